@@ -1,0 +1,86 @@
+"""Finding parts: a vehicle, thruster, plant, controller, ... is one file, and no list names it.
+
+A module of a part folder whose name is also the name of a callable inside it *is* a part: `vehicles/odin.py`
+with `def odin()`. Parts from elsewhere are named `./my_rov.py:my_rov`, or come as Python entry points of the
+group `undertow.<kind>`.
+"""
+
+import importlib
+import importlib.metadata
+import importlib.util
+import pkgutil
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from undertow.core.errors import BadInput, did_you_mean
+
+KINDS = ("vehicles", "thrusters", "plants", "controllers", "disturbances", "references", "sensors")
+
+Part = Callable[..., Any]
+
+
+def collect(package: ModuleType) -> dict[str, Part]:
+    """Parts that the modules of a package define, by name."""
+    parts = {}
+    for info in pkgutil.iter_modules(package.__path__):
+        module = importlib.import_module(f"{package.__name__}.{info.name}")
+        part = getattr(module, info.name, None)
+        if callable(part):
+            parts[info.name] = part
+    return parts
+
+
+def publish(package_name: str) -> Callable[[str], Any]:
+    """Make every part an attribute of its package; returns the package's `__getattr__`."""
+    package = importlib.import_module(package_name)
+    parts = collect(package)
+    vars(package).update(parts)
+
+    def missing(name: str) -> Any:
+        raise AttributeError(f"{package_name} has no part `{name}`. {did_you_mean(name, parts)}")
+
+    return missing
+
+
+def names(kind: str) -> dict[str, Part]:
+    """All parts of a kind: shipped ones and those of installed entry points."""
+    parts = collect(importlib.import_module(f"undertow.{kind}"))
+    for entry in importlib.metadata.entry_points(group=f"undertow.{kind}"):
+        parts[entry.name] = entry.load()
+    return parts
+
+
+def find(kind: str, name: str, folder: Path | None = None) -> Part:
+    """Part called `name`, or the callable named by `path.py:callable` (relative to `folder`).
+
+    Raises:
+        BadInput: no such part, file or callable.
+    """
+    if ".py:" in name:
+        return _from_file(name, folder or Path())
+    parts = names(kind)
+    if name not in parts:
+        raise BadInput("name", f"be a part in {kind}", name, hint=did_you_mean(name, parts))
+    return parts[name]
+
+
+def _from_file(name: str, folder: Path) -> Part:
+    path_text, attribute = name.rsplit(":", 1)
+    path = (folder / path_text).resolve()
+    if not path.is_file():
+        raise BadInput("name", "name an existing file", path_text)
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise BadInput("name", "name a Python file", path_text)
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise BadInput("name", "name a file that Python can run", f"{path_text}: {error!r}") from error
+    part = getattr(module, attribute, None)
+    if not callable(part):
+        hint = did_you_mean(attribute, [n for n, v in vars(module).items() if callable(v) and n[0] != "_"])
+        raise BadInput("name", f"name a callable of {path.name}", attribute, hint=hint)
+    return part

@@ -1,0 +1,83 @@
+"""Checks of parameter values at construction. Traced values pass: they were checked when they were numbers."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core.errors import BadInput
+
+
+def positive(name: str, value: Any, unit: str = "") -> None:
+    """Every entry finite and > 0."""
+    _each(name, value, lambda x: x > 0, "be positive", unit)
+
+
+def not_negative(name: str, value: Any, unit: str = "") -> None:
+    """Every entry finite and >= 0."""
+    _each(name, value, lambda x: x >= 0, "be zero or positive", unit)
+
+
+def finite(name: str, value: Any, unit: str = "") -> None:
+    """Every entry finite."""
+    _each(name, value, np.isfinite, "be a finite number", unit)
+
+
+def length(name: str, value: Any, expected: int, what: str) -> None:
+    """One-dimensional, with `expected` entries."""
+    shape = np.shape(value)
+    if shape != (expected,):
+        got = f"{shape[0]} long" if len(shape) == 1 else f"of shape {shape}"
+        raise BadInput(name, f"have {expected} entries ({what})", got)
+
+
+def choice(name: str, value: Any, allowed: tuple[str, ...]) -> None:
+    """One of the allowed words."""
+    if value not in allowed:
+        raise BadInput(name, f"be one of {', '.join(allowed)}", value)
+
+
+def hurwitz(name: str, feedback: Any) -> None:
+    """Gains (k1, k2), one pair or one per axis, that make s^2 + k2 s + k1 stable."""
+    if jnp.shape(feedback)[-1:] != (2,) or jnp.ndim(feedback) > 2:
+        raise BadInput(name, "be a pair (k1, k2), or one pair per axis", f"of shape {jnp.shape(feedback)}")
+    if isinstance(feedback, jax.core.Tracer):
+        return
+    finite(name, feedback)
+    for k1, k2 in np.asarray(feedback).reshape(-1, 2):
+        if not (k1 > 0 and k2 > 0):
+            raise BadInput(
+                name,
+                "make the error dynamics Hurwitz",
+                f"({k1:g}, {k2:g})",
+                hint="Both k1 and k2 must be positive, as in Table 1: (1, 2)",
+            )
+
+
+def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
+    """Square matrix, or one per axis, symmetric with positive eigenvalues."""
+    shape = jnp.shape(matrix)
+    if len(shape) < 2 or shape[-1] != shape[-2]:
+        raise BadInput(name, "be a square matrix", f"of shape {shape}")
+    if isinstance(matrix, jax.core.Tracer):
+        return
+    finite(name, matrix, unit)
+    for block in np.asarray(matrix).reshape(-1, *shape[-2:]):
+        skew = np.abs(block - block.T).max()
+        if skew > 1e-9 * np.abs(block).max():
+            raise BadInput(name, "be symmetric", f"off by {skew:.3g} {unit}".strip())
+        smallest = float(np.linalg.eigvalsh(block).min())
+        if not smallest > 0:
+            raise BadInput(name, "be positive definite", f"a matrix with smallest eigenvalue {smallest:.3g}")
+
+
+def _each(name: str, value: Any, good: Any, must: str, unit: str) -> None:
+    if isinstance(value, jax.core.Tracer):
+        return
+    array = np.asarray(value)
+    bad = ~(np.isfinite(array) & good(array))
+    if bad.any():
+        index = tuple(int(i) for i in np.argwhere(bad)[0])
+        at = f"[{', '.join(map(str, index))}]" if index else ""
+        raise BadInput(f"{name}{at}", must, f"{array[index]:g} {unit}".strip())

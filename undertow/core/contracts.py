@@ -1,0 +1,185 @@
+"""The contracts: pure functions on pytrees, SI units, t in s.
+
+Objects hold parameters only; state goes in and comes out. A class is either abstract (never made) or final
+(never inherited from).
+"""
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PRNGKeyArray, PyTree
+
+Time = Float[Array, ""]
+Outputs = Float[Array, " n"]
+Inputs = Float[Array, " m"]
+Gain = Float[Array, "n m"]
+
+
+class Measurement(NamedTuple):
+    """What is measured of a plant: y."""
+
+    position: Outputs  # m, rad
+    velocity: Outputs  # m/s, rad/s
+    actuator: Any = None  # whatever else the actuators report; None when nothing
+
+
+class Target(NamedTuple):
+    """What is wanted of a plant: r (position, velocity, acceleration)."""
+
+    position: Outputs
+    velocity: Outputs
+    acceleration: Outputs
+
+
+class Load(NamedTuple):
+    """What the surroundings do to a plant. Loads add."""
+
+    acceleration: Outputs  # lumped, added to x_ddot; m/s^2, rad/s^2
+    wrench: Outputs  # w_d of Eq. (2), on the left side: it opposes; N, N m (body axes for a vehicle)
+
+
+class Effort(NamedTuple):
+    """What driving the actuators costs."""
+
+    power: Inputs  # electrical power drawn, W
+    saturated: Inputs  # 1 where an input is at its limit, else 0
+
+
+class Telemetry(NamedTuple):
+    """What a controller lets one look at. Nothing here is carried."""
+
+    estimate: Outputs  # d_hat, m/s^2, rad/s^2
+    robust: Outputs  # u_r
+    modelling_error: Outputs  # eps, m/s, rad/s
+    predicted_position: Outputs  # x_hat
+    predicted_velocity: Outputs
+    weights_peak: Float[Array, ""]  # max |theta|
+
+
+class AbstractModel(eqx.Module):
+    """What a controller may know of a plant: x_ddot = F + G u (+ d, unknown). Eq. (17)."""
+
+    angles: eqx.AbstractVar[tuple[bool, ...]]  # which outputs are angles, to be compared modulo 2 pi
+
+    @abc.abstractmethod
+    def drift(self, y: Measurement) -> Outputs:
+        """F, m/s^2 and rad/s^2."""
+
+    @abc.abstractmethod
+    def gain(self, y: Measurement) -> Gain:
+        """G, per unit of input."""
+
+    @abc.abstractmethod
+    def invert(self, y: Measurement, acceleration: Outputs) -> Inputs:
+        """u with G u = acceleration as nearly as the plant allows: G# of Eqs. (22)-(27)."""
+
+    def difference(self, target: Outputs, actual: Outputs) -> Outputs:
+        """target - actual, angles the short way round."""
+        turn = 2 * jnp.pi * jnp.asarray(self.angles)
+        raw = target - actual
+        return raw - turn * jnp.round(raw / (2 * jnp.pi))
+
+
+class AbstractPlant(eqx.Module):
+    """A second-order control-affine system with n outputs and m inputs."""
+
+    outputs: eqx.AbstractVar[tuple[str, ...]]  # names of the n outputs
+    output_units: eqx.AbstractVar[tuple[str, ...]]
+    input_unit: eqx.AbstractVar[str]
+
+    @abc.abstractmethod
+    def initial_state(self) -> PyTree:
+        """State x at rest at the origin."""
+
+    @abc.abstractmethod
+    def dynamics(self, t: Time, x: PyTree, u: Inputs, d: Load) -> PyTree:
+        """dx/dt."""
+
+    @abc.abstractmethod
+    def output(self, t: Time, x: PyTree) -> Measurement:
+        """y, without error."""
+
+    @abc.abstractmethod
+    def acceleration(self, t: Time, x: PyTree, u: Inputs, d: Load) -> Outputs:
+        """x_ddot of the outputs, m/s^2 and rad/s^2."""
+
+    @abc.abstractmethod
+    def admissible(self, u: Inputs) -> Inputs:
+        """What reaches the actuators when u is commanded (limits)."""
+
+    @abc.abstractmethod
+    def effort(self, x: PyTree, u: Inputs) -> Effort:
+        """What applying u costs."""
+
+    @abc.abstractmethod
+    def inputs(self) -> int:
+        """Number m of inputs."""
+
+    @abc.abstractmethod
+    def health(self, x: PyTree) -> Array:
+        """Status code of a state; `Status.OK` as long as it means anything."""
+
+    @abc.abstractmethod
+    def advice(self) -> tuple[str, ...]:
+        """What a user should know before running this plant; each with the numbers that caused it."""
+
+    def no_load(self) -> Load:
+        """Load of calm surroundings."""
+        zero = jnp.zeros(len(self.outputs))
+        return Load(zero, zero)
+
+
+class AbstractController(eqx.Module):
+    """A law. `command` before `advance`: the input leaves first, and adaptation sees what was applied."""
+
+    model: eqx.AbstractVar[AbstractModel]
+
+    @abc.abstractmethod
+    def init(self, y: Measurement, r: Target) -> PyTree:
+        """State z before the first measurement is used."""
+
+    @abc.abstractmethod
+    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, Telemetry]:
+        """Input u, and what one may look at."""
+
+    @abc.abstractmethod
+    def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
+        """State one sampling time later."""
+
+
+class AbstractDisturbance(eqx.Module):
+    """A load drawn once from a key; afterwards a function of time."""
+
+    @abc.abstractmethod
+    def draw(self, key: PRNGKeyArray) -> PyTree:
+        """Path: everything random about one realisation."""
+
+    @abc.abstractmethod
+    def at(self, path: PyTree, t: Time, calm: Load) -> Load:
+        """Load at time t, starting from that of calm surroundings."""
+
+    @abc.abstractmethod
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        """Times in (0, duration) at which the load is not smooth."""
+
+
+class AbstractReference(eqx.Module):
+    """What to follow."""
+
+    @abc.abstractmethod
+    def at(self, t: Time) -> Target:
+        """Wanted position, velocity and acceleration at time t."""
+
+
+class AbstractSensor(eqx.Module):
+    """What stands between the truth and the measurement."""
+
+    @abc.abstractmethod
+    def draw(self, key: PRNGKeyArray) -> PyTree:
+        """Path: everything random about one realisation."""
+
+    @abc.abstractmethod
+    def measure(self, path: PyTree, t: Time, truth: Measurement) -> Measurement:
+        """Measurement at time t."""

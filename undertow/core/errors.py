@@ -1,0 +1,48 @@
+"""Errors in one grammar: what, must be what, but is what, what to try.
+
+    Error: `plant.thruster.resistance` must be positive, but is -1.2 ohm (scenario.yaml, line 14)
+
+Advice is not an error: parts that have some to give have a method `advice()`, and the run goes on.
+"""
+
+import difflib
+from collections.abc import Iterable
+
+
+class BadInput(ValueError):
+    """Something the user gave cannot be used. One line; the command line turns it into exit code 2.
+
+    Args:
+        name: key path or argument, as the user wrote it.
+        must: what it must be, completing "must ...".
+        got: what it is.
+        hint: what to try, a full sentence.
+        where: file and line, when known.
+    """
+
+    def __init__(self, name: str, must: str, got: object = None, *, hint: str = "", where: str = ""):
+        self.name, self.must, self.got, self.hint, self.where = name, must, got, hint, where
+        super().__init__(name, must, got)
+
+    def __str__(self) -> str:
+        got = "" if self.got is None else f", but is {_one_line(self.got)}"
+        where = f" ({self.where})" if self.where else ""
+        hint = f". {self.hint}" if self.hint else ""
+        return f"`{self.name}` must {self.must}{got}{where}{hint}"
+
+    def at(self, prefix: str = "", where: str = "") -> "BadInput":
+        """Same complaint, seen from further out: with a key prefix and a place in a file."""
+        name = f"{prefix}.{self.name}" if prefix and self.name else prefix or self.name
+        return BadInput(name, self.must, self.got, hint=self.hint, where=where or self.where)
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Sentence naming the nearest known word, or all of them when none is near."""
+    known = sorted(known)
+    near = difflib.get_close_matches(str(word), known, n=1, cutoff=0.6)
+    return f"Did you mean `{near[0]}`?" if near else f"Known: {', '.join(known)}"
+
+
+def _one_line(value: object) -> str:
+    text = " ".join(str(value).split())
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -1,0 +1,75 @@
+"""Parameters that know their unit, symbol, meaning and source; declared once, used everywhere."""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+
+class Parameter(NamedTuple):
+    """One parameter of a part, as `undertow describe`, the docs and the result files show it."""
+
+    name: str
+    value: Any
+    unit: str
+    meaning: str
+    symbol: str
+    source: str
+
+
+def param(
+    unit: str,
+    meaning: str,
+    *,
+    symbol: str = "",
+    source: str = "",
+    default: Any = dataclasses.MISSING,
+) -> Any:
+    """Field of an `eqx.Module` that holds an array.
+
+    Values are converted to arrays on construction, so that a changed number never causes a recompilation.
+
+    Args:
+        unit: SI unit, "" for a pure number.
+        meaning: a few words.
+        symbol: letter in the literature.
+        source: where the default comes from; a part's own `sources` takes precedence.
+        default: value when none is given.
+    """
+    metadata = {"unit": unit, "meaning": meaning, "symbol": symbol, "source": source}
+    extra = {} if default is dataclasses.MISSING else {"default": default}
+    return eqx.field(converter=_to_array, metadata=metadata, **extra)
+
+
+def sources_field() -> Any:
+    """Field for {parameter name: source}; "*" stands for every parameter not named."""
+    return eqx.field(static=True, default=(), converter=_freeze)
+
+
+def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]:
+    """Every declared parameter of a part (values) or of a class (defaults), nested parts included."""
+    sources = dict(getattr(part, "sources", ()) or ()) if not isinstance(part, type) else {}
+    for field in dataclasses.fields(part):
+        name = f"{prefix}{field.name}"
+        if isinstance(part, type):
+            value = "required" if field.default is dataclasses.MISSING else field.default
+        else:
+            value = getattr(part, field.name)
+        if "unit" in field.metadata:
+            meta = dict(field.metadata)
+            own = sources.get(field.name, sources.get("*", "")) or meta["source"]
+            shown = value if isinstance(value, str) else np.asarray(value).tolist()
+            yield Parameter(name, shown, meta["unit"], meta["meaning"], meta["symbol"], own)
+        elif isinstance(value, eqx.Module):
+            yield from parameters(value, f"{name}.")
+
+
+def _to_array(value: Any) -> Any:
+    return value if eqx.is_array(value) else jnp.asarray(value, dtype=float)
+
+
+def _freeze(sources: Mapping[str, str] | tuple) -> tuple:
+    return tuple(sources.items()) if isinstance(sources, Mapping) else tuple(sources)

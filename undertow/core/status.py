@@ -1,0 +1,32 @@
+"""How a run ended: a code carried through compiled code, a sentence on the host."""
+
+import enum
+
+
+class Status(enum.IntEnum):
+    """Ending of one run. Codes are data: one bad run never costs the others."""
+
+    OK = 0
+    DIVERGED = 1
+    NOT_FINITE = 2
+    PITCH_SINGULAR = 3
+    STEPS_EXHAUSTED = 4
+
+    @property
+    def word(self) -> str:
+        """Name as it stands in results files."""
+        return self.name.lower()
+
+    @property
+    def sentence(self) -> str:
+        """What happened, for people."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Status.OK: "The run reached its end.",
+    Status.DIVERGED: "A position or velocity left the envelope in which the run means anything: the loop is unstable.",
+    Status.NOT_FINITE: "A state became infinite or undefined; the last finite state was kept.",
+    Status.PITCH_SINGULAR: "Pitch came within 0.06 degrees of +-90, where Euler angles, and so Eq. (1), are undefined.",
+    Status.STEPS_EXHAUSTED: "The adaptive integrator used up its steps: the closed loop became too stiff to follow.",
+}

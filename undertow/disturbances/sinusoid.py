@@ -1,0 +1,38 @@
+"""A constant plus a sinusoid on every axis: the probe for frequency and amplitude."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.param import param
+
+
+class Sinusoid(AbstractDisturbance):
+    """offset + amplitude sin(frequency t + phase), the same arguments for all axes or one per axis."""
+
+    amplitude: Float[Array, "..."] = param("m/s^2, rad/s^2", "amplitude")
+    frequency: Float[Array, "..."] = param("rad/s", "angular frequency")
+    offset: Float[Array, "..."] = param("m/s^2, rad/s^2", "constant part")
+    phase: Float[Array, "..."] = param("rad", "phase at t = 0")
+
+    def draw(self, key) -> tuple[()]:
+        return ()
+
+    def at(self, path, t, calm: Load) -> Load:
+        signal = self.offset + self.amplitude * jnp.sin(self.frequency * t + self.phase)
+        return calm._replace(acceleration=calm.acceleration + signal)
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return ()
+
+
+def sinusoid(amplitude=1.0, frequency=1.0, offset=0.0, phase=0.0) -> Sinusoid:
+    """Lumped acceleration offset + amplitude sin(frequency t + phase).
+
+    Args:
+        amplitude: m/s^2 and rad/s^2; one number or one per axis.
+        frequency: rad/s; likewise.
+        offset: m/s^2 and rad/s^2; likewise.
+        phase: rad; likewise.
+    """
+    return Sinusoid(amplitude, frequency, offset, phase)

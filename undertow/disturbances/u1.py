@@ -1,0 +1,54 @@
+"""Suite U1: large, sudden, fast; one signal per axis, as the paper's Fig. 7 describes them."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+
+
+# Arguments of the seven sines, rate t + sweep t^2 (rad/s, rad/s^2): one vector, so that they cost little more than one.
+_RATES = np.array([1.0, 2.0, 20.0, 0.5, np.pi / 2, 3.0, 0.0])
+_SWEEPS = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25])
+
+
+class SuiteU1(AbstractDisturbance):
+    """Six lumped accelerations: steps on a swell, high frequency, square wave, pulse, ramp and reset, chirp."""
+
+    scale: Float[Array, ""] = param("", "factor on all six", default=1.0)
+
+    def draw(self, key) -> tuple[()]:
+        return ()
+
+    def at(self, path, t, calm: Load) -> Load:
+        if calm.acceleration.shape != (6,):
+            raise BadInput("disturbance", "fit the plant", "u1, which has 6 axes", hint="Use kind: table")
+        swell, fast, ripple, slow, square, pulse, chirp = jnp.sin(_RATES * t + _SWEEPS * t**2)
+        signals = jnp.stack(
+            [
+                4 * swell + 6 * (t >= 8) - 9 * (t >= 14),
+                3 * fast + 2 * ripple,
+                -3 + 2 * slow + jnp.where(square >= 0, 3.0, -3.0),
+                2 * pulse + 4 * (t >= 6) - 4 * (t >= 10),
+                4 * (t / 10 - jnp.floor(t / 10)),
+                2 * chirp,
+            ]
+        )
+        return calm._replace(acceleration=calm.acceleration + self.scale * signals)
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        steps = {6.0, 8.0, 10.0, 14.0}
+        square = {2.0 * k for k in range(1, int(duration // 2) + 1)}
+        resets = {10.0 * k for k in range(1, int(duration // 10) + 1)}
+        return tuple(sorted(t for t in steps | square | resets if t < duration))
+
+
+def u1(scale: float = 1.0) -> SuiteU1:
+    """Benchmark suite U1 of six lumped accelerations (m/s^2, rad/s^2).
+
+    Args:
+        scale: factor on all of them.
+    """
+    return SuiteU1(scale)

@@ -1,0 +1,38 @@
+"""A constant external force and moment: w_d of Eq. (2)."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+
+
+class ConstantWrench(AbstractDisturbance):
+    """On the left side of Eq. (2), so a positive force opposes motion ahead."""
+
+    value: Float[Array, " n"] = param("N, N m", "force and moment", symbol="w_d")
+
+    def __check_init__(self):
+        checks.finite("value", self.value)
+
+    def draw(self, key) -> tuple[()]:
+        return ()
+
+    def at(self, path, t, calm: Load) -> Load:
+        if jnp.shape(self.value) != calm.wrench.shape:
+            raise BadInput("value", f"have {calm.wrench.shape[0]} entries", f"of shape {jnp.shape(self.value)}")
+        return calm._replace(wrench=calm.wrench + self.value)
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return ()
+
+
+def wrench(value=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> ConstantWrench:
+    """Constant load in body axes (N, N m), with the sign of Eq. (2).
+
+    Args:
+        value: one entry per axis.
+    """
+    return ConstantWrench(value)

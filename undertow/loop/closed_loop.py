@@ -1,0 +1,120 @@
+"""The five roles around one loop, and what is written down about an instant."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PRNGKeyArray, PyTree
+
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractDisturbance,
+    AbstractPlant,
+    AbstractReference,
+    AbstractSensor,
+    Inputs,
+    Load,
+    Measurement,
+    Outputs,
+    Target,
+    Telemetry,
+    Time,
+)
+from undertow.numerics.linear import matvec
+
+
+class Sample(NamedTuple):
+    """Everything worth keeping of one instant; names as they stand in result files."""
+
+    position: Outputs
+    velocity: Outputs
+    target: Outputs
+    error: Outputs
+    uncertainty: Outputs  # d = x_ddot - F - G V, measured, never assumed
+    estimate: Outputs
+    robust: Outputs
+    modelling_error: Outputs
+    predicted_position: Outputs
+    predicted_velocity: Outputs
+    weights_peak: Float[Array, ""]
+    voltage: Inputs  # applied
+    command: Inputs  # asked for
+    power: Inputs
+    saturated: Inputs
+
+
+class Decision(NamedTuple):
+    """What the controller makes of an instant."""
+
+    y: Measurement
+    r: Target
+    command: Inputs
+    applied: Inputs
+    telemetry: Telemetry
+
+
+class ClosedLoop(eqx.Module):
+    """Plant, controller, reference, disturbance and sensor, ready to be run by either loop."""
+
+    plant: AbstractPlant
+    controller: AbstractController
+    reference: AbstractReference
+    disturbance: AbstractDisturbance
+    sensor: AbstractSensor
+
+    def draw(self, key: PRNGKeyArray) -> "Drawn":
+        """Draw everything random once."""
+        return Drawn(self, self.disturbance.draw(key), self.sensor.draw(jnp.flip(key)))
+
+
+class Drawn(NamedTuple):
+    """A closed loop whose random parts have been drawn: from here on everything is a function of time."""
+
+    loop: ClosedLoop
+    disturbance_path: PyTree
+    sensor_path: PyTree
+
+    def start(self, position: Any = None, velocity: Any = None) -> tuple[PyTree, PyTree]:
+        """States of plant and controller at t = 0."""
+        zero = jnp.zeros(())
+        x = self.loop.plant.initial_state(position, velocity)
+        truth = self.loop.plant.output(zero, x)
+        y = self.loop.sensor.measure(self.sensor_path, zero, truth)
+        return x, self.loop.controller.init(y, self.loop.reference.at(zero))
+
+    def load(self, t: Time) -> Load:
+        """What the surroundings do at time t."""
+        return self.loop.disturbance.at(self.disturbance_path, t, self.loop.plant.no_load())
+
+    def decide(self, t: Time, x: PyTree, z: PyTree) -> Decision:
+        """Measure, compare, command, limit."""
+        truth = self.loop.plant.output(t, x)
+        y = self.loop.sensor.measure(self.sensor_path, t, truth)
+        r = self.loop.reference.at(t)
+        command, telemetry = self.loop.controller.command(z, y, r)
+        return Decision(y, r, command, self.loop.plant.admissible(command), telemetry)
+
+    def sample(self, t: Time, x: PyTree, decision: Decision) -> Sample:
+        """What is written down about time t. Errors are those of the truth, not of the measurement."""
+        plant, model = self.loop.plant, self.loop.controller.model
+        truth = plant.output(t, x)
+        _, r, command, applied, telemetry = decision
+        known = model.drift(truth) + matvec(model.gain(truth), applied)
+        effort = plant.effort(x, applied)
+        return Sample(
+            position=truth.position,
+            velocity=truth.velocity,
+            target=r.position,
+            error=model.difference(r.position, truth.position),
+            uncertainty=plant.acceleration(t, x, applied, self.load(t)) - known,
+            estimate=telemetry.estimate,
+            robust=telemetry.robust,
+            modelling_error=telemetry.modelling_error,
+            predicted_position=telemetry.predicted_position,
+            predicted_velocity=telemetry.predicted_velocity,
+            weights_peak=telemetry.weights_peak,
+            voltage=applied,
+            command=command,
+            power=effort.power,
+            saturated=effort.saturated,
+        )

@@ -1,0 +1,29 @@
+"""What a loop hands back, and how failure travels through compiled code."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, PyTree
+
+from undertow.core.contracts import AbstractPlant
+from undertow.core.status import Status
+from undertow.loop.closed_loop import Sample
+
+
+class Outcome(NamedTuple):
+    """One run: what was recorded, what was accumulated, how it ended."""
+
+    time: Float[Array, " records"]  # s
+    samples: Sample  # one entry per record, the end included
+    accumulated: Any  # final states of the accumulators
+    final: Any  # states (x, z) of plant and controller at the end
+    status: Int[Array, ""]  # a Status code
+    ended: Float[Array, ""]  # s; when it failed, else the duration
+
+
+def health(plant: AbstractPlant, x: PyTree, z: PyTree) -> Array:
+    """Status code of an instant."""
+    leaves = [jnp.isfinite(leaf).all() for leaf in jax.tree.leaves((x, z))]
+    finite = jnp.stack(leaves).all()
+    return jnp.where(finite, plant.health(x), int(Status.NOT_FINITE))

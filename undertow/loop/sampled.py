@@ -1,0 +1,123 @@
+"""The sampled loop: the controller at its own rate, the plant in between, compiled as one scan."""
+
+import abc
+from functools import partial
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PRNGKeyArray, PyTree
+
+from undertow.core.errors import BadInput
+from undertow.core.status import Status
+from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
+from undertow.loop.outcome import Outcome, health
+from undertow.numerics.integrators import METHODS
+
+
+class AbstractAccumulator(eqx.Module):
+    """Statistics gathered inside the loop, so that a long run need not keep its series."""
+
+    @abc.abstractmethod
+    def init(self, sample: Sample) -> PyTree:
+        """State before the first sample; `sample` gives the shapes."""
+
+    @abc.abstractmethod
+    def update(self, state: PyTree, t: Float[Array, ""], sample: Sample) -> PyTree:
+        """State with one more sample."""
+
+
+def simulate(
+    loop: ClosedLoop,
+    *,
+    duration: float,
+    dt: float = 1e-3,
+    key: PRNGKeyArray | None = None,
+    position: Any = None,
+    velocity: Any = None,
+    record_every: int = 10,
+    accumulators: tuple[AbstractAccumulator, ...] = (),
+    method: str = "rk4",
+    substeps: int = 1,
+) -> Outcome:
+    """Run a closed loop with the input held over each sampling time.
+
+    Args:
+        loop: the five roles.
+        duration: s; rounded to whole records.
+        dt: sampling time of the controller, s.
+        key: for everything random; None for key 0.
+        position, velocity: outputs at t = 0; None for zero.
+        record_every: ticks per record; 0 keeps no series, only what is accumulated.
+        accumulators: statistics over every tick.
+        method, substeps: integration of the plant within one tick, rk4 or euler.
+
+    Returns:
+        Outcome. A failed run keeps its last sound state; nothing is raised.
+
+    Raises:
+        BadInput: duration or dt not positive, or duration shorter than one record.
+    """
+    if not (0 < dt < float("inf")):
+        raise BadInput("dt", "be positive", f"{dt:g} s")
+    ticks = round(duration / dt) if 0 < duration < float("inf") else 0
+    if ticks < max(1, record_every):
+        raise BadInput("duration", f"be at least one record ({max(1, record_every) * dt:g} s)", f"{duration:g} s")
+    key = jax.random.PRNGKey(0) if key is None else key
+    plan = (ticks, record_every, method, substeps)
+    return _run(loop, key, position, velocity, jnp.asarray(dt, dtype=float), accumulators, plan)
+
+
+@eqx.filter_jit
+def _run(loop, key, position, velocity, dt, accumulators, plan: tuple[int, int, str, int]) -> Outcome:
+    ticks, record_every, method, substeps = plan
+    drawn = loop.draw(key)
+    x, z = drawn.start(position, velocity)
+    tick = partial(_tick, drawn, accumulators, dt, METHODS[method], substeps)
+    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.sample, dt, x, jax.eval_shape(drawn.decide, dt, x, z)))
+    gathered = tuple(a.init(blank) for a in accumulators)
+    carry = (x, z, gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
+    if record_every == 0:
+        carry, records = jax.lax.scan(lambda c, k: (tick(c, k), None), carry, jnp.arange(ticks))
+        time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
+    else:
+
+        def block(carry, first):
+            t = first * dt
+            sample = drawn.sample(t, carry[0], drawn.decide(t, carry[0], carry[1]))
+            carry = jax.lax.fori_loop(first, first + record_every, lambda k, c: tick(c, k), carry)
+            return carry, (t, sample)
+
+        starts = jnp.arange(ticks // record_every) * record_every
+        carry, (time, samples) = jax.lax.scan(block, carry, starts)
+        end = (ticks // record_every) * record_every * dt
+        last = drawn.sample(end, carry[0], drawn.decide(end, carry[0], carry[1]))
+        append = lambda series, value: jnp.concatenate([series, value[None]])
+        time, samples = jax.tree.map(append, (time, samples), (end, last))
+    x, z, gathered, status, ended = carry
+    return Outcome(time, samples, gathered, (x, z), status, jnp.where(status == int(Status.OK), ticks * dt, ended))
+
+
+def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
+    """Command, move the plant with the input held, then let the controller learn from what was applied."""
+    x, z, gathered, status, ended = carry
+    loop, t = drawn.loop, k * dt
+    decision = drawn.decide(t, x, z)
+    if accumulators:
+        sample = drawn.sample(t, x, decision)
+        gathered = tuple(a.update(g, t, sample) for a, g in zip(accumulators, gathered, strict=True))
+    new_x, h = x, dt / substeps
+    for i in range(substeps):
+        new_x = step(partial(_motion, drawn, decision.applied), t + i * h, new_x, h)
+    new_z = loop.controller.advance(z, decision.y, decision.r, decision.applied, dt)
+    code = health(loop.plant, new_x, new_z)
+    failing = (status == int(Status.OK)) & (code != int(Status.OK))
+    status, ended = jnp.where(failing, code, status), jnp.where(failing, t + dt, ended)
+    sound = status == int(Status.OK)
+    x, z = jax.tree.map(lambda new, old: jnp.where(sound, new, old), (new_x, new_z), (x, z))
+    return x, z, gathered, status, ended
+
+
+def _motion(drawn: Drawn, applied, t, x):
+    return drawn.loop.plant.dynamics(t, x, applied, drawn.load(t))

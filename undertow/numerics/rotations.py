@@ -1,0 +1,198 @@
+"""Attitude: quaternions inside, Euler angles at the border.
+
+Convention of Fossen (2021), "Handbook of Marine Craft Hydrodynamics and Motion Control", ch. 2: body axes
+x forward, y starboard, z down; world axes north, east, down; Euler angles (roll, pitch, yaw) in the order
+z-y-x; quaternion (w, x, y, z), rotating body vectors into the world.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+Vector3 = Float[Array, "3"]
+Vector6 = Float[Array, "6"]
+Matrix3 = Float[Array, "3 3"]
+Quaternion = Float[Array, "4"]
+
+# Permutation symbol: (a x b)_i = e_ijk a_j b_k. As one product it stays one operation for the compiler.
+_LEVI_CIVITA = np.array(
+    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]],
+    dtype=float,
+)
+
+# cos(pitch) is kept from vanishing by this much, so that a body passing through the vertical stays finite.
+_SMALLEST_COSINE = 1e-12
+
+
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    """Cross product a x b."""
+    return (_LEVI_CIVITA * (a[:, None] * b)).sum((1, 2))
+
+
+def skew(a: Vector3) -> Matrix3:
+    """Matrix S(a) with S(a) b = a x b."""
+    x, y, z = a
+    zero = jnp.zeros_like(x)
+    return jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
+
+
+def wrap_angle(angle: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Same angle in [-pi, pi), rad."""
+    return angle - 2 * jnp.pi * jnp.floor((angle + jnp.pi) / (2 * jnp.pi))
+
+
+def rotation_from_euler(angles: Vector3) -> Matrix3:
+    """Rotation body -> world, R(roll, pitch, yaw). Fossen (2.31); upper block of J in Eq. (1)."""
+    return _rotation_from_quaternion_parts(*quaternion_from_euler(angles))
+
+
+def euler_rate_matrix(angles: Vector3) -> Matrix3:
+    """T with Euler rates = T (p, q, r); singular at pitch = +-90 deg. Fossen (2.41); lower block of J in Eq. (1)."""
+    (sr, sp, _), (cr, cp, _) = jnp.sin(angles), jnp.cos(angles)
+    zero, one = jnp.zeros_like(sr), jnp.ones_like(sr)
+    return jnp.stack(
+        [
+            jnp.stack([one, sr * sp / cp, cr * sp / cp]),
+            jnp.stack([zero, cr, -sr]),
+            jnp.stack([zero, sr / cp, cr / cp]),
+        ]
+    )
+
+
+def quaternion_from_euler(angles: Vector3) -> Quaternion:
+    """Unit quaternion of (roll, pitch, yaw)."""
+    (sr, sp, sy), (cr, cp, cy) = jnp.sin(angles / 2), jnp.cos(angles / 2)
+    return jnp.stack(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ]
+    )
+
+
+def rotation_from_quaternion(q: Quaternion) -> Matrix3:
+    """Rotation body -> world. Exact for a unit quaternion; no trigonometry."""
+    return _rotation_from_quaternion_parts(*q)
+
+
+def euler_from_rotation(rotation: Matrix3) -> Vector3:
+    """(roll, pitch, yaw) of a rotation, roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2]."""
+    return jnp.stack(
+        [
+            jnp.arctan2(rotation[2, 1], rotation[2, 2]),
+            -jnp.arcsin(jnp.clip(rotation[2, 0], -1.0, 1.0)),
+            jnp.arctan2(rotation[1, 0], rotation[0, 0]),
+        ]
+    )
+
+
+def quaternion_rate(q: Quaternion, omega: Vector3) -> Quaternion:
+    """Time derivative of q at body rates omega (rad/s), with a pull back to unit length.
+
+    The pull (one per second) vanishes on the unit sphere; it keeps the length from drifting over hours.
+    """
+    w, x, y, z = q
+    p, r, s = omega
+    turn = jnp.stack(
+        [-x * p - y * r - z * s, w * p + y * s - z * r, w * r + z * p - x * s, w * s + x * r - y * p]
+    )
+    return 0.5 * turn + 0.5 * (1.0 - (q * q).sum()) * q
+
+
+def attitude_error(target: Quaternion, actual: Quaternion) -> Vector3:
+    """Rotation vector part sign(q0) 2 q_v of actual -> target, in body axes, the short way round.
+
+    Both signs of either quaternion give the same answer: no unwinding.
+    """
+    w0, v0 = actual[0], actual[1:]
+    w1, v1 = target[0], target[1:]
+    scalar = w0 * w1 + (v0 * v1).sum()
+    vector = w0 * v1 - w1 * v0 - cross(v0, v1)
+    return jnp.where(scalar < 0, -2.0, 2.0) * vector
+
+
+class Kinematics:
+    """Jacobian J of Eq. (1), eta_dot = J nu, and its relatives, without ever forming a 6 x 6 matrix.
+
+    Made from the rotation alone: the third row of R is (-sin pitch, cos pitch sin roll, cos pitch cos roll),
+    so neither sines nor cosines are needed.
+
+    Args:
+        rotation: body -> world, shape (3, 3).
+    """
+
+    def __init__(self, rotation: Matrix3):
+        self.rotation = rotation
+        self.minus_sin_pitch, *down = rotation[2]
+        self.cos_pitch = jnp.sqrt(down[0] ** 2 + down[1] ** 2 + _SMALLEST_COSINE**2)
+        self.down = down
+        self.sin_roll, self.cos_roll = down[0] / self.cos_pitch, down[1] / self.cos_pitch
+
+    def to_world(self, nu: Vector6) -> Vector6:
+        """J nu: body rates -> (world velocity, Euler rates)."""
+        across = self.sin_roll * nu[4] + self.cos_roll * nu[5]
+        return jnp.concatenate(
+            [
+                (self.rotation * nu[:3]).sum(-1),
+                jnp.stack(
+                    [
+                        nu[3] - self.minus_sin_pitch / self.cos_pitch * across,
+                        self.cos_roll * nu[4] - self.sin_roll * nu[5],
+                        across / self.cos_pitch,
+                    ]
+                ),
+            ]
+        )
+
+    def to_body(self, rates: Vector6) -> Vector6:
+        """J^-1 rates: (world velocity, Euler rates) -> body rates."""
+        return jnp.concatenate(
+            [
+                (self.rotation.T * rates[:3]).sum(-1),
+                jnp.stack(
+                    [
+                        rates[3] + self.minus_sin_pitch * rates[5],
+                        self.cos_roll * rates[4] + self.down[0] * rates[5],
+                        -self.sin_roll * rates[4] + self.down[1] * rates[5],
+                    ]
+                ),
+            ]
+        )
+
+    def rate_term(self, nu: Vector6) -> Vector6:
+        """J_dot nu (m/s^2, rad/s^2): the part of Eq. (4) that Remark 2 calls unknown. It is pure kinematics."""
+        velocity, omega = nu[:3], nu[3:]
+        across = self.sin_roll * omega[1] + self.cos_roll * omega[2]
+        pitch_rate = self.cos_roll * omega[1] - self.sin_roll * omega[2]
+        tan_pitch = -self.minus_sin_pitch / self.cos_pitch
+        roll_rate = omega[0] + tan_pitch * across
+        return jnp.concatenate(
+            [
+                (self.rotation * cross(omega, velocity)).sum(-1),
+                jnp.stack(
+                    [
+                        pitch_rate * across / self.cos_pitch**2 + tan_pitch * roll_rate * pitch_rate,
+                        -roll_rate * across,
+                        (roll_rate * pitch_rate + tan_pitch * pitch_rate * across) / self.cos_pitch,
+                    ]
+                ),
+            ]
+        )
+
+
+def jacobian(angles: Vector3) -> Float[Array, "6 6"]:
+    """J of Eq. (1) as a matrix, from (roll, pitch, yaw)."""
+    zero = jnp.zeros((3, 3))
+    return jnp.block([[rotation_from_euler(angles), zero], [zero, euler_rate_matrix(angles)]])
+
+
+def _rotation_from_quaternion_parts(w: Array, x: Array, y: Array, z: Array) -> Matrix3:
+    return jnp.stack(
+        [
+            jnp.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]),
+            jnp.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]),
+            jnp.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]),
+        ]
+    )

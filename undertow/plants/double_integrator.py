@@ -1,0 +1,90 @@
+"""n independent axes x_ddot = u + d: the plant on which the theory of the law can be read off."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.status import Status
+
+_ENVELOPE = 1e6
+
+
+class AxisState(NamedTuple):
+    """Positions (m) and velocities (m/s)."""
+
+    position: Float[Array, " n"]
+    velocity: Float[Array, " n"]
+
+
+class DoubleIntegratorModel(AbstractModel):
+    """F = 0, G = I."""
+
+    angles: tuple[bool, ...] = eqx.field(static=True)
+
+    def drift(self, y: Measurement):
+        return jnp.zeros_like(y.position)
+
+    def gain(self, y: Measurement):
+        return jnp.eye(len(self.angles))
+
+    def invert(self, y: Measurement, acceleration):
+        return acceleration
+
+
+class DoubleIntegrator(AbstractPlant):
+    """Unit masses on rails, pushed by accelerations; optionally limited to +-limit m/s^2."""
+
+    limit: Float[Array, ""]
+    outputs: tuple[str, ...] = eqx.field(static=True)
+    output_units: tuple[str, ...] = eqx.field(static=True)
+    input_unit: str = eqx.field(static=True, default="m/s^2")
+
+    def initial_state(self, position=None, velocity=None) -> AxisState:
+        zero = jnp.zeros(self.inputs())
+        return AxisState(
+            zero if position is None else jnp.asarray(position, dtype=float),
+            zero if velocity is None else jnp.asarray(velocity, dtype=float),
+        )
+
+    def dynamics(self, t, x: AxisState, u, d: Load) -> AxisState:
+        return AxisState(x.velocity, self.acceleration(t, x, u, d))
+
+    def output(self, t, x: AxisState) -> Measurement:
+        return Measurement(x.position, x.velocity)
+
+    def acceleration(self, t, x: AxisState, u, d: Load):
+        return u + d.acceleration - d.wrench
+
+    def admissible(self, u):
+        return jnp.clip(u, -self.limit, self.limit)
+
+    def effort(self, x: AxisState, u) -> Effort:
+        return Effort(power=u * x.velocity, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
+
+    def inputs(self) -> int:
+        return len(self.outputs)
+
+    def health(self, x: AxisState) -> Array:
+        far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
+        return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
+
+    def advice(self) -> tuple[str, ...]:
+        return ()
+
+    def model(self) -> DoubleIntegratorModel:
+        """The exact model."""
+        return DoubleIntegratorModel(angles=(False,) * self.inputs())
+
+
+def double_integrator(axes: int = 1, limit: float = float(jnp.inf)) -> DoubleIntegrator:
+    """x_ddot = u + d on a number of independent axes.
+
+    Args:
+        axes: number n of axes.
+        limit: largest |u|, m/s^2.
+    """
+    names = tuple(f"x{i + 1}" for i in range(axes))
+    return DoubleIntegrator(jnp.asarray(limit, dtype=float), names, ("m",) * axes)

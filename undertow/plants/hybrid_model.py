@@ -1,0 +1,61 @@
+"""What a controller may know of a vehicle with thrusters: F and G of Eq. (17), and how to invert G."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import AbstractModel, Measurement
+from undertow.numerics.inverses import pseudo_inverse, regularised_sharp
+from undertow.numerics.linear import matvec
+from undertow.numerics.rotations import Kinematics, rotation_from_euler
+from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.body import Body
+
+
+class HybridModel(AbstractModel):
+    """x_ddot = F + G V + d, Eq. (17), in Euler angles; valid for |pitch| < 90 deg."""
+
+    body: Body
+    thruster: AbstractThruster
+    thruster_matrix: Float[Array, "6 N"]
+    body_gain: Float[Array, "6 N"]  # M^-1 B alpha
+    allocation: Float[Array, "N 6"]  # (B alpha)+
+    regularisation: float | None
+    rank: int = eqx.field(static=True)
+    speed_sensor: bool = eqx.field(static=True)
+    rate_term: bool = eqx.field(static=True)
+    angles: tuple[bool, ...] = eqx.field(static=True, default=(False, False, False, True, True, True))
+
+    def drift(self, y: Measurement) -> Float[Array, "6"]:
+        """F of Eq. (17): J M^-1 (-C nu - D nu - g), with J M^-1 B phi if speeds are measured."""
+        kinematics = _kinematics(y)
+        nu = kinematics.to_body(y.velocity)
+        own = self.body.free_acceleration(nu, kinematics.rotation[2])
+        if self.speed_sensor:
+            phi = self.thruster.speed_term(y.actuator)
+            phi = jnp.broadcast_to(phi, self.thruster_matrix.shape[1:])
+            own = own + self.body.accelerate(matvec(self.thruster_matrix, phi))
+        drift = kinematics.to_world(own)
+        return drift + kinematics.rate_term(nu) if self.rate_term else drift
+
+    def gain(self, y: Measurement) -> Float[Array, "6 N"]:
+        """G = J M^-1 B alpha of Eq. (17); equal to M_J^-1 J^-T B alpha."""
+        return jax.vmap(_kinematics(y).to_world, in_axes=1, out_axes=1)(self.body_gain)
+
+    def invert(self, y: Measurement, acceleration: Float[Array, "6"]) -> Float[Array, " N"]:
+        """V = G# acceleration, Eq. (23).
+
+        At rank 6 the inverse has a closed form, G+ = (B alpha)+ M J^-1 with a constant first factor: nothing
+        is factorised in the loop. Below rank 6 it is the Moore-Penrose inverse, and with a regularisation Eq. (27).
+        """
+        if self.regularisation is not None:
+            return matvec(regularised_sharp(self.gain(y), self.regularisation), acceleration)
+        if self.rank < 6:
+            return matvec(pseudo_inverse(self.gain(y)), acceleration)
+        wrench = matvec(self.body.mass_matrix, _kinematics(y).to_body(acceleration))
+        return matvec(self.allocation, wrench)
+
+
+def _kinematics(y: Measurement) -> Kinematics:
+    return Kinematics(rotation_from_euler(y.position[3:]))

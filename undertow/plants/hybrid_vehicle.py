@@ -1,0 +1,162 @@
+"""The vehicle together with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement
+from undertow.core.status import Status
+from undertow.numerics.linear import matvec
+from undertow.numerics.rotations import (
+    Kinematics,
+    euler_from_rotation,
+    quaternion_from_euler,
+    quaternion_rate,
+    rotation_from_quaternion,
+)
+from undertow.plants.hybrid_model import HybridModel
+from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.body import Body
+from undertow.vehicles.vehicle import Vehicle
+
+_ENVELOPE = 1e3  # m, m/s, rad/s; far beyond any vehicle
+
+
+class VehicleState(NamedTuple):
+    """State of body and thrusters. The attitude is a quaternion: no singularity, no trigonometry."""
+
+    position: Float[Array, "3"]  # m, world
+    attitude: Float[Array, "4"]  # unit quaternion, body -> world
+    nu: Float[Array, "6"]  # m/s, rad/s, body
+    thrusters: Any
+
+
+class HybridVehicle(AbstractPlant):
+    """x = (north, east, down, roll, pitch, yaw) driven by thruster voltages.
+
+    On the rungs `ideal` and `static` a prescribed acceleration load is the whole of d, J_dot nu included
+    (Remark 2); on the others the body moves as it does and the load is added to x_ddot.
+
+    Args:
+        vehicle: hull and thruster layout.
+        thruster: what turns volts into thrust.
+    """
+
+    vehicle: Vehicle
+    thruster: AbstractThruster
+    body: Body
+    thruster_matrix: Float[Array, "6 N"]
+    outputs: tuple[str, ...] = eqx.field(static=True)
+    output_units: tuple[str, ...] = eqx.field(static=True)
+    input_unit: str = eqx.field(static=True)
+
+    def __init__(self, vehicle: Vehicle, thruster: AbstractThruster):
+        self.vehicle, self.thruster = vehicle, thruster
+        self.body, self.thruster_matrix = vehicle.body(), vehicle.thruster_matrix()
+        self.outputs = ("north", "east", "down", "roll", "pitch", "yaw")
+        self.output_units = ("m", "m", "m", "rad", "rad", "rad")
+        self.input_unit = "V"
+
+    def initial_state(self, position=None, velocity=None) -> VehicleState:
+        position = jnp.zeros(6) if position is None else jnp.asarray(position, dtype=float)
+        velocity = jnp.zeros(6) if velocity is None else jnp.asarray(velocity, dtype=float)
+        attitude = quaternion_from_euler(position[3:])
+        nu = Kinematics(rotation_from_quaternion(attitude)).to_body(velocity)
+        return VehicleState(position[:3], attitude, nu, self.thruster.initial_state(self.inputs()))
+
+    def dynamics(self, t, x: VehicleState, u, d: Load) -> VehicleState:
+        kinematics = Kinematics(rotation_from_quaternion(x.attitude))
+        return VehicleState(
+            position=matvec(kinematics.rotation, x.nu[:3]),
+            attitude=quaternion_rate(x.attitude, x.nu[3:]),
+            nu=self._body_acceleration(kinematics, x, u, d),
+            thrusters=self.thruster.dynamics(x.thrusters, u),
+        )
+
+    def output(self, t, x: VehicleState) -> Measurement:
+        kinematics = Kinematics(rotation_from_quaternion(x.attitude))
+        angles = euler_from_rotation(kinematics.rotation)
+        return Measurement(
+            position=jnp.concatenate([x.position, angles]),
+            velocity=kinematics.to_world(x.nu),
+            actuator=self.thruster.report(x.thrusters),
+        )
+
+    def acceleration(self, t, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
+        kinematics = Kinematics(rotation_from_quaternion(x.attitude))
+        nu_rate = self._body_acceleration(kinematics, x, u, d)
+        return kinematics.to_world(nu_rate) + kinematics.rate_term(x.nu)
+
+    def _body_acceleration(self, kinematics: Kinematics, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
+        """nu_dot of Eq. (2): thrust (6), the body's own motion, and the loads."""
+        thrust = self.thruster.thrust(x.thrusters, u)
+        wrench = matvec(self.thruster_matrix, thrust) - d.wrench
+        prescribed = d.acceleration
+        if self.thruster.has_prescribed_acceleration:
+            prescribed = prescribed - kinematics.rate_term(x.nu)
+        own = self.body.free_acceleration(x.nu, kinematics.rotation[2])
+        return own + self.body.accelerate(wrench) + kinematics.to_body(prescribed)
+
+    def admissible(self, u):
+        return jnp.clip(u, -self.thruster.supply, self.thruster.supply)
+
+    def effort(self, x: VehicleState, u) -> Effort:
+        current = self.thruster.current(x.thrusters, u)
+        limited = jnp.abs(u) >= self.thruster.supply
+        return Effort(power=u * current, saturated=limited.astype(u.dtype))
+
+    def inputs(self) -> int:
+        return self.vehicle.thrusters
+
+    def health(self, x: VehicleState) -> Array:
+        third_row = rotation_from_quaternion(x.attitude)[2]
+        near_vertical = third_row[1] ** 2 + third_row[2] ** 2 < 1e-6
+        far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.nu) > _ENVELOPE).any()
+        code = jnp.where(near_vertical, int(Status.PITCH_SINGULAR), int(Status.OK))
+        return jnp.where(far, int(Status.DIVERGED), code)
+
+    def advice(self) -> tuple[str, ...]:
+        rank = self.rank()
+        few = (
+            f"the thruster matrix has rank {rank} of 6: {6 - rank} direction(s) cannot be controlled "
+            "and stay in open loop",
+        )
+        return self.thruster.advice() + (few if rank < 6 else ())
+
+    def rank(self) -> int:
+        """Rank of the thruster matrix; that of G too, wherever J is regular."""
+        if isinstance(self.thruster_matrix, jax.core.Tracer):
+            return min(6, self.inputs())
+        return int(np.linalg.matrix_rank(np.asarray(self.thruster_matrix), tol=1e-9))
+
+    def model(
+        self, *, speed_sensor: bool = False, rate_term: bool = False, regularisation: float | None = None
+    ) -> HybridModel:
+        """What a controller may know of this plant.
+
+        Args:
+            speed_sensor: whether phi of Eq. (15) is known from propeller-speed sensors (Example 1) or left in d.
+            rate_term: whether J_dot nu is in F; the paper leaves it in d (Remark 2).
+            regularisation: delta of Definition 2; None for the exact inverse.
+        """
+        alpha = jnp.broadcast_to(self.thruster.voltage_gain(), (self.inputs(),))
+        return HybridModel(
+            body=self.body,
+            thruster=self.thruster,
+            thruster_matrix=self.thruster_matrix,
+            body_gain=self.body.inverse_mass_matrix @ self.thruster_matrix * alpha,
+            allocation=jnp.linalg.pinv(self.thruster_matrix * alpha),
+            rank=self.rank(),
+            regularisation=regularisation,
+            speed_sensor=speed_sensor,
+            rate_term=rate_term,
+        )
+
+
+def hybrid_vehicle(vehicle: Vehicle, thruster: AbstractThruster) -> HybridVehicle:
+    """A vehicle with its thrusters, voltages in, pose out: the paper's hybrid system."""
+    return HybridVehicle(vehicle, thruster)

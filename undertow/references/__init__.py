@@ -1,0 +1,5 @@
+"""References: what to follow. One file each."""
+
+from undertow.core.catalogue import publish
+
+__getattr__ = publish(__name__)

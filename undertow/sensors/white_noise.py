@@ -1,0 +1,46 @@
+"""White noise on position and velocity."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractSensor, Measurement
+from undertow.core.param import param
+
+
+class WhiteNoise(AbstractSensor):
+    """Independent Gaussian errors, new at every sample of the control loop.
+
+    Raises:
+        BadInput: a standard deviation negative.
+    """
+
+    position: Float[Array, "..."] = param("m, rad", "standard deviation on position")
+    velocity: Float[Array, "..."] = param("m/s, rad/s", "standard deviation on velocity")
+
+    def __check_init__(self):
+        checks.not_negative("position", self.position)
+        checks.not_negative("velocity", self.velocity)
+
+    def draw(self, key):
+        return key
+
+    def measure(self, path, t, truth: Measurement) -> Measurement:
+        # One draw per instant: the time in microseconds picks it, whatever the sampling rate.
+        instant = jax.random.fold_in(path, jnp.round(t * 1e6).astype(jnp.uint32))
+        errors = jax.random.normal(instant, (2, *truth.position.shape), dtype=truth.position.dtype)
+        return truth._replace(
+            position=truth.position + self.position * errors[0],
+            velocity=truth.velocity + self.velocity * errors[1],
+        )
+
+
+def white_noise(position=0.0, velocity=0.01) -> WhiteNoise:
+    """Gaussian noise on every sample; meant for the sampled loop.
+
+    Args:
+        position: standard deviation, m and rad; one number or one per output.
+        velocity: standard deviation, m/s and rad/s; likewise.
+    """
+    return WhiteNoise(position, velocity)

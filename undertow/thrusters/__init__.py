@@ -1,0 +1,7 @@
+"""Thrusters: volts in, thrust out. One file per thruster; the rungs of the fidelity ladder beside them."""
+
+from undertow.core.catalogue import publish
+from undertow.thrusters.motor import DCMotor as DCMotor
+from undertow.thrusters.thruster import AbstractThruster as AbstractThruster
+
+__getattr__ = publish(__name__)

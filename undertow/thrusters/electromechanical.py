@@ -1,0 +1,59 @@
+"""Rung `electromechanical`: the whole of Eqs. (8)-(11)."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.param import param
+from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.thruster import AbstractThruster, PerThruster, PropellerReport
+
+
+class ElectromechanicalState(NamedTuple):
+    """Propeller speeds (rad/s) and winding currents (A)."""
+
+    speed: PerThruster
+    current: PerThruster
+
+
+class ElectromechanicalThruster(AbstractThruster):
+    """L I_dot + R I + k_e Om = V, J Om_dot + k_f Om + c_q Om|Om| = k_t I, T = c_t Om|Om|."""
+
+    motor: DCMotor
+    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
+
+    def initial_state(self, count) -> ElectromechanicalState:
+        return ElectromechanicalState(jnp.zeros(count), jnp.zeros(count))
+
+    def dynamics(self, state, voltage) -> ElectromechanicalState:
+        motor = self.motor
+        lost = motor.resistance * state.current + motor.back_emf_constant * state.speed
+        current_rate = (self.terminal(voltage) - lost) / motor.inductance  # Eq. (9)
+        return ElectromechanicalState(self._acceleration(state), current_rate)
+
+    def thrust(self, state, voltage) -> PerThruster:
+        return self.motor.thrust(state.speed)
+
+    def current(self, state, voltage) -> PerThruster:
+        return state.current
+
+    def report(self, state) -> PropellerReport:
+        return PropellerReport(state.speed, self._acceleration(state))
+
+    def voltage_gain(self):
+        return self.motor.voltage_gain
+
+    def speed_term(self, report) -> PerThruster:
+        return self.motor.speed_term(report.speed, report.acceleration)
+
+    def advice(self):
+        return self.motor.advice()
+
+    def _acceleration(self, state: ElectromechanicalState) -> PerThruster:
+        motor = self.motor
+        resisted = motor.friction * state.speed + motor.torque(state.speed)
+        return (motor.torque_constant * state.current - resisted) / motor.rotor_inertia  # Eq. (8)

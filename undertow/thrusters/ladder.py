@@ -1,0 +1,39 @@
+"""The fidelity ladder: one motor, four degrees of truth."""
+
+import jax.numpy as jnp
+
+from undertow.core import checks
+from undertow.thrusters.electromechanical import ElectromechanicalThruster
+from undertow.thrusters.ideal import IdealThruster
+from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.shaft import ShaftThruster
+from undertow.thrusters.static import StaticThruster
+from undertow.thrusters.thruster import AbstractThruster
+
+RUNGS = {
+    "ideal": IdealThruster,
+    "static": StaticThruster,
+    "shaft": ShaftThruster,
+    "electromechanical": ElectromechanicalThruster,
+}
+
+
+def on_rung(
+    motor: DCMotor, rung: str, supply: float = float(jnp.inf), dead_zone: float = 0.0
+) -> AbstractThruster:
+    """The motor on a rung of the ladder.
+
+    Args:
+        motor: constants.
+        rung: ideal, static, shaft or electromechanical.
+        supply: voltage limit, V; infinite by default.
+        dead_zone: voltage below which nothing turns, V.
+
+    Raises:
+        BadInput: unknown rung, supply not positive, dead zone negative.
+    """
+    checks.choice("rung", rung, tuple(RUNGS))
+    if not supply > 0:
+        checks.positive("supply", supply, "V")
+    checks.not_negative("dead_zone", dead_zone, "V")
+    return RUNGS[rung](motor=motor, supply=supply, dead_zone=dead_zone)

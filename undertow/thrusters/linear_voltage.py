@@ -1,0 +1,19 @@
+"""Thrust proportional to voltage, T = c_0 V."""
+
+import math
+
+from undertow.thrusters.memoryless import MemorylessThruster
+
+
+def linear_voltage(
+    thrust_per_volt: float = 10.9, current_per_thrust: float = 0.072, supply: float = math.inf, dead_zone: float = 0.0
+) -> MemorylessThruster:
+    """T = c_0 V, I = c_I T. Defaults go through the steady state of the paper's motor at 10 V.
+
+    Args:
+        thrust_per_volt: c_0, N/V.
+        current_per_thrust: c_I, A/N.
+        supply: voltage limit, V.
+        dead_zone: voltage below which nothing turns, V.
+    """
+    return MemorylessThruster(thrust_per_volt, 1.0, current_per_thrust, thrust_per_volt, supply, dead_zone)

@@ -1,0 +1,55 @@
+"""The static thruster models that the paper's Fig. 2 argues against: T = c_0 V, T = c_V V|V|, I = c_I T."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.thrusters.thruster import AbstractThruster, PerThruster
+
+
+class MemorylessThruster(AbstractThruster):
+    """Thrust c |V|^(p-1) V with no motor behind it; current proportional to thrust.
+
+    Raises:
+        BadInput: a coefficient is not positive.
+    """
+
+    thrust_per_volt: Float[Array, ""] = param("N/V^p", "thrust coefficient", symbol="c_0, c_V")
+    power: Float[Array, ""] = param("", "power of the voltage", symbol="p")
+    current_per_thrust: Float[Array, ""] = param("A/N", "current coefficient", symbol="c_I")
+    linear_gain: Float[Array, ""] = param("N/V", "gain the controller's model assumes", symbol="alpha")
+    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
+
+    def __check_init__(self):
+        for name in ("thrust_per_volt", "power", "current_per_thrust", "linear_gain"):
+            checks.positive(name, getattr(self, name))
+
+    def initial_state(self, count):
+        return jnp.zeros(0)
+
+    def dynamics(self, state, voltage):
+        return jnp.zeros(0)
+
+    def thrust(self, state, voltage) -> PerThruster:
+        volts = self.terminal(voltage)
+        return self.thrust_per_volt * jnp.sign(volts) * jnp.abs(volts) ** self.power
+
+    def current(self, state, voltage) -> PerThruster:
+        return self.current_per_thrust * self.thrust(state, voltage)
+
+    def report(self, state) -> None:
+        return None
+
+    def voltage_gain(self):
+        return self.linear_gain
+
+    def speed_term(self, report):
+        raise BadInput("model.speed_sensor", "be false", "true", hint="This thruster has no propeller speed")
+
+    def advice(self):
+        return ()

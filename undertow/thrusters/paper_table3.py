@@ -1,0 +1,33 @@
+"""The paper's thruster: the DC motor of its Table 3."""
+
+import math
+
+from undertow.thrusters.ladder import on_rung
+from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.thruster import AbstractThruster
+
+
+def paper_table3(
+    rung: str = "electromechanical", supply: float = math.inf, dead_zone: float = 0.0
+) -> AbstractThruster:
+    """Thruster of Table 3, as printed, on a rung of the fidelity ladder.
+
+    An impossible motor: k_t / k_e is 117, so the shaft gives several times the power the supply puts in.
+
+    Args:
+        rung: ideal, static, shaft or electromechanical.
+        supply: voltage limit, V; infinite by default.
+        dead_zone: voltage below which nothing turns, V.
+    """
+    motor = DCMotor(
+        resistance=1.2,
+        inductance=0.01,
+        torque_constant=1.27,
+        back_emf_constant=0.01086,
+        friction=0.06,
+        rotor_inertia=0.01,
+        thrust_coefficient=0.0375,
+        torque_coefficient=0.00232,
+        sources={"*": "the paper, Table 3", "friction": "the paper, Table 3 (unit printed as N s)"},
+    )
+    return on_rung(motor, rung, supply, dead_zone)

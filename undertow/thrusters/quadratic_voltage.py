@@ -1,0 +1,24 @@
+"""Thrust proportional to the square of the voltage, T = c_V V|V|."""
+
+import math
+
+from undertow.thrusters.memoryless import MemorylessThruster
+
+
+def quadratic_voltage(
+    thrust_per_volt_squared: float = 1.09,
+    current_per_thrust: float = 0.072,
+    linear_gain: float = 10.9,
+    supply: float = math.inf,
+    dead_zone: float = 0.0,
+) -> MemorylessThruster:
+    """T = c_V V|V|, I = c_I T. Defaults go through the steady state of the paper's motor at 10 V.
+
+    Args:
+        thrust_per_volt_squared: c_V, N/V^2.
+        current_per_thrust: c_I, A/N.
+        linear_gain: alpha that the controller's model assumes, N/V.
+        supply: voltage limit, V.
+        dead_zone: voltage below which nothing turns, V.
+    """
+    return MemorylessThruster(thrust_per_volt_squared, 2.0, current_per_thrust, linear_gain, supply, dead_zone)

@@ -1,0 +1,60 @@
+"""Rung `shaft`: the rotor has inertia, the winding no inductance."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.thruster import AbstractThruster, PerThruster
+
+
+class ShaftState(NamedTuple):
+    """Propeller speeds, rad/s."""
+
+    speed: PerThruster
+
+
+class ShaftThruster(AbstractThruster):
+    """k_1 Om_dot + k_2 Om + k_3 Q = V: Eq. (14) with L = 0."""
+
+    motor: DCMotor
+    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
+
+    def initial_state(self, count) -> ShaftState:
+        return ShaftState(jnp.zeros(count))
+
+    def dynamics(self, state, voltage) -> ShaftState:
+        motor = self.motor
+        resisted = motor.k2 * state.speed + motor.k3 * motor.torque(state.speed)
+        return ShaftState((self.terminal(voltage) - resisted) / motor.k1)
+
+    def thrust(self, state, voltage) -> PerThruster:
+        return self.motor.thrust(state.speed)
+
+    def current(self, state, voltage) -> PerThruster:
+        motor = self.motor
+        return (self.terminal(voltage) - motor.back_emf_constant * state.speed) / motor.resistance
+
+    def report(self, state) -> None:
+        return None
+
+    def voltage_gain(self):
+        return self.motor.voltage_gain
+
+    def speed_term(self, report):
+        raise BadInput(
+            "model.speed_sensor",
+            "be false on rung `shaft`",
+            "true",
+            hint="There Om_dot depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1. "
+            "Use rung: electromechanical, where it is a state",
+        )
+
+    def advice(self):
+        return self.motor.advice()

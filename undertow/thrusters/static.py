@@ -1,0 +1,48 @@
+"""Rung `static`: the motor is in its steady state at every instant."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.thruster import AbstractThruster, PerThruster
+
+
+class StaticThruster(AbstractThruster):
+    """k_3 c_q Om|Om| + k_2 Om = V, T = c_t Om|Om|. The paper's Example 2, speed-sensorless."""
+
+    motor: DCMotor
+    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
+
+    def initial_state(self, count):
+        return jnp.zeros(0)
+
+    def dynamics(self, state, voltage):
+        return jnp.zeros(0)
+
+    def thrust(self, state, voltage) -> PerThruster:
+        return self.motor.thrust(self.motor.steady_speed(self.terminal(voltage)))
+
+    def current(self, state, voltage) -> PerThruster:
+        return self.motor.steady_current(self.motor.steady_speed(self.terminal(voltage)))
+
+    def report(self, state) -> None:
+        return None
+
+    def voltage_gain(self):
+        return self.motor.voltage_gain
+
+    def speed_term(self, report):
+        raise BadInput(
+            "model.speed_sensor",
+            "be false on rung `static`",
+            "true",
+            hint="There phi depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1",
+        )
+
+    def advice(self):
+        return self.motor.advice()

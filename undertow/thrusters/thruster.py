@@ -1,0 +1,65 @@
+"""What a thruster is to the rest of undertow: volts in, thrust out."""
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+PerThruster = Float[Array, " N"]
+
+
+class PropellerReport(NamedTuple):
+    """What a propeller-speed sensor tells: speed (rad/s) and its rate (rad/s^2)."""
+
+    speed: PerThruster
+    acceleration: PerThruster
+
+
+class AbstractThruster(eqx.Module):
+    """A set of N thrusters of one kind; every array has one entry per thruster."""
+
+    supply: eqx.AbstractVar[Float[Array, ""]]  # V; the drive can give -supply ... supply
+    dead_zone: eqx.AbstractVar[Float[Array, ""]]  # V; smaller voltages turn nothing
+
+    @abc.abstractmethod
+    def initial_state(self, count: int) -> Any:
+        """State of `count` thrusters at rest."""
+
+    @abc.abstractmethod
+    def dynamics(self, state: Any, voltage: PerThruster) -> Any:
+        """d(state)/dt."""
+
+    @abc.abstractmethod
+    def thrust(self, state: Any, voltage: PerThruster) -> PerThruster:
+        """T, N."""
+
+    @abc.abstractmethod
+    def current(self, state: Any, voltage: PerThruster) -> PerThruster:
+        """I, A."""
+
+    @abc.abstractmethod
+    def report(self, state: Any) -> PropellerReport | None:
+        """What a speed sensor would tell; None where speed is not a state."""
+
+    @abc.abstractmethod
+    def voltage_gain(self) -> Float[Array, ""]:
+        """alpha of Eq. (7), N/V: what the controller's model takes for granted."""
+
+    @abc.abstractmethod
+    def speed_term(self, report: PropellerReport | None) -> PerThruster | Float[Array, ""]:
+        """phi of Eq. (15), N, from a speed sensor."""
+
+    @property
+    @abc.abstractmethod
+    def has_prescribed_acceleration(self) -> bool:
+        """Whether J_dot nu counts as part of the prescribed uncertainty (benchmark rungs `ideal`, `static`)."""
+
+    @abc.abstractmethod
+    def advice(self) -> tuple[str, ...]:
+        """What is odd about this thruster."""
+
+    def terminal(self, voltage: PerThruster) -> PerThruster:
+        """Voltage that turns the motor: zero inside the dead zone."""
+        return jnp.where(jnp.abs(voltage) > self.dead_zone, voltage, 0.0)

@@ -1,0 +1,93 @@
+"""Rigid body in water: M, C(nu) nu, D(nu) nu and g of Eq. (2), in the form of Fossen (2021), ch. 3, 6 and 8."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.param import param
+from undertow.numerics.linear import matvec
+from undertow.numerics.rotations import cross, skew
+
+Vector3 = Float[Array, "3"]
+Vector6 = Float[Array, "6"]
+Matrix6 = Float[Array, "6 6"]
+
+
+class Body(eqx.Module):
+    """Coefficients of the equation of motion about the body origin, ready for use.
+
+    Body axes forward, starboard, down. Added mass is part of `mass_matrix`; damping matrices are positive.
+    """
+
+    mass_matrix: Matrix6 = param("kg, kg m, kg m^2", "mass and added mass", symbol="M")
+    inverse_mass_matrix: Matrix6 = param("1/kg, ...", "inverse of the mass matrix", symbol="M^-1")
+    linear_damping: Matrix6 = param("N s/m, ...", "linear damping", symbol="D_l")
+    quadratic_damping: Matrix6 = param("N s^2/m^2, ...", "quadratic damping", symbol="D_q")
+    weight: Float[Array, ""] = param("N", "weight", symbol="W")
+    buoyancy: Float[Array, ""] = param("N", "buoyancy", symbol="B")
+    r_g: Vector3 = param("m", "centre of gravity", symbol="r_g")
+    r_b: Vector3 = param("m", "centre of buoyancy", symbol="r_b")
+
+    def coriolis(self, nu: Vector6) -> Vector6:
+        """C(nu) nu, N and N m; does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, multiplied out."""
+        momentum = matvec(self.mass_matrix, nu)
+        linear, angular = momentum[:3], momentum[3:]
+        return jnp.concatenate(
+            [cross(nu[3:], linear), cross(nu[:3], linear) + cross(nu[3:], angular)]
+        )
+
+    def damping(self, nu: Vector6) -> Vector6:
+        """D(nu) nu = D_l nu + D_q (|nu| nu), N and N m."""
+        return matvec(self.linear_damping, nu) + matvec(self.quadratic_damping, jnp.abs(nu) * nu)
+
+    def restoring(self, down: Vector3) -> Vector6:
+        """g, N and N m, on the left side of Eq. (2).
+
+        Args:
+            down: the world's down axis seen from the body: third row of R.
+        """
+        force = (self.weight - self.buoyancy) * down
+        moment = cross(self.weight * self.r_g - self.buoyancy * self.r_b, down)
+        return -jnp.concatenate([force, moment])
+
+    def free_acceleration(self, nu: Vector6, down: Vector3) -> Vector6:
+        """M^-1 (-C(nu) nu - D(nu) nu - g): body acceleration without thrust, m/s^2 and rad/s^2."""
+        return self.accelerate(-self.coriolis(nu) - self.damping(nu) - self.restoring(down))
+
+    def accelerate(self, wrench: Vector6) -> Vector6:
+        """M^-1 wrench, m/s^2 and rad/s^2."""
+        return matvec(self.inverse_mass_matrix, wrench)
+
+    def kinetic_energy(self, nu: Vector6) -> Float[Array, ""]:
+        """1/2 nu . M nu, J."""
+        return 0.5 * (nu * matvec(self.mass_matrix, nu)).sum()
+
+    def potential_energy(self, position: Vector3, down: Vector3) -> Float[Array, ""]:
+        """Of weight and buoyancy, J; zero with the body upright at the world origin and r_g = r_b = 0."""
+        lever = self.weight * self.r_g - self.buoyancy * self.r_b
+        return -(self.weight - self.buoyancy) * position[2] - (lever * down).sum()
+
+
+def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> Matrix6:
+    """M_RB about the body origin. Fossen (2021), Eq. (3.49).
+
+    Args:
+        mass: kg.
+        r_g: centre of gravity, m.
+        inertia: about the body origin, kg m^2.
+    """
+    lever = mass * skew(r_g)
+    return jnp.block([[mass * jnp.eye(3), -lever], [lever, inertia]])
+
+
+def shift_matrix(r: Vector3) -> Matrix6:
+    """H(r): the same motion seen from a point r away is H nu; M_b = H^T M H. Fossen (2021), Eq. (C.5)."""
+    return jnp.block([[jnp.eye(3), skew(r).T], [jnp.zeros((3, 3)), jnp.eye(3)]])
+
+
+def coriolis_matrix(mass_matrix: Matrix6, nu: Vector6) -> Matrix6:
+    """C(nu) from M, skew-symmetric. Fossen (2021), theorem 3.2."""
+    symmetric = 0.5 * (mass_matrix + mass_matrix.T)
+    momentum = matvec(symmetric, nu)
+    linear, angular = skew(momentum[:3]), skew(momentum[3:])
+    return -jnp.block([[jnp.zeros((3, 3)), linear], [linear, angular]])

@@ -1,0 +1,106 @@
+"""A vehicle as data: published numbers with their sources, and what follows from them."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.param import param, sources_field
+from undertow.vehicles.body import Body, rigid_body_mass
+
+
+class Vehicle(eqx.Module):
+    """Hull and thruster layout. Body axes forward, starboard, down; matrices positive.
+
+    Raises:
+        BadInput: a value is not finite or of the wrong sign or size, or the mass matrix is not symmetric
+            positive definite.
+    """
+
+    name: str = eqx.field(static=True)
+    mass: Float[Array, ""] = param("kg", "dry mass", symbol="m")
+    weight: Float[Array, ""] = param("N", "weight in air", symbol="W")
+    buoyancy: Float[Array, ""] = param("N", "buoyancy, fully submerged", symbol="B")
+    r_g: Float[Array, "3"] = param("m", "centre of gravity", symbol="r_g")
+    r_b: Float[Array, "3"] = param("m", "centre of buoyancy", symbol="r_b")
+    inertia: Float[Array, "3 3"] = param("kg m^2", "inertia about the body origin", symbol="I_o")
+    added_mass: Float[Array, "6 6"] = param("kg, kg m, kg m^2", "added mass, positive", symbol="M_A")
+    linear_damping: Float[Array, "6 6"] = param(
+        "N s/m, N s, N m s", "linear damping, positive", symbol="D_l"
+    )
+    quadratic_damping: Float[Array, "6 6"] = param(
+        "N s^2/m^2, N s^2, N m s^2", "quadratic damping, positive", symbol="D_q"
+    )
+    thruster_positions: Float[Array, "N 3"] = param("m", "where each thruster acts", symbol="r_j")
+    thruster_directions: Float[Array, "N 3"] = param("", "unit vector of positive thrust", symbol="e_j")
+    sources: tuple = sources_field()
+
+    def __check_init__(self):
+        for name in ("r_g", "r_b"):
+            checks.length(name, getattr(self, name), 3, "forward, starboard, down")
+            checks.finite(name, getattr(self, name), "m")
+        checks.positive("mass", self.mass, "kg")
+        checks.not_negative("weight", self.weight, "N")
+        checks.not_negative("buoyancy", self.buoyancy, "N")
+        self._check_thrusters()
+        for name, size in (("inertia", 3), ("added_mass", 6), ("linear_damping", 6), ("quadratic_damping", 6)):
+            shape = jnp.shape(getattr(self, name))
+            if shape != (size, size):
+                raise BadInput(name, f"be a {size} x {size} matrix", f"of shape {shape}")
+            checks.finite(name, getattr(self, name))
+        checks.positive_definite("mass_matrix", self.mass_matrix())
+
+    def _check_thrusters(self) -> None:
+        shapes = jnp.shape(self.thruster_positions), jnp.shape(self.thruster_directions)
+        if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3 or shapes[0][0] == 0:
+            raise BadInput(
+                "thruster_positions", "have one row (x, y, z) per thruster, like thruster_directions", shapes
+            )
+        checks.finite("thruster_positions", self.thruster_positions, "m")
+        if not isinstance(self.thruster_directions, jax.core.Tracer):
+            norms = np.linalg.norm(np.asarray(self.thruster_directions), axis=1)
+            for j in np.flatnonzero(~(np.abs(norms - 1) < 1e-6)):
+                raise BadInput(f"thruster_directions[{j}]", "have length 1", f"{norms[j]:.6g} long")
+
+    @property
+    def thrusters(self) -> int:
+        """Number N of thrusters."""
+        return self.thruster_positions.shape[0]
+
+    def mass_matrix(self) -> Float[Array, "6 6"]:
+        """M = M_RB + M_A."""
+        return rigid_body_mass(self.mass, self.r_g, self.inertia) + self.added_mass
+
+    def thruster_matrix(self) -> Float[Array, "6 N"]:
+        """B of Eq. (6) from the thruster poses: column j is (e_j, r_j x e_j)."""
+        moments = jnp.cross(self.thruster_positions, self.thruster_directions)
+        return jnp.concatenate([self.thruster_directions, moments], axis=1).T
+
+    def body(self) -> Body:
+        """Coefficients of the equation of motion."""
+        mass_matrix = self.mass_matrix()
+        return Body(
+            mass_matrix=mass_matrix,
+            inverse_mass_matrix=jnp.linalg.inv(mass_matrix),
+            linear_damping=self.linear_damping,
+            quadratic_damping=self.quadratic_damping,
+            weight=self.weight,
+            buoyancy=self.buoyancy,
+            r_g=self.r_g,
+            r_b=self.r_b,
+        )
+
+    def with_thrusters(self, keep: tuple[int, ...]) -> "Vehicle":
+        """Same hull with only the thrusters numbered in `keep` (from 0)."""
+        for j in keep:
+            if not 0 <= j < self.thrusters:
+                raise BadInput("thrusters", f"number thrusters 0 to {self.thrusters - 1}", j)
+        index = jnp.asarray(keep, dtype=int)
+        return eqx.tree_at(
+            lambda v: (v.thruster_positions, v.thruster_directions),
+            self,
+            (self.thruster_positions[index], self.thruster_directions[index]),
+        )
