@@ -50,9 +50,7 @@ class RCAF(AbstractContinuousController):
     weight: Float[Array, "*n 2 2"] = param(
         "", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)), source="Table 1"
     )
-    adaptation: Float[Array, "..."] = param(
-        "1/s^2", "adaptation gain", symbol="gamma", default=100.0, source="Table 1"
-    )
+    adaptation: Float[Array, "..."] = param("1/s^2", "adaptation gain", symbol="gamma", default=100.0, source="Table 1")
     composite: Float[Array, "..."] = param(
         "", "share of the modelling error; 0 is RAFC, Eq. (61)", symbol="gamma_eps", default=500.0, source="Table 1"
     )

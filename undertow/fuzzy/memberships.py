@@ -9,9 +9,7 @@ from jaxtyping import Array, Float
 _LARGEST_EXPONENT = 600.0
 
 
-def memberships(
-    x: Float[Array, "*n"], centres: Float[Array, " M"], widths: Float[Array, " M"]
-) -> Float[Array, "*n M"]:
+def memberships(x: Float[Array, "*n"], centres: Float[Array, " M"], widths: Float[Array, " M"]) -> Float[Array, "*n M"]:
     """exp(-((x - c_l) / sigma_l)^2) / sum of the same; finite however far x lies from every set."""
     return jax.nn.softmax(-(((x[..., None] - centres) / widths) ** 2), axis=-1)
 

@@ -64,9 +64,7 @@ class FuzzySystem(eqx.Module):
         return (self.basis(jnp.zeros((1, self.inputs))) ** 2).sum()
 
 
-def gaussian_sets(
-    count: int = 5, reach: tuple[float, ...] = (1.0,), width: float | None = None
-) -> FuzzySystem:
+def gaussian_sets(count: int = 5, reach: tuple[float, ...] = (1.0,), width: float | None = None) -> FuzzySystem:
     """Equally spaced sets from -reach to reach on every input.
 
     Args:

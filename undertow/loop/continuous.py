@@ -69,9 +69,7 @@ def _run(loop, key, position, velocity, times, duration, jumps, rtol, atol) -> O
         y0=start,
         args=drawn,
         saveat=diffrax.SaveAt(subs=(diffrax.SubSaveAt(ts=times), diffrax.SubSaveAt(t1=True))),
-        stepsize_controller=diffrax.ClipStepSizeController(
-            diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=jumps
-        ),
+        stepsize_controller=diffrax.ClipStepSizeController(diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=jumps),
         event=diffrax.Event(_is_unsound),
         max_steps=_MAX_STEPS,
         throw=False,

@@ -1,0 +1,1 @@
+"""Rotations, integrators, inverses, Lyapunov, smoothing: mathematics without vehicles."""

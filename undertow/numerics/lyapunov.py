@@ -4,9 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 
-def companion_lyapunov(
-    feedback: Float[Array, "*n 2"], weight: Float[Array, "*n 2 2"]
-) -> Float[Array, "*n 2 2"]:
+def companion_lyapunov(feedback: Float[Array, "*n 2"], weight: Float[Array, "*n 2 2"]) -> Float[Array, "*n 2 2"]:
     """P of A^T P + P A + Q = 0, A = [[0, 1], [-k1, -k2]], Eq. (21), in closed form for every axis.
 
     Args:

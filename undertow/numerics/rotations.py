@@ -95,9 +95,7 @@ def quaternion_rate(q: Quaternion, omega: Vector3) -> Quaternion:
     """
     w, x, y, z = q
     p, r, s = omega
-    turn = jnp.stack(
-        [-x * p - y * r - z * s, w * p + y * s - z * r, w * r + z * p - x * s, w * s + x * r - y * p]
-    )
+    turn = jnp.stack([-x * p - y * r - z * s, w * p + y * s - z * r, w * r + z * p - x * s, w * s + x * r - y * p])
     return 0.5 * turn + 0.5 * (1.0 - (q * q).sum()) * q
 
 

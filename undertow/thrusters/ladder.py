@@ -18,9 +18,7 @@ RUNGS = {
 }
 
 
-def on_rung(
-    motor: DCMotor, rung: str, supply: float = float(jnp.inf), dead_zone: float = 0.0
-) -> AbstractThruster:
+def on_rung(motor: DCMotor, rung: str, supply: float = float(jnp.inf), dead_zone: float = 0.0) -> AbstractThruster:
     """The motor on a rung of the ladder.
 
     Args:

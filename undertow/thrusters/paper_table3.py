@@ -7,9 +7,7 @@ from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import AbstractThruster
 
 
-def paper_table3(
-    rung: str = "electromechanical", supply: float = math.inf, dead_zone: float = 0.0
-) -> AbstractThruster:
+def paper_table3(rung: str = "electromechanical", supply: float = math.inf, dead_zone: float = 0.0) -> AbstractThruster:
     """Thruster of Table 3, as printed, on a rung of the fidelity ladder.
 
     An impossible motor: k_t / k_e is 117, so the shaft gives several times the power the supply puts in.

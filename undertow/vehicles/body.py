@@ -32,9 +32,7 @@ class Body(eqx.Module):
         """C(nu) nu, N and N m; does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, multiplied out."""
         momentum = matvec(self.mass_matrix, nu)
         linear, angular = momentum[:3], momentum[3:]
-        return jnp.concatenate(
-            [cross(nu[3:], linear), cross(nu[:3], linear) + cross(nu[3:], angular)]
-        )
+        return jnp.concatenate([cross(nu[3:], linear), cross(nu[:3], linear) + cross(nu[3:], angular)])
 
     def damping(self, nu: Vector6) -> Vector6:
         """D(nu) nu = D_l nu + D_q (|nu| nu), N and N m."""

@@ -28,9 +28,7 @@ class Vehicle(eqx.Module):
     r_b: Float[Array, "3"] = param("m", "centre of buoyancy", symbol="r_b")
     inertia: Float[Array, "3 3"] = param("kg m^2", "inertia about the body origin", symbol="I_o")
     added_mass: Float[Array, "6 6"] = param("kg, kg m, kg m^2", "added mass, positive", symbol="M_A")
-    linear_damping: Float[Array, "6 6"] = param(
-        "N s/m, N s, N m s", "linear damping, positive", symbol="D_l"
-    )
+    linear_damping: Float[Array, "6 6"] = param("N s/m, N s, N m s", "linear damping, positive", symbol="D_l")
     quadratic_damping: Float[Array, "6 6"] = param(
         "N s^2/m^2, N s^2, N m s^2", "quadratic damping, positive", symbol="D_q"
     )

@@ -1,0 +1,1 @@
+"""Analysis: metrics, linear prediction, stability certificate."""

@@ -1,0 +1,1 @@
+"""Studies: the paper, figure by figure and claim by claim."""
