@@ -24,6 +24,9 @@ PerAxis = Float[Array, " n"]
 
 FUZZY_INPUTS = ("error", "state")
 
+_PER_AXIS = ("adaptation", "composite", "robust_gain", "layer")
+_PER_AXIS_IDENTIFICATION = ("pole", "compensation_gain", "layer")
+
 
 class RCAFState(NamedTuple):
     """State z of the law."""
@@ -73,6 +76,12 @@ class RCAF(AbstractContinuousController):
         checks.choice("fuzzy_input", self.fuzzy_input, FUZZY_INPUTS)
         if self.fuzzy.inputs != 1 + FUZZY_INPUTS.index(self.fuzzy_input):
             raise BadInput("fuzzy", f"have the inputs of `{self.fuzzy_input}`", f"of {self.fuzzy.inputs} input(s)")
+        axes = len(self.model.angles)
+        for part, names in ((self, _PER_AXIS), (self.identification, _PER_AXIS_IDENTIFICATION)):
+            for name in names:
+                checks.per_axis(name, getattr(part, name), axes)
+        checks.per_axis("feedback", self.feedback, axes, (2,))
+        checks.per_axis("weight", self.weight, axes, (2, 2))
         checks.hurwitz("feedback", self.feedback)
         checks.positive_definite("weight", self.weight)
 

@@ -32,6 +32,14 @@ def length(name: str, value: Any, expected: int, what: str) -> None:
         raise BadInput(name, f"have {expected} entries ({what})", got)
 
 
+def per_axis(name: str, value: Any, axes: int, entry: tuple[int, ...] = ()) -> None:
+    """One entry of shape `entry`, or one such entry per axis."""
+    shape = jnp.shape(value)
+    if shape not in (entry, (axes, *entry)):
+        what = "one number" if not entry else f"one entry of shape {entry}"
+        raise BadInput(name, f"be {what}, or {axes} of them, one per axis", f"of shape {shape}")
+
+
 def choice(name: str, value: Any, allowed: tuple[str, ...]) -> None:
     """One of the allowed words."""
     if value not in allowed:
@@ -40,8 +48,6 @@ def choice(name: str, value: Any, allowed: tuple[str, ...]) -> None:
 
 def hurwitz(name: str, feedback: Any) -> None:
     """Gains (k1, k2), one pair or one per axis, that make s^2 + k2 s + k1 stable."""
-    if jnp.shape(feedback)[-1:] != (2,) or jnp.ndim(feedback) > 2:
-        raise BadInput(name, "be a pair (k1, k2), or one pair per axis", f"of shape {jnp.shape(feedback)}")
     if isinstance(feedback, jax.core.Tracer):
         return
     finite(name, feedback)
@@ -56,10 +62,8 @@ def hurwitz(name: str, feedback: Any) -> None:
 
 
 def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
-    """Square matrix, or one per axis, symmetric with positive eigenvalues."""
+    """Square matrix, or a stack of them, symmetric with positive eigenvalues."""
     shape = jnp.shape(matrix)
-    if len(shape) < 2 or shape[-1] != shape[-2]:
-        raise BadInput(name, "be a square matrix", f"of shape {shape}")
     if isinstance(matrix, jax.core.Tracer):
         return
     finite(name, matrix, unit)

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.core import checks
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
@@ -142,7 +143,14 @@ class HybridVehicle(AbstractPlant):
             speed_sensor: whether phi of Eq. (15) is known from propeller-speed sensors (Example 1) or left in d.
             rate_term: whether J_dot nu is in F; the paper leaves it in d (Remark 2).
             regularisation: delta of Definition 2; None for the exact inverse.
+
+        Raises:
+            BadInput: speed_sensor for thrusters that have no measurable speed, or regularisation not positive.
         """
+        if regularisation is not None:
+            checks.positive("regularisation", regularisation)
+        if speed_sensor:  # thrusters without a speed to measure complain here, not in the loop
+            self.thruster.speed_term(self.thruster.report(self.thruster.initial_state(self.inputs())))
         alpha = jnp.broadcast_to(self.thruster.voltage_gain(), (self.inputs(),))
         return HybridModel(
             body=self.body,

@@ -49,7 +49,7 @@ class MemorylessThruster(AbstractThruster):
         return self.linear_gain
 
     def speed_term(self, report):
-        raise BadInput("model.speed_sensor", "be false", "true", hint="This thruster has no propeller speed")
+        raise BadInput("speed_sensor", "be false", "true", hint="This thruster has no propeller speed")
 
     def advice(self):
         return ()

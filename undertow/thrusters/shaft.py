@@ -49,7 +49,7 @@ class ShaftThruster(AbstractThruster):
 
     def speed_term(self, report):
         raise BadInput(
-            "model.speed_sensor",
+            "speed_sensor",
             "be false on rung `shaft`",
             "true",
             hint="There Om_dot depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1. "

@@ -38,7 +38,7 @@ class StaticThruster(AbstractThruster):
 
     def speed_term(self, report):
         raise BadInput(
-            "model.speed_sensor",
+            "speed_sensor",
             "be false on rung `static`",
             "true",
             hint="There phi depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1",

@@ -1,0 +1,132 @@
+"""The benchmark's metrics, defined once: gathered tick by tick inside the loop, or from a recorded series."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core.param import param
+from undertow.loop.closed_loop import Sample
+from undertow.loop.outcome import Outcome
+from undertow.loop.sampled import AbstractAccumulator
+
+PerAxis = Float[Array, " n"]
+Scalar = Float[Array, ""]
+
+# Sample times are k * dt in floating point: a window takes its borders in.
+_HAIR = 1e-9  # s
+
+# Share of its step that the position error must leave no more to be settled.
+_SETTLED = 0.02
+
+
+class MetricsState(NamedTuple):
+    """Running sums over a window."""
+
+    count: Scalar
+    squares: dict[str, PerAxis]  # of the signals of _SIGNALS
+    largest_error: PerAxis
+    voltage_squares: Scalar
+    voltage_peak: Scalar
+    variation: Scalar  # sum over samples of the mean |V_k - V_{k-1}|
+    span: Scalar  # s covered by steps inside the window
+    energy: Scalar
+    saturated: Scalar
+    weights_peak: Scalar
+    step: PerAxis  # |error| at the first sample of the run
+    settled_at: PerAxis
+    previous: Any  # (t, voltage, power, inside) of the sample before
+
+
+# Metric name -> the signal whose rms it is.
+_SIGNALS = {
+    "tracking": lambda s: s.error,
+    "estimation": lambda s: s.estimate - s.uncertainty,
+    "uncertainty": lambda s: s.uncertainty,
+    "robust": lambda s: s.robust,
+    "model": lambda s: s.modelling_error,
+}
+
+
+class Metrics(AbstractAccumulator):
+    """All metrics over start <= t <= stop."""
+
+    start: Scalar = param("s", "first time that counts", default=0.0)
+    stop: Scalar = param("s", "last time that counts", default=jnp.inf)
+
+    def init(self, sample: Sample) -> MetricsState:
+        axes, zero = jnp.zeros_like(sample.error), jnp.zeros(())
+        return MetricsState(
+            count=zero,
+            squares=dict.fromkeys(_SIGNALS, axes),
+            largest_error=axes,
+            voltage_squares=zero,
+            voltage_peak=zero,
+            variation=zero,
+            span=zero,
+            energy=zero,
+            saturated=zero,
+            weights_peak=zero,
+            step=-jnp.ones_like(axes),
+            settled_at=axes,
+            previous=(zero, jnp.zeros_like(sample.voltage), zero, zero),
+        )
+
+    def update(self, state: MetricsState, t: Scalar, sample: Sample) -> MetricsState:
+        inside = jnp.where((t >= self.start - _HAIR) & (t <= self.stop + _HAIR), 1.0, 0.0)
+        last_t, last_voltage, last_power, last_inside = state.previous
+        power, between = sample.power.sum(), inside * last_inside
+        size = jnp.abs(sample.error)
+        step = jnp.where(state.step < 0, size, state.step)
+        return MetricsState(
+            count=state.count + inside,
+            squares={name: state.squares[name] + inside * pick(sample) ** 2 for name, pick in _SIGNALS.items()},
+            largest_error=jnp.maximum(state.largest_error, inside * size),
+            voltage_squares=state.voltage_squares + inside * (sample.voltage**2).mean(),
+            voltage_peak=jnp.maximum(state.voltage_peak, inside * jnp.abs(sample.voltage).max()),
+            variation=state.variation + between * jnp.abs(sample.voltage - last_voltage).mean(),
+            span=state.span + between * (t - last_t),
+            energy=state.energy + between * (t - last_t) * (power + last_power) / 2,
+            saturated=state.saturated + inside * sample.saturated.mean(),
+            weights_peak=jnp.maximum(state.weights_peak, inside * sample.weights_peak),
+            step=step,
+            settled_at=jnp.where(size > _SETTLED * step, t, state.settled_at),
+            previous=(t, sample.voltage, power, inside),
+        )
+
+
+def results(state: MetricsState) -> dict[str, Any]:
+    """Metrics by their names in result files: overall values as numbers, per-axis values as `<name>_axes` lists."""
+    host = jax.tree.map(np.asarray, state)
+    count, span = max(float(host.count), 1.0), float(host.span)
+    found: dict[str, Any] = {}
+    for name, squares in host.squares.items():
+        found[f"{name}_rms"] = float(np.sqrt(squares.mean() / count))
+        found[f"{name}_rms_axes"] = np.sqrt(squares / count).tolist()
+    return found | {
+        "tracking_max": float(host.largest_error.max()),
+        "tracking_max_axes": host.largest_error.tolist(),
+        "voltage_rms": float(np.sqrt(host.voltage_squares / count)),
+        "voltage_peak": float(host.voltage_peak),
+        "voltage_variation": float(host.variation) / span if span > 0 else 0.0,
+        "weights_peak": float(host.weights_peak),
+        "energy": float(host.energy),
+        "settling_time": float(host.settled_at.max()),
+        "settling_time_axes": host.settled_at.tolist(),
+        "saturated_fraction": float(host.saturated) / count,
+    }
+
+
+def measure(outcome: Outcome, start: float = 0.0, stop: float = float("inf")) -> dict[str, Any]:
+    """Metrics of a recorded run over start <= t <= stop, s, at the rate of the record."""
+    return results(_over_series(Metrics(start, stop), outcome.time, outcome.samples))
+
+
+@eqx.filter_jit
+def _over_series(metrics: Metrics, time: Array, samples: Sample) -> MetricsState:
+    first = jax.tree.map(lambda series: series[0], samples)
+    step = lambda state, at: (metrics.update(state, *at), None)  # noqa: E731
+    return jax.lax.scan(step, metrics.init(first), (time, samples))[0]

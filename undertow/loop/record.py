@@ -1,0 +1,49 @@
+"""A run as a labelled dataset: names, units, and how it came about."""
+
+import numpy as np
+import xarray as xr
+
+from undertow.core.contracts import AbstractPlant
+from undertow.core.status import Status
+from undertow.loop.outcome import Outcome
+
+# Signal -> (dimension, meaning, unit of a plain axis; rates of angles follow from the axis).
+_MEANINGS = {
+    "position": ("axis", "position", ""),
+    "velocity": ("axis", "velocity", "/s"),
+    "target": ("axis", "wanted position", ""),
+    "error": ("axis", "tracking error x_d - x", ""),
+    "uncertainty": ("axis", "lumped uncertainty d = x_ddot - F - G V, measured", "/s^2"),
+    "estimate": ("axis", "estimate d_hat", "/s^2"),
+    "robust": ("axis", "robust term u_r", "/s^2"),
+    "modelling_error": ("axis", "modelling error eps = x_hat_dot - x_dot", "/s"),
+    "predicted_position": ("axis", "position of the identification model", ""),
+    "predicted_velocity": ("axis", "velocity of the identification model", "/s"),
+    "voltage": ("input", "input applied", None),
+    "command": ("input", "input asked for", None),
+    "power": ("input", "electrical power drawn", "W"),
+    "saturated": ("input", "1 where the input is at its limit", "1"),
+    "weights_peak": (None, "largest |theta|", "m/s^2, rad/s^2"),
+}
+
+
+def to_dataset(outcome: Outcome, plant: AbstractPlant) -> xr.Dataset:
+    """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `input` (numbers from 1)."""
+    units = np.array(plant.output_units)
+    variables = {}
+    for name, (dimension, meaning, unit) in _MEANINGS.items():
+        values = np.asarray(getattr(outcome.samples, name))
+        dims = ("time",) if dimension is None else ("time", dimension)
+        if dimension == "axis":
+            unit = ", ".join(f"{u}{unit}" for u in dict.fromkeys(units))
+        variables[name] = (dims, values, {"long_name": meaning, "units": unit or plant.input_unit})
+    status = Status(int(outcome.status))
+    return xr.Dataset(
+        variables,
+        coords={
+            "time": ("time", np.asarray(outcome.time), {"units": "s", "long_name": "time"}),
+            "axis": ("axis", list(plant.outputs), {"long_name": "output", "unit_of_each": ", ".join(units)}),
+            "input": ("input", np.arange(1, plant.inputs() + 1), {"long_name": "input"}),
+        },
+        attrs={"status": status.word, "status_sentence": status.sentence, "ended": float(outcome.ended)},
+    )

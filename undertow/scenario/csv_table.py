@@ -1,0 +1,52 @@
+"""Samples from a CSV file: columns t, d1, d2, ... with a header."""
+
+import csv
+import math
+from pathlib import Path
+
+from undertow.core.errors import BadInput
+
+
+def read_samples(path: str | Path) -> list[list[float]]:
+    """Rows (t, d1, d2, ...) of a CSV file; t in s, increasing.
+
+    Args:
+        path: of the file; header `t,d1,d2,...`, at least two rows.
+
+    Raises:
+        BadInput: missing, empty or malformed file, or times that do not increase.
+    """
+    path = Path(path)
+    name = path.name
+    if not path.is_file():
+        raise BadInput("file", "be an existing CSV file", str(path))
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as handle:
+            rows = [[cell.strip() for cell in row] for row in csv.reader(handle)]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadInput("file", "be a CSV text file", f"{name}: {error}") from None
+    numbered = [(line, row) for line, row in enumerate(rows, start=1) if any(row)]
+    if not numbered:
+        raise BadInput("file", "have a header and at least two rows", f"{name}, which is empty")
+    header = numbered[0][1]
+    if len(header) < 2 or header != ["t", *(f"d{i}" for i in range(1, len(header)))]:
+        raise BadInput("file", "have the columns t, d1, d2, ...", f"{name} with columns {', '.join(header)}")
+    if len(numbered) < 3:
+        raise BadInput("file", "have at least two rows of samples", f"{name} with {len(numbered) - 1}")
+    samples = [_numbers(name, line, row, len(header)) for line, row in numbered[1:]]
+    for (line, _), before, after in zip(numbered[2:], samples, samples[1:], strict=False):
+        if not after[0] > before[0]:
+            raise BadInput("file", "have increasing times", f"{name}, line {line}: {after[0]:g} after {before[0]:g}")
+    return samples
+
+
+def _numbers(name: str, line: int, row: list[str], columns: int) -> list[float]:
+    if len(row) != columns:
+        raise BadInput("file", f"have {columns} columns in every row", f"{name}, line {line} with {len(row)}")
+    try:
+        numbers = [float(cell) for cell in row]
+    except ValueError:
+        raise BadInput("file", "hold numbers only", f"{name}, line {line}: {', '.join(row)}") from None
+    if not all(map(math.isfinite, numbers)):
+        raise BadInput("file", "hold finite numbers only", f"{name}, line {line}: {', '.join(row)}")
+    return numbers

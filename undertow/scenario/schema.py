@@ -1,0 +1,118 @@
+"""What a scenario file may say. Validated before anything is built or compiled."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.scenario.reading import Text
+
+
+def _named(default: str | None = None) -> BeforeValidator:
+    """`odin` is short for `{kind: odin}`, and `kind` may have a default."""
+
+    def complete(value: Any) -> Any:
+        if isinstance(value, str):
+            return {"kind": value}
+        return {"kind": default, **value} if default and isinstance(value, dict) else value
+
+    return BeforeValidator(complete)
+
+
+class Part(BaseModel):
+    """A part by name, with its options: checked against the part's own signature when it is built."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+    kind: str = Field(description="name of the part, see `undertow list`, or ./file.py:function")
+
+
+NamedPart = Annotated[Part, _named()]
+Numbers = list[float]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class Loop(_Strict):
+    """How the closed loop is run."""
+
+    kind: Literal["sampled", "continuous"] = Field("sampled", description="a scan at dt, or one ODE")
+    duration: float = Field(20.0, gt=0, le=1e6, description="s")
+    dt: float = Field(1e-3, gt=0, le=10, description="sampling time of the controller, s (sampled)")
+    record: float = Field(1e-2, gt=0, le=1e5, description="time between records, s")
+    method: Literal["rk4", "euler"] = Field("rk4", description="integration of the plant (sampled)")
+    substeps: int = Field(1, ge=1, le=1000, description="plant steps per dt (sampled)")
+    rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (continuous)")
+    atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (continuous)")
+
+
+class Initial(_Strict):
+    """State at t = 0; zero where not given."""
+
+    position: Numbers | None = Field(None, description="one entry per output, m and rad")
+    velocity: Numbers | None = Field(None, description="one entry per output, m/s and rad/s")
+
+
+class Window(_Strict):
+    """Part of the run that the metrics `steady` are taken over."""
+
+    start: float = Field(10.0, ge=0, description="s")
+    stop: float = Field(20.0, gt=0, description="s")
+
+
+class Scenario(_Strict):
+    """One closed loop, start to finish."""
+
+    description: str = Field("", description="free text")
+    plant: Annotated[Part, _named("hybrid_vehicle")] = Field(
+        Part(kind="hybrid_vehicle"), description="what is controlled"
+    )
+    model: dict[str, Any] = Field(default_factory=dict, description="what the controller may know of the plant")
+    controller: Annotated[Part, _named("rcaf")] = Field(Part(kind="rcaf"), description="the law")
+    reference: NamedPart = Field(description="what to follow")
+    disturbance: NamedPart = Field(Part(kind="none"), description="what the surroundings do")
+    sensor: NamedPart = Field(Part(kind="perfect"), description="what stands before the measurement")
+    loop: Loop = Field(default_factory=Loop, description="how it is run")  # pyright: ignore[reportArgumentType]
+    initial: Initial = Field(default_factory=Initial, description="state at t = 0")  # pyright: ignore[reportArgumentType]
+    steady: Window = Field(default_factory=Window, description="window of the steady metrics")  # pyright: ignore[reportArgumentType]
+    seed: int = Field(0, ge=0, le=2**32 - 1, description="of everything random")
+    precision: Literal["float64", "float32"] = Field("float64", description="of all arithmetic")
+
+
+def validate(text: Text) -> Scenario:
+    """The scenario, or the first complaint about it.
+
+    Raises:
+        BadInput: unknown key, wrong type, value out of range; names key, place and nearest known word.
+    """
+    try:
+        return Scenario.model_validate(text.data)
+    except ValidationError as errors:
+        raise _complaint(errors.errors()[0], text) from None
+
+
+def _complaint(error: Any, text: Text) -> BadInput:
+    path = tuple(error["loc"])
+    name, where = ".".join(map(str, path)), text.where(path)
+    got = None if error["type"] == "missing" else error["input"]
+    if error["type"] == "extra_forbidden":
+        hint = did_you_mean(str(path[-1]), _keys_beside(path))
+        return BadInput(name, "be a key of the scenario", "unknown", hint=hint, where=where)
+    if error["type"] == "missing":
+        return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to the scenario", where=where)
+    return BadInput(name, _must(error), f"{got!r}" if isinstance(got, str) else got, where=where)
+
+
+def _must(error: Any) -> str:
+    """pydantic's 'Input should be ...' in the house grammar."""
+    message = error["msg"].replace("Input should be a valid ", "be a ").replace("Input should be ", "be ")
+    return message.replace("be a integer", "be an integer").replace(" or instance of Part", "")
+
+
+def _keys_beside(path: tuple) -> list[str]:
+    model: Any = Scenario
+    for key in path[:-1]:
+        field = model.model_fields.get(key) if hasattr(model, "model_fields") else None
+        model = field.annotation if field is not None else None
+    return list(model.model_fields) if hasattr(model, "model_fields") else []
