@@ -6,6 +6,7 @@ rho = |xi(0)|^2. Per axis, on x_ddot = u + d with an exact model and actuator, t
 is a plain number of one axis of a law, in SI units.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -102,12 +103,15 @@ def crossing_frequency(law: RCAF, axis: int = 0) -> float:
 
     Near sqrt(gamma gamma_eps rho / 2) when the composite branch dominates.
     """
-    excess = lambda w: np.abs(estimation_response(law, w, axis)) - 1
+
+    def worse(frequency):
+        return np.abs(estimation_response(law, frequency, axis)) > 1
+
     grid = np.geomspace(1e-3, 1e5, 4001)
-    above = np.flatnonzero(excess(grid) > 0)
+    above = np.flatnonzero(worse(grid))
     if len(above) == 0:
         return float("inf")
-    return _bisect(lambda w: bool(excess(w) > 0), *grid[[above[0] - 1, above[0]]])
+    return bisect(worse, *grid[[max(above[0] - 1, 0), above[0]]])
 
 
 def ramp_error(law: RCAF, axis: int = 0) -> tuple[float, float]:
@@ -143,39 +147,50 @@ def transient_bias(law: RCAF, axis: int = 0) -> float:
 
 
 def sampled_matrix(law: RCAF, dt: float, rule: str = "euler", axis: int = 0) -> np.ndarray:
-    """Jacobian (4 x 4) of one tick on (e, e_dot, eps, d_til) with the input held over dt seconds. Section 3.6.
+    """Jacobian (4 x 4) of one tick on (e, e_dot, eps, d_til): y, r and u held over dt seconds. Section 3.6.
 
     Args:
         law: the law.
         dt: sampling time, s.
-        rule: `euler`, one explicit step of the law's state per tick; `exact`, the matrix exponential of eps and
-            d_til between two ticks, s held.
+        rule: `euler`, one explicit step of the law's state per tick, or `exact`, its flow followed exactly, which
+            is the limit of many substeps.
         axis: which axis.
     """
     if rule not in RULES:
         raise BadInput("rule", f"be one of {', '.join(RULES)}", rule)
     g = gains(law, axis)
+    unit = np.eye(4)
     push = np.array([g.stiffness, g.damping, 0.0, -1.0])  # u = push . state
-    sliding = np.array([g.p12, g.p22, 0.0, 0.0])
-    step = np.eye(4)
-    step[0, 1] = dt
-    step[:2] -= np.outer([dt**2 / 2, dt], push)
-    observer = np.array([[-g.pole, 1.0], [-g.b2, 0.0]])
-    forced = np.zeros((3, 3))  # (eps, d_til, s), s constant
-    forced[:2, :2], forced[1, 2] = observer, -g.adaptation
-    across = np.eye(3) + dt * forced if rule == "euler" else _exponential(dt * forced)
-    step[2:] = across[:2] @ np.stack([np.eye(4)[2], np.eye(4)[3], sliding])
-    return step
+    sliding = np.array([g.p12, g.p22, 0.0, 0.0])  # s = sliding . state
+    # The law's own flow between two ticks: (x_hat_dot - measured x_dot, d_hat), driven by s and u.
+    flow = np.zeros((4, 4))
+    flow[0] = -g.pole, 1.0, 0.0, 1.0
+    flow[1] = -g.b2, 0.0, -g.adaptation, 0.0
+    across = unit + dt * flow if rule == "euler" else _exponential(dt * flow)
+    learned = across[:2] @ np.stack([unit[2], unit[3], sliding, push])
+    rate = unit[1] - dt * push  # e_dot one tick later; x_dot moves by dt u
+    return np.stack([unit[0] + dt * unit[1] - dt**2 / 2 * push, rate, learned[0] - dt * push, learned[1]])
 
 
 def largest_sampling_time(law: RCAF, rule: str = "euler", axis: int = 0) -> float:
-    """Sampling time, s, at which the spectral radius of the sampled Jacobian reaches 1. Section 3.6."""
-    unstable = lambda dt: bool(np.abs(np.linalg.eigvals(sampled_matrix(law, dt, rule, axis))).max() > 1)
+    """Sampling time, s, at which the spectral radius of the sampled Jacobian first reaches 1. Section 3.6."""
+
+    def unstable(dt: float) -> bool:
+        return bool(np.abs(np.linalg.eigvals(sampled_matrix(law, dt, rule, axis))).max() > 1)
+
     grid = np.geomspace(1e-6, 1e2, 2001)
     first = next((i for i, dt in enumerate(grid) if unstable(dt)), None)
     if first is None:
         return float("inf")
-    return 0.0 if first == 0 else _bisect(unstable, grid[first - 1], grid[first])
+    return 0.0 if first == 0 else bisect(unstable, grid[first - 1], grid[first])
+
+
+def bisect(beyond: Callable[[float], bool], low: float, high: float) -> float:
+    """Where `beyond` turns true between low and high, to rounding."""
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if beyond(middle) else (middle, high)
+    return float(high)
 
 
 def _response(law: RCAF, frequency, axis: int) -> np.ndarray:
@@ -204,11 +219,3 @@ def _exponential(matrix: np.ndarray) -> np.ndarray:
     for _ in range(halvings):
         result = result @ result
     return result
-
-
-def _bisect(beyond, low: float, high: float) -> float:
-    """Where `beyond` turns true between low and high, to 12 digits."""
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if beyond(middle) else (middle, high)
-    return float(high)

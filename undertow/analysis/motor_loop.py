@@ -1,0 +1,103 @@
+"""The law in small signal with an actuator that takes time: section 3.9 of the theory page.
+
+Per axis, on x_ddot = a with a the acceleration that the actuators give when the law asks for a_c. The
+identification model is told a_c (the voltage that was applied): nobody measures propeller speeds. Masses cancel,
+so what follows holds for any vehicle.
+"""
+
+import numpy as np
+
+from undertow.analysis.linear import bisect, gains
+from undertow.controllers.law import RCAF
+from undertow.thrusters.motor import DCMotor
+
+
+def motor_lag(motor: DCMotor, speed: float) -> tuple[float, float]:
+    """Gain kappa and lag tau (s) of a / a_c = kappa / (tau p + 1) about a propeller speed (rad/s), L = 0.
+
+    g0 = 2 k_3 c_q |speed|, kappa = g0 / (k_2 + g0), tau = k_1 / (k_2 + g0). Section 3.9.
+    """
+    slope = 2 * float(motor.k3 * motor.torque_coefficient) * abs(speed)
+    total = float(motor.k2) + slope
+    return slope / total, float(motor.k1) / total
+
+
+def lag_matrix(law: RCAF, lag: float, gain: float = 1.0, axis: int = 0) -> np.ndarray:
+    """Closed loop (5 x 5) on (e, e_dot, eps, d_hat, a) with a / a_c = gain / (lag p + 1), lag in s. Section 3.9."""
+    return _closed(law, np.array([[-1 / lag]]), np.array([gain / lag]), np.array([1.0]), axis)
+
+
+def motor_matrix(law: RCAF, motor: DCMotor, speed: float, inductance: bool = True, axis: int = 0) -> np.ndarray:
+    """Closed loop on (e, e_dot, eps, d_hat, motor) about a propeller speed (rad/s). Eqs. (8)-(11), section 3.9.
+
+    Args:
+        law: the law.
+        motor: constants, one motor.
+        speed: propeller speed about which the thrust is linearised, rad/s.
+        inductance: whether the winding counts; the motor's states are then its speed and current (6 x 6),
+            else its speed alone (5 x 5).
+        axis: which axis.
+    """
+    volts_per_thrust = 1 / float(motor.voltage_gain)
+    thrust_slope = 2 * float(motor.thrust_coefficient) * abs(speed)
+    torque_slope = 2 * float(motor.torque_coefficient) * abs(speed)
+    if not inductance:
+        resisted = float(motor.k2) + float(motor.k3) * torque_slope
+        own = np.array([[-resisted]]) / float(motor.k1)
+        return _closed(law, own, np.array([volts_per_thrust / float(motor.k1)]), np.array([thrust_slope]), axis)
+    inertia, winding = float(motor.rotor_inertia), float(motor.inductance)
+    own = np.array(
+        [
+            [-(float(motor.friction) + torque_slope) / inertia, float(motor.torque_constant) / inertia],
+            [-float(motor.back_emf_constant) / winding, -float(motor.resistance) / winding],
+        ]
+    )
+    return _closed(law, own, np.array([0.0, volts_per_thrust / winding]), np.array([thrust_slope, 0.0]), axis)
+
+
+def rightmost(matrix: np.ndarray) -> complex:
+    """Eigenvalue of largest real part, 1/s, the one of a pair with positive imaginary part."""
+    values = np.linalg.eigvals(matrix)
+    value = complex(values[np.argmax(values.real)])
+    return complex(value.real, abs(value.imag))
+
+
+def critical_lag(law: RCAF, gain: float = 1.0, axis: int = 0) -> float:
+    """Actuator lag, s, beyond which the whole loop is unstable; infinite if none below 100 s is. Section 3.9."""
+
+    def unstable(lag: float) -> bool:
+        return rightmost(lag_matrix(law, lag, gain, axis)).real > 0
+
+    grid = np.geomspace(1e-6, 1e2, 1601)
+    first = next((i for i, lag in enumerate(grid) if unstable(lag)), None)
+    if first is None:
+        return float("inf")
+    return 0.0 if first == 0 else bisect(unstable, grid[first - 1], grid[first])
+
+
+def critical_observer_lag(law: RCAF, axis: int = 0) -> float:
+    """Unity-gain lag, s, that the observer loop alone tolerates: a1 / (b2 - a1^2), or infinite. Section 3.9.
+
+    Routh's condition for lag p^3 + (1 + a1 lag) p^2 + a1 p + b2, without the feedback and the robust term.
+    """
+    g = gains(law, axis)
+    return g.pole / (g.b2 - g.pole**2) if g.b2 > g.pole**2 else float("inf")
+
+
+def _closed(law: RCAF, own: np.ndarray, drive: np.ndarray, push: np.ndarray, axis: int) -> np.ndarray:
+    """Law around an actuator m' = own m + drive a_c, a = push m."""
+    g = gains(law, axis)
+    states = 4 + len(own)
+    asked = np.zeros(states)
+    asked[:4] = g.stiffness, g.damping, 0.0, -1.0
+    given = np.zeros(states)
+    given[4:] = push
+    matrix = np.zeros((states, states))
+    matrix[0, 1] = 1.0
+    matrix[1] = -given
+    matrix[2] = asked - given
+    matrix[2, 2:4] += -g.pole, 1.0
+    matrix[3, :3] = -g.adaptation * g.p12, -g.adaptation * g.p22, -g.b2
+    matrix[4:, 4:] = own
+    matrix[4:] += np.outer(drive, asked)
+    return matrix
