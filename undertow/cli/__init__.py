@@ -1,1 +1,1 @@
-"""The command line."""
+"""The command line: commands, nothing else. Nothing heavy is imported before a command runs."""

@@ -13,6 +13,10 @@ from undertow.scenario import parts
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Scenario, validate
 
+# A record takes about a kilobyte, a sampling time some microseconds.
+MOST_RECORDS = 1_000_000
+MOST_TICKS = 2_000_000_000
+
 
 class Built(NamedTuple):
     """A scenario turned into objects."""
@@ -20,6 +24,12 @@ class Built(NamedTuple):
     closed_loop: ClosedLoop
     scenario: Scenario
     resolved: dict[str, Any]  # the scenario with every default filled in
+
+    def advice(self) -> tuple[str, ...]:
+        """What is odd about it, though it can be run."""
+        window, loop = self.scenario.steady, self.scenario.loop
+        late = f"the steady window starts at {window.start:g} s, the run ends at {loop.duration:g} s: no steady metrics"
+        return self.closed_loop.plant.advice() + ((late,) if window.start >= loop.duration else ())
 
 
 def build(source: Text | Mapping[str, Any]) -> Built:
@@ -71,6 +81,12 @@ def _check_times(text: Text, scenario: Scenario) -> None:
     if loop.duration < shortest:
         must, got = f"be at least one record ({shortest:g} s)", f"{loop.duration:g} s"
         raise BadInput("loop.duration", must, got, where=text.where(("loop", "duration")))
+    if loop.duration / loop.record > MOST_RECORDS:
+        must = f"keep the run to {MOST_RECORDS} records: at least {loop.duration / MOST_RECORDS:g} s"
+        raise BadInput("loop.record", must, f"{loop.record:g} s", where=text.where(("loop", "record")))
+    if loop.kind == "sampled" and loop.duration / loop.dt > MOST_TICKS:
+        must = f"keep the run to {MOST_TICKS} sampling times: at least {loop.duration / MOST_TICKS:g} s"
+        raise BadInput("loop.dt", must, f"{loop.dt:g} s", where=text.where(("loop", "dt")))
     ratio = loop.record / loop.dt
     if loop.kind == "sampled" and (round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6 * ratio):
         must, got = f"be a whole number of sampling times ({loop.dt:g} s)", f"{loop.record:g} s"

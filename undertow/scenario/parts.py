@@ -16,7 +16,7 @@ from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario.csv_table import read_samples
 
 # Arguments that are parts themselves: their kind, and what they are when nothing is said.
-_INNER = {"vehicle": ("vehicles", "odin"), "thruster": ("thrusters", "paper_table3")}
+INNER = {"vehicle": ("vehicles", "odin"), "thruster": ("thrusters", "paper_table3")}
 
 # Kinds that are data: every declared parameter of theirs may be changed by name.
 _ADJUSTABLE = ("vehicles", "thrusters")
@@ -72,8 +72,8 @@ def call(
     hints = typing.get_type_hints(function)
     arguments, resolved = {}, {}
     for name, parameter in known.items():
-        if name in _INNER:
-            kind, default = _INNER[name]
+        if name in INNER:
+            kind, default = INNER[name]
             inner = options.get(name, default)
             if isinstance(inner, Mapping):
                 inner = {"kind": default, **inner}

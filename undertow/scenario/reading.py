@@ -1,9 +1,11 @@
 """Reading scenario files: YAML 1.2 with line numbers, or the scenario inside a result file."""
 
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import xarray as xr
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
@@ -53,9 +55,7 @@ def read(path: Path) -> Text:
 
 def dump(data: Mapping[str, Any]) -> str:
     """Data as YAML text that reads back to the same data."""
-    from io import StringIO
-
-    stream = StringIO()
+    stream = io.StringIO()
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.width = 4096
@@ -65,8 +65,6 @@ def dump(data: Mapping[str, Any]) -> str:
 
 
 def _from_result(path: Path) -> Text:
-    import xarray as xr
-
     try:
         with xr.open_dataset(path, engine="netcdf4") as dataset:
             text = dataset.attrs.get("scenario")

@@ -1,6 +1,8 @@
 """What a scenario file may say. Validated before anything is built or compiled."""
 
-from typing import Annotated, Any, Literal
+import typing
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -116,3 +118,41 @@ def _keys_beside(path: tuple) -> list[str]:
         field = model.model_fields.get(key) if hasattr(model, "model_fields") else None
         model = field.annotation if field is not None else None
     return list(model.model_fields) if hasattr(model, "model_fields") else []
+
+
+class Key(NamedTuple):
+    """One key of a scenario file."""
+
+    path: str
+    type: str
+    default: Any  # "required" when there is none
+    meaning: str
+
+
+def keys(model: type[BaseModel] = Scenario, prefix: str = "") -> Iterator[Key]:
+    """Every key a scenario may have, nested ones included."""
+    for name, field in model.model_fields.items():
+        inner = field.annotation if isinstance(field.annotation, type) else None
+        meaning = field.description or ""
+        if inner is not None and issubclass(inner, _Strict):
+            yield Key(f"{prefix}{name}", "mapping", "see below", meaning)
+            yield from keys(inner, f"{prefix}{name}.")
+        else:
+            default = field.get_default(call_default_factory=True)
+            shown = default.kind if isinstance(default, Part) else "required" if field.is_required() else default
+            yield Key(f"{prefix}{name}", _type_name(field.annotation), shown, meaning)
+
+
+def _type_name(annotation: Any) -> str:
+    if annotation is Part:
+        return "part"
+    if typing.get_origin(annotation) is Literal:
+        return " or ".join(typing.get_args(annotation))
+    words = {
+        float: "number",
+        int: "integer",
+        str: "text",
+        Numbers: "list of numbers",
+        Numbers | None: "list of numbers",
+    }
+    return words.get(annotation, "mapping")

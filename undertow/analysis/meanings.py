@@ -1,0 +1,40 @@
+"""What each metric means, for tables, reports and `undertow describe metrics`."""
+
+from typing import NamedTuple
+
+
+class Meaning(NamedTuple):
+    """One metric: its meaning in words and its unit."""
+
+    meaning: str
+    unit: str
+
+
+# In the order in which tables show them. Over all axes: root mean square of the axes' own figures.
+MEANINGS = {
+    "tracking_rms": Meaning("rms of the tracking error x_d - x, angles the short way round", "m, rad"),
+    "tracking_max": Meaning("largest tracking error", "m, rad"),
+    "estimation_rms": Meaning("rms of d_hat - d", "m/s^2, rad/s^2"),
+    "uncertainty_rms": Meaning("rms of the lumped uncertainty d = x_ddot - F - G V", "m/s^2, rad/s^2"),
+    "robust_rms": Meaning("rms of the robust term u_r", "m/s^2, rad/s^2"),
+    "model_rms": Meaning("rms of the modelling error eps = x_hat_dot - x_dot", "m/s, rad/s"),
+    "voltage_rms": Meaning("rms of the applied voltage over all thrusters", "V"),
+    "voltage_peak": Meaning("largest applied voltage", "V"),
+    "voltage_variation": Meaning("total variation of the voltage per second, mean over thrusters: chattering", "V/s"),
+    "weights_peak": Meaning("largest |theta|: drift shows here first", "m/s^2, rad/s^2"),
+    "energy": Meaning("electrical energy drawn", "J"),
+    "settling_time": Meaning("last time the position error is more than 2 % of its first value", "s"),
+    "saturated_fraction": Meaning("share of thruster-seconds at a limit", ""),
+    "rules": Meaning("fuzzy rules per axis", ""),
+}
+
+# Metrics that also come per axis, as `<name>_axes`.
+PER_AXIS = (
+    "tracking_rms",
+    "tracking_max",
+    "estimation_rms",
+    "uncertainty_rms",
+    "robust_rms",
+    "model_rms",
+    "settling_time",
+)

@@ -1,0 +1,67 @@
+"""`undertow describe`: one part, the scenario file, or the metrics."""
+
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from undertow.analysis.meanings import MEANINGS, PER_AXIS
+from undertow.cli.tables import wide_console
+from undertow.scenario import describing
+from undertow.scenario.schema import keys
+
+
+def describe(name: str) -> None:
+    """Print what is known about a part, the keys of a scenario, or the metrics."""
+    console = wide_console()
+    if name == "scenario":
+        rows = [(key.path, key.type, _text(key.default), key.meaning) for key in keys()]
+        _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
+    elif name == "metrics":
+        rows = [(key, unit, "yes" if key in PER_AXIS else "", meaning) for key, (meaning, unit) in MEANINGS.items()]
+        _show_table(console, "Metrics", ("metric", "unit", "also <metric>_axes", "meaning"), rows)
+    else:
+        for description in describing.describe(name):
+            _show_part(console, description)
+
+
+def _show_part(console: Console, part: describing.Description) -> None:
+    console.print(Text(f"{part.name} {part.kind}".rstrip(), style="bold"))
+    console.print(Text(part.summary))
+    if part.options:
+        rows = [(option.name, _text(option.default), option.meaning) for option in part.options]
+        _show_table(console, "Options", ("option", "default", "meaning"), rows)
+    if part.parameters:
+        rows = [(p.name, _text(p.value), p.unit, p.symbol, p.meaning, p.source) for p in part.parameters]
+        _show_table(console, "Parameters", ("parameter", "value", "unit", "symbol", "meaning", "source"), rows)
+    for sentence in part.advice:
+        console.print(Text(f"Advice: {sentence}"))
+
+
+def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    table = Table(title=title, title_justify="left", title_style="bold")
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    console.print(table)
+
+
+def _text(value: Any) -> str:
+    """A value in few characters; diagonal matrices by their diagonal."""
+    if isinstance(value, str) or value is None:
+        return "none" if value is None else value
+    if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
+        return str(value).lower()
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 0:
+        return f"{array:.6g}"
+    if array.ndim == 2 and array.shape[0] == array.shape[1] and not np.any(array - np.diag(np.diag(array))):
+        return f"diag{_row(np.diag(array))}"
+    return "\n".join(map(_row, np.atleast_2d(array)))
+
+
+def _row(entries: np.ndarray) -> str:
+    return f"({', '.join(f'{entry:.6g}' for entry in entries)})"

@@ -1,0 +1,52 @@
+"""How a command ends: exit codes, and one line on stderr when something is wrong."""
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+
+DONE = 0
+RUN_FAILED = 1
+BAD_INPUT = 2
+INTERNAL_ERROR = 3
+FILES_FAILED = 4
+INTERRUPTED = 130
+
+
+def run_guarded(command: Any, arguments: Sequence[str]) -> int:
+    """Exit code of a command; whatever it raises becomes one line on stderr."""
+    try:
+        return command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except Exception as error:
+        if os.environ.get("UNDERTOW_TRACEBACK") and not isinstance(error, typer.TyperException):
+            traceback.print_exc()
+        code, sentence = _explain(error)
+        complain(sentence)
+        return code
+
+
+def complain(sentence: str) -> None:
+    """Say what is wrong, in one line."""
+    print("Error: " + " ".join(sentence.split()), file=sys.stderr)
+
+
+def _explain(error: Exception) -> tuple[int, str]:
+    if isinstance(error, typer.TyperException):
+        sentence = getattr(error, "format_message", error.__str__)().rstrip(".")
+        context = getattr(error, "ctx", None)
+        path = context.command_path if context is not None else "undertow"
+        return BAD_INPUT, f"{sentence}. See `{path} --help`"
+    from undertow.core.errors import BadInput  # noqa: PLC0415  (JAX comes with it: not needed for a mistyped option)
+
+    if isinstance(error, BadInput):
+        return BAD_INPUT, str(error)
+    if isinstance(error, OSError):
+        at = f" ({error.filename})" if error.filename else ""
+        return FILES_FAILED, f"files could not be read or written: {error.strerror or error}{at}"
+    hint = "To see where, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
+    return INTERNAL_ERROR, f"internal error, {type(error).__name__}: {error}. {hint}"

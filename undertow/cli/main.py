@@ -1,0 +1,132 @@
+"""`undertow`: what can be typed. The work is in one file per command, imported when the command runs."""
+
+# ruff: noqa: PLC0415  (imports inside the commands keep `undertow --help` under half a second)
+
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from undertow.cli.exit_codes import INTERRUPTED, run_guarded
+
+app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@app.callback(invoke_without_command=True)
+def undertow(
+    context: typer.Context,
+    traceback: Annotated[bool, typer.Option("--traceback", help="Show where an error came from.")] = False,
+) -> None:
+    """Robust adaptive control of underwater vehicles, from volts to trajectory, that shows its own limits.
+
+    Exit codes: 0 done; 1 done, but a run failed; 2 bad input; 3 internal error; 4 files could not be read or written;
+    130 interrupted.
+    """
+    if traceback:
+        os.environ["UNDERTOW_TRACEBACK"] = "1"
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command()
+def reproduce(
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder for the report, made if missing; an earlier one is replaced.")
+    ] = Path("reproduction"),
+    quick: Annotated[bool, typer.Option("--quick", help="Leave out sweeps. Accuracy stays.")] = False,
+) -> None:
+    """Reproduce the paper.
+
+    Computes every figure and table, audits the claims, and writes one HTML page, DIR/report.html.
+    """
+    from undertow.cli.reproduce import reproduce
+
+    reproduce(out, quick)
+
+
+@app.command()
+def simulate(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for the results. Default: runs/NAME for NAME.yaml, or runs/NAME-2, ... if taken.",
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool,
+        typer.Option("--overwrite", help="Replace an earlier result in DIR. Without it, DIR must not hold one."),
+    ] = False,
+) -> int:
+    """Run one closed loop.
+
+    Writes run.nc, metrics.json, scenario.yaml and figures/. A result file as SCENARIO repeats its run bit for bit, and
+    says whether it did. Nothing is written unless the whole run was; files of other names in DIR stay as they are.
+    """
+    from undertow.cli.simulate import simulate
+
+    return simulate(scenario, out, overwrite)
+
+
+@app.command("list")
+def list_parts(
+    kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,
+) -> None:
+    """List what there is.
+
+    Kinds: vehicles, thrusters, plants, controllers, disturbances, references, sensors.
+    """
+    from undertow.cli.list_parts import list_parts
+
+    list_parts(kind)
+
+
+@app.command()
+def describe(
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME", help="A part (see `undertow list`), ./file.py:function, scenario or metrics."),
+    ],
+) -> None:
+    """Describe a part.
+
+    Shows its options, its parameters with unit, symbol and source, and advice. `describe scenario` shows the keys of
+    a scenario file, `describe metrics` what is measured.
+    """
+    from undertow.cli.describe import describe
+
+    describe(name)
+
+
+@app.command()
+def version() -> None:
+    """Show versions."""
+    from undertow.cli.version import version
+
+    version()
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Exit code of `undertow` with these arguments; what it says goes to stdout and stderr."""
+    return run_guarded(typer.main.get_command(app), arguments)
+
+
+def main() -> None:
+    """Entry point of the `undertow` command."""
+    if not os.environ.get("UNDERTOW_TRACEBACK"):
+        warnings.simplefilter("ignore")
+    code = run(sys.argv[1:])
+    if code == INTERRUPTED:  # a compiled loop may still be running in its thread; nothing can stop it gently
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,43 @@
+"""`undertow reproduce`: the paper, whole."""
+
+import json
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from undertow.cli.results_folder import results_folder
+from undertow.cli.tables import wide_console
+from undertow.studies.paper import reproduce as study
+
+_WRITTEN = ("report.html", "results.json", "figures", "runs")
+
+
+def reproduce(out: Path, quick: bool) -> None:
+    """Write the report to `out` and print its verdicts."""
+    console = wide_console()
+    with results_folder(out, _WRITTEN, "results.json", overwrite=True) as staging:
+        report = out / _watched(console, staging, quick).relative_to(staging)
+    for line in _verdicts(out / "results.json"):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    console.print(f"Report: {report}", highlight=False, soft_wrap=True)
+
+
+def _watched(console: Console, folder: Path, quick: bool) -> Path:
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
+        task = live.add_task("starting", total=1.0)
+
+        def progress(message: str, fraction: float) -> None:
+            live.update(task, description=message, completed=fraction)
+            if not console.is_terminal:
+                console.print(f"{fraction:4.0%} {message}", markup=False, highlight=False)
+
+        return study.reproduce(folder, quick, progress)
+
+
+def _verdicts(results: Path) -> list[str]:
+    if not results.is_file():
+        return []
+    claims = json.loads(results.read_text(encoding="utf-8")).get("claims", [])
+    return [f"{claim['id']:<4}{claim['verdict']}: {claim['claim']}" for claim in claims]

@@ -1,0 +1,71 @@
+"""`undertow simulate`: one closed loop, from a scenario file to figures."""
+
+from pathlib import Path
+
+import typer
+from rich.console import Console
+
+from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
+from undertow.cli.interruptible import interruptible
+from undertow.cli.results_folder import next_free, results_folder
+from undertow.cli.stages import Stages
+from undertow.cli.tables import metrics_table, wide_console
+from undertow.core.status import Status
+from undertow.scenario.build import build
+from undertow.scenario.execute import Executed, execute, save
+from undertow.scenario.labelling import metrics_text
+from undertow.scenario.reading import dump, read
+from undertow.scenario.repetition import Repetition, compare
+
+_WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
+
+
+def simulate(scenario: Path, out: Path | None, overwrite: bool) -> int:
+    """Exit code of a run whose results went to `out`, or to a folder under runs/ that was free."""
+    console = wide_console()
+    stages = Stages(console)
+    folder = next_free(Path("runs") / scenario.stem) if out is None else out
+    with results_folder(folder, _WRITTEN, "run.nc", overwrite) as staging:
+        executed = _run(scenario, stages)
+        with stages("figures and files"):
+            _write(executed, staging)
+        repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
+    window, duration = executed.built.scenario.steady, executed.built.scenario.loop.duration
+    console.print(metrics_table(executed.steady, executed.whole, (window.start, min(window.stop, duration))))
+    console.print(f"Status: {executed.status.word}. Results: {folder}", highlight=False, soft_wrap=True)
+    codes = [_judge_ending(executed)] + ([_judge(repetition, console)] if repetition else [])
+    return max(codes)
+
+
+def _run(path: Path, stages: Stages) -> Executed:
+    with stages("reading"):
+        text = read(path)
+    with stages("building"):
+        built = build(text)
+    for sentence in built.advice():
+        typer.echo(f"Advice: {sentence}", err=True)
+    with stages("compiling and running"):
+        return interruptible(lambda: execute(built))
+
+
+def _write(executed: Executed, folder: Path) -> None:
+    save(executed.dataset, folder / "run.nc")
+    (folder / "metrics.json").write_text(metrics_text(executed.dataset), encoding="utf-8")
+    (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
+
+
+def _judge_ending(executed: Executed) -> int:
+    if executed.status is Status.OK:
+        return DONE
+    ended, duration = float(executed.outcome.ended), executed.built.scenario.loop.duration
+    ending = f"ended as `{executed.status.word}` at {ended:.4g} s of {duration:g} s"
+    complain(f"the run {ending}. {executed.status.sentence}")
+    return RUN_FAILED
+
+
+def _judge(repetition: Repetition, console: Console) -> int:
+    if repetition.equal or repetition.explained:
+        console.print(f"{repetition.sentence}.", highlight=False, soft_wrap=True)
+        return DONE
+    complain(repetition.sentence)
+    return RUN_FAILED

@@ -1,0 +1,112 @@
+"""What can be said about a part without running it: for `undertow list`, `undertow describe` and the docs."""
+
+import inspect
+import re
+import typing
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import equinox as eqx
+
+from undertow.core import catalogue
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.param import Parameter, parameters
+from undertow.scenario import parts
+
+
+class Option(NamedTuple):
+    """One argument of a part, as it stands in a scenario."""
+
+    name: str
+    default: Any  # "required" when there is none
+    meaning: str
+
+
+class Description(NamedTuple):
+    """A part, described."""
+
+    kind: str
+    name: str
+    summary: str
+    options: tuple[Option, ...]
+    parameters: tuple[Parameter, ...]
+    advice: tuple[str, ...]
+
+
+def describe(name: str) -> tuple[Description, ...]:
+    """Every part of that name; kinds are separate, so there may be more than one.
+
+    Args:
+        name: of a part, `kind/name` for one kind only, or `./file.py:function`.
+
+    Raises:
+        BadInput: no such part.
+    """
+    if ".py:" in name:
+        return (_describe("", name, catalogue.find("", name)),)
+    wanted, _, short = name.rpartition("/")
+    kinds = [kind for kind in catalogue.KINDS if wanted in ("", kind)]
+    known = {kind: catalogue.names(kind) for kind in kinds}
+    found = tuple(_describe(kind, short, known[kind][short]) for kind in kinds if short in known[kind])
+    if not found:
+        every = {part for parts_of_kind in known.values() for part in parts_of_kind}
+        raise BadInput("NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "metrics"}))
+    return found
+
+
+def summary(part: Any) -> str:
+    """First sentence of a part's docstring."""
+    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+
+
+def _describe(kind: str, name: str, part: Any) -> Description:
+    instance = _instance(kind, name, part)
+    shown = instance if instance is not None else typing.get_type_hints(part).get("return")
+    described = isinstance(shown, eqx.Module) or (isinstance(shown, type) and issubclass(shown, eqx.Module))
+    return Description(
+        kind=kind,
+        name=name,
+        summary=_prose(part),
+        options=_options(kind, part),
+        parameters=tuple(parameters(shown)) if described else (),
+        advice=instance.advice() if hasattr(instance, "advice") else (),
+    )
+
+
+def _instance(kind: str, name: str, part: Any) -> Any:
+    """The part with all its defaults; None when it needs something to be given."""
+    try:
+        return parts.make(kind, name, Path())[0] if kind else part()
+    except (BadInput, TypeError):
+        return None
+
+
+def _prose(part: Any) -> str:
+    """Docstring without its sections."""
+    return re.split(r"\n\s*(?:Args|Raises|Returns):", inspect.getdoc(part) or "")[0].strip()
+
+
+def _options(kind: str, part: Any) -> tuple[Option, ...]:
+    meanings = _meanings(inspect.getdoc(part) or "")
+    options = []
+    for name, parameter in inspect.signature(part).parameters.items():
+        default = "required" if parameter.default is inspect.Parameter.empty else parameter.default
+        if name in parts.INNER:
+            default = parts.INNER[name][1]
+        if not (kind == "controllers" and name == "model"):  # comes from the plant, not from the user
+            options.append(Option(name, default, meanings.get(name, "")))
+    return tuple(options)
+
+
+def _meanings(text: str) -> dict[str, str]:
+    """Argument -> its line(s) in the `Args:` section of a docstring; `a, b: ...` speaks of both."""
+    section = re.search(r"^Args:\n((?:[ \t]+.*\n?|\n)*)", text, re.MULTILINE)
+    found: dict[str, str] = {}
+    names: list[str] = []
+    for line in (section.group(1) if section else "").splitlines():
+        entry = re.match(r"^ {4}(\w+(?:, \w+)*): (.*)$", line)
+        names = entry.group(1).split(", ") if entry else names
+        more = entry.group(2) if entry else line.strip()
+        for name in names:
+            found[name] = f"{found.get(name, '')} {more}".strip()
+    return found

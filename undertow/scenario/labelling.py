@@ -1,0 +1,66 @@
+"""What is known about a finished run: status, metrics, and a dataset that says how it came about."""
+
+import json
+import math
+from typing import Any, NamedTuple
+
+import xarray as xr
+
+from undertow.analysis.metrics import measure
+from undertow.core.status import Status
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.outcome import Outcome
+from undertow.loop.record import to_dataset
+from undertow.scenario.provenance import content_hash, versions
+
+
+class Labelled(NamedTuple):
+    """One finished run."""
+
+    status: Status
+    steady: dict[str, Any] | None  # metrics over the steady window; None when the run did not last
+    whole: dict[str, Any]
+    dataset: xr.Dataset
+
+
+def label(loop: ClosedLoop, outcome: Outcome, window: tuple[float, float], attributes: dict[str, Any]) -> Labelled:
+    """Measure a run and write down what it was.
+
+    Args:
+        loop: what was run.
+        outcome: how it went.
+        window: start and stop of the steady metrics, s.
+        attributes: of the dataset, beside status, metrics, versions and content hash.
+    """
+    status, ended, rules = Status(int(outcome.status)), float(outcome.ended), _rules(loop)
+    covered = status is Status.OK and window[0] < ended
+    steady = measure(outcome, *window) | rules if covered else None
+    whole = measure(outcome, 0.0, ended) | rules
+    dataset = to_dataset(outcome, loop.plant)
+    dataset.attrs |= attributes | versions()
+    dataset.attrs |= {"metrics": to_json({"steady": steady, "whole": whole}), "content_hash": content_hash(dataset)}
+    return Labelled(status, steady, whole, dataset)
+
+
+def metrics_text(dataset: xr.Dataset) -> str:
+    """Contents of metrics.json for a run."""
+    ending = {"status": dataset.attrs["status"], "ended": dataset.attrs["ended"]}
+    return to_json(ending | json.loads(dataset.attrs["metrics"]), indent=2) + "\n"
+
+
+def to_json(value: Any, indent: int | None = None) -> str:
+    """JSON that every reader takes: numbers that are not finite become null."""
+    return json.dumps(_finite(value), indent=indent, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _rules(loop: ClosedLoop) -> dict[str, int]:
+    fuzzy = getattr(loop.controller, "fuzzy", None)
+    return {} if fuzzy is None else {"rules": fuzzy.rules}
