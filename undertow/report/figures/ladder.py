@@ -1,0 +1,106 @@
+"""The fidelity ladder: the same law on four truths of the same thruster."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
+
+from undertow.report.figures import signals, style
+
+_SHOWN = {
+    "tracking_rms": "tracking error rms, m and rad",
+    "estimation_rms": "estimation error rms, m/s$^2$ and rad/s$^2$",
+    "voltage_variation": "voltage variation, V/s",
+    "weights_peak": "largest weight, m/s$^2$ or rad/s$^2$",
+}
+_MARKS = {"rcafc": "o", "rafc": "s"}
+
+Runs = Mapping[str, Mapping[str, xr.Dataset]]  # rung, controller
+
+
+def ladder_figure(ladder: Mapping[str, Mapping[str, Any]], datasets: Runs | None = None) -> Figure:
+    """Error against time on every rung, and metrics over the rungs.
+
+    Args:
+        ladder: by rung and controller, `status`, `diverged_at` (s or None), `steady` (metrics or None).
+        datasets: the runs, by rung and controller; without them only the metrics are drawn.
+    """
+    tall = 1.75 if datasets else 0.0
+    figure = style.blank(9.6, 0.55 + tall + 2.35)
+    style.head(figure, "Fidelity ladder: one law, four thrusters", dict(style.CONTROLLERS.values()))
+    for number, rung in enumerate(ladder if datasets else ()):
+        panel = style.place(figure, 0.56 + 2.38 * number, 0.58, 1.75, 1.25)
+        _errors(panel, rung, ladder[rung], datasets[rung])
+        style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", rung)
+    for number, (metric, text) in enumerate(_SHOWN.items()):
+        panel = style.place(figure, 0.56 + 2.38 * number, 0.68 + tall, 1.75, 1.35)
+        _metric(panel, ladder, metric)
+        style.label(panel, "", "", text, style.TINY)
+    return figure
+
+
+def _errors(panel: Axes, rung: str, entries: Mapping[str, Any], runs: Mapping[str, xr.Dataset]) -> None:
+    """Root mean square over the axes of the tracking error; a cross where a run ended early."""
+    panel.set_yscale("log", nonpositive="mask")
+    panel.yaxis.set_minor_locator(NullLocator())
+    for key, run in runs.items():
+        name, look = style.CONTROLLERS[key]
+        error = signals.curve(run, name, "error", look)
+        time, size = error.time, np.sqrt((error.values**2).mean(axis=1))
+        panel.plot(
+            time,
+            size,
+            color=look.colour,
+            linestyle=look.dashes,
+            linewidth=look.width,
+            zorder=look.order,
+            label=f"{name}, {rung}",
+        )
+        if entries[key]["status"] != "ok":
+            panel.plot(time[-1], size[-1], "X", color=look.colour, markersize=6, zorder=5)
+            _say(panel, f"{name}: {_ending(entries[key])}", (0.98, 0.9))
+
+
+def _metric(panel: Axes, ladder: Mapping[str, Mapping[str, Any]], metric: str) -> None:
+    rungs = list(ladder)
+    panel.set_yscale("log")
+    panel.yaxis.set_major_locator(LogLocator(numticks=5))
+    panel.yaxis.set_minor_locator(NullLocator())
+    for key, (name, look) in style.CONTROLLERS.items():
+        entries = [ladder[rung].get(key) or {} for rung in rungs]
+        values = [(entry.get("steady") or {}).get(metric, np.nan) for entry in entries]
+        panel.plot(
+            range(len(rungs)),
+            values,
+            color=look.colour,
+            linestyle=look.dashes,
+            linewidth=look.width,
+            marker=_MARKS[key],
+            markersize=4,
+            zorder=look.order,
+            label=name,
+        )
+        for place, entry in enumerate(entries):
+            if entry and not entry.get("steady"):
+                top = panel.get_xaxis_transform()
+                panel.plot(place, 0.93, "X", transform=top, color=look.colour, markersize=6)
+                words = {"transform": top, "fontsize": style.TINY, "ha": "right", "va": "center"}
+                panel.text(place - 0.15, 0.93, f"{name} {_ending(entry)}", **words)
+    panel.set_xticks(range(len(rungs)), [rung.replace("electromechanical", "electro-\nmech.") for rung in rungs])
+    panel.set_xlim(-0.3, len(rungs) - 0.7)
+    low, high = panel.get_ylim()
+    panel.set_ylim(low, high * (high / low) ** 0.25)  # room for what failed
+
+
+def _ending(entry: Mapping[str, Any]) -> str:
+    when = entry.get("diverged_at")
+    word = str(entry["status"]).replace("_", " ")
+    return word if when is None else f"{word} at {when:.3g} s"
+
+
+def _say(panel: Axes, text: str, place: tuple[float, float]) -> None:
+    panel.text(*place, text, transform=panel.transAxes, fontsize=style.TINY, ha="right", va="top")

@@ -1,0 +1,78 @@
+"""Ranges of the y axis: made for what the reader should see, and saying so where something lies outside."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
+
+from undertow.report.figures import style
+
+Named = Sequence[tuple[str, np.ndarray, np.ndarray]]  # name, time, values
+
+
+def fit_linear(panel: Axes, series: Named, start: float) -> None:
+    """Fit to the values after `start`, s; what leaves the panel before is written above it."""
+    late = _finite([values[time >= start] for _, time, values in series])
+    if not late.size:
+        return
+    low, high = float(late.min()), float(late.max())
+    margin = 0.08 * (high - low) or 0.08 * max(abs(high), 1e-12)
+    low, high = low - margin, high + margin
+    panel.set_ylim(low, high)
+    beyond = []
+    for name, _, values in series:
+        outside = np.where(np.isfinite(values), np.maximum(values - high, low - values), -np.inf)
+        if outside.size and outside.max() > 0:
+            beyond.append(f"{name} to {values[outside.argmax()]:.3g}")
+    if beyond:
+        _note(panel, f"first {start:.2g} s: {', '.join(beyond)}")
+
+
+def fit_log(panel: Axes, series: Named, start: float) -> None:
+    """Logarithmic; the bottom leaves out the dips at zero crossings."""
+    del start
+    sizes = _finite([values for _, _, values in series])
+    sizes = sizes[sizes > 0]
+    panel.set_yscale("log", nonpositive="mask")
+    panel.yaxis.set_major_locator(LogLocator(numticks=5))
+    panel.yaxis.set_minor_locator(NullLocator())
+    if sizes.size:
+        panel.set_ylim(float(np.quantile(sizes, 0.02)) / 2, 2 * float(sizes.max()))
+
+
+def fit_symmetric(panel: Axes, series: Named, start: float) -> None:
+    """Linear about zero, logarithmic outside: for runs that left every scale."""
+    del start
+    early = max(early_size(time, values) for _, time, values in series)
+    panel.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(max(early, 1e-12))))
+    sizes = np.abs(_finite([values for _, _, values in series]))
+    if sizes.size and sizes.max() > 0:
+        top = 10.0 ** np.floor(np.log10(sizes.max()))
+        panel.yaxis.set_major_locator(FixedLocator([-top, 0.0, top]))
+
+
+def early_size(time: np.ndarray, values: np.ndarray) -> float:
+    """Median size in the first third of a record: what was normal before a run failed."""
+    sizes = np.abs(_finite([values[time <= time[0] + (time[-1] - time[0]) / 3].ravel()])) if len(time) else np.zeros(0)
+    return float(np.median(sizes)) if sizes.size else 0.0
+
+
+def _finite(parts: Sequence[np.ndarray]) -> np.ndarray:
+    values = np.concatenate(parts) if parts else np.zeros(0)
+    return values[np.isfinite(values)]
+
+
+def _note(panel: Axes, text: str) -> None:
+    """A line above the upper right corner."""
+    panel.annotate(
+        text,
+        (1, 1),
+        xycoords="axes fraction",
+        xytext=(0, 2),
+        textcoords="offset points",
+        fontsize=style.TINY,
+        color=style.INK,
+        ha="right",
+        va="bottom",
+    )

@@ -1,0 +1,96 @@
+"""Small multiples: one panel per axis or thruster, with a second panel that shows what the first cannot."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from undertow.report.figures import style
+from undertow.report.figures.limits import fit_linear, fit_log, fit_symmetric
+
+WIDTH = 9.6  # in
+_HEAD, _FOOT, _LEFT, _RIGHT, _GAP, _BETWEEN = 0.34, 0.2, 0.56, 0.1, 0.08, 0.24
+
+
+class Curve(NamedTuple):
+    """A signal of several columns, one panel each."""
+
+    name: str
+    time: np.ndarray  # s, (samples,)
+    values: np.ndarray  # (samples, columns)
+    look: style.Look
+
+
+class Block(NamedTuple):
+    """What is drawn once per column."""
+
+    curves: Sequence[Curve]
+    quantities: Sequence[str]  # y label per column, with unit
+    height: float = 1.15  # in
+    width: float = 1.0  # share, where blocks stand beside each other
+    scale: str = "linear"  # or log, symlog
+    window: tuple[float, float] | None = None  # s; the whole record by default
+    limits_from: float = 0.0  # s; the y axis is made for what comes after
+    titled: bool = False  # carries the name of the column
+
+
+def small_multiples(
+    title: str, names: Sequence[str], blocks: Sequence[Block], columns: int = 3, beside: bool = False
+) -> Figure:
+    """A grid with one cell per name; the blocks of a cell stand below each other, or beside each other."""
+    rows = math.ceil(len(names) / columns)
+    heights = [block.height + _above(block) for block in blocks]
+    tall = (max(heights) if beside else sum(heights)) + _BETWEEN
+    figure = style.blank(WIDTH, _HEAD + rows * tall + _FOOT)
+    style.head(figure, title, {curve.name: curve.look for block in blocks for curve in block.curves})
+    cell = (WIDTH - _RIGHT) / columns
+    shares = np.array([block.width for block in blocks]) / sum(block.width for block in blocks)
+    for index, name in enumerate(names):
+        row, column = divmod(index, columns)
+        left, top = column * cell, _HEAD + row * tall
+        lowest = index + columns >= len(names)
+        for number, block in enumerate(blocks):
+            width = cell * (shares[number] if beside else 1.0)
+            panel = style.place(figure, left + _LEFT, top + _above(block), width - _LEFT - _GAP, block.height)
+            timed = lowest and (beside or number == len(blocks) - 1)
+            style.label(panel, "time, s" if timed else "", block.quantities[index], name if block.titled else "")
+            _draw(panel, block, index)
+            panel.tick_params(labelbottom=beside or number == len(blocks) - 1 or block.window != blocks[-1].window)
+            left, top = (left + width, top) if beside else (left, top + heights[number])
+    return figure
+
+
+def _above(block: Block) -> float:
+    """Space for a title, or for the tick labels of the panel above, in."""
+    return 0.24 if block.titled else 0.2
+
+
+def _draw(panel: Axes, block: Block, column: int) -> None:
+    shown = [_cut(curve, block.window) for curve in block.curves]
+    for curve in shown:
+        values = np.where(np.isfinite(curve.values[:, column]), curve.values[:, column], np.nan)
+        look = curve.look
+        panel.plot(
+            curve.time,
+            values,
+            color=look.colour,
+            linestyle=look.dashes,
+            linewidth=look.width,
+            zorder=look.order,
+            label=curve.name,
+        )
+    series = [(curve.name, curve.time, curve.values[:, column]) for curve in shown]
+    {"linear": fit_linear, "log": fit_log, "symlog": fit_symmetric}[block.scale](panel, series, block.limits_from)
+    ends = [curve.time[[0, -1]] for curve in shown if len(curve.time)]
+    if ends and np.ptp(ends) > 0:
+        panel.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
+
+
+def _cut(curve: Curve, window: tuple[float, float] | None) -> Curve:
+    if window is None:
+        return curve
+    inside = (curve.time >= window[0]) & (curve.time <= window[1])
+    return curve._replace(time=curve.time[inside], values=curve.values[inside])

@@ -1,0 +1,23 @@
+"""Robust term on every axis, and the second half of the run enlarged below it."""
+
+from matplotlib.figure import Figure
+
+from undertow.report.figures import signals, style
+from undertow.report.figures.multiples import Block, small_multiples
+from undertow.report.figures.tracking import Controllers
+
+
+def robust_term(title: str, runs: Controllers) -> Figure:
+    """Fig. 8."""
+    first = next(iter(runs.values()))
+    drawn = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
+    curves = [signals.curve(run, name, "robust", look) for run, name, look in drawn]
+    end = float(first["time"].values[-1])
+    return small_multiples(
+        title,
+        signals.axis_names(first),
+        [
+            Block(curves, signals.per_axis(first, "$u_r$", "/s^2"), height=1.05, titled=True),
+            Block(curves, signals.per_axis(first, "$u_r$", "/s^2"), height=1.05, window=(end / 2, end)),
+        ],
+    )

@@ -1,0 +1,70 @@
+"""Figures of any single run: any number of outputs and inputs, whether it lasted or not."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from undertow.report.figures import signals, style
+from undertow.report.figures.limits import early_size
+from undertow.report.figures.multiples import Block, Curve, small_multiples
+from undertow.report.figures.uncertainty import settled
+
+# A run that failed is drawn on a symmetric logarithmic scale where its peak is this many times its early size.
+_RUNAWAY = 1e2
+
+
+def run_figures(run: xr.Dataset) -> dict[str, Figure]:
+    """Tracking, error, estimate and effort of one run, by these names."""
+    outputs, columns = signals.axis_names(run), _columns(run.sizes["axis"])
+    inputs = [f"input {number}" for number in run["input"].values]
+    wanted = signals.curve(run, "wanted $x_d$", "target", style.TRUTH)
+    actual = signals.curve(run, "actual $x$", "position", style.SOLID)
+    error = signals.magnitude(signals.curve(run, "|$x_d - x$|", "error", style.SOLID))
+    true = signals.curve(run, "true $d$", "uncertainty", style.TRUTH)
+    estimate = signals.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID)
+    asked = signals.curve(run, "asked for", "command", style.DASHED)
+    applied = signals.curve(run, "applied", "voltage", style.SOLID)
+    places, errors = signals.places(run), signals.per_axis(run, "|error|")
+    rates = signals.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
+    levels = [f"input, {run['voltage'].attrs['units']}"] * run.sizes["input"]
+    return {
+        "tracking": small_multiples(
+            _titled(run, "Tracking"), outputs, [_block(run, [wanted, actual], places, 0.0)], columns
+        ),
+        "error": small_multiples(
+            _titled(run, "Tracking error"), outputs, [Block([error], errors, 1.4, scale="log", titled=True)], columns
+        ),
+        "estimate": small_multiples(
+            _titled(run, "Lumped uncertainty and its estimate"),
+            outputs,
+            [_block(run, [true, estimate], rates, settled(run))],
+            columns,
+        ),
+        "effort": small_multiples(
+            _titled(run, "Inputs"),
+            inputs,
+            [_block(run, [asked, applied], levels, settled(run))],
+            _columns(run.sizes["input"]),
+        ),
+    }
+
+
+def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float) -> Block:
+    failed = run.attrs.get("status", "ok") != "ok"
+    peaks = [np.nanmax(np.abs(curve.values), initial=0.0) for curve in curves]
+    early = [early_size(curve.time, curve.values) for curve in curves]
+    runaway = failed and max(peaks) > _RUNAWAY * max(early)
+    scale = "symlog" if runaway else "linear"
+    return Block(curves, quantities, 1.4, scale=scale, limits_from=0.0 if failed else start, titled=True)
+
+
+def _titled(run: xr.Dataset, what: str) -> str:
+    status = run.attrs.get("status", "ok")
+    return what if status == "ok" else f"{what} ({status.replace('_', ' ')} at {run.attrs['ended']:.3g} s)"
+
+
+def _columns(count: int) -> int:
+    """Three beside each other, two where that fills the rows better."""
+    if count % 3 == 0:
+        return 3
+    return min(count, 2)

@@ -1,0 +1,93 @@
+"""How every figure looks. Line style carries the meaning, so a grey print says the same as a screen.
+
+Only matplotlib's objects are used, never pyplot, and no setting of matplotlib is changed: two threads may draw at once.
+"""
+
+from typing import NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import ScaledTranslation, Transform
+
+TEXT, SMALL, TINY = 8.0, 7.0, 6.2  # pt
+INK, FAINT = "#222222", "#d9d9d9"
+_STEPS = (1, 2, 2.5, 5, 10)  # between ticks
+
+
+class Look(NamedTuple):
+    """Colour (safe for colour-blind readers, dark or light enough to differ in grey), dashes, width, order."""
+
+    colour: str
+    dashes: str | tuple
+    width: float
+    order: int
+
+
+TRUTH = Look("#000000", (0, (1, 1.8)), 1.1, 4)  # dotted: wanted or true
+SOLID = Look("#0072b2", "-", 1.1, 3)  # RCAFC, or what the run did
+DASHED = Look("#e07b00", (0, (4, 1.6)), 1.1, 2)  # RAFC, or the second of two
+CONTROLLERS = {"rcafc": ("RCAFC", SOLID), "rafc": ("RAFC", DASHED)}
+
+
+def blank(width: float, height: float) -> Figure:
+    """An empty figure, size in inches."""
+    return Figure(figsize=(width, height), facecolor="white")
+
+
+def place(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
+    """A panel at a place given in inches from the upper left corner."""
+    page_width, page_height = figure.get_size_inches()
+    panel = figure.add_axes(
+        (left / page_width, 1 - (top + height) / page_height, width / page_width, height / page_height)
+    )
+    panel.tick_params(which="both", left=False, bottom=False, labelsize=SMALL, labelcolor=INK, pad=3)
+    panel.grid(True, color=FAINT, linewidth=0.5)
+    panel.set_axisbelow(True)
+    panel.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 0.4)), steps=_STEPS))
+    panel.yaxis.set_major_locator(MaxNLocator(4, steps=_STEPS))
+    for side, spine in panel.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_linewidth(0.6)
+    return panel
+
+
+def label(panel: Axes, x: str = "", y: str = "", title: str = "", size: float = TEXT) -> None:
+    """Axis labels, with units, and a title at the upper left of a panel, at fixed distances from it."""
+    panel.set_xlabel(x, fontsize=SMALL, color=INK)
+    panel.set_ylabel(y, fontsize=SMALL, color=INK)
+    # Without coordinates of their own the labels would be moved clear of the tick labels: most of the drawing time.
+    panel.xaxis.set_label_coords(0.5, 0, transform=_shifted(panel, 0, -0.2))
+    panel.yaxis.set_label_coords(0, 0.5, transform=_shifted(panel, -0.42, 0))
+    panel.set_title(title, fontsize=size, color=INK, loc="left", fontweight="bold", y=1, pad=3)
+
+
+def _shifted(panel: Axes, right: float, up: float) -> Transform:
+    """Fractions of the panel, moved by inches."""
+    return panel.transAxes + ScaledTranslation(right, up, panel.figure.dpi_scale_trans)
+
+
+def head(figure: Figure, title: str, keys: dict[str, Look]) -> None:
+    """Title at the upper left, key of line styles at the upper right."""
+    _, height = figure.get_size_inches()
+    figure.text(0.012, 1 - 0.09 / height, title, fontsize=TEXT + 1.5, fontweight="bold", color=INK, va="top")
+    lines = [Line2D([], [], color=k.colour, linestyle=k.dashes, linewidth=1.6, label=name) for name, k in keys.items()]
+    if lines:
+        figure.legend(
+            handles=lines,
+            loc="upper right",
+            bbox_to_anchor=(0.995, 1.0 - 0.02 / height),
+            ncols=len(lines),
+            fontsize=TEXT,
+            frameon=False,
+            handlelength=3.0,
+            columnspacing=1.4,
+            borderaxespad=0.2,
+        )
+
+
+def power(unit: str) -> str:
+    """A unit as it is typeset: m/s^2 with a raised 2."""
+    base, _, exponent = unit.partition("^")
+    return f"{base}$^{exponent}$" if exponent else unit

@@ -1,0 +1,60 @@
+"""How much of a sinusoidal uncertainty the estimate misses, against its frequency."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from undertow.report.figures import style
+
+_MARKS = {"rcafc": "o", "rafc": "s"}
+
+
+def sweep_figure(sweep: Mapping[str, Mapping[str, Sequence[float]] | Any]) -> Figure:
+    """Measured points against the theory's curve, one pair per controller.
+
+    Args:
+        sweep: by controller (`rcafc`, `rafc`), the lists `frequency` (rad/s) and `measured` (|d_err| / |d|), and
+            `theory_frequency` (rad/s) and `theory` where a prediction is at hand.
+    """
+    figure = style.blank(9.6, 3.7)
+    drawn = {key: look for key, look in style.CONTROLLERS.items() if key in sweep}
+    style.head(figure, "Estimation error against frequency", {})
+    panel = style.place(figure, 0.62, 0.55, 8.75, 2.7)
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    for key, (name, look) in drawn.items():
+        points = sweep[key]
+        if points.get("theory"):
+            panel.plot(
+                points["theory_frequency"],
+                points["theory"],
+                color=look.colour,
+                linestyle=look.dashes,
+                linewidth=look.width + 0.2,
+                zorder=look.order,
+                label=f"{name}, theory",
+            )
+        panel.plot(
+            points["frequency"],
+            points["measured"],
+            _MARKS[key],
+            color=look.colour,
+            markerfacecolor="white",
+            markersize=5,
+            zorder=5,
+            label=f"{name}, measured",
+        )
+    panel.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
+    panel.annotate(
+        "above this line the estimate is worse than none",
+        (0.01, 1.0),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 2),
+        textcoords="offset points",
+        fontsize=style.TINY,
+        va="bottom",
+    )
+    panel.legend(fontsize=style.SMALL, frameon=False, loc="lower right", handlelength=3.2)
+    style.label(panel, "frequency of d, rad/s", r"$|\hat{d} - d| \,/\, |d|$ (ratio)")
+    return figure

@@ -1,0 +1,1 @@
+"""The paper: its examples, figures, tables and claims, as runs and numbers."""
