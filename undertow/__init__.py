@@ -1,1 +1,55 @@
-"""undertow: robust adaptive control of underwater vehicles, from volts to trajectory, that shows its own limits."""
+"""undertow: robust adaptive control of underwater vehicles, from volts to trajectory, that shows its own limits.
+
+    import undertow as ut
+    plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3())
+    run = ut.simulate(plant, ut.rcaf(plant.model()), ut.references.setpoint([2, 3, 4, 0, 0, 1]))
+
+Names are loaded when first used: `import undertow` by itself is quick.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from undertow import controllers as controllers
+    from undertow import disturbances as disturbances
+    from undertow import plants as plants
+    from undertow import references as references
+    from undertow import sensors as sensors
+    from undertow import thrusters as thrusters
+    from undertow import vehicles as vehicles
+    from undertow.controllers.rcaf import rcaf as rcaf
+    from undertow.core.errors import BadInput as BadInput
+    from undertow.plants.hybrid_vehicle import HybridVehicle as HybridVehicle
+    from undertow.run import Run as Run
+    from undertow.run import simulate as simulate
+    from undertow.run import simulate_scenario as simulate_scenario
+    from undertow.scenario.csv_table import read_samples as read_samples
+
+    __version__: str
+
+# Public name -> module; packages of parts stand for themselves.
+_HOMES = {
+    "BadInput": "undertow.core.errors",
+    "HybridVehicle": "undertow.plants.hybrid_vehicle",
+    "Run": "undertow.run",
+    "rcaf": "undertow.controllers.rcaf",
+    "read_samples": "undertow.scenario.csv_table",
+    "simulate": "undertow.run",
+    "simulate_scenario": "undertow.run",
+}
+_PACKAGES = ("controllers", "disturbances", "plants", "references", "sensors", "thrusters", "vehicles")
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return importlib.import_module(f"undertow.{name}")
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
+    if name == "__version__":
+        return importlib.import_module("importlib.metadata").version("undertow")
+    raise AttributeError(f"undertow has no `{name}`. It has: {', '.join(__dir__())}")
+
+
+def __dir__() -> list[str]:
+    return sorted((*_PACKAGES, *_HOMES, "__version__"))

@@ -1,4 +1,4 @@
-"""Samples from a CSV file: columns t, d1, d2, ... with a header."""
+"""Samples from CSV: columns t, d1, d2, ... with a header."""
 
 import csv
 import math
@@ -16,14 +16,33 @@ def read_samples(path: str | Path) -> list[list[float]]:
     Raises:
         BadInput: missing, empty or malformed file, or times that do not increase.
     """
+    return samples_of(read_csv(path), Path(path).name)
+
+
+def read_csv(path: str | Path) -> str:
+    """Text of a CSV file.
+
+    Raises:
+        BadInput: missing or unreadable file.
+    """
     path = Path(path)
-    name = path.name
     if not path.is_file():
         raise BadInput("file", "be an existing CSV file", str(path))
     try:
-        with path.open(newline="", encoding="utf-8-sig") as handle:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(handle)]
-    except (UnicodeDecodeError, csv.Error) as error:
+        return path.read_text(encoding="utf-8-sig")
+    except (UnicodeDecodeError, OSError) as error:
+        raise BadInput("file", "be a CSV text file", f"{path.name}: {error}") from None
+
+
+def samples_of(text: str, name: str) -> list[list[float]]:
+    """Rows (t, d1, d2, ...) of CSV text; `name` stands for it in messages.
+
+    Raises:
+        BadInput: empty or malformed text, or times that do not increase.
+    """
+    try:
+        rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines())]
+    except csv.Error as error:
         raise BadInput("file", "be a CSV text file", f"{name}: {error}") from None
     numbered = [(line, row) for line, row in enumerate(rows, start=1) if any(row)]
     if not numbered:

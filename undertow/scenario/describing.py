@@ -61,15 +61,16 @@ def summary(part: Any) -> str:
 
 def _describe(kind: str, name: str, part: Any) -> Description:
     instance = _instance(kind, name, part)
-    shown = instance if instance is not None else typing.get_type_hints(part).get("return")
+    shown: Any = instance if instance is not None else typing.get_type_hints(part).get("return")
     described = isinstance(shown, eqx.Module) or (isinstance(shown, type) and issubclass(shown, eqx.Module))
+    advise = getattr(instance, "advice", tuple)
     return Description(
         kind=kind,
         name=name,
         summary=_prose(part),
         options=_options(kind, part),
         parameters=tuple(parameters(shown)) if described else (),
-        advice=instance.advice() if hasattr(instance, "advice") else (),
+        advice=advise(),
     )
 
 

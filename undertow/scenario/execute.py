@@ -57,14 +57,20 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
 def run_loop(loop: ClosedLoop, settings: Loop, start: Initial, seed: int) -> Outcome:
     """Run a closed loop as `loop:` and `initial:` of a scenario say."""
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
-    common = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
+    common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
     if settings.kind == "continuous":
-        rates = {"record_step": settings.record, "rtol": settings.rtol, "atol": settings.atol}
-        outcome = continuous.simulate(loop, **common, **rates)
+        outcome = continuous.simulate(
+            loop, record_step=settings.record, rtol=settings.rtol, atol=settings.atol, **common
+        )
     else:
-        plant = {"method": settings.method, "substeps": settings.substeps}
-        record_every = round(settings.record / settings.dt)
-        outcome = sampled.simulate(loop, dt=settings.dt, record_every=record_every, **common, **plant)
+        outcome = sampled.simulate(
+            loop,
+            dt=settings.dt,
+            record_every=round(settings.record / settings.dt),
+            method=settings.method,
+            substeps=settings.substeps,
+            **common,
+        )
     return jax.block_until_ready(outcome)
 
 

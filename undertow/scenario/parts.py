@@ -1,7 +1,6 @@
 """Building parts from their descriptions: a part's own signature says what may be given."""
 
 import inspect
-import math
 import typing
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -9,11 +8,13 @@ from typing import Any
 
 import equinox as eqx
 import numpy as np
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from undertow.core import catalogue
+from undertow.core import catalogue, contracts
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.scenario.csv_table import read_samples
+from undertow.scenario.csv_table import read_csv, samples_of
+from undertow.scenario.values import checked
+from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.vehicle import Vehicle
 
 # Arguments that are parts themselves: their kind, and what they are when nothing is said.
 INNER = {"vehicle": ("vehicles", "odin"), "thruster": ("thrusters", "paper_table3")}
@@ -21,8 +22,17 @@ INNER = {"vehicle": ("vehicles", "odin"), "thruster": ("thrusters", "paper_table
 # Kinds that are data: every declared parameter of theirs may be changed by name.
 _ADJUSTABLE = ("vehicles", "thrusters")
 
-_WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "text", type(None): "null"}
-_NUMBERS = float | list[float] | list[list[float]] | list[list[list[float]]]
+_CONTRACTS = {
+    "vehicles": Vehicle,
+    "thrusters": AbstractThruster,
+    "plants": contracts.AbstractPlant,
+    "controllers": contracts.AbstractController,
+    "disturbances": contracts.AbstractDisturbance,
+    "references": contracts.AbstractReference,
+    "sensors": contracts.AbstractSensor,
+}
+
+_VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
 
 
 def make(
@@ -39,22 +49,26 @@ def make(
     Raises:
         BadInput: anything wrong with the description; key names start at the part.
     """
-    options = {"kind": description} if isinstance(description, str) else dict(description)
+    options: dict[str, Any] = {"kind": description} if isinstance(description, str) else dict(description)
     name = options.pop("kind", None)
     if not isinstance(name, str):
         raise BadInput("kind", f"name one of the {kind}", name)
     try:
         function = catalogue.find(kind, name, folder)
     except BadInput as error:
-        raise BadInput("kind", error.must, error.got, hint=error.hint) from None
+        raise BadInput("kind", error.must, error.got, hint=error.hint) from error.__cause__
     own = inspect.signature(function).parameters
-    changes = {}
+    changes, table = {}, {}
     if kind in _ADJUSTABLE:
         changes = {key: options.pop(key) for key in list(options) if key not in own}
-    if "file" in options and "samples" in own:
-        options["samples"] = read_samples(folder / str(options.pop("file")))
+    if "samples" in own:
+        table = _samples(options, folder)
     part, resolved = call(function, options, given, folder)
-    return adjust(part, changes) if changes else part, {"kind": _portable(name, folder), **resolved, **changes}
+    if not isinstance(part, _CONTRACTS[kind]):
+        raise BadInput("kind", f"name a function that returns a {_CONTRACTS[kind].__name__}", f"{name}: {part!r}")
+    if table:
+        del resolved["samples"]
+    return adjust(part, changes) if changes else part, {"kind": _portable(name, folder), **resolved, **changes, **table}
 
 
 def call(
@@ -65,7 +79,8 @@ def call(
     Raises:
         BadInput: unknown, missing or mistyped option, or the function's own complaint.
     """
-    known = dict(list(inspect.signature(function).parameters.items())[len(given) :])
+    signature = list(inspect.signature(function).parameters.items())[len(given) :]
+    known = {name: parameter for name, parameter in signature if parameter.kind not in _VARIABLE}
     for key in options:
         if key not in known:
             raise BadInput(key, "be an option here", "unknown", hint=did_you_mean(key, known) if known else "")
@@ -73,23 +88,14 @@ def call(
     arguments, resolved = {}, {}
     for name, parameter in known.items():
         if name in INNER:
-            kind, default = INNER[name]
-            inner = options.get(name, default)
-            if isinstance(inner, Mapping):
-                inner = {"kind": default, **inner}
-            elif not isinstance(inner, str):
-                raise BadInput(name, "be a name, or a mapping with `kind` and options", inner)
-            try:
-                arguments[name], resolved[name] = make(kind, inner, folder or Path())
-            except BadInput as error:
-                raise error.at(name) from None
+            arguments[name], resolved[name] = _inner(name, options.get(name, INNER[name][1]), folder or Path())
         elif name in options:
-            arguments[name] = resolved[name] = _checked(name, options[name], hints.get(name), parameter.default)
+            arguments[name] = resolved[name] = checked(name, options[name], hints.get(name), parameter.default)
         elif parameter.default is inspect.Parameter.empty:
             raise BadInput(name, "be given")
         else:
             arguments[name], resolved[name] = parameter.default, _listed(parameter.default)
-    return function(*given, **arguments), resolved
+    return _made(lambda: function(*given, **arguments)), resolved
 
 
 def adjust(part: Any, changes: Mapping[str, Any]) -> Any:
@@ -110,35 +116,55 @@ def adjust(part: Any, changes: Mapping[str, Any]) -> Any:
             try:
                 values[key] = adjust(values[key], change)
             except BadInput as error:
-                raise error.at(key) from None
+                raise error.at(key) from error.__cause__
         else:
-            number = np.asarray(_checked(key, change, None, 0.0), dtype=float)
+            number = np.asarray(checked(key, change, None, 0.0), dtype=float)
             if number.shape != np.shape(values[key]):
                 raise BadInput(key, f"have shape {np.shape(values[key])}", f"of shape {number.shape}")
             values[key] = number
-    return type(part)(**values)
+    return _made(lambda: type(part)(**values))
 
 
-def _checked(name: str, value: Any, hint: Any, default: Any) -> Any:
-    """The value, if it is of the annotated type; numbers finite unless the default is infinite."""
-    if value is None and default is None:
-        return None
-    kinds = typing.get_args(hint) or (hint,)
-    plain = all(kind in _WORDS for kind in kinds)
+def _made(make: Callable[[], Any]) -> Any:
+    """What `make` makes; whatever it raises is about the options, which are all it was given."""
     try:
-        TypeAdapter(hint if plain else _NUMBERS, config=ConfigDict(strict=True)).validate_python(value)
-    except ValidationError:
-        must = " or ".join(_WORDS[kind] for kind in kinds) if plain else "a number or a list of numbers"
-        raise BadInput(name, f"be {must}", repr(value)) from None
-    if not isinstance(value, str):
-        try:
-            numbers = np.asarray(value, dtype=float)
-        except ValueError:
-            raise BadInput(name, "have rows of equal length", value) from None
-        endless = isinstance(default, float) and math.isinf(default)
-        if np.isnan(numbers).any() or (np.isinf(numbers).any() and not endless):
-            raise BadInput(name, "be finite", value)
-    return value
+        return make()
+    except BadInput:
+        raise
+    except Exception as error:
+        raise BadInput("", "be something that can be made", f"not: {type(error).__name__}: {error}") from error
+
+
+def _inner(name: str, description: Any, folder: Path) -> tuple[Any, dict[str, Any]]:
+    kind, default = INNER[name]
+    if isinstance(description, Mapping):
+        description = {"kind": default, **description}
+    elif not isinstance(description, str):
+        raise BadInput(name, "be a name, or a mapping with `kind` and options", description)
+    try:
+        return make(kind, description, folder)
+    except BadInput as error:
+        raise error.at(name) from error.__cause__
+
+
+def _samples(options: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Turn `file` (a CSV file) or `csv` (its text, as results keep it) into `samples`; returns what results keep."""
+    given = [key for key in ("file", "csv", "samples") if key in options]
+    if len(given) > 1:
+        raise BadInput(given[1], "be left out when there is another source of samples", f"beside `{given[0]}`")
+    for key in ("file", "csv"):
+        if key in options and not isinstance(options[key], str):
+            raise BadInput(key, "be text", repr(options[key]))
+    if "file" in options:
+        name = options.pop("file")
+        options["csv"] = read_csv(folder / name)
+    else:
+        name = "csv"
+    if "csv" not in options:
+        return {}
+    text = options.pop("csv")
+    options["samples"] = samples_of(text, Path(name).name)
+    return {"csv": text}
 
 
 def _listed(value: Any) -> Any:

@@ -13,6 +13,10 @@ from undertow.core.errors import BadInput
 
 Path_ = tuple[str | int, ...]
 
+# Aliases let a few lines of YAML stand for very many; no scenario comes near these.
+_MOST_KEYS = 100_000
+_DEEPEST = 20
+
 
 class Text(NamedTuple):
     """A scenario as read: plain data, and where each key stands."""
@@ -50,6 +54,8 @@ def read(path: Path) -> Text:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise BadInput("SCENARIO", "be a text file", path.name) from None
+    except OSError as error:
+        raise BadInput("SCENARIO", "be a file that can be read", f"{path}: {error.strerror}") from None
     return _parse(text, path.name, path.resolve().parent)
 
 
@@ -82,30 +88,37 @@ def _parse(text: str, name: str, folder: Path) -> Text:
         mark = error.problem_mark or error.context_mark
         where = f"{name}, line {mark.line + 1}" if mark else name
         problem = " ".join((error.problem or "malformed").split())
-        raise BadInput("SCENARIO", "be valid YAML", problem.split(" original value")[0], where=where) from None
-    except YAMLError as error:
-        raise BadInput("SCENARIO", "be valid YAML", str(error), where=name) from None
+        raise BadInput("SCENARIO", "be valid YAML", f"not: {problem}", where=where) from None
+    except (YAMLError, ValueError) as error:
+        raise BadInput("SCENARIO", "be valid YAML", f"not: {error}", where=name) from None
+    except RecursionError:
+        raise BadInput("SCENARIO", "be less deeply nested", where=name) from None
     if not isinstance(tree, Mapping):
-        got = "empty" if tree is None else f"a {type(tree).__name__}"
+        got = "empty" if tree is None else "a list" if isinstance(tree, list) else f"a single {type(tree).__name__}"
         raise BadInput("SCENARIO", "be a mapping of keys to values", got, where=name)
     lines: dict[Path_, int] = {}
-    _note_lines(tree, (), lines)
-    return Text(_plain(tree), name, folder, lines)
+    return Text(_unwrapped(tree, (), lines, name), name, folder, lines)
 
 
-def _note_lines(node: Any, path: Path_, lines: dict[Path_, int]) -> None:
-    if isinstance(node, Mapping):
-        for key, value in node.items():
-            lines[(*path, key)] = node.lc.key(key)[0] + 1  # pyright: ignore[reportAttributeAccessIssue]
-            _note_lines(value, (*path, key), lines)
-    elif isinstance(node, list):
-        for index, value in enumerate(node):
-            lines[(*path, index)] = node.lc.item(index)[0] + 1  # pyright: ignore[reportAttributeAccessIssue]
-            _note_lines(value, (*path, index), lines)
+def _unwrapped(node: Any, path: Path_, lines: dict[Path_, int], name: str) -> Any:
+    """Same data without the reader's own classes; notes the line of every key and entry."""
+    if len(path) > _DEEPEST or len(lines) > _MOST_KEYS:
+        raise BadInput("SCENARIO", f"have at most {_MOST_KEYS} keys and {_DEEPEST} levels", "larger", where=name)
+    if not isinstance(node, Mapping | list):
+        return _plain(node)
+    items = node.items() if isinstance(node, Mapping) else enumerate(node)
+    unwrapped = {}
+    for key, value in items:
+        label = key if isinstance(key, int) and isinstance(node, list) else str(key)
+        place = (node.lc.data or {}).get(key)  # pyright: ignore[reportAttributeAccessIssue]  (none where merged in)
+        if place is not None:
+            lines[(*path, label)] = place[0] + 1
+        unwrapped[label] = _unwrapped(value, (*path, label), lines, name)
+    return unwrapped if isinstance(node, Mapping) else list(unwrapped.values())
 
 
 def _plain(node: Any) -> Any:
-    """Same data without the reader's own classes."""
+    """Same data without classes of other libraries."""
     if isinstance(node, Mapping):
         return {str(key): _plain(value) for key, value in node.items()}
     if isinstance(node, Sequence) and not isinstance(node, str):

@@ -20,7 +20,7 @@ def compare(path: Path, repeated: xr.Dataset) -> Repetition:
     """Compare a run with the result file at `path`, whose scenario it followed."""
     with xr.open_dataset(path, engine="netcdf4") as earlier:
         before, actual = dict(earlier.attrs), content_hash(earlier)
-    stated = before.get("content_hash")
+    stated = str(before.get("content_hash"))
     if actual != stated:
         return Repetition(
             False, False, f"{path.name} was changed after it was written: its numbers do not match its hash"

@@ -91,18 +91,20 @@ def validate(text: Text) -> Scenario:
     try:
         return Scenario.model_validate(text.data)
     except ValidationError as errors:
-        raise _complaint(errors.errors()[0], text) from None
+        raise complaint(errors, text) from None
 
 
-def _complaint(error: Any, text: Text) -> BadInput:
+def complaint(errors: ValidationError, text: Text) -> BadInput:
+    """The first of pydantic's errors in the house grammar."""
+    error: Any = errors.errors()[0]
     path = tuple(error["loc"])
     name, where = ".".join(map(str, path)), text.where(path)
-    got = None if error["type"] == "missing" else error["input"]
     if error["type"] == "extra_forbidden":
         hint = did_you_mean(str(path[-1]), _keys_beside(path))
         return BadInput(name, "be a key of the scenario", "unknown", hint=hint, where=where)
     if error["type"] == "missing":
         return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to the scenario", where=where)
+    got = error["input"]
     return BadInput(name, _must(error), f"{got!r}" if isinstance(got, str) else got, where=where)
 
 

@@ -1,0 +1,158 @@
+"""One closed loop from Python: what `undertow simulate` does, one level down."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import xarray as xr
+from pydantic import ValidationError
+
+from undertow.analysis.meanings import MEANINGS
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractDisturbance,
+    AbstractPlant,
+    AbstractReference,
+    AbstractSensor,
+)
+from undertow.core.errors import BadInput
+from undertow.core.status import Status
+from undertow.disturbances.none import none
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.outcome import Outcome
+from undertow.scenario import execute
+from undertow.scenario.fitting import check_fit, check_times
+from undertow.scenario.labelling import label
+from undertow.scenario.reading import from_data, read
+from undertow.scenario.schema import Initial, Loop, Window, complaint
+from undertow.sensors.perfect import perfect
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Run:
+    """One finished run.
+
+    Attributes:
+        dataset: recorded series with names and units, metrics, versions, seed and content hash.
+        metrics: `steady` (over the steady window; None when the run did not last) and `whole`: numbers by name,
+            per-axis values as lists named `<name>_axes`; see `undertow describe metrics`.
+        status: how it ended.
+        outcome: the same series as arrays, and the final states.
+    """
+
+    dataset: xr.Dataset
+    metrics: dict[str, dict[str, Any] | None]
+    status: Status
+    outcome: Outcome
+
+    def plot(self) -> "dict[str, Figure]":
+        """Figures of the run, by name."""
+        from undertow.report.figures import run_figures  # noqa: PLC0415  (matplotlib, only when asked for)
+
+        return run_figures(self.dataset)
+
+    def save(self, path: str | Path) -> None:
+        """Write the dataset as netCDF; the file appears whole or not at all.
+
+        Raises:
+            OSError: the folder cannot be written.
+        """
+        execute.save(self.dataset, Path(path))
+
+    def __repr__(self) -> str:
+        steady, whole = self.metrics["steady"], self.metrics["whole"] or {}
+        lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.status.sentence}"]
+        lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
+        for name, (_, unit) in MEANINGS.items():
+            if name in whole:
+                late = f"{steady[name]:.4g}" if steady else "-"
+                lines.append(f"  {name:<20}{late:>12}{whole[name]:>12.4g}  {unit}".rstrip())
+        return "\n".join(lines)
+
+
+def simulate(
+    plant: AbstractPlant,
+    controller: AbstractController,
+    reference: AbstractReference,
+    *,
+    disturbance: AbstractDisturbance | None = None,
+    sensor: AbstractSensor | None = None,
+    duration: float = 20.0,
+    loop: Literal["sampled", "continuous"] = "sampled",
+    dt: float = 1e-3,
+    record: float = 1e-2,
+    seed: int = 0,
+    position: Any = None,
+    velocity: Any = None,
+) -> Run:
+    """Run a plant under a controller. A run that fails says so in its status; nothing is raised.
+
+    Args:
+        plant: what is controlled.
+        controller: the law, made from `plant.model()`.
+        reference: what to follow.
+        disturbance: what the surroundings do; None for nothing.
+        sensor: what stands before the measurement; None for the truth.
+        duration: s. The steady metrics are taken over its second half.
+        loop: `sampled` (input held over each dt) or `continuous` (one ODE, the paper's setting).
+        dt: sampling time of the controller, s; sampled loop only.
+        record: time between records, s.
+        seed: of everything random.
+        position: outputs at t = 0, shape (n,), m and rad; None for zero.
+        velocity: their rates, shape (n,), m/s and rad/s; None for zero.
+
+    Raises:
+        BadInput: something given cannot be used, or does not fit the rest.
+    """
+    roles = {
+        "plant": (plant, AbstractPlant),
+        "controller": (controller, AbstractController),
+        "reference": (reference, AbstractReference),
+        "disturbance": (none() if disturbance is None else disturbance, AbstractDisturbance),
+        "sensor": (perfect() if sensor is None else sensor, AbstractSensor),
+    }
+    for name, (part, contract) in roles.items():
+        if not isinstance(part, contract):
+            raise BadInput(name, f"be an {contract.__name__}", f"a {type(part).__name__}")
+    closed_loop = ClosedLoop(*(part for part, _ in roles.values()))
+    nowhere = from_data({})
+    try:
+        times = {"duration": _plain(duration), "dt": _plain(dt), "record": _plain(record)}
+        settings = Loop.model_validate({"kind": loop, **times})
+        start = Initial(position=_plain(position), velocity=_plain(velocity))
+        window = Window(start=settings.duration / 2, stop=settings.duration)
+        check_times(nowhere, settings, window)
+        check_fit(nowhere, closed_loop, start)
+    except ValidationError as errors:
+        wrong = complaint(errors, nowhere)
+        raise BadInput("loop" if wrong.name == "kind" else wrong.name, wrong.must, wrong.got) from None
+    except BadInput as error:
+        raise BadInput(error.name.rpartition(".")[2], error.must, error.got, hint=error.hint) from None
+    outcome = execute.run_loop(closed_loop, settings, start, seed)
+    attributes = {"title": "a closed loop run by undertow", "seed": seed}
+    return _run(outcome, *label(closed_loop, outcome, (window.start, window.stop), attributes))
+
+
+def simulate_scenario(scenario: str | Path | Mapping[str, Any]) -> Run:
+    """Run a scenario: a .yaml file, an earlier run.nc, or the same as a mapping.
+
+    Raises:
+        BadInput: anything wrong with it, with key path and line.
+    """
+    text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario))
+    _, outcome, status, steady, whole, dataset = execute.execute(text)
+    return _run(outcome, status, steady, whole, dataset)
+
+
+def _run(outcome: Outcome, status: Status, steady: Any, whole: Any, dataset: xr.Dataset) -> Run:
+    return Run(dataset, {"steady": steady, "whole": whole}, status, outcome)
+
+
+def _plain(value: Any) -> Any:
+    """Arrays and numpy numbers as lists and numbers."""
+    return value if value is None or isinstance(value, str) else np.asarray(value).tolist()

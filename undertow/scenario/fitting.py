@@ -1,0 +1,81 @@
+"""Whether times and parts fit together: shapes only, nothing is computed."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.scenario.reading import Text
+from undertow.scenario.schema import Initial, Loop, Window
+
+# A record takes about a kilobyte, a sampling time some microseconds.
+MOST_RECORDS = 1_000_000
+MOST_TICKS = 2_000_000_000
+
+
+def placed(text: Text, key: str, make: Callable[[], Any]) -> Any:
+    """Result of `make`; its complaints with the key path and place in the scenario file."""
+    try:
+        return make()
+    except BadInput as error:
+        complaint = error.at(key)
+        path = tuple(part.split("[")[0] for part in complaint.name.split("."))
+        raise complaint.at(where=text.where(path)) from error.__cause__
+
+
+def check_times(text: Text, loop: Loop, window: Window) -> None:
+    """Duration, records and sampling times that go together.
+
+    Raises:
+        BadInput: they do not.
+    """
+    if not window.start < window.stop:
+        must, got = f"be later than steady.start ({window.start:g} s)", f"{window.stop:g} s"
+        raise BadInput("steady.stop", must, got, where=text.where(("steady", "stop")))
+    sampled = loop.kind == "sampled"
+    shortest = max(loop.record, loop.dt if sampled else 0.0)
+    if loop.duration < shortest:
+        must, got = f"be at least one record ({shortest:g} s)", f"{loop.duration:g} s"
+        raise BadInput("loop.duration", must, got, where=text.where(("loop", "duration")))
+    for key, most, what in (("record", MOST_RECORDS, "records"), ("dt", MOST_TICKS, "sampling times")):
+        step = getattr(loop, key)
+        if loop.duration / step > most and (sampled or key == "record"):
+            must = f"be at least {loop.duration / most:g} s, so that the run has at most {most} {what}"
+            raise BadInput(f"loop.{key}", must, f"{step:g} s", where=text.where(("loop", key)))
+    ratio = loop.record / loop.dt
+    if sampled and (round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6 * ratio):
+        must, got = f"be a whole number of sampling times ({loop.dt:g} s)", f"{loop.record:g} s"
+        raise BadInput("loop.record", must, got, where=text.where(("loop", "record")))
+
+
+def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
+    """Parts that agree on the number of outputs and can take a step together.
+
+    Raises:
+        BadInput: they do not.
+    """
+    axes, zero = len(loop.plant.outputs), jnp.zeros(())
+    for key, value in start:
+        if value is not None:
+            place = f"initial.{key}"
+            placed(text, place, lambda value=value: checks.length("", value, axes, "one per output of the plant"))
+            placed(text, place, lambda value=value: checks.finite("", value))
+    target = placed(text, "reference", lambda: jax.eval_shape(loop.reference.at, zero))
+    if target.position.shape != (axes,):
+        must, got = f"have {axes} entries, one per output of the plant", f"of shape {target.position.shape}"
+        raise BadInput("reference.position", must, got, where=text.where(("reference", "position")))
+    drawn = jax.eval_shape(loop.draw, jax.random.PRNGKey(0))
+    load = placed(text, "disturbance", lambda: jax.eval_shape(lambda d: d.load(zero), drawn))
+    if any(signal.shape != (axes,) for signal in load):
+        got = f"of shapes {[signal.shape for signal in load]}"
+        raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
+
+    def first_step(drawn: Any) -> Any:
+        x, z = drawn.start()
+        return drawn.decide(zero, x, z)
+
+    placed(text, "controller", lambda: jax.eval_shape(first_step, drawn))

@@ -1,0 +1,45 @@
+"""Whether a value is what an option's annotation says."""
+
+import math
+import typing
+from typing import Any
+
+import numpy as np
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from undertow.core.errors import BadInput
+
+_WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "text", type(None): "null"}
+_NUMBERS = float | list[float] | list[list[float]] | list[list[list[float]]]
+
+
+def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
+    """The value, if it is of the annotated type; numbers finite unless the default is infinite.
+
+    Args:
+        name: of the option.
+        value: as read from a scenario.
+        hint: its annotation; anything but plain words and numbers means numbers or lists of them.
+        default: of the option.
+
+    Raises:
+        BadInput: it is not.
+    """
+    if value is None and default is None:
+        return None
+    kinds = typing.get_args(hint) or (hint,)
+    plain = all(kind in _WORDS for kind in kinds)
+    try:
+        TypeAdapter(hint if plain else _NUMBERS, config=ConfigDict(strict=True)).validate_python(value)
+    except ValidationError:
+        must = " or ".join(_WORDS[kind] for kind in kinds) if plain else "a number or a list of numbers"
+        raise BadInput(name, f"be {must}", repr(value)) from None
+    if not isinstance(value, str):
+        try:
+            numbers = np.asarray(value, dtype=float)
+        except (ValueError, OverflowError):
+            raise BadInput(name, "have rows of equal length and numbers of ordinary size", value) from None
+        endless = isinstance(default, float) and math.isinf(default)
+        if np.isnan(numbers).any() or (np.isinf(numbers).any() and not endless):
+            raise BadInput(name, "be finite", value)
+    return value
