@@ -11,6 +11,8 @@ from undertow.cli.results_folder import next_free, results_folder
 from undertow.cli.stages import Stages
 from undertow.cli.tables import metrics_table, wide_console
 from undertow.core.status import Status
+from undertow.report.figures import run_figures
+from undertow.report.figures import save as save_figure
 from undertow.scenario.build import build
 from undertow.scenario.execute import Executed, execute, save
 from undertow.scenario.labelling import metrics_text
@@ -52,6 +54,9 @@ def _write(executed: Executed, folder: Path) -> None:
     save(executed.dataset, folder / "run.nc")
     (folder / "metrics.json").write_text(metrics_text(executed.dataset), encoding="utf-8")
     (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
+    (folder / "figures").mkdir()
+    for name, figure in run_figures(executed.dataset).items():
+        save_figure(figure, folder / "figures", name)
 
 
 def _judge_ending(executed: Executed) -> int:
