@@ -1,0 +1,130 @@
+"""I32: q and -q mean the same attitude, errors go the short way round, and nothing unwinds."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.controllers import rcaf
+from undertow.core.contracts import Load, Target
+from undertow.numerics.integrators import rk4
+from undertow.numerics.rotations import attitude_error, rotation_from_quaternion
+from undertow.plants import hybrid_vehicle
+from undertow.thrusters import paper_table3
+from undertow.vehicles import odin
+
+RNG = np.random.default_rng(11)
+STARTS = 1000
+QUATERNIONS = RNG.normal(size=(STARTS, 4))
+QUATERNIONS /= np.linalg.norm(QUATERNIONS, axis=1, keepdims=True)
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def about(axis, angle):
+    """Unit quaternion of a turn by `angle` about a unit vector."""
+    return np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * np.asarray(axis)])
+
+
+@pytest.mark.parametrize(("sign_target", "sign_actual"), [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
+def test_sign_of_either_quaternion_does_not_change_the_error(sign_target, sign_actual):
+    targets, actuals = QUATERNIONS[::-1], QUATERNIONS
+    plain = jax.vmap(attitude_error)(targets, actuals)
+    flipped = jax.vmap(attitude_error)(sign_target * targets, sign_actual * actuals)
+    np.testing.assert_allclose(flipped, plain, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [1, 90, 179, 181, 200, 270, 359])
+def test_quaternion_error_is_the_short_turn_in_body_axes(degrees):
+    """2 sin(angle/2) about the axis, for the angle in (-180, 180] deg; the world attitude makes no difference."""
+    axis, base = np.array([2.0, -1.0, 2.0]) / 3, QUATERNIONS[0]
+    turn = about(axis, np.radians(degrees))
+    w0, v0, w1, v1 = base[0], base[1:], turn[0], turn[1:]
+    target = np.concatenate([[w0 * w1 - v0 @ v1], w0 * v1 + w1 * v0 + np.cross(v0, v1)])  # base, then the turn
+    short = np.radians(degrees if degrees <= 180 else degrees - 360)
+    np.testing.assert_allclose(attitude_error(target, base), 2 * np.sin(short / 2) * axis, rtol=0, atol=1e-14)
+
+
+def test_both_quaternions_of_an_attitude_get_the_same_voltages():
+    """Through the plant's output and the law's command, at large and small attitudes."""
+    plant = hybrid_vehicle(odin(), paper_table3("ideal"))
+    controller = rcaf(plant.model())
+    r = Target(jnp.array([2.0, 3.0, 4.0, 1.0, 0.7, 1.2]), jnp.zeros(6), jnp.zeros(6))
+
+    @jax.jit
+    @jax.vmap
+    def voltages(q, nu):
+        x = plant.initial_state()._replace(attitude=q, nu=nu)
+        y = plant.output(jnp.zeros(()), x)
+        return controller.command(controller.init(y, r), y, r)[0]
+
+    nu = 0.3 * RNG.normal(size=(STARTS, 6))
+    plus, minus = voltages(QUATERNIONS, nu), voltages(-QUATERNIONS, nu)
+    np.testing.assert_allclose(minus, plus, rtol=1e-12)
+
+
+def test_euler_error_differs_by_whole_turns_and_is_at_most_half_a_turn():
+    model = hybrid_vehicle(odin(), paper_table3("ideal")).model()
+    targets, actuals = RNG.uniform(-20, 20, (2, 200, 6))
+    error = np.asarray(jax.vmap(model.difference)(targets, actuals))
+    raw = targets - actuals
+    np.testing.assert_array_equal(error[:, :3], raw[:, :3])
+    assert np.abs(error[:, 3:]).max() <= np.pi + 1e-14
+    turns = (raw - error)[:, 3:] / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
+
+
+def test_law_turns_the_short_way_across_the_border_of_the_euler_angles():
+    """From yaw -170 deg to 170 deg is 20 deg to port; the same wish written as -190 deg gets the same voltages."""
+    plant = hybrid_vehicle(odin(), paper_table3("ideal"))
+    controller = rcaf(plant.model())
+    y = plant.output(jnp.zeros(()), plant.initial_state(position=[0, 0, 0, 0.1, 0.2, np.radians(-170)]))
+
+    @jax.jit
+    def voltages(yaw):
+        r = Target(jnp.stack([0.0, 0.0, 0.0, 0.1, 0.2, yaw]), jnp.zeros(6), jnp.zeros(6))
+        return controller.command(controller.init(y, r), y, r)[0]
+
+    np.testing.assert_allclose(voltages(np.radians(170)), voltages(np.radians(-190)), rtol=0, atol=1e-12)
+    yaw_acceleration = (controller.model.gain(y) @ voltages(np.radians(170)) + controller.model.drift(y))[5]
+    short = -np.radians(20)
+    np.testing.assert_allclose(yaw_acceleration, short + 10 * np.tanh(5 * short / 0.5), rtol=1e-9)
+
+
+def turned(starts, short_way):
+    """Angle turned through by bodies under a quaternion PD, and how far they are from upright after 12 s.
+
+    Without the short way the error keeps the sign that the quaternion happens to have: the classic mistake.
+    """
+    plant = hybrid_vehicle(odin(), paper_table3("shaft"))
+    zero = jnp.zeros(6)
+
+    def motion(short, t, state):
+        x, _ = state
+        sign = jnp.where(short, 1.0, jnp.where(x.attitude[0] < 0, -1.0, 1.0))
+        torque = 60 * sign * attitude_error(UPRIGHT, x.attitude) - 20 * x.nu[3:]
+        hover = plant.body.restoring(rotation_from_quaternion(x.attitude)[2])
+        wrench = hover + jnp.concatenate([jnp.zeros(3), torque])
+        return plant.dynamics(t, x, jnp.zeros(8), Load(zero, -wrench)), jnp.linalg.norm(x.nu[3:])
+
+    def run(q, short):
+        def field(t, state):
+            return motion(short, t, state)
+
+        def step(state, k):
+            return (rk4(field, k * 0.05, state, 0.05), None)
+
+        start = (plant.initial_state()._replace(attitude=q), jnp.zeros(()))
+        (x, path), _ = jax.lax.scan(step, start, jnp.arange(240.0))
+        return path, jnp.linalg.norm(attitude_error(UPRIGHT, x.attitude))
+
+    return jax.tree.map(np.asarray, jax.jit(jax.vmap(run))(starts, short_way))
+
+
+def test_no_start_unwinds_and_without_the_short_way_half_of_them_do():
+    long_starts = QUATERNIONS[QUATERNIONS[:, 0] < 0][:200]
+    starts = np.concatenate([QUATERNIONS, long_starts])
+    path, left_over = turned(starts, np.arange(len(starts)) < STARTS)
+    shortest = 2 * np.arccos(np.abs(QUATERNIONS[:, 0]))
+    assert left_over[:STARTS].max() < 1e-4
+    assert (path[:STARTS] <= 1.02 * shortest).all()
+    assert (path[STARTS:] > np.pi).all()  # negative control: the long way round

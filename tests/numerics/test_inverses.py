@@ -1,0 +1,127 @@
+"""I12: Moore-Penrose identities, the printed cases of Eq. (22), and what regularisation costs, Eqs. (24)-(27)."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.numerics.inverses import printed_inverse, pseudo_inverse, regularised_inverse, regularised_sharp
+from undertow.numerics.rotations import jacobian
+from undertow.vehicles import odin
+
+RNG = np.random.default_rng(5)
+COUNT = 50
+SQUARE, WIDE, TALL = RNG.normal(size=(COUNT, 6, 6)), RNG.normal(size=(COUNT, 6, 8)), RNG.normal(size=(COUNT, 6, 4))
+WEAK = RNG.normal(size=(COUNT, 6, 3)) @ RNG.normal(size=(COUNT, 3, 8))  # rank 3
+ODIN = np.asarray(odin().body().inverse_mass_matrix @ odin().thruster_matrix())
+ANGLES = RNG.uniform(-1, 1, (COUNT, 3)) * np.array([np.pi, 1.3, np.pi])
+GAINS = np.asarray(jax.vmap(lambda a: jacobian(a) @ ODIN)(ANGLES)) * 17.11
+SHAPES = {"square": SQUARE, "wide": WIDE, "tall": TALL, "rank 3": WEAK, "odin": GAINS}
+FULL_RANK = ["square", "wide", "tall", "odin"]
+
+
+def each(function):
+    return jax.jit(jax.vmap(function))
+
+
+def norms(matrices):
+    return np.linalg.norm(matrices, ord=2, axis=(1, 2))
+
+
+def condition(gains):
+    """Largest over smallest singular value that is not zero."""
+    s = np.linalg.svd(gains, compute_uv=False)
+    return np.array([row.max() / row[row > 1e-10 * row.max()].min() for row in s])
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_four_moore_penrose_identities(shape):
+    g = SHAPES[shape]
+    p = np.asarray(each(pseudo_inverse)(g))
+    allowed = 1e-9 * condition(g)
+    assert (norms(g @ p @ g - g) <= allowed * norms(g)).all()
+    assert (norms(p @ g @ p - p) <= allowed * norms(p)).all()
+    assert (norms(g @ p - (g @ p).swapaxes(1, 2)) <= allowed).all()
+    assert (norms(p @ g - (p @ g).swapaxes(1, 2)) <= allowed).all()
+
+
+@pytest.mark.parametrize("shape", FULL_RANK)
+def test_printed_inverse_is_the_pseudo_inverse_wherever_it_exists(shape):
+    g = SHAPES[shape]
+    expected = np.asarray(each(pseudo_inverse)(g))
+    allowed = 1e-12 * condition(g) ** 2  # normal equations square the condition
+    assert (norms(np.asarray(each(printed_inverse)(g)) - expected) <= allowed * norms(expected)).all()
+
+
+@pytest.mark.parametrize("shape", ["square", "wide", "odin"])
+@pytest.mark.parametrize("inverse", [printed_inverse, pseudo_inverse])
+def test_rank_six_inverts_exactly(shape, inverse):
+    """Eq. (25): G G# = I."""
+    g = SHAPES[shape]
+    assert norms(g @ np.asarray(each(inverse)(g)) - np.eye(6)).max() <= 1e-9
+
+
+@pytest.mark.parametrize("delta", [1e-6, 1e-2, 1.0])
+@pytest.mark.parametrize("shape", ["wide", "odin"])
+def test_regularised_right_inverse_loses_the_fourth_power_share(shape, delta):
+    """||I - G reg G#|| = delta / (delta + sigma_min^4): N > 6."""
+    g = SHAPES[shape]
+    smallest = np.linalg.svd(g, compute_uv=False).min(1)
+    loss = norms(np.eye(6) - g @ np.asarray(each(lambda g: regularised_sharp(g, delta))(g)))
+    np.testing.assert_allclose(loss, delta / (delta + smallest**4), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("delta", [1e-6, 1e-2, 1.0])
+def test_regularised_square_inverse_loses_the_second_power_share(delta):
+    """N = 6 regularises G itself, not G G^T: delta / (delta + sigma_min^2)."""
+    smallest = np.linalg.svd(SQUARE, compute_uv=False).min(1)
+    loss = norms(np.eye(6) - SQUARE @ np.asarray(each(lambda g: regularised_sharp(g, delta))(SQUARE)))
+    np.testing.assert_allclose(loss, delta / (delta + smallest**2), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("delta", [1e-6, 1e-2, 1.0])
+def test_fewer_than_six_inputs_make_the_outer_factor_a_mere_gain(delta):
+    """N < 6, full column rank: G+ [G G+]^r = G+ / (1 + delta), whatever G (theory of Eq. (24))."""
+
+    def sharp(g):
+        plus = printed_inverse(g)
+        return plus @ regularised_inverse(g @ plus, delta)
+
+    expected = np.asarray(each(pseudo_inverse)(TALL)) / (1 + delta)
+    np.testing.assert_allclose(each(sharp)(TALL), expected, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("delta", [1e-6, 1e-3, 1.0])
+def test_printed_regularisation_for_fewer_than_six_inputs_in_closed_form(delta):
+    """Eq. (27) regularises twice: singular value s becomes (1/s) m^2 / (delta + m^2), m = s^4 / (delta + s^4)."""
+    u, s, vt = np.linalg.svd(TALL, full_matrices=False)
+    share = s**4 / (delta + s**4)
+    expected = np.einsum("kji,kj,klj->kil", vt, share**2 / (delta + share**2) / s, u)
+    found = each(lambda g: regularised_sharp(g, delta))(TALL)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
+
+
+def test_printed_regularisation_tends_to_the_mere_gain():
+    """Where delta is far below sigma^4 the two agree."""
+    q = np.linalg.qr(TALL)[0] * np.array([1.0, 1.5, 2.0, 3.0])
+    found = each(lambda g: regularised_sharp(g, 1e-5))(q)
+    np.testing.assert_allclose(found, np.asarray(each(pseudo_inverse)(q)) / (1 + 1e-5), rtol=0, atol=1e-8)
+
+
+def test_product_with_fewer_than_six_inputs_is_a_projector_that_nothing_inverts():
+    """So [G G+]^-1 of Eq. (24) never exists: rank 4 of 6, in double precision a condition of 1e15 and more."""
+    product = np.asarray(each(lambda g: g @ pseudo_inverse(g))(TALL))
+    np.testing.assert_allclose(product @ product, product, atol=1e-12)
+    np.testing.assert_allclose(product, product.swapaxes(1, 2), atol=1e-12)
+    np.testing.assert_allclose(np.trace(product, axis1=1, axis2=2), 4.0, atol=1e-12)
+    assert np.linalg.cond(product).min() > 1e14
+
+
+def test_number_of_inputs_is_not_the_rank():
+    """Four horizontal thrusters have rank 3: G^T G is singular, and the printed inverse with it; G+ is not."""
+    g = np.asarray(odin().with_thrusters((1, 2, 3, 4)).thruster_matrix())
+    assert np.linalg.matrix_rank(g) == 3
+    assert np.linalg.cond(g.T @ g) > 1e15
+    p = np.asarray(pseudo_inverse(jnp.asarray(g)))
+    np.testing.assert_allclose(g @ p @ g, g, atol=1e-9)
+    np.testing.assert_allclose(g @ p, np.diag([1.0, 1, 0, 0, 0, 1]), atol=1e-12)

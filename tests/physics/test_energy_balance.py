@@ -1,0 +1,121 @@
+"""I5: the work that the thrusters do is all there, as motion, height or heat; without them energy only falls."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core.contracts import Load
+from undertow.numerics.integrators import rk4
+from undertow.numerics.rotations import rotation_from_quaternion
+from undertow.plants import hybrid_vehicle
+from undertow.thrusters import paper_table3
+from undertow.vehicles import odin
+
+ODIN = hybrid_vehicle(odin(), paper_table3("shaft"))
+# |nu| nu has a corner in its slope wherever a velocity changes sign; order 4 shows on linear damping only.
+SMOOTH = hybrid_vehicle(
+    eqx.tree_at(
+        lambda v: (v.linear_damping, v.quadratic_damping),
+        odin(),
+        (jnp.diag(jnp.array([60.0, 70, 80, 30, 35, 40])), jnp.zeros((6, 6))),
+    ),
+    paper_table3("shaft"),
+)
+START = ([0.0, 0, 0, 0.5, -0.4, 1.0], [0.4, -0.3, 0.2, 0.3, -0.2, 0.5])
+
+
+class Ledger(NamedTuple):
+    """State of the plant, the net work done on it so far, and all that went in or out, J."""
+
+    x: Any
+    work: Any
+    throughput: Any
+
+
+def energy(plant, x):
+    down = rotation_from_quaternion(x.attitude)[2]
+    return plant.body.kinetic_energy(x.nu) + plant.body.potential_energy(x.position, down)
+
+
+def pushed(t):
+    """tau(t), N and N m: every axis differently, enough to turn the vehicle over."""
+    angles = jnp.array([0.7, 1.1, 1.7, 0.4, 0.9, 1.3]) * t + jnp.arange(6.0)
+    return jnp.array([60.0, 50, 70, 60, 70, 40]) * jnp.sin(angles)
+
+
+def balance(plant, steps, dt, force):
+    """(E - work) / throughput at the end, and E at every step."""
+
+    def field(t, state):
+        tau = force(t)
+        nu, calm = state.x.nu, jnp.zeros(6)
+        rates = plant.dynamics(t, state.x, jnp.zeros(8), Load(calm, -tau))
+        supplied, lost = nu @ tau, nu @ plant.body.damping(nu)
+        return Ledger(rates, supplied - lost, jnp.abs(supplied) + lost)
+
+    @jax.jit
+    def run():
+        start = Ledger(plant.initial_state(*START), jnp.zeros(()), jnp.zeros(()))
+
+        def step(state, k):
+            return (rk4(field, k * dt, state, jnp.asarray(dt)), energy(plant, state.x))
+
+        end, energies = jax.lax.scan(step, start, jnp.arange(float(steps)))
+        gained = energy(plant, end.x) - energy(plant, start.x)
+        return (gained - end.work) / end.throughput, end.throughput, energies
+
+    defect, throughput, energies = run()
+    return abs(float(defect)), float(throughput), np.asarray(energies)
+
+
+def test_energy_balances_over_twenty_seconds():
+    defect, throughput, _ = balance(ODIN, 20_000, 1e-3, pushed)
+    assert throughput > 1000
+    assert defect <= 1e-6
+
+
+def test_error_of_the_balance_is_of_order_four():
+    """Halving dt divides the defect by sixteen."""
+    defects = [balance(SMOOTH, n, 20 / n, pushed)[0] for n in (200, 400, 800)]
+    slopes = np.log2(np.array(defects)[:-1] / np.array(defects)[1:])
+    assert ((slopes >= 3.8) & (slopes <= 4.2)).all(), (defects, slopes)
+
+
+def test_energy_never_rises_without_thrust():
+    _, _, energies = balance(ODIN, 20_000, 1e-3, lambda t: jnp.zeros(6))
+    assert np.diff(energies).max() <= 1e-12 * np.abs(energies).max()
+    assert energies[0] - energies[-1] > 10
+
+
+def test_power_of_the_loads_is_the_rate_of_energy():
+    """d(T + U)/dt = nu . (tau - D nu) at any instant, by automatic differentiation: thrusters at work, tumbling."""
+    rng = np.random.default_rng(8)
+    count = 300
+
+    def rates(q, nu, speed, tau):
+        x = ODIN.initial_state()._replace(attitude=q / jnp.linalg.norm(q), nu=nu)
+        x = x._replace(thrusters=x.thrusters._replace(speed=speed))
+        rate = jax.jvp(
+            lambda x: energy(ODIN, x), (x,), (ODIN.dynamics(jnp.zeros(()), x, speed, Load(jnp.zeros(6), -tau)),)
+        )[1]
+        thrust = ODIN.thruster_matrix @ ODIN.thruster.thrust(x.thrusters, speed)
+        return rate, nu @ (tau + thrust - ODIN.body.damping(nu))
+
+    draws = rng.normal(size=(count, 4)), rng.normal(size=(count, 6)), 20 * rng.normal(size=(count, 8))
+    found, expected = jax.jit(jax.vmap(rates))(*draws, 50 * rng.normal(size=(count, 6)))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_upright_is_where_potential_energy_is_least():
+    """ODIN's centre of gravity hangs 5 cm below its centre of buoyancy: 61.3 N m/rad of righting moment."""
+    body = ODIN.body
+
+    def at(roll):
+        return body.potential_energy(jnp.zeros(3), jnp.array([0.0, jnp.sin(roll), jnp.cos(roll)]))
+
+    np.testing.assert_allclose(jax.grad(at)(0.0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(jax.grad(jax.grad(at))(0.0), 1226.0 * 0.05, rtol=1e-12)
+    np.testing.assert_allclose(at(np.pi) - at(0.0), 2 * 1226.0 * 0.05, rtol=1e-12)

@@ -1,0 +1,161 @@
+"""I3, I4: three ways to write the hybrid system, Eqs. (1)-(20), give one acceleration; G and its rank."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.core.contracts import Load
+from undertow.numerics.rotations import jacobian
+from undertow.plants import hybrid_vehicle
+from undertow.thrusters import paper_table3
+from undertow.vehicles import Vehicle, odin
+from undertow.vehicles.body import coriolis_matrix
+
+RNG = np.random.default_rng(2)
+COUNT = 300
+NOMINAL = hybrid_vehicle(odin(), paper_table3("electromechanical"))
+
+
+def heavier(vehicle: Vehicle) -> Vehicle:
+    """The true vehicle: everything differs from what the controller was told."""
+    tilt = RNG.normal(size=(6, 6))
+    return Vehicle(
+        name="true",
+        mass=140.0,
+        weight=1300.0,
+        buoyancy=1250.0,
+        r_g=[0.02, -0.01, 0.08],
+        r_b=[0.0, 0.01, -0.02],
+        inertia=np.diag([9.0, 7.0, 10.0]) + 0.2,
+        added_mass=np.asarray(vehicle.added_mass) + 0.5 * tilt @ tilt.T,
+        linear_damping=np.asarray(vehicle.linear_damping) + 5 * np.eye(6),
+        quadratic_damping=1.3 * np.asarray(vehicle.quadratic_damping),
+        thruster_positions=vehicle.thruster_positions,
+        thruster_directions=vehicle.thruster_directions,
+    )
+
+
+PLANT = hybrid_vehicle(heavier(odin()), paper_table3("electromechanical"))
+POSE = RNG.uniform(-1, 1, (COUNT, 6)) * np.array([10, 10, 10, np.pi, 1.3, np.pi])
+VELOCITY, WRENCH = RNG.normal(size=(COUNT, 6)), 50 * RNG.normal(size=(COUNT, 6))
+SPEED, CURRENT = 40 * RNG.normal(size=(COUNT, 8)), 5 * RNG.normal(size=(COUNT, 8))
+VOLTS = 10 * RNG.normal(size=(COUNT, 8))
+
+
+def situation(pose, velocity, speed, current, wrench):
+    x = PLANT.initial_state(pose, velocity)
+    x = x._replace(thrusters=x.thrusters._replace(speed=speed, current=current))
+    return x, Load(jnp.zeros(6), wrench)
+
+
+def accelerations(pose, velocity, speed, current, volts, wrench):
+    """x_ddot of the plant, of (1.A), of Eqs. (4)-(5) and of Eq. (17) with d from its definition, phi known or not."""
+    t = jnp.zeros(())
+    x, load = situation(pose, velocity, speed, current, wrench)
+    rates = PLANT.dynamics(t, x, volts, load)
+    nu, nu_rate, y = x.nu, rates.nu, PLANT.output(t, x)
+    nominal, true = NOMINAL.body, PLANT.body
+    down = jacobian(pose[3:])[2, :3]
+
+    def own(body):
+        return body.coriolis(nu) + body.damping(nu) + body.restoring(down)
+
+    delta = (true.mass_matrix - nominal.mass_matrix) @ nu_rate + own(true) - own(nominal)  # Eq. (3)
+
+    j, j_rate = jax.jvp(jacobian, (pose[3:],), (velocity[3:],))
+    inverse = jnp.linalg.inv(j)
+    thrust = PLANT.thruster.thrust(x.thrusters, volts)
+    tau = PLANT.thruster_matrix @ thrust
+    direct = j_rate @ nu + j @ jnp.linalg.solve(nominal.mass_matrix, tau - own(nominal) - wrench - delta)
+
+    coriolis = coriolis_matrix(nominal.mass_matrix, nu)
+    damping = nominal.linear_damping + nominal.quadratic_damping * jnp.abs(nu)
+    m_j = inverse.T @ nominal.mass_matrix @ inverse
+    inverse_rate = -inverse @ j_rate @ inverse
+    moving = inverse.T @ (nominal.mass_matrix @ inverse_rate + (coriolis + damping) @ inverse) @ velocity
+    f_k = -moving - inverse.T @ (nominal.restoring(down) + wrench + delta)
+    lagrangian = jnp.linalg.solve(m_j, f_k + inverse.T @ tau)
+
+    motor = PLANT.thruster.motor
+    varphi = -motor.voltage_gain * (motor.k1 * rates.thrusters.speed + motor.k2 * speed)
+    missing = -motor.voltage_gain * motor.inductance * rates.thrusters.current  # Delta_V of Eq. (15)
+
+    def hybrid(speed_sensor, unknown):
+        model = NOMINAL.model(speed_sensor=speed_sensor)
+        wrenches = PLANT.thruster_matrix @ unknown - wrench - delta
+        lumped = j @ jnp.linalg.solve(nominal.mass_matrix, wrenches) + j_rate @ nu
+        return model.drift(y) + model.gain(y) @ volts + lumped
+
+    plant = PLANT.acceleration(t, x, volts, load)
+    return jnp.stack([plant, direct, lagrangian, hybrid(False, missing + varphi), hybrid(True, missing)])
+
+
+def test_all_forms_of_the_system_give_one_acceleration():
+    found = np.asarray(jax.jit(jax.vmap(accelerations))(POSE, VELOCITY, SPEED, CURRENT, VOLTS, WRENCH))
+    for i in range(1, 5):
+        for k in range(i):
+            difference = np.linalg.norm(found[:, i] - found[:, k], axis=1)
+            assert (difference <= 1e-10 * np.linalg.norm(found[:, i], axis=1)).all()
+
+
+def test_rate_term_in_the_model_takes_exactly_j_dot_nu_out_of_the_uncertainty():
+    def difference(pose, velocity):
+        t = jnp.zeros(())
+        y = NOMINAL.output(t, NOMINAL.initial_state(pose, velocity))
+        j, j_rate = jax.jvp(jacobian, (pose[3:],), (velocity[3:],))
+        expected = j_rate @ jnp.linalg.solve(j, velocity)
+        found = NOMINAL.model(rate_term=True).drift(y) - NOMINAL.model().drift(y)
+        return jnp.linalg.norm(found - expected) / jnp.linalg.norm(expected)
+
+    assert float(jax.jit(jax.vmap(difference))(POSE, VELOCITY).max()) <= 1e-10
+
+
+def gains(pose):
+    """G of the model, J M^-1 B alpha, and M_J^-1 J^-T B alpha."""
+    y = NOMINAL.output(jnp.zeros(()), NOMINAL.initial_state(pose))
+    j, inverse = jacobian(pose[3:]), jnp.linalg.inv(jacobian(pose[3:]))
+    b_alpha = NOMINAL.thruster_matrix * NOMINAL.thruster.voltage_gain()
+    m = NOMINAL.body.mass_matrix
+    lagrangian = jnp.linalg.solve(inverse.T @ m @ inverse, inverse.T @ b_alpha)
+    return NOMINAL.model().gain(y), j @ jnp.linalg.solve(m, b_alpha), lagrangian
+
+
+def test_gain_matrix_is_what_the_paper_says_it_is():
+    code, direct, lagrangian = (np.asarray(g) for g in jax.jit(jax.vmap(gains))(POSE))
+    scale = np.linalg.norm(direct, axis=(1, 2))
+    assert (np.linalg.norm(code - direct, axis=(1, 2)) <= 1e-10 * scale).all()
+    assert (np.linalg.norm(code - lagrangian, axis=(1, 2)) <= 1e-10 * scale).all()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "rank"),
+    [(range(1, 9), 6), ((1, 2, 3, 4), 3), ((5, 6, 7, 8), 3), ((1, 2, 3, 5, 6), 5), ((1,), 1), (range(2, 9), 6)],
+)
+def test_rank_of_gain_is_the_rank_of_the_thruster_matrix(numbers, rank):
+    """Wherever |pitch| < 1.5: geometry decides once and for all."""
+    plant = hybrid_vehicle(odin().with_thrusters(tuple(numbers)), paper_table3("ideal"))
+    model = plant.model()
+    steep = POSE * np.array([1, 1, 1, 1, 1.5 / 1.3, 1])
+
+    def gain(pose):
+        return model.gain(plant.output(jnp.zeros(()), plant.initial_state(pose)))
+
+    singular = np.linalg.svd(np.asarray(jax.jit(jax.vmap(gain))(steep)), compute_uv=False)
+    assert ((singular > 1e-10 * singular[:, :1]).sum(1) == rank).all()
+    assert plant.rank() == rank
+
+
+def test_inverse_of_the_model_is_the_pseudo_inverse_of_its_gain():
+    """Also below rank 6, where the closed form does not hold."""
+    for numbers in (tuple(range(1, 9)), (1, 2, 3, 5, 6), (1, 2, 3, 4)):
+        plant = hybrid_vehicle(odin().with_thrusters(numbers), paper_table3("ideal"))
+        model = plant.model()
+
+        def both(pose, wanted, plant=plant, model=model):
+            y = plant.output(jnp.zeros(()), plant.initial_state(pose))
+            return model.invert(y, wanted), jnp.linalg.pinv(model.gain(y), rtol=1e-10) @ wanted
+
+        found, expected = map(np.asarray, jax.jit(jax.vmap(both))(POSE, VELOCITY))
+        difference = np.linalg.norm(found - expected, axis=1)
+        assert (difference <= 1e-9 * np.linalg.norm(expected, axis=1)).all()

@@ -1,0 +1,133 @@
+"""I8: turning and shifting the world, renaming thrusters and changing units change nothing but names."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.controllers import rcaf
+from undertow.core.contracts import Load
+from undertow.disturbances import u1
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.sampled import simulate
+from undertow.numerics.integrators import rk4
+from undertow.plants import hybrid_vehicle
+from undertow.references import setpoint
+from undertow.sensors import perfect
+from undertow.thrusters import paper_table3
+from undertow.vehicles import odin
+
+POSE = np.array([1.0, -2.0, 3.0, 0.2, -0.3, 0.5])
+VELOCITY = np.array([0.3, -0.2, 0.1, 0.1, 0.2, -0.1])
+ORDER = (3, 8, 1, 5, 7, 2, 6, 4)  # thrusters, from 1
+
+
+def volts(t):
+    return 8 * jnp.sin(jnp.arange(1.0, 9.0) * t + jnp.arange(8.0))
+
+
+def push(t):
+    """Lumped acceleration, earth frame, and wrench, body frame."""
+    return Load(jnp.sin(t + jnp.arange(6.0)), 20 * jnp.cos(2 * t + jnp.arange(6.0)))
+
+
+@eqx.filter_jit
+def trajectory(plant, start, volts_factor=1.0, length=1.0, load=push, steps=5000, dt=1e-3):
+    """States over 5 s of prescribed voltages and loads; `length`: metres in units of the plant.
+
+    A step of 5 ms would not do: between its stages a quaternion is not quite of unit length, and the matrix made
+    from it turns with the world only up to the error of the integrator (1.4e-10 at 5 ms).
+    """
+    force = jnp.array([1.0, 1, 1, length, length, length]) * length
+    stretch = jnp.array([length, length, length, 1.0, 1, 1])
+
+    def field(t, x):
+        d = load(t)
+        return plant.dynamics(t, x, volts_factor * volts(t), Load(stretch * d.acceleration, force * d.wrench))
+
+    def step(x, k):
+        x = rk4(field, k * dt, x, jnp.asarray(dt))
+        return x, x
+
+    return jax.lax.scan(step, start, jnp.arange(float(steps)))[1]
+
+
+def test_turning_the_world_about_the_vertical_and_shifting_it_maps_trajectories():
+    plant = hybrid_vehicle(odin(), paper_table3("electromechanical"))
+    turn, shift = 1.1, np.array([5.0, -7.0, 11.0])
+    about = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+
+    def turned(t):
+        d = push(t)
+        return d._replace(acceleration=jnp.concatenate([about @ d.acceleration[:3], d.acceleration[3:]]))
+
+    moved = np.concatenate([about @ POSE[:3] + shift, POSE[3:] + np.array([0, 0, turn])])
+    rates = np.concatenate([about @ VELOCITY[:3], VELOCITY[3:]])
+    here = trajectory(plant, plant.initial_state(POSE, VELOCITY))
+    there = trajectory(plant, plant.initial_state(moved, rates), load=turned)
+    assert np.ptp(np.asarray(here.position), axis=0).min() > 0.5
+    np.testing.assert_allclose(there.position, here.position @ about.T + shift, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(there.nu, here.nu, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(there.thrusters.speed, here.thrusters.speed, rtol=0, atol=1e-10)
+    c, s = np.cos(turn / 2), np.sin(turn / 2)
+    w, x, y, z = np.asarray(here.attitude).T
+    product = np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=1)  # the turn, then q
+    np.testing.assert_allclose(there.attitude, product, rtol=0, atol=1e-10)
+
+
+def in_centimetres(plant):
+    """Same vehicle and motor in centimetres, kilograms, seconds, amperes: newtons grow by 100, volts by 10^4."""
+    length, area = 100.0, 1e4
+    force_rows = np.array([1.0, 1, 1, length, length, length])
+    vehicle, motor = plant.vehicle, plant.thruster.motor
+    mass_like = np.outer(force_rows, force_rows)  # kg, kg m, kg m^2
+    quadratic_like = np.outer(force_rows, [1 / length] * 3 + [length] * 3)  # N s^2/m^2 ... N m s^2
+    vehicle = eqx.tree_at(
+        lambda v: (
+            *(v.weight, v.buoyancy, v.r_g, v.r_b, v.inertia, v.added_mass),
+            *(v.linear_damping, v.quadratic_damping, v.thruster_positions),
+        ),
+        vehicle,
+        (
+            *(length * vehicle.weight, length * vehicle.buoyancy, length * vehicle.r_g, length * vehicle.r_b),
+            *(area * vehicle.inertia, mass_like * vehicle.added_mass, mass_like * vehicle.linear_damping),
+            *(quadratic_like * vehicle.quadratic_damping, length * vehicle.thruster_positions),
+        ),
+    )
+    electrical = ("resistance", "inductance", "torque_constant", "back_emf_constant")
+    mechanical = ("friction", "rotor_inertia", "torque_coefficient")
+    scaled = {name: area * getattr(motor, name) for name in electrical + mechanical}
+    scaled["thrust_coefficient"] = length * motor.thrust_coefficient
+    motor = eqx.tree_at(lambda m: [getattr(m, name) for name in scaled], motor, list(scaled.values()))
+    return hybrid_vehicle(vehicle, eqx.tree_at(lambda t: t.motor, plant.thruster, motor))
+
+
+def test_centimetres_give_the_same_motion_as_metres():
+    plant = hybrid_vehicle(odin(), paper_table3("electromechanical"))
+    small = in_centimetres(plant)
+    scale = np.array([100.0, 100, 100, 1, 1, 1])
+    metres = trajectory(plant, plant.initial_state(POSE, VELOCITY))
+    centimetres = trajectory(small, small.initial_state(scale * POSE, scale * VELOCITY), 1e4, 100.0)
+    np.testing.assert_allclose(centimetres.position / 100, metres.position, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(centimetres.nu / scale, metres.nu, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(centimetres.attitude, metres.attitude, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(centimetres.thrusters.speed, metres.thrusters.speed, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(centimetres.thrusters.current, metres.thrusters.current, rtol=0, atol=1e-9)
+
+
+def closed_loop(vehicle):
+    plant = hybrid_vehicle(vehicle, paper_table3("ideal"))
+    goal = setpoint(np.array([2, 3, 4, np.pi / 3, np.pi / 4, 2 * np.pi / 5]))
+    return ClosedLoop(plant, rcaf(plant.model()), goal, u1(), perfect())
+
+
+def test_renaming_the_thrusters_renames_the_voltages_and_nothing_else():
+    """In closed loop with the paper's law, gains and disturbances."""
+    named = simulate(closed_loop(odin().with_thrusters(range(1, 9))), duration=2.0)
+    renamed = simulate(closed_loop(odin().with_thrusters(ORDER)), duration=2.0)
+    volts = np.asarray(named.samples.voltage)
+    assert np.abs(volts).max() > 10
+    np.testing.assert_allclose(renamed.samples.position, named.samples.position, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        renamed.samples.voltage, volts[:, np.array(ORDER) - 1], rtol=0, atol=1e-11 * np.abs(volts).max()
+    )
