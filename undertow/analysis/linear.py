@@ -158,25 +158,15 @@ def sampled_matrix(law: RCAF, dt: float, rule: str = "euler", axis: int = 0) -> 
     """
     if rule not in RULES:
         raise BadInput("rule", f"be one of {', '.join(RULES)}", rule)
-    g = gains(law, axis)
-    unit = np.eye(4)
-    push = np.array([g.stiffness, g.damping, 0.0, -1.0])  # u = push . state
-    sliding = np.array([g.p12, g.p22, 0.0, 0.0])  # s = sliding . state
-    # The law's own flow between two ticks: (x_hat_dot - measured x_dot, d_hat), driven by s and u.
-    flow = np.zeros((4, 4))
-    flow[0] = -g.pole, 1.0, 0.0, 1.0
-    flow[1] = -g.b2, 0.0, -g.adaptation, 0.0
-    across = unit + dt * flow if rule == "euler" else _exponential(dt * flow)
-    learned = across[:2] @ np.stack([unit[2], unit[3], sliding, push])
-    rate = unit[1] - dt * push  # e_dot one tick later; x_dot moves by dt u
-    return np.stack([unit[0] + dt * unit[1] - dt**2 / 2 * push, rate, learned[0] - dt * push, learned[1]])
+    return _tick(gains(law, axis), dt, rule)
 
 
 def largest_sampling_time(law: RCAF, rule: str = "euler", axis: int = 0) -> float:
     """Sampling time, s, at which the spectral radius of the sampled Jacobian first reaches 1. Section 3.6."""
+    g = gains(law, axis)
 
     def unstable(dt: float) -> bool:
-        return bool(np.abs(np.linalg.eigvals(sampled_matrix(law, dt, rule, axis))).max() > 1)
+        return bool(np.abs(np.linalg.eigvals(_tick(g, dt, rule))).max() > 1)
 
     grid = np.geomspace(1e-6, 1e2, 2001)
     first = next((i for i, dt in enumerate(grid) if unstable(dt)), None)
@@ -191,6 +181,20 @@ def bisect(beyond: Callable[[float], bool], low: float, high: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if beyond(middle) else (middle, high)
     return float(high)
+
+
+def _tick(g: Gains, dt: float, rule: str) -> np.ndarray:
+    unit = np.eye(4)
+    push = np.array([g.stiffness, g.damping, 0.0, -1.0])  # u = push . state
+    sliding = np.array([g.p12, g.p22, 0.0, 0.0])  # s = sliding . state
+    # The law's own flow between two ticks: (x_hat_dot - measured x_dot, d_hat), driven by s and u.
+    flow = np.zeros((4, 4))
+    flow[0] = -g.pole, 1.0, 0.0, 1.0
+    flow[1] = -g.b2, 0.0, -g.adaptation, 0.0
+    across = unit + dt * flow if rule == "euler" else _exponential(dt * flow)
+    learned = across[:2] @ np.stack([unit[2], unit[3], sliding, push])
+    rate = unit[1] - dt * push  # e_dot one tick later; x_dot moves by dt u
+    return np.stack([unit[0] + dt * unit[1] - dt**2 / 2 * push, rate, learned[0] - dt * push, learned[1]])
 
 
 def _response(law: RCAF, frequency, axis: int) -> np.ndarray:

@@ -7,7 +7,7 @@ so what follows holds for any vehicle.
 
 import numpy as np
 
-from undertow.analysis.linear import bisect, gains
+from undertow.analysis.linear import Gains, bisect, gains
 from undertow.controllers.law import RCAF
 from undertow.thrusters.motor import DCMotor
 
@@ -24,7 +24,7 @@ def motor_lag(motor: DCMotor, speed: float) -> tuple[float, float]:
 
 def lag_matrix(law: RCAF, lag: float, gain: float = 1.0, axis: int = 0) -> np.ndarray:
     """Closed loop (5 x 5) on (e, e_dot, eps, d_hat, a) with a / a_c = gain / (lag p + 1), lag in s. Section 3.9."""
-    return _closed(law, np.array([[-1 / lag]]), np.array([gain / lag]), np.array([1.0]), axis)
+    return _lagged(gains(law, axis), lag, gain)
 
 
 def motor_matrix(law: RCAF, motor: DCMotor, speed: float, inductance: bool = True, axis: int = 0) -> np.ndarray:
@@ -44,7 +44,7 @@ def motor_matrix(law: RCAF, motor: DCMotor, speed: float, inductance: bool = Tru
     if not inductance:
         resisted = float(motor.k2) + float(motor.k3) * torque_slope
         own = np.array([[-resisted]]) / float(motor.k1)
-        return _closed(law, own, np.array([volts_per_thrust / float(motor.k1)]), np.array([thrust_slope]), axis)
+        return _closed(gains(law, axis), own, np.array([volts_per_thrust / float(motor.k1)]), np.array([thrust_slope]))
     inertia, winding = float(motor.rotor_inertia), float(motor.inductance)
     own = np.array(
         [
@@ -52,7 +52,7 @@ def motor_matrix(law: RCAF, motor: DCMotor, speed: float, inductance: bool = Tru
             [-float(motor.back_emf_constant) / winding, -float(motor.resistance) / winding],
         ]
     )
-    return _closed(law, own, np.array([0.0, volts_per_thrust / winding]), np.array([thrust_slope, 0.0]), axis)
+    return _closed(gains(law, axis), own, np.array([0.0, volts_per_thrust / winding]), np.array([thrust_slope, 0.0]))
 
 
 def rightmost(matrix: np.ndarray) -> complex:
@@ -64,9 +64,10 @@ def rightmost(matrix: np.ndarray) -> complex:
 
 def critical_lag(law: RCAF, gain: float = 1.0, axis: int = 0) -> float:
     """Actuator lag, s, beyond which the whole loop is unstable; infinite if none below 100 s is. Section 3.9."""
+    g = gains(law, axis)
 
     def unstable(lag: float) -> bool:
-        return rightmost(lag_matrix(law, lag, gain, axis)).real > 0
+        return rightmost(_lagged(g, lag, gain)).real > 0
 
     grid = np.geomspace(1e-6, 1e2, 1601)
     first = next((i for i, lag in enumerate(grid) if unstable(lag)), None)
@@ -84,9 +85,12 @@ def critical_observer_lag(law: RCAF, axis: int = 0) -> float:
     return g.pole / (g.b2 - g.pole**2) if g.b2 > g.pole**2 else float("inf")
 
 
-def _closed(law: RCAF, own: np.ndarray, drive: np.ndarray, push: np.ndarray, axis: int) -> np.ndarray:
+def _lagged(g: Gains, lag: float, gain: float) -> np.ndarray:
+    return _closed(g, np.array([[-1 / lag]]), np.array([gain / lag]), np.array([1.0]))
+
+
+def _closed(g: Gains, own: np.ndarray, drive: np.ndarray, push: np.ndarray) -> np.ndarray:
     """Law around an actuator m' = own m + drive a_c, a = push m."""
-    g = gains(law, axis)
     states = 4 + len(own)
     asked = np.zeros(states)
     asked[:4] = g.stiffness, g.damping, 0.0, -1.0

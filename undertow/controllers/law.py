@@ -103,7 +103,7 @@ class RCAF(AbstractContinuousController):
             modelling_error=eps,
             predicted_position=z.predicted_position,
             predicted_velocity=z.predicted_velocity,
-            weights_peak=jnp.abs(z.weights).max(),
+            weights=z.weights,
         )
         return self.model.invert(y, wanted), telemetry
 

@@ -18,7 +18,7 @@ Gain = Float[Array, "n m"]
 
 
 class Measurement(NamedTuple):
-    """What is measured of a plant: y."""
+    """What is measured of a plant: y; the state X of Eq. (18)."""
 
     position: Outputs  # m, rad
     velocity: Outputs  # m/s, rad/s
@@ -55,7 +55,7 @@ class Telemetry(NamedTuple):
     modelling_error: Outputs  # eps, m/s, rad/s
     predicted_position: Outputs  # x_hat
     predicted_velocity: Outputs
-    weights_peak: Float[Array, ""]  # max |theta|
+    weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2; no columns when nothing is learnt
 
 
 class AbstractModel(eqx.Module):
@@ -83,15 +83,15 @@ class AbstractModel(eqx.Module):
 
 
 class AbstractPlant(eqx.Module):
-    """A second-order control-affine system with n outputs and m inputs."""
+    """A second-order control-affine system with n outputs and m inputs, Eq. (20)."""
 
     outputs: eqx.AbstractVar[tuple[str, ...]]  # names of the n outputs
     output_units: eqx.AbstractVar[tuple[str, ...]]
     input_unit: eqx.AbstractVar[str]
 
     @abc.abstractmethod
-    def initial_state(self) -> PyTree:
-        """State x at rest at the origin."""
+    def initial_state(self, position: Outputs | None = None, velocity: Outputs | None = None) -> PyTree:
+        """State x with given outputs (zero where None), actuators at rest."""
 
     @abc.abstractmethod
     def dynamics(self, t: Time, x: PyTree, u: Inputs, d: Load) -> PyTree:

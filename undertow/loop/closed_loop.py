@@ -30,13 +30,14 @@ class Sample(NamedTuple):
     velocity: Outputs
     target: Outputs
     error: Outputs
-    uncertainty: Outputs  # d = x_ddot - F - G V, measured, never assumed
+    uncertainty: Outputs  # d = x_ddot - F - G V, measured, never assumed; holds Delta of Eq. (3) and all else
     estimate: Outputs
     robust: Outputs
     modelling_error: Outputs
     predicted_position: Outputs
     predicted_velocity: Outputs
-    weights_peak: Float[Array, ""]
+    weights: Float[Array, "n rules"]  # theta
+    weights_peak: Float[Array, ""]  # max |theta|
     voltage: Inputs  # applied
     command: Inputs  # asked for
     power: Inputs
@@ -62,6 +63,14 @@ class ClosedLoop(eqx.Module):
     disturbance: AbstractDisturbance
     sensor: AbstractSensor
 
+    def outputs_at_start(self, position: Any, velocity: Any) -> tuple[Outputs, Outputs]:
+        """Outputs at t = 0 as arrays, zero where None: one compiled program serves every start."""
+        zero = jnp.zeros(len(self.plant.outputs))
+        return (
+            zero if position is None else jnp.asarray(position, dtype=float),
+            zero if velocity is None else jnp.asarray(velocity, dtype=float),
+        )
+
     def draw(self, key: PRNGKeyArray) -> "Drawn":
         """Draw everything random once."""
         return Drawn(self, self.disturbance.draw(key), self.sensor.draw(jnp.flip(key)))
@@ -74,8 +83,8 @@ class Drawn(NamedTuple):
     disturbance_path: PyTree
     sensor_path: PyTree
 
-    def start(self, position: Any = None, velocity: Any = None) -> tuple[PyTree, PyTree]:
-        """States of plant and controller at t = 0."""
+    def start(self, position: Outputs | None = None, velocity: Outputs | None = None) -> tuple[PyTree, PyTree]:
+        """States of plant and controller at t = 0, from the outputs there."""
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
         truth = self.loop.plant.output(zero, x)
@@ -112,7 +121,8 @@ class Drawn(NamedTuple):
             modelling_error=telemetry.modelling_error,
             predicted_position=telemetry.predicted_position,
             predicted_velocity=telemetry.predicted_velocity,
-            weights_peak=telemetry.weights_peak,
+            weights=telemetry.weights,
+            weights_peak=jnp.abs(telemetry.weights).max(initial=0.0),
             voltage=applied,
             command=command,
             power=effort.power,

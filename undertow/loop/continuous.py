@@ -16,6 +16,7 @@ from undertow.loop.closed_loop import ClosedLoop, Drawn
 from undertow.loop.outcome import Outcome, health
 
 _MAX_STEPS = 2**20
+_FIRST_STEP = 1e-4  # s; the integrator finds its own from there
 
 
 def simulate(
@@ -51,22 +52,22 @@ def simulate(
     if records < 1:
         raise BadInput("duration", f"be at least one record ({record_step:g} s)", f"{duration:g} s")
     key = jax.random.PRNGKey(0) if key is None else key
+    start = loop.outputs_at_start(position, velocity)
     times = jnp.asarray(np.arange(records + 1) * record_step, dtype=float)
     jumps = jnp.asarray([0.0, *loop.disturbance.jumps(duration)])
-    return _run(loop, key, position, velocity, times, times[-1], jumps, rtol, atol)
+    return _run(loop, key, start, times, times[-1], jumps, rtol, atol)
 
 
 @eqx.filter_jit
-def _run(loop, key, position, velocity, times, duration, jumps, rtol, atol) -> Outcome:
+def _run(loop, key, start, times, duration, jumps, rtol, atol) -> Outcome:
     drawn = loop.draw(key)
-    start = drawn.start(position, velocity)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(_flow),
         diffrax.Tsit5(),
         t0=0.0,
         t1=duration,
-        dt0=None,
-        y0=start,
+        dt0=_FIRST_STEP,
+        y0=drawn.start(*start),
         args=drawn,
         saveat=diffrax.SaveAt(subs=(diffrax.SubSaveAt(ts=times), diffrax.SubSaveAt(t1=True))),
         stepsize_controller=diffrax.ClipStepSizeController(diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=jumps),
@@ -86,6 +87,7 @@ def _run(loop, key, position, velocity, times, duration, jumps, rtol, atol) -> O
     return Outcome(times, samples, (), jax.tree.map(lambda leaf: leaf[0], final), status, ended)
 
 
+@jax.jit  # traced once, although the integrator's stages call it many times
 def _flow(t: Float[Array, ""], state, drawn: Drawn):
     x, z = state
     decision = drawn.decide(t, x, z)

@@ -24,6 +24,7 @@ _MEANINGS = {
     "power": ("input", "electrical power drawn", "W"),
     "saturated": ("input", "1 where the input is at its limit", "1"),
     "weights_peak": (None, "largest |theta|", "m/s^2, rad/s^2"),
+    "weights": ("rule", "weights theta of the fuzzy rules", "/s^2"),
 }
 
 
@@ -33,10 +34,10 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant) -> xr.Dataset:
     variables = {}
     for name, (dimension, meaning, unit) in _MEANINGS.items():
         values = np.asarray(getattr(outcome.samples, name))
-        dims = ("time",) if dimension is None else ("time", dimension)
-        if dimension == "axis":
-            unit = ", ".join(f"{u}{unit}" for u in dict.fromkeys(units))
-        variables[name] = (dims, values, {"long_name": meaning, "units": unit or plant.input_unit})
+        dims = {None: ("time",), "rule": ("time", "axis", "rule")}.get(dimension, ("time", dimension))
+        rates = ", ".join(f"{u}{unit}" for u in dict.fromkeys(units))
+        shown = rates if "axis" in dims else unit or plant.input_unit
+        variables[name] = (dims, values, {"long_name": meaning, "units": shown})
     status = Status(int(outcome.status))
     return xr.Dataset(
         variables,

@@ -65,36 +65,34 @@ def simulate(
     if ticks < max(1, record_every):
         raise BadInput("duration", f"be at least one record ({max(1, record_every) * dt:g} s)", f"{duration:g} s")
     key = jax.random.PRNGKey(0) if key is None else key
+    start = loop.outputs_at_start(position, velocity)
     plan = (ticks, record_every, method, substeps)
-    return _run(loop, key, position, velocity, jnp.asarray(dt, dtype=float), accumulators, plan)
+    return _run(loop, key, start, jnp.asarray(dt, dtype=float), accumulators, plan)
 
 
 @eqx.filter_jit
-def _run(loop, key, position, velocity, dt, accumulators, plan: tuple[int, int, str, int]) -> Outcome:
+def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) -> Outcome:
     ticks, record_every, method, substeps = plan
     drawn = loop.draw(key)
-    x, z = drawn.start(position, velocity)
+    x, z = drawn.start(*start)
     tick = partial(_tick, drawn, accumulators, dt, METHODS[method], substeps)
     blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.sample, dt, x, jax.eval_shape(drawn.decide, dt, x, z)))
     gathered = tuple(a.init(blank) for a in accumulators)
     carry = (x, z, gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
     if record_every == 0:
-        carry, records = jax.lax.scan(lambda c, k: (tick(c, k), None), carry, jnp.arange(ticks))
+        carry = jax.lax.fori_loop(0, ticks, lambda k, c: tick(c, k), carry)
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
     else:
+        ticks -= ticks % record_every
 
         def block(carry, first):
+            """Record, then run to the next record; the last block only records."""
             t = first * dt
             sample = drawn.sample(t, carry[0], drawn.decide(t, carry[0], carry[1]))
-            carry = jax.lax.fori_loop(first, first + record_every, lambda k, c: tick(c, k), carry)
-            return carry, (t, sample)
+            until = jnp.minimum(first + record_every, ticks)
+            return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), (t, sample)
 
-        starts = jnp.arange(ticks // record_every) * record_every
-        carry, (time, samples) = jax.lax.scan(block, carry, starts)
-        end = (ticks // record_every) * record_every * dt
-        last = drawn.sample(end, carry[0], drawn.decide(end, carry[0], carry[1]))
-        append = lambda series, value: jnp.concatenate([series, value[None]])
-        time, samples = jax.tree.map(append, (time, samples), (end, last))
+        carry, (time, samples) = jax.lax.scan(block, carry, jnp.arange(0, ticks + 1, record_every))
     x, z, gathered, status, ended = carry
     return Outcome(time, samples, gathered, (x, z), status, jnp.where(status == int(Status.OK), ticks * dt, ended))
 

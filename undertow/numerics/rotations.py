@@ -79,12 +79,10 @@ def rotation_from_quaternion(q: Quaternion) -> Matrix3:
 
 def euler_from_rotation(rotation: Matrix3) -> Vector3:
     """(roll, pitch, yaw) of a rotation, roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2]."""
-    return jnp.stack(
-        [
-            jnp.arctan2(rotation[2, 1], rotation[2, 2]),
-            -jnp.arcsin(jnp.clip(rotation[2, 0], -1.0, 1.0)),
-            jnp.arctan2(rotation[1, 0], rotation[0, 0]),
-        ]
+    level = jnp.sqrt(rotation[2, 1] ** 2 + rotation[2, 2] ** 2)
+    return jnp.arctan2(
+        jnp.stack([rotation[2, 1], -rotation[2, 0], rotation[1, 0]]),
+        jnp.stack([rotation[2, 2], level, rotation[0, 0]]),
     )
 
 

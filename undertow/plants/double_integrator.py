@@ -44,10 +44,7 @@ class DoubleIntegrator(AbstractPlant):
 
     def initial_state(self, position=None, velocity=None) -> AxisState:
         zero = jnp.zeros(self.inputs())
-        return AxisState(
-            zero if position is None else jnp.asarray(position, dtype=float),
-            zero if velocity is None else jnp.asarray(velocity, dtype=float),
-        )
+        return AxisState(zero if position is None else position, zero if velocity is None else velocity)
 
     def dynamics(self, t, x: AxisState, u, d: Load) -> AxisState:
         return AxisState(x.velocity, self.acceleration(t, x, u, d))

@@ -63,8 +63,8 @@ class HybridVehicle(AbstractPlant):
         self.input_unit = "V"
 
     def initial_state(self, position=None, velocity=None) -> VehicleState:
-        position = jnp.zeros(6) if position is None else jnp.asarray(position, dtype=float)
-        velocity = jnp.zeros(6) if velocity is None else jnp.asarray(velocity, dtype=float)
+        position = jnp.zeros(6) if position is None else position
+        velocity = jnp.zeros(6) if velocity is None else velocity
         attitude = quaternion_from_euler(position[3:])
         nu = Kinematics(rotation_from_quaternion(attitude)).to_body(velocity)
         return VehicleState(position[:3], attitude, nu, self.thruster.initial_state(self.inputs()))
@@ -165,6 +165,17 @@ class HybridVehicle(AbstractPlant):
         )
 
 
-def hybrid_vehicle(vehicle: Vehicle, thruster: AbstractThruster) -> HybridVehicle:
-    """A vehicle with its thrusters, voltages in, pose out: the paper's hybrid system."""
+def hybrid_vehicle(vehicle: Vehicle, thruster: AbstractThruster, thrusters=None) -> HybridVehicle:
+    """A vehicle with its thrusters, voltages in, pose out: the paper's hybrid system.
+
+    Args:
+        vehicle: hull and thruster layout.
+        thruster: what turns volts into thrust.
+        thrusters: numbers, from 1, of the thrusters that are fitted; None for all.
+
+    Raises:
+        BadInput: a number that is not one of the vehicle's thrusters.
+    """
+    if thrusters is not None:
+        vehicle = vehicle.with_thrusters(thrusters)
     return HybridVehicle(vehicle, thruster)

@@ -1,4 +1,4 @@
-"""What a thruster is to the rest of undertow: volts in, thrust out."""
+"""What a thruster is to the rest of undertow: volts in, thrust out; N of them at once, Eq. (16)."""
 
 import abc
 from typing import Any, NamedTuple

@@ -91,12 +91,18 @@ class Vehicle(eqx.Module):
             r_b=self.r_b,
         )
 
-    def with_thrusters(self, keep: tuple[int, ...]) -> "Vehicle":
-        """Same hull with only the thrusters numbered in `keep` (from 0)."""
-        for j in keep:
-            if not 0 <= j < self.thrusters:
-                raise BadInput("thrusters", f"number thrusters 0 to {self.thrusters - 1}", j)
-        index = jnp.asarray(keep, dtype=int)
+    def with_thrusters(self, numbers) -> "Vehicle":
+        """Same hull with only some of its thrusters, numbered from 1.
+
+        Raises:
+            BadInput: a number that is not one of the vehicle's thrusters, one given twice, or none at all.
+        """
+        for number in numbers:
+            if number not in range(1, self.thrusters + 1):
+                raise BadInput("thrusters", f"be numbers from 1 to {self.thrusters}", number)
+        if len(set(numbers)) != len(numbers) or not len(numbers):
+            raise BadInput("thrusters", "name one or more different thrusters", list(numbers))
+        index = jnp.asarray([int(number) - 1 for number in numbers])
         return eqx.tree_at(
             lambda v: (v.thruster_positions, v.thruster_directions),
             self,

@@ -1,0 +1,94 @@
+"""I15: for constant d the composite function Vf of Eq. (46) never increases, and estimate and error converge.
+
+Classical RK4 with 0.1 ms on plant and law together; a batch of gains and disturbances per fuzzy layout. I16, the same
+under projection, waits for a projection. Negative control: for a d that moves, Vf does increase.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.disturbances.sinusoid import sinusoid
+from undertow.numerics.integrators import rk4
+from undertow.references.setpoint import setpoint
+
+STEP, START = 1e-4, 2.0
+CONSTANTS = np.array([0.0, 3.0, -20.0, 50.0, 0.5, -50.0])
+ROBUST = np.array([0.0, 10.0, 10.0, 0.0, 1.0, 10.0])  # w_bar; 0 leaves the switch out
+LAYOUTS = {
+    "one set": {"sets": 1},
+    "narrow sets": {"sets": 5, "reach": (0.1,)},
+    "wide overlapping sets": {"sets": 3, "width": 3.0},
+    "state input": {"sets": 3, "fuzzy_input": "state"},
+}
+
+
+def lyapunov(law, truth, state, d):
+    """Vf of Eq. (46) on every axis, with theta* = d in every rule."""
+    x, z = state
+    error = jnp.stack([truth.position - x.position, truth.velocity - x.velocity], -1)
+    tracking = (error @ law.lyapunov() * error).sum(-1) / 2
+    eps = z.predicted_velocity - x.velocity
+    parameters = ((z.weights - d[:, None]) ** 2).sum(-1)
+    return tracking + law.composite / 2 * eps**2 + parameters / (2 * law.adaptation)
+
+
+@eqx.filter_jit
+def watch(loop, ticks):
+    """Largest increase of Vf in one step over Vf(0); final e and d_til; each per axis."""
+    drawn = loop.draw(jax.random.PRNGKey(0))
+
+    def flow(t, state):
+        x, z = state
+        seen = drawn.decide(t, x, z)
+        moved = loop.plant.dynamics(t, x, seen.applied, drawn.load(t))
+        return moved, loop.controller.flow(z, seen.y, seen.r, seen.applied)
+
+    def value(t, state):
+        return lyapunov(loop.controller, loop.reference.at(t), state, drawn.load(t).acceleration)
+
+    def tick(k, carry):
+        state, before, worst = carry
+        t = k.astype(float) * STEP
+        state = rk4(flow, t, state, STEP)
+        after = value(t + STEP, state)
+        return state, after, jnp.maximum(worst, after - before)
+
+    start = drawn.start()
+    first = value(jnp.zeros(()), start)
+    (x, z), _, worst = jax.lax.fori_loop(0, ticks, tick, (start, first, jnp.full_like(first, -jnp.inf)))
+    end = jnp.asarray(ticks * STEP)
+    sample = drawn.sample(end, x, drawn.decide(end, x, z))
+    return worst / first, sample.error, sample.estimate - sample.uncertainty
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_never_increases_for_constant_disturbance(rails, layout):
+    loop = rails(
+        len(CONSTANTS),
+        goal=START,
+        disturbance=sinusoid(0.0, 1.0, offset=CONSTANTS),
+        robust_gain=ROBUST,
+        **LAYOUTS[layout],
+    )
+    worst, error, d_til = map(np.asarray, watch(loop, jnp.asarray(100_000)))
+    assert (worst <= 1e-10).all(), worst
+    assert (np.abs(error) <= 1.1 * START * np.exp(-10) * (1 + 10)).all(), error
+    assert (np.abs(d_til) <= 1e-3).all(), d_til
+
+
+def test_increases_when_the_disturbance_moves(rails):
+    """Negative control: the theorem needs a constant d, and the check sees it."""
+    loop = rails(2, goal=0.0, disturbance=sinusoid(5.0, np.array([1.0, 20.0]), offset=1.0))
+    worst, _, _ = watch(loop, jnp.asarray(5_000))
+    assert (np.asarray(worst) > 1e-6).all()
+
+
+def test_starts_at_the_energy_of_the_step(rails):
+    """Vf itself: at rest, 1/2 p11 e^2 + |theta*|^2 / (2 gamma)."""
+    loop = rails(1, goal=START, disturbance=sinusoid(0.0, 1.0, offset=3.0))
+    drawn = loop.draw(jax.random.PRNGKey(0))
+    value = lyapunov(loop.controller, setpoint(np.array([START])).at(0.0), drawn.start(), jnp.array([3.0]))
+    assert float(value[0]) == pytest.approx(0.5 * 15 * START**2 + 3 * 9 / 200)

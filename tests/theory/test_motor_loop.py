@@ -1,0 +1,116 @@
+"""Section 3.9: Table 1 with the motor of Table 3 is unstable at every speed; the whole table, and the code itself.
+
+The linear model is checked against the Jacobian of the closed loop as it is simulated: ODIN in heave, eight
+thrusters, the four vertical ones turning at a given speed.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.flatten_util import ravel_pytree
+
+from undertow.analysis import linear, motor_loop
+from undertow.controllers.rcaf import rcaf
+from undertow.disturbances.sinusoid import sinusoid
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.references.setpoint import setpoint
+from undertow.sensors.perfect import perfect
+from undertow.thrusters.electromechanical import ElectromechanicalState
+from undertow.thrusters.paper_table3 import paper_table3
+from undertow.vehicles.odin import odin
+
+MOTOR = paper_table3().motor
+LAWS = {"rcafc": {}, "rafc": {"composite": 0.0}, "no robust term": {"robust_gain": 0.0}}
+RIGHTMOST = {
+    2: {"rcafc": 9.6 + 21j, "rafc": -0.95, "no robust term": -0.97},
+    10: {"rcafc": 17.0 + 36j, "rafc": -0.99, "no robust term": 0.5 + 24j},
+    20: {"rcafc": 21.0 + 45j, "rafc": -0.99, "no robust term": 2.1 + 33j},
+    40: {"rcafc": 25.1 + 56j, "rafc": -1.0, "no robust term": 4.0 + 44j},
+}
+LAGS = {0: (0, 0.140), 10: (0.39, 0.085), 20: (0.56, 0.061), 40: (0.72, 0.039), 60: (0.80, 0.029)}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_rightmost_eigenvalues(table1, name):
+    law = table1(**LAWS[name])
+    for speed, expected in RIGHTMOST.items():
+        value = motor_loop.rightmost(motor_loop.motor_matrix(law, MOTOR, speed, inductance=True))
+        wanted = complex(expected[name])
+        assert value.real == pytest.approx(wanted.real, abs=0.06 if abs(wanted.real) > 1 else 0.02)
+        assert value.imag == pytest.approx(wanted.imag, abs=0.6)
+        assert np.sign(value.real) == np.sign(wanted.real)
+
+
+def test_unstable_at_every_speed_with_or_without_inductance(table1):
+    law, robustless = table1(), table1(composite=0.0)
+    for speed in np.linspace(2, 60, 30):
+        for inductance in (True, False):
+            matrix = motor_loop.motor_matrix(law, MOTOR, speed, inductance)
+            assert motor_loop.rightmost(matrix).real > 8
+            calm = motor_loop.motor_matrix(robustless, MOTOR, speed, inductance)
+            assert motor_loop.rightmost(calm).real < -0.9
+
+
+@pytest.mark.parametrize("speed", LAGS)
+def test_motor_as_a_lag(table1, speed):
+    gain, lag = motor_loop.motor_lag(MOTOR, speed)
+    assert gain == pytest.approx(LAGS[speed][0], abs=0.006) and lag == pytest.approx(LAGS[speed][1], abs=6e-4)
+    law = table1()
+    as_lag = np.sort_complex(np.linalg.eigvals(motor_loop.lag_matrix(law, lag, gain)))
+    as_motor = np.sort_complex(np.linalg.eigvals(motor_loop.motor_matrix(law, MOTOR, speed, inductance=False)))
+    np.testing.assert_allclose(as_lag, as_motor, rtol=1e-8, atol=1e-8)
+
+
+def test_critical_unity_gain_lags(table1):
+    assert motor_loop.critical_lag(table1()) == pytest.approx(7.2e-3, rel=0.03)
+    assert motor_loop.critical_lag(table1(sets=1)) == pytest.approx(3.0e-3, rel=0.03)
+    third = (1 / 3) / float(table1().fuzzy.gathering())
+    assert motor_loop.critical_lag(table1(adaptation=100 * third)) == pytest.approx(9.1e-3, rel=0.03)
+    assert motor_loop.critical_lag(table1(robust_gain=0.0)) == pytest.approx(45e-3, rel=0.03)
+    assert motor_loop.critical_lag(table1(sets=1, robust_gain=0.0)) == pytest.approx(5e-3, rel=0.03)
+
+
+def test_observer_alone_tolerates_any_lag_or_a_closed_form(table1):
+    assert motor_loop.critical_observer_lag(table1()) == np.inf
+    g = linear.gains(table1(sets=1))
+    critical = motor_loop.critical_observer_lag(table1(sets=1))
+    assert critical * (g.b2 - g.pole**2) == pytest.approx(g.pole)
+    for factor, stable in ((0.99, True), (1.01, False)):
+        lag = factor * critical
+        roots = np.roots([lag, 1 + g.pole * lag, g.pole, g.b2])
+        assert (roots.real.max() < 0) == stable
+
+
+def test_linear_model_is_the_jacobian_of_the_code():
+    speed = 20.0
+    plant = hybrid_vehicle(odin(), paper_table3())
+    law = rcaf(plant.model(), sets=3)
+    speeds = np.concatenate([np.zeros(4), np.full(4, speed)])
+    current = MOTOR.steady_current(jnp.asarray(speeds))
+    volts = MOTOR.resistance * current + MOTOR.back_emf_constant * speeds
+    thrust = plant.body.accelerate(plant.thruster_matrix @ MOTOR.thrust(jnp.asarray(speeds)))
+    x = plant.initial_state()._replace(thrusters=ElectromechanicalState(jnp.asarray(speeds), current))
+    y = plant.output(0.0, x)
+    held = -(thrust + law.model.drift(y))  # the load that these speeds balance
+    loop = ClosedLoop(plant, law, setpoint(np.zeros(6)), sinusoid(0.0, 1.0, offset=held), perfect())
+    drawn = loop.draw(jax.random.PRNGKey(0))
+    _, z = drawn.start()
+    estimate = -(law.model.drift(y) + law.model.gain(y) @ volts)
+    z = z._replace(weights=jnp.broadcast_to(estimate[:, None], z.weights.shape))
+    flat, restore = ravel_pytree((x, z))
+
+    @jax.jit
+    def flow(flat):
+        x, z = restore(flat)
+        seen = drawn.decide(jnp.zeros(()), x, z)
+        moved = plant.dynamics(jnp.zeros(()), x, seen.applied, drawn.load(jnp.zeros(())))
+        return ravel_pytree((moved, law.flow(z, seen.y, seen.r, seen.applied)))[0]
+
+    assert np.abs(flow(flat)).max() < 1e-9, "this is an equilibrium"
+    nudge = jnp.zeros_like(flat).at[flat.size - z.weights.size - 6 :].set(1e-12)
+    found = np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(flow))(flat + nudge)))
+    for value in np.linalg.eigvals(motor_loop.motor_matrix(law, MOTOR, speed)):
+        assert np.abs(found - value).min() < 1e-6 * max(1.0, abs(value)), (value, found)
+    assert found.real.max() > 20, "and so the simulated vehicle is unstable too"

@@ -1,0 +1,32 @@
+"""C11: the static thruster models hold for long-period inputs only (Fig. 2)."""
+
+from undertow.studies.paper.claims.finding import Finding, Runs
+from undertow.studies.paper.thruster_response import thruster_response
+
+CLAIM = "T = c_0 V, T = c_V V|V| and I = c_I T hold only for long-period inputs."
+
+# A model that misses by less than this share of the signal counts as valid.
+_VALID = 10.0  # %
+
+
+def scenarios(quick: bool) -> dict:
+    """None: Fig. 2 drives the bare motor, and the ladder shows what the difference does to the loop."""
+    return {}
+
+
+def judge(runs: Runs) -> Finding:
+    """Error of each model, fitted to V = 10 sin t, there and at V = 10 sin 10t."""
+    laws = thruster_response().laws
+    numbers = {law.text: {"long": law.error_long, "short": law.error_short} for law in laws}
+    text = "rms error in % of the signal at V = 10 sin t and 10 sin 10t: "
+    text += "; ".join(f"{law.text} {law.error_long:.0f} and {law.error_short:.0f}" for law in laws)
+    text += ". In the loop the same difference separates rung static, which works, from electromechanical, which does not."
+    valid = [law.text for law in laws if law.error_long < _VALID]
+    fails_short = all(law.error_short > _VALID for law in laws)
+    if len(valid) == len(laws) and fails_short:
+        verdict = "holds"
+    elif fails_short and valid:
+        verdict = f"holds if only {' and '.join(valid)} is meant: the others are off at long periods too"
+    else:
+        verdict = "fails"
+    return Finding(verdict, text, "electromechanical_rcafc", numbers)

@@ -1,0 +1,39 @@
+"""C12: the Lyapunov function never increases."""
+
+from undertow.analysis.certificate import lyapunov_function, minimax_weight, share_increasing
+from undertow.studies.paper.claims.finding import Finding, Runs
+from undertow.studies.paper.setup import scenario
+
+CLAIM = "V_dot <= 0 along every solution (Eqs. (46)-(58))."
+
+_CONSTANT = [5.0, -3.0, 2.0, 1.0, -1.0, 0.5]  # m/s^2, rad/s^2
+
+
+def scenarios(quick: bool) -> dict:
+    """A constant d, where the proof applies word for word."""
+    return {
+        "c12_constant": scenario(
+            "RCAFC under constant uncertainty: the Lyapunov function only falls",
+            disturbance={"kind": "sinusoid", "amplitude": 0.0, "offset": _CONSTANT, "frequency": [1.0] * 6},
+        )
+    }
+
+
+def judge(runs: Runs) -> Finding:
+    """Share of 10 ms steps at which V_f grows: constant d with theta* = d, and suite U1 with the minimax theta*."""
+    constant, varying = runs["c12_constant"], runs["ideal_rcafc"]
+    law = varying.built.closed_loop.controller
+    steps = {
+        "constant": share_increasing(lyapunov_function(law, constant.dataset, minimax_weight(constant.dataset))),
+        "u1": share_increasing(lyapunov_function(law, varying.dataset, minimax_weight(varying.dataset))),
+    }
+    text = (
+        f"Constant d: V_f grows at {100 * steps['constant']:.2g} % of the 10 ms steps. Suite U1, with the best constant "
+        f"theta* there is: at {100 * steps['u1']:.0f} %. The bound needs omega_bar > |omega|, half the range of d, "
+        "which Table 1 (0.1) does not give."
+    )
+    if steps["constant"] > 0:
+        return Finding("fails", text, "c12_constant", steps)
+    if steps["u1"] > 0:
+        return Finding("holds if d is constant", text, "ideal_rcafc", steps)
+    return Finding("holds", text, "ideal_rcafc", steps)

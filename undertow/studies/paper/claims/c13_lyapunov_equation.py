@@ -1,0 +1,24 @@
+"""C13: P solves the Lyapunov equation (21)."""
+
+import numpy as np
+
+from undertow.studies.paper.claims.finding import Finding, Runs
+
+CLAIM = "A positive definite P solves Eq. (21) for the gains of Table 1."
+
+
+def scenarios(quick: bool) -> dict:
+    """Nothing beyond Example 1."""
+    return {}
+
+
+def judge(runs: Runs) -> Finding:
+    """Residual and eigenvalues."""
+    law = runs["ideal_rcafc"].built.closed_loop.controller
+    p, (k1, k2), q = np.asarray(law.lyapunov()), np.asarray(law.feedback), np.asarray(law.weight)
+    a = np.array([[0.0, 1.0], [-k1, -k2]])
+    residual = float(np.abs(a.T @ p + p @ a + q).max())
+    smallest = float(np.linalg.eigvalsh(p).min())
+    text = f"P = {p.tolist()}, smallest eigenvalue {smallest:.3f}, residual {residual:.1g}."
+    good = residual <= 1e-12 * np.abs(q).max() and smallest > 0
+    return Finding("holds" if good else "fails", text, "ideal_rcafc", {"residual": residual, "smallest": smallest})

@@ -1,0 +1,63 @@
+"""`undertow reproduce`: every figure and table of the paper, and the audit of its claims."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from undertow.scenario.provenance import versions
+from undertow.studies.paper import claims, examples
+from undertow.studies.paper.experiments import run_all
+from undertow.studies.paper.thruster_response import ThrusterResponse, thruster_response
+
+Progress = Callable[[str, float], None]
+
+# Share of the work that running takes; the rest is judging and drawing.
+_RUNNING = 0.85
+
+
+class Reproduction:
+    """Everything `undertow reproduce` finds out, before it is drawn."""
+
+    def __init__(self, results: dict[str, Any], runs: dict, response: ThrusterResponse):
+        self.results, self.runs, self.response = results, runs, response
+
+    def datasets(self, number: int) -> dict[str, Any]:
+        """Recorded series of Example 1 or 2, by controller."""
+        rung = ("ideal", "static")[number - 1]
+        return {name: self.runs[f"{rung}_{name}"].dataset for name in ("rcafc", "rafc")}
+
+
+def reproduce(folder: Path, quick: bool, progress: Progress) -> Reproduction:
+    """Run the paper and audit it; writes `runs/`, `scenarios/` and `results.json` into a folder.
+
+    Args:
+        folder: an existing, empty folder.
+        quick: fewer points in the sweeps; the same accuracy.
+        progress: told a message and the share done.
+    """
+    wanted = examples.scenarios() | claims.scenarios(quick)
+    runs = run_all(wanted, folder, lambda message, share: progress(f"ran {message}", _RUNNING * share))
+    progress("judging the claims", _RUNNING)
+    results = {
+        "provenance": {"quick": quick, "scenarios": sorted(wanted), **versions()},
+        "example1": examples.example(runs, 1),
+        "example2": examples.example(runs, 2),
+        "table2": examples.table2(runs),
+        "ladder": examples.ladder(runs),
+        "claims": claims.audit(runs),
+    }
+    text = json.dumps(_finite(results), indent=1, allow_nan=False)
+    (folder / "results.json").write_text(text + "\n", encoding="utf-8")
+    return Reproduction(results, runs, thruster_response())
+
+
+def _finite(value: Any) -> Any:
+    """Same data with numbers that JSON cannot hold replaced by null."""
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value

@@ -1,0 +1,41 @@
+"""The paper's set-up with its gaps filled, as scenario data: every number of the study can be run again from a file."""
+
+import math
+from typing import Any
+
+GOAL = [2.0, 3.0, 4.0, math.pi / 3, math.pi / 4, 2 * math.pi / 5]  # m, rad; Section 5
+
+RCAFC, RAFC = 500.0, 0.0  # gamma_eps of Table 1, and of Eq. (61)
+
+CONTROLLERS = {"rcafc": RCAFC, "rafc": RAFC}
+
+RUNGS = ("ideal", "static", "shaft", "electromechanical")
+
+
+def scenario(
+    description: str,
+    *,
+    rung: str = "ideal",
+    composite: float = RCAFC,
+    controller: dict[str, Any] | None = None,
+    **changes: Any,
+) -> dict[str, Any]:
+    """ODIN with the paper's thrusters under suite U1, Table 1 gains, as one ODE over 20 s.
+
+    Args:
+        description: what the scenario shows.
+        rung: of the fidelity ladder. On `ideal` the speed sensor is perfect (Example 1), elsewhere there is none.
+        composite: gamma_eps; 0 is RAFC.
+        controller: further options of the law.
+        changes: other keys of the scenario, replacing the paper's.
+    """
+    plant = {"kind": "hybrid_vehicle", "vehicle": "odin", "thruster": {"kind": "paper_table3", "rung": rung}}
+    return {
+        "description": description,
+        "plant": plant,
+        "model": {"speed_sensor": rung == "ideal"},
+        "controller": {"kind": "rcaf", "composite": composite, **(controller or {})},
+        "reference": {"kind": "setpoint", "position": GOAL},
+        "disturbance": {"kind": "u1"},
+        "loop": {"kind": "continuous", "duration": 20.0},
+    } | changes
