@@ -44,22 +44,29 @@ def test_quaternion_error_is_the_short_turn_in_body_axes(degrees):
     np.testing.assert_allclose(attitude_error(target, base), 2 * np.sin(short / 2) * axis, rtol=0, atol=1e-14)
 
 
-def test_both_quaternions_of_an_attitude_get_the_same_voltages():
-    """Through the plant's output and the law's command, at large and small attitudes."""
+@pytest.fixture(scope="module")
+def commanded():
+    """Voltages of the paper's law, and the acceleration that its model expects of them, for 1000 cases at once."""
     plant = hybrid_vehicle(odin(), paper_table3("ideal"))
     controller = rcaf(plant.model())
-    r = Target(jnp.array([2.0, 3.0, 4.0, 1.0, 0.7, 1.2]), jnp.zeros(6), jnp.zeros(6))
 
     @jax.jit
     @jax.vmap
-    def voltages(q, nu):
-        x = plant.initial_state()._replace(attitude=q, nu=nu)
-        y = plant.output(jnp.zeros(()), x)
-        return controller.command(controller.init(y, r), y, r)[0]
+    def evaluate(q, nu, goal):
+        r = Target(goal, jnp.zeros(6), jnp.zeros(6))
+        y = plant.output(jnp.zeros(()), plant.initial_state()._replace(attitude=q, nu=nu))
+        volts = controller.command(controller.init(y, r), y, r)[0]
+        return volts, controller.model.drift(y) + controller.model.gain(y) @ volts
 
+    return evaluate
+
+
+def test_both_quaternions_of_an_attitude_get_the_same_voltages(commanded):
+    """Through the plant's output and the law's command, at all attitudes."""
     nu = 0.3 * RNG.normal(size=(STARTS, 6))
-    plus, minus = voltages(QUATERNIONS, nu), voltages(-QUATERNIONS, nu)
-    np.testing.assert_allclose(minus, plus, rtol=1e-12)
+    goals = np.tile([2.0, 3.0, 4.0, 1.0, 0.7, 1.2], (STARTS, 1))
+    plus, minus = commanded(QUATERNIONS, nu, goals), commanded(-QUATERNIONS, nu, goals)
+    np.testing.assert_allclose(minus[0], plus[0], rtol=1e-12)
 
 
 def test_euler_error_differs_by_whole_turns_and_is_at_most_half_a_turn():
@@ -73,21 +80,19 @@ def test_euler_error_differs_by_whole_turns_and_is_at_most_half_a_turn():
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
 
 
-def test_law_turns_the_short_way_across_the_border_of_the_euler_angles():
-    """From yaw -170 deg to 170 deg is 20 deg to port; the same wish written as -190 deg gets the same voltages."""
-    plant = hybrid_vehicle(odin(), paper_table3("ideal"))
-    controller = rcaf(plant.model())
-    y = plant.output(jnp.zeros(()), plant.initial_state(position=[0, 0, 0, 0.1, 0.2, np.radians(-170)]))
-
-    @jax.jit
-    def voltages(yaw):
-        r = Target(jnp.stack([0.0, 0.0, 0.0, 0.1, 0.2, yaw]), jnp.zeros(6), jnp.zeros(6))
-        return controller.command(controller.init(y, r), y, r)[0]
-
-    np.testing.assert_allclose(voltages(np.radians(170)), voltages(np.radians(-190)), rtol=0, atol=1e-12)
-    yaw_acceleration = (controller.model.gain(y) @ voltages(np.radians(170)) + controller.model.drift(y))[5]
+def test_law_turns_the_short_way_across_the_border_of_the_euler_angles(commanded):
+    """From any yaw: 20 deg to port across the border, the same wish a turn lower gets the same voltages."""
+    yaws = np.linspace(-np.pi, np.pi, STARTS)
+    half, level = yaws / 2, np.zeros(STARTS)
+    attitudes = np.stack([np.cos(half), level, level, np.sin(half)], axis=1)
+    port = np.stack([level] * 5 + [yaws - np.radians(20)], axis=1)
+    wrapped = np.where(port < -np.pi, port + 2 * np.pi, port)
+    assert (wrapped[:50, 5] > 3 - np.radians(20)).all()
+    at_rest = np.zeros((STARTS, 6))
+    as_said, expected = commanded(attitudes, at_rest, port)
+    np.testing.assert_allclose(commanded(attitudes, at_rest, wrapped)[0], as_said, rtol=0, atol=1e-12)
     short = -np.radians(20)
-    np.testing.assert_allclose(yaw_acceleration, short + 10 * np.tanh(5 * short / 0.5), rtol=1e-9)
+    np.testing.assert_allclose(expected[:, 5], short + 10 * np.tanh(5 * short / 0.5), rtol=1e-9)
 
 
 def turned(starts, short_way):

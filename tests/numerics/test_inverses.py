@@ -1,5 +1,7 @@
 """I12: Moore-Penrose identities, the printed cases of Eq. (22), and what regularisation costs, Eqs. (24)-(27)."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,8 +22,13 @@ SHAPES = {"square": SQUARE, "wide": WIDE, "tall": TALL, "rank 3": WEAK, "odin": 
 FULL_RANK = ["square", "wide", "tall", "odin"]
 
 
+@functools.cache
 def each(function):
     return jax.jit(jax.vmap(function))
+
+
+sharp = jax.jit(jax.vmap(regularised_sharp, in_axes=(0, None)))
+outer = jax.jit(jax.vmap(regularised_inverse, in_axes=(0, None)))
 
 
 def norms(matrices):
@@ -67,7 +74,7 @@ def test_regularised_right_inverse_loses_the_fourth_power_share(shape, delta):
     """||I - G reg G#|| = delta / (delta + sigma_min^4): N > 6."""
     g = SHAPES[shape]
     smallest = np.linalg.svd(g, compute_uv=False).min(1)
-    loss = norms(np.eye(6) - g @ np.asarray(each(lambda g: regularised_sharp(g, delta))(g)))
+    loss = norms(np.eye(6) - g @ np.asarray(sharp(g, delta)))
     np.testing.assert_allclose(loss, delta / (delta + smallest**4), rtol=0, atol=1e-8)
 
 
@@ -75,7 +82,7 @@ def test_regularised_right_inverse_loses_the_fourth_power_share(shape, delta):
 def test_regularised_square_inverse_loses_the_second_power_share(delta):
     """N = 6 regularises G itself, not G G^T: delta / (delta + sigma_min^2)."""
     smallest = np.linalg.svd(SQUARE, compute_uv=False).min(1)
-    loss = norms(np.eye(6) - SQUARE @ np.asarray(each(lambda g: regularised_sharp(g, delta))(SQUARE)))
+    loss = norms(np.eye(6) - SQUARE @ np.asarray(sharp(SQUARE, delta)))
     np.testing.assert_allclose(loss, delta / (delta + smallest**2), rtol=0, atol=1e-8)
 
 
@@ -83,12 +90,10 @@ def test_regularised_square_inverse_loses_the_second_power_share(delta):
 def test_fewer_than_six_inputs_make_the_outer_factor_a_mere_gain(delta):
     """N < 6, full column rank: G+ [G G+]^r = G+ / (1 + delta), whatever G (theory of Eq. (24))."""
 
-    def sharp(g):
-        plus = printed_inverse(g)
-        return plus @ regularised_inverse(g @ plus, delta)
-
+    plus = np.asarray(each(printed_inverse)(TALL))
+    found = plus @ np.asarray(outer(TALL @ plus, delta))
     expected = np.asarray(each(pseudo_inverse)(TALL)) / (1 + delta)
-    np.testing.assert_allclose(each(sharp)(TALL), expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("delta", [1e-6, 1e-3, 1.0])
@@ -97,14 +102,14 @@ def test_printed_regularisation_for_fewer_than_six_inputs_in_closed_form(delta):
     u, s, vt = np.linalg.svd(TALL, full_matrices=False)
     share = s**4 / (delta + s**4)
     expected = np.einsum("kji,kj,klj->kil", vt, share**2 / (delta + share**2) / s, u)
-    found = each(lambda g: regularised_sharp(g, delta))(TALL)
+    found = sharp(TALL, delta)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
 
 
 def test_printed_regularisation_tends_to_the_mere_gain():
     """Where delta is far below sigma^4 the two agree."""
     q = np.linalg.qr(TALL)[0] * np.array([1.0, 1.5, 2.0, 3.0])
-    found = each(lambda g: regularised_sharp(g, 1e-5))(q)
+    found = sharp(q, 1e-5)
     np.testing.assert_allclose(found, np.asarray(each(pseudo_inverse)(q)) / (1 + 1e-5), rtol=0, atol=1e-8)
 
 

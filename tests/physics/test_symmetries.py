@@ -19,6 +19,7 @@ from undertow.vehicles import odin
 
 POSE = np.array([1.0, -2.0, 3.0, 0.2, -0.3, 0.5])
 VELOCITY = np.array([0.3, -0.2, 0.1, 0.1, 0.2, -0.1])
+STILL = np.eye(3)
 ORDER = (3, 8, 1, 5, 7, 2, 6, 4)  # thrusters, from 1
 
 
@@ -32,39 +33,40 @@ def push(t):
 
 
 @eqx.filter_jit
-def trajectory(plant, start, volts_factor=1.0, length=1.0, load=push, steps=5000, dt=1e-3):
-    """States over 5 s of prescribed voltages and loads; `length`: metres in units of the plant.
+def compiled(plant, start, world, length, voltage):
+    """States over 5 s; `world` turns the earth-frame load, `length` and `voltage` are a metre and a volt."""
+    force = jnp.concatenate([jnp.ones(3), jnp.full(3, length)]) * length
+    stretch = jnp.concatenate([jnp.full(3, length), jnp.ones(3)])
+
+    def field(t, x):
+        d = push(t)
+        acceleration = jnp.concatenate([world @ d.acceleration[:3], d.acceleration[3:]])
+        return plant.dynamics(t, x, voltage * volts(t), Load(stretch * acceleration, force * d.wrench))
+
+    def step(x, k):
+        x = rk4(field, k * 1e-3, x, jnp.asarray(1e-3))
+        return x, x
+
+    return jax.lax.scan(step, start, jnp.arange(5000.0))[1]
+
+
+def trajectory(plant, start, world=STILL, length=1.0, voltage=1.0):
+    """Under prescribed voltages and loads, at steps of 1 ms.
 
     A step of 5 ms would not do: between its stages a quaternion is not quite of unit length, and the matrix made
     from it turns with the world only up to the error of the integrator (1.4e-10 at 5 ms).
     """
-    force = jnp.array([1.0, 1, 1, length, length, length]) * length
-    stretch = jnp.array([length, length, length, 1.0, 1, 1])
-
-    def field(t, x):
-        d = load(t)
-        return plant.dynamics(t, x, volts_factor * volts(t), Load(stretch * d.acceleration, force * d.wrench))
-
-    def step(x, k):
-        x = rk4(field, k * dt, x, jnp.asarray(dt))
-        return x, x
-
-    return jax.lax.scan(step, start, jnp.arange(float(steps)))[1]
+    return compiled(plant, start, jnp.asarray(world), jnp.asarray(length), jnp.asarray(voltage))
 
 
 def test_turning_the_world_about_the_vertical_and_shifting_it_maps_trajectories():
     plant = hybrid_vehicle(odin(), paper_table3("electromechanical"))
     turn, shift = 1.1, np.array([5.0, -7.0, 11.0])
     about = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-
-    def turned(t):
-        d = push(t)
-        return d._replace(acceleration=jnp.concatenate([about @ d.acceleration[:3], d.acceleration[3:]]))
-
     moved = np.concatenate([about @ POSE[:3] + shift, POSE[3:] + np.array([0, 0, turn])])
     rates = np.concatenate([about @ VELOCITY[:3], VELOCITY[3:]])
     here = trajectory(plant, plant.initial_state(POSE, VELOCITY))
-    there = trajectory(plant, plant.initial_state(moved, rates), load=turned)
+    there = trajectory(plant, plant.initial_state(moved, rates), about)
     assert np.ptp(np.asarray(here.position), axis=0).min() > 0.5
     np.testing.assert_allclose(there.position, here.position @ about.T + shift, rtol=0, atol=1e-10)
     np.testing.assert_allclose(there.nu, here.nu, rtol=0, atol=1e-10)
@@ -107,7 +109,7 @@ def test_centimetres_give_the_same_motion_as_metres():
     small = in_centimetres(plant)
     scale = np.array([100.0, 100, 100, 1, 1, 1])
     metres = trajectory(plant, plant.initial_state(POSE, VELOCITY))
-    centimetres = trajectory(small, small.initial_state(scale * POSE, scale * VELOCITY), 1e4, 100.0)
+    centimetres = trajectory(small, small.initial_state(scale * POSE, scale * VELOCITY), length=100.0, voltage=1e4)
     np.testing.assert_allclose(centimetres.position / 100, metres.position, rtol=0, atol=1e-10)
     np.testing.assert_allclose(centimetres.nu / scale, metres.nu, rtol=0, atol=1e-10)
     np.testing.assert_allclose(centimetres.attitude, metres.attitude, rtol=0, atol=1e-10)
