@@ -30,7 +30,7 @@ def ladder_figure(ladder: Mapping[str, Mapping[str, Any]], datasets: Runs | None
         datasets: the runs, by rung and controller; without them only the metrics are drawn.
     """
     tall = 1.75 if datasets else 0.0
-    figure = style.blank(9.6, 0.55 + tall + 2.35)
+    figure = style.blank(9.6, 0.55 + tall + 1.95)
     style.head(figure, "Fidelity ladder: one law, four thrusters", dict(style.CONTROLLERS.values()))
     for number, rung in enumerate(ladder if datasets else ()):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.58, 1.75, 1.25)

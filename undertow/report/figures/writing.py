@@ -36,7 +36,7 @@ def png(figure: Figure) -> bytes:
         canvas = FigureCanvasAgg(figure)
         before = figure.dpi
         figure.dpi = DOTS_PER_INCH
-        canvas.print_png(data, metadata={"Software": "undertow"})
+        canvas.print_png(data, metadata={"Software": "undertow"}, pil_kwargs={"compress_level": 3})
         figure.dpi = before
     return data.getvalue()
 

@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+import xarray as xr
+
+from undertow.report.figures import ladder_figure, run_figures
+from undertow.report.paper_report import write_report
+
+
+def run_of(controller="rcafc", axes=6, inputs=8, status="ok", ended=20.0, samples=201):
+    """A run in the shape of undertow's datasets, with signals that can be told apart."""
+    time = np.linspace(0.0, 20.0, samples)
+    size = {"rcafc": 1e-4, "rafc": 1e-2}[controller]
+    wanted = np.ones((samples, axes)) * np.arange(1, axes + 1)
+    error = wanted * np.exp(-time)[:, None] + size * np.sin(3 * time)[:, None]
+    d = 3 * np.sin(time)[:, None] * np.arange(1, axes + 1)
+    miss = (100 * size * np.cos(time) + 40 * np.exp(-30 * time))[:, None] * np.ones(axes)
+    volts = 10 * np.sin(time)[:, None] * np.arange(1, inputs + 1)
+    if status != "ok":
+        volts = volts * np.exp(np.minimum(time, ended) * 4)[:, None]
+        d = d * np.exp(np.minimum(time, ended) * 4)[:, None]
+    per_axis = {
+        "position": wanted - error,
+        "target": wanted,
+        "error": error,
+        "uncertainty": d,
+        "estimate": d + miss,
+        "robust": miss / 2,
+        "predicted_position": wanted - error + 2e-3,
+    }
+    per_input = {"voltage": volts, "command": 2 * volts}
+    names = ["north", "east", "down", "roll", "pitch", "yaw", "extra"][:axes]
+    units = ["m", "m", "m", "rad", "rad", "rad", "1"][:axes]
+    return xr.Dataset(
+        {name: (("time", "axis"), values) for name, values in per_axis.items()}
+        | {name: (("time", "input"), values, {"units": "V"}) for name, values in per_input.items()},
+        coords={
+            "time": ("time", time),
+            "axis": ("axis", names, {"unit_of_each": ", ".join(units)}),
+            "input": ("input", np.arange(1, inputs + 1)),
+        },
+        attrs={"status": status, "ended": ended},
+    )
+
+
+@pytest.fixture(scope="session")
+def runs():
+    return {name: run_of(name) for name in ("rcafc", "rafc")}
+
+
+@pytest.fixture(scope="session")
+def make_run():
+    return run_of
+
+
+def metrics(scale):
+    overall = {
+        "tracking_rms": 1.6e-4,
+        "tracking_max": 6e-4,
+        "estimation_rms": 0.201,
+        "uncertainty_rms": 3.224,
+        "robust_rms": 0.144,
+        "model_rms": 1e-3,
+        "voltage_rms": 17.8,
+        "voltage_peak": 56.6,
+        "voltage_variation": 53.5,
+        "weights_peak": 13.9,
+        "settling_time": 4.03,
+        "rules": 5,
+    }
+    return {name: value * scale for name, value in overall.items()} | {"tracking_rms_axes": [1e-4] * 6}
+
+
+def results_of_a_study():
+    both = {"rcafc": {"steady": metrics(1), "whole": metrics(2)}, "rafc": {"steady": metrics(10), "whole": metrics(20)}}
+    lasted = {
+        "status": "ok",
+        "diverged_at": None,
+        "steady": metrics(1),
+        "whole": metrics(1),
+        "why": "stable at k_e < 1",
+    }
+    failed = {"status": "diverged", "diverged_at": 3.295, "steady": None, "whole": metrics(9), "why": "motor lag"}
+    table = [f"{name}_{fed}" for name in ("rcafc", "rafc") for fed in ("error", "state")]
+    verdicts = ["holds", "holds if d < 103 rad/s", "fails", "open"]
+    return {
+        "provenance": {"version_undertow": "9.8.7", "scenarios": ["one", "two"]},
+        "example1": both,
+        "example2": both,
+        "table2": {key: lasted | {"steady": metrics(k + 1)} for k, key in enumerate(table)},
+        "ladder": {
+            "ideal": {"rcafc": lasted, "rafc": lasted},
+            "electromechanical": {"rcafc": failed, "rafc": lasted},
+        },
+        "claims": [
+            {
+                "id": f"C{k}",
+                "claim": f"Claim number {k} <script>alert(1)</script> & more.",
+                "verdict": verdict,
+                "evidence": f"rms 0.{k} m/s^2 of `sign`",
+                "scenario": None if verdict == "open" else f"scenarios/c{k:02d}.yaml",
+            }
+            for k, verdict in enumerate(verdicts, 1)
+        ],
+    }
+
+
+@pytest.fixture
+def results():
+    return results_of_a_study()
+
+
+@pytest.fixture(scope="session")
+def page(runs, tmp_path_factory):
+    """The report of the study with two figures: its folder and its text."""
+    folder, results = tmp_path_factory.mktemp("report"), results_of_a_study()
+    figures = {"fig06": run_figures(runs["rcafc"])["tracking"], "ladder": ladder_figure(results["ladder"])}
+    written = write_report(results, figures, folder)
+    assert written == folder / "report.html"
+    return written.read_text(encoding="utf-8")

@@ -1,0 +1,68 @@
+"""Numbers, units, prose and verdicts as a reader sees them."""
+
+import math
+import re
+from typing import Any
+
+from undertow.report.page import Html, join, tag, text
+
+_DIGITS = 3
+_KINDS = {"holds": "holds", "fails": "fails", "open": "open"}
+
+
+def number(value: Any, digits: int = _DIGITS) -> Html:
+    """A number with so many digits; powers of ten are written out, and a dash stands for none."""
+    if value is None:
+        return Html("&ndash;")
+    if isinstance(value, float) and not math.isfinite(value):
+        return text(value)
+    if value and not 1e-3 <= abs(value) < 1e5:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return join(_minus(mantissa), Html("&thinsp;&times;&thinsp;10"), tag("sup", _minus(str(int(exponent)))))
+    return text(_minus(f"{value:.{digits}g}" if abs(value) < 1000 else f"{value:.0f}"))
+
+
+def percent(value: float | None) -> Html:
+    """A signed difference in %."""
+    if value is None:
+        return number(None)
+    return join(_minus(f"{value:+.1f}" if round(value, 1) else "0.0"), Html("&nbsp;%"))
+
+
+def prose(content: Any) -> Html:
+    """Plain text with powers raised (m/s^2), one-letter indices lowered (k_e) and `code` set as code."""
+    marked = re.sub(r"\^(-?\d)", r"<sup>\1</sup>", text(content))
+    marked = re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked)
+    return Html(re.sub(r"`([^`]+)`", r"<code>\1</code>", marked))
+
+
+def unit(value: str) -> Html:
+    """A unit in small print."""
+    return tag("span", prose(value), class_="unit") if value else Html("")
+
+
+def kind(verdict: str) -> str:
+    """Class of a verdict: holds, partly, fails or open."""
+    return _KINDS.get(verdict, "partly" if verdict.startswith("holds") else "open")
+
+
+def chip(verdict: str) -> Html:
+    """A verdict in one or two words, coloured; the word says it too."""
+    word = {"partly": "holds if", "holds": "holds", "fails": "fails", "open": "open"}[kind(verdict)]
+    return tag("span", word, class_=f"chip {kind(verdict)}")
+
+
+def condition(verdict: str) -> str:
+    """What a verdict depends on: what follows its first words."""
+    return verdict.removeprefix("holds if").strip() if kind(verdict) == "partly" else ""
+
+
+def ending(entry: dict[str, Any]) -> str:
+    """How a run ended, and when if it ended early."""
+    word, when = str(entry.get("status", "ok")).replace("_", " "), entry.get("diverged_at")
+    return word if when is None else f"{word} at {when:.3g} s"
+
+
+def _minus(value: str) -> str:
+    """With a true minus."""
+    return value.replace("-", "\u2212")

@@ -1,0 +1,78 @@
+"""One self-contained HTML page: no script, nothing loaded from anywhere, readable on a phone and on paper."""
+
+import base64
+import html
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+
+class Html(str):
+    """Markup, put into a page as it is. Every other text is escaped."""
+
+    __slots__ = ()
+
+
+def text(content: Any) -> Html:
+    """Content as markup: escaped unless it is markup already."""
+    return content if isinstance(content, Html) else Html(html.escape(str(content)))
+
+
+def join(*parts: Any) -> Html:
+    """Parts one after the other."""
+    return Html("".join(map(text, parts)))
+
+
+def tag(name: str, *content: Any, **attributes: str) -> Html:
+    """An element; `class_` stands for the attribute `class`."""
+    named = "".join(f' {key.rstrip("_")}="{html.escape(value)}"' for key, value in attributes.items())
+    return Html(f"<{name}{named}>{join(*content)}</{name}>")
+
+
+def bullets(items: Sequence[Any]) -> Html:
+    """A list."""
+    return tag("ul", *(tag("li", item) for item in items))
+
+
+def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[int] = (), wide: bool = False) -> Html:
+    """A table that scrolls inside its own box where the screen is narrow.
+
+    Args:
+        head: column titles.
+        rows: cells, the first of a row names it.
+        numeric: columns set to the right.
+        wide: too wide for a phone; keeps its width and scrolls.
+    """
+    style = lambda column: {"class_": "number"} if column in numeric else {}  # noqa: E731
+    titles = tag("tr", *(tag("th", cell, scope="col", **style(i)) for i, cell in enumerate(head)))
+    head_rows = (tag("thead", titles),) if any(head) else ()
+    body = []
+    for row in rows:
+        first = tag("th", row[0], scope="row", **style(0))
+        body.append(tag("tr", first, *(tag("td", cell, **style(i)) for i, cell in enumerate(row[1:], 1))))
+    whole = tag("table", *head_rows, tag("tbody", *body), class_="wide" if wide else "fit")
+    return tag("div", whole, class_="scroll", tabindex="0")
+
+
+def figure(svg: str, name: str, alternative: str, caption: Any) -> Html:
+    """A drawing with its caption; drawn from the page itself, at no less than a readable size."""
+    data = base64.b64encode(svg.encode()).decode()
+    image = Html(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(alternative)}">')
+    return tag(
+        "figure", tag("div", image, class_="scroll", tabindex="0"), tag("figcaption", caption), id=f"figure-{name}"
+    )
+
+
+def section(identity: str, title: str, *content: Any) -> Html:
+    """A part of the page with a heading that can be linked to."""
+    return tag("section", tag("h2", title), *content, id=identity)
+
+
+def document(title: str, *content: Any) -> str:
+    """The whole page as text."""
+    looks = files("undertow.report").joinpath("page.css").read_text(encoding="utf-8")
+    head = (
+        f'<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{html.escape(title)}</title><style>{looks}</style>"
+    )
+    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body><main>{join(*content)}</main></body></html>\n'
