@@ -109,8 +109,8 @@ def test_linear_model_is_the_jacobian_of_the_code():
         return ravel_pytree((moved, law.flow(z, seen.y, seen.r, seen.applied)))[0]
 
     assert np.abs(flow(flat)).max() < 1e-9, "this is an equilibrium"
-    nudge = jnp.zeros_like(flat).at[flat.size - z.weights.size - 6 :].set(1e-12)
-    found = np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(flow))(flat + nudge)))
+    nudges = 1e-6 * np.eye(flat.size)
+    found = np.linalg.eigvals(np.stack([(flow(flat + nudge) - flow(flat - nudge)) / 2e-6 for nudge in nudges], 1))
     for value in np.linalg.eigvals(motor_loop.motor_matrix(law, MOTOR, speed)):
-        assert np.abs(found - value).min() < 1e-6 * max(1.0, abs(value)), (value, found)
+        assert np.abs(found - value).min() < 1e-4 * max(1.0, abs(value)), (value, found)
     assert found.real.max() > 20, "and so the simulated vehicle is unstable too"

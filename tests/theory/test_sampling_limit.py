@@ -43,8 +43,8 @@ def test_nonlinear_loop_agrees(rails, rule):
 
 @pytest.mark.parametrize("rule", RULES)
 def test_jacobian_is_that_of_the_code(rails, rule):
-    """Eigenvalues of one tick by automatic differentiation: the predicted four, and ones for what is marginal."""
-    loop = rails(1, **(DISCRETISED[rule] | {"substeps": 8} if rule == "exact" else {}))
+    """Eigenvalues of one tick by central differences: the predicted four, and ones for what is marginal."""
+    loop = rails(1, **DISCRETISED[rule])
     drawn = loop.draw(jax.random.PRNGKey(0))
     zero = jnp.zeros(())
     flat, restore = ravel_pytree(drawn.start())
@@ -56,14 +56,16 @@ def test_jacobian_is_that_of_the_code(rails, rule):
         after = moved, loop.controller.advance(z, seen.y, seen.r, seen.applied, step)
         return ravel_pytree(after)[0]
 
-    jacobian = jax.jit(jax.jacfwd(tick))
-    for dt in (1e-3, 7e-3):
-        # Beside the fixed point, where the code has one derivative.
-        found = np.linalg.eigvals(np.asarray(jacobian(flat + 1e-9, jnp.asarray(dt))))
+    tick = jax.jit(tick)
+    nudges = 1e-6 * np.eye(flat.size)
+    for dt in (1e-3, 3e-3):
+        step = jnp.asarray(dt)
+        columns = [(tick(flat + nudge, step) - tick(flat - nudge, step)) / 2e-6 for nudge in nudges]
+        found = np.linalg.eigvals(np.stack(columns, 1))
         predicted = np.linalg.eigvals(linear.sampled_matrix(loop.controller, dt, rule))
         marginal = np.ones(len(found) - 4)  # x_hat, and weights that cancel in d_hat
         for value in np.concatenate([predicted, marginal]):
-            assert np.abs(found - value).min() < 1e-5, (dt, value, found)
+            assert np.abs(found - value).min() < 2e-5, (dt, value, found)
 
 
 def test_closed_forms_of_the_parts(table1):
