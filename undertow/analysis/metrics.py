@@ -26,7 +26,7 @@ _SETTLED = 0.02
 class MetricsState(NamedTuple):
     """Running sums over a window."""
 
-    count: Scalar
+    samples: Scalar  # number of them inside the window
     squares: dict[str, PerAxis]  # of the signals of _SIGNALS
     largest_error: PerAxis
     voltage_squares: Scalar
@@ -60,7 +60,7 @@ class Metrics(AbstractAccumulator):
     def init(self, sample: Sample) -> MetricsState:
         axes, zero = jnp.zeros_like(sample.error), jnp.zeros(())
         return MetricsState(
-            count=zero,
+            samples=zero,
             squares=dict.fromkeys(_SIGNALS, axes),
             largest_error=axes,
             voltage_squares=zero,
@@ -82,7 +82,7 @@ class Metrics(AbstractAccumulator):
         size = jnp.abs(sample.error)
         step = jnp.where(state.step < 0, size, state.step)
         return MetricsState(
-            count=state.count + inside,
+            samples=state.samples + inside,
             squares={name: state.squares[name] + inside * pick(sample) ** 2 for name, pick in _SIGNALS.items()},
             largest_error=jnp.maximum(state.largest_error, inside * size),
             voltage_squares=state.voltage_squares + inside * (sample.voltage**2).mean(),
@@ -101,7 +101,7 @@ class Metrics(AbstractAccumulator):
 def results(state: MetricsState) -> dict[str, Any]:
     """Metrics by their names in result files: overall values as numbers, per-axis values as `<name>_axes` lists."""
     host = jax.tree.map(np.asarray, state)
-    count, span = max(float(host.count), 1.0), float(host.span)
+    count, span = max(float(host.samples), 1.0), float(host.span)
     found: dict[str, Any] = {}
     for name, squares in host.squares.items():
         found[f"{name}_rms"] = float(np.sqrt(squares.mean() / count))
@@ -128,5 +128,5 @@ def measure(outcome: Outcome, start: float = 0.0, stop: float = float("inf")) ->
 @eqx.filter_jit
 def _over_series(metrics: Metrics, time: Array, samples: Sample) -> MetricsState:
     first = jax.tree.map(lambda series: series[0], samples)
-    step = lambda state, at: (metrics.update(state, *at), None)  # noqa: E731
+    step = lambda state, at: (metrics.update(state, *at), None)
     return jax.lax.scan(step, metrics.init(first), (time, samples))[0]

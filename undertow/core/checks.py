@@ -2,9 +2,9 @@
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from undertow.core.errors import BadInput
 
@@ -48,7 +48,7 @@ def choice(name: str, value: Any, allowed: tuple[str, ...]) -> None:
 
 def hurwitz(name: str, feedback: Any) -> None:
     """Gains (k1, k2), one pair or one per axis, that make s^2 + k2 s + k1 stable."""
-    if isinstance(feedback, jax.core.Tracer):
+    if isinstance(feedback, Tracer):
         return
     finite(name, feedback)
     for k1, k2 in np.asarray(feedback).reshape(-1, 2):
@@ -64,7 +64,7 @@ def hurwitz(name: str, feedback: Any) -> None:
 def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
     """Square matrix, or a stack of them, symmetric with positive eigenvalues."""
     shape = jnp.shape(matrix)
-    if isinstance(matrix, jax.core.Tracer):
+    if isinstance(matrix, Tracer):
         return
     finite(name, matrix, unit)
     for block in np.asarray(matrix).reshape(-1, *shape[-2:]):
@@ -77,7 +77,7 @@ def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
 
 
 def _each(name: str, value: Any, good: Any, must: str, unit: str) -> None:
-    if isinstance(value, jax.core.Tracer):
+    if isinstance(value, Tracer):
         return
     array = np.asarray(value)
     bad = ~(np.isfinite(array) & good(array))

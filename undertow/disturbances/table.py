@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -25,7 +26,7 @@ class Table(AbstractDisturbance):
         if len(shape) != 2 or shape[0] < 2 or shape[1] < 2:
             raise BadInput("samples", "have two or more rows (t, d1, d2, ...)", f"of shape {shape}")
         checks.finite("samples", self.samples)
-        if not isinstance(self.samples, jax.core.Tracer):
+        if not isinstance(self.samples, Tracer):
             steps = np.diff(np.asarray(self.samples)[:, 0])
             if not (steps > 0).all():
                 raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")

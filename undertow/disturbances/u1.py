@@ -8,7 +8,6 @@ from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 
-
 # Arguments of the seven sines, rate t + sweep t^2 (rad/s, rad/s^2): one vector, so that they cost little more than one.
 _RATES = np.array([1.0, 2.0, 20.0, 0.5, np.pi / 2, 3.0, 0.0])
 _SWEEPS = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25])

@@ -1,6 +1,6 @@
 """The continuous loop: plant and law as one ODE, the paper's own setting and the reference for the sampled loop."""
 
-from typing import Any
+from typing import Any, cast
 
 import diffrax
 import equinox as eqx
@@ -75,8 +75,8 @@ def _run(loop, key, start, times, duration, jumps, rtol, atol) -> Outcome:
         max_steps=_MAX_STEPS,
         throw=False,
     )
-    states, final = solution.ys
-    ended = solution.ts[1][0]
+    states, final = cast(tuple[Any, Any], solution.ys)
+    ended = cast(tuple[Array, Array], solution.ts)[1][0]
     code = health(loop.plant, *jax.tree.map(lambda leaf: leaf[0], final))
     out_of_steps = (solution.result != diffrax.RESULTS.successful) & (code == int(Status.OK))
     status = jnp.where(out_of_steps, int(Status.STEPS_EXHAUSTED), code)
@@ -90,9 +90,10 @@ def _run(loop, key, start, times, duration, jumps, rtol, atol) -> Outcome:
 @jax.jit  # traced once, although the integrator's stages call it many times
 def _flow(t: Float[Array, ""], state, drawn: Drawn):
     x, z = state
+    controller = cast(AbstractContinuousController, drawn.loop.controller)
     decision = drawn.decide(t, x, z)
     x_rate = drawn.loop.plant.dynamics(t, x, decision.applied, drawn.load(t))
-    return x_rate, drawn.loop.controller.flow(z, decision.y, decision.r, decision.applied)
+    return x_rate, controller.flow(z, decision.y, decision.r, decision.applied)
 
 
 def _is_unsound(t, y, args: Drawn, **_):

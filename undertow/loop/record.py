@@ -32,11 +32,11 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant) -> xr.Dataset:
     """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `input` (numbers from 1)."""
     units = np.array(plant.output_units)
     variables = {}
-    for name, (dimension, meaning, unit) in _MEANINGS.items():
+    for name, (dimension, meaning, rate) in _MEANINGS.items():
         values = np.asarray(getattr(outcome.samples, name))
         dims = {None: ("time",), "rule": ("time", "axis", "rule")}.get(dimension, ("time", dimension))
-        rates = ", ".join(f"{u}{unit}" for u in dict.fromkeys(units))
-        shown = rates if "axis" in dims else unit or plant.input_unit
+        rates = ", ".join(f"{u}{rate}" for u in dict.fromkeys(units))
+        shown = rates if "axis" in dims else rate or plant.input_unit
         variables[name] = (dims, values, {"long_name": meaning, "units": shown})
     status = Status(int(outcome.status))
     return xr.Dataset(

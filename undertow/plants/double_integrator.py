@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.param import param
 from undertow.core.status import Status
 
 _ENVELOPE = 1e6
@@ -37,7 +38,7 @@ class DoubleIntegratorModel(AbstractModel):
 class DoubleIntegrator(AbstractPlant):
     """Unit masses on rails, pushed by accelerations; optionally limited to +-limit m/s^2."""
 
-    limit: Float[Array, ""]
+    limit: Float[Array, ""] = param("m/s^2", "largest input")
     outputs: tuple[str, ...] = eqx.field(static=True)
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True, default="m/s^2")
@@ -84,4 +85,4 @@ def double_integrator(axes: int = 1, limit: float = float(jnp.inf)) -> DoubleInt
         limit: largest |u|, m/s^2.
     """
     names = tuple(f"x{i + 1}" for i in range(axes))
-    return DoubleIntegrator(jnp.asarray(limit, dtype=float), names, ("m",) * axes)
+    return DoubleIntegrator(limit=limit, outputs=names, output_units=("m",) * axes)

@@ -3,9 +3,9 @@
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -130,7 +130,7 @@ class HybridVehicle(AbstractPlant):
 
     def rank(self) -> int:
         """Rank of the thruster matrix; that of G too, wherever J is regular."""
-        if isinstance(self.thruster_matrix, jax.core.Tracer):
+        if isinstance(self.thruster_matrix, Tracer):
             return min(6, self.inputs())
         return int(np.linalg.matrix_rank(np.asarray(self.thruster_matrix), tol=1e-9))
 

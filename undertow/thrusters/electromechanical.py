@@ -47,7 +47,7 @@ class ElectromechanicalThruster(AbstractThruster):
     def voltage_gain(self):
         return self.motor.voltage_gain
 
-    def speed_term(self, report) -> PerThruster:
+    def speed_term(self, report: PropellerReport) -> PerThruster:
         return self.motor.speed_term(report.speed, report.acceleration)
 
     def advice(self):

@@ -22,6 +22,8 @@ class AbstractThruster(eqx.Module):
 
     supply: eqx.AbstractVar[Float[Array, ""]]  # V; the drive can give -supply ... supply
     dead_zone: eqx.AbstractVar[Float[Array, ""]]  # V; smaller voltages turn nothing
+    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, rungs `ideal` and `static`.
+    has_prescribed_acceleration: eqx.AbstractVar[bool]
 
     @abc.abstractmethod
     def initial_state(self, count: int) -> Any:
@@ -48,13 +50,8 @@ class AbstractThruster(eqx.Module):
         """alpha of Eq. (7), N/V: what the controller's model takes for granted."""
 
     @abc.abstractmethod
-    def speed_term(self, report: PropellerReport | None) -> PerThruster | Float[Array, ""]:
+    def speed_term(self, report: Any) -> PerThruster | Float[Array, ""]:
         """phi of Eq. (15), N, from a speed sensor."""
-
-    @property
-    @abc.abstractmethod
-    def has_prescribed_acceleration(self) -> bool:
-        """Whether J_dot nu counts as part of the prescribed uncertainty (benchmark rungs `ideal`, `static`)."""
 
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:

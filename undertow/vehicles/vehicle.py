@@ -1,9 +1,9 @@
 """A vehicle as data: published numbers with their sources, and what follows from them."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -58,7 +58,7 @@ class Vehicle(eqx.Module):
                 "thruster_positions", "have one row (x, y, z) per thruster, like thruster_directions", shapes
             )
         checks.finite("thruster_positions", self.thruster_positions, "m")
-        if not isinstance(self.thruster_directions, jax.core.Tracer):
+        if not isinstance(self.thruster_directions, Tracer):
             norms = np.linalg.norm(np.asarray(self.thruster_directions), axis=1)
             for j in np.flatnonzero(~(np.abs(norms - 1) < 1e-6)):
                 raise BadInput(f"thruster_directions[{j}]", "have length 1", f"{norms[j]:.6g} long")

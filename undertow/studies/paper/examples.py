@@ -6,7 +6,7 @@ from typing import Any
 from undertow.analysis.motor_loop import motor_matrix, rightmost
 from undertow.core.status import Status
 from undertow.scenario.execute import Executed
-from undertow.studies.paper.setup import CONTROLLERS, RUNGS, scenario
+from undertow.studies.paper.setup import CONTROLLERS, RUNGS, law_of, motor_of, scenario
 
 # Propeller speeds at which the linearised loop is looked at, rad/s: Section 3.9 of the theory, 6 to 90 N of thrust.
 _SPEEDS = (2.0, 10.0, 20.0, 40.0, 60.0)
@@ -68,7 +68,7 @@ def _why(runs: Mapping[str, Executed], rung: str, controller: str) -> str:
         return "Thrust follows voltage at once: what the theory assumes."
     if rung == "static":
         return "The motor's curve is part of d, but without lag: the estimator sees it as one more disturbance."
-    law, motor = run.built.closed_loop.controller, run.built.closed_loop.plant.thruster.motor
+    law, motor = law_of(run), motor_of(run)
     winding = rung == "electromechanical"
     modes = [rightmost(motor_matrix(law, motor, speed, winding)) for speed in _SPEEDS]
     growth = [mode.real for mode in modes]
@@ -78,5 +78,11 @@ def _why(runs: Mapping[str, Executed], rung: str, controller: str) -> str:
         return f"The linearised loop is stable from 2 to 60 rad/s: rightmost eigenvalue {growth[worst]:+.2f} 1/s {at}."
     number = sum(value > 0 for value in growth)
     rate = f"{growth[worst]:+.1f} 1/s, {abs(modes[worst].imag):.0f} rad/s, {at}"
-    tail = "grows until something gives" if run.status is not Status.OK else "is held by the propeller's own drag: a limit cycle"
-    return f"The linearised loop is unstable at {number} of {len(_SPEEDS)} speeds (worst {rate}); the oscillation {tail}."
+    tail = (
+        "grows until something gives"
+        if run.status is not Status.OK
+        else "is held by the propeller's own drag: a limit cycle"
+    )
+    return (
+        f"The linearised loop is unstable at {number} of {len(_SPEEDS)} speeds (worst {rate}); the oscillation {tail}."
+    )

@@ -1,7 +1,13 @@
 """The paper's set-up with its gaps filled, as scenario data: every number of the study can be run again from a file."""
 
 import math
-from typing import Any
+from typing import Any, cast
+
+from undertow.controllers.law import RCAF
+from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.scenario.execute import Executed
+from undertow.thrusters.electromechanical import ElectromechanicalThruster
+from undertow.thrusters.motor import DCMotor
 
 GOAL = [2.0, 3.0, 4.0, math.pi / 3, math.pi / 4, 2 * math.pi / 5]  # m, rad; Section 5
 
@@ -39,3 +45,18 @@ def scenario(
         "disturbance": {"kind": "u1"},
         "loop": {"kind": "continuous", "duration": 20.0},
     } | changes
+
+
+def law_of(run: Executed) -> RCAF:
+    """The law that ran."""
+    return cast(RCAF, run.built.closed_loop.controller)
+
+
+def plant_of(run: Executed) -> HybridVehicle:
+    """The vehicle that was run."""
+    return cast(HybridVehicle, run.built.closed_loop.plant)
+
+
+def motor_of(run: Executed) -> DCMotor:
+    """The motor of its thrusters."""
+    return cast(ElectromechanicalThruster, plant_of(run).thruster).motor

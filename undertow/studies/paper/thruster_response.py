@@ -76,8 +76,8 @@ def _steady_period(thruster: AbstractThruster, frequency: float) -> Period:
 def _drive(thruster: AbstractThruster, frequency: Float[Array, ""]):
     """Time, voltage, thrust and current over all periods, from rest."""
     dt = 2 * jnp.pi / frequency / _STEPS
-    voltage = lambda t: AMPLITUDE * jnp.sin(frequency * t)[None]  # noqa: E731
-    field = lambda t, state: thruster.dynamics(state, voltage(t))  # noqa: E731
+    voltage = lambda t: AMPLITUDE * jnp.sin(frequency * t)[None]
+    field = lambda t, state: thruster.dynamics(state, voltage(t))
 
     def tick(state, t):
         volts = voltage(t)

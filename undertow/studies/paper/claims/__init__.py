@@ -35,7 +35,7 @@ def audit(runs: Mapping[str, Executed]) -> list[dict[str, Any]]:
                 "verdict": finding.verdict,
                 "evidence": finding.evidence,
                 "scenario": f"scenarios/{finding.shown_by}.yaml" if finding.shown_by else None,
-                "numbers": finding.numbers,
+                "numbers": dict(finding.numbers),
             }
         )
     return found

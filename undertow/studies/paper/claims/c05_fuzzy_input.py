@@ -35,8 +35,8 @@ def judge(runs: Runs) -> Finding:
     found = {key: steady(runs[name])["estimation_rms"] for key, name in named.items()}
     text = (
         f"rms estimation error, m/s^2: modelling error with 5 rules {found['error_5_rules']:.3g}, state with 25 rules "
-        f"{found['state_25_rules']:.3g} at the same gamma. At the same gamma |xi|^2 one rule (a plain integrator) gives "
-        f"{found['error_1_rule']:.3g} and the state {found['state_25_rules_matched']:.3g}: what differs is the loop "
+        f"{found['state_25_rules']:.3g} at the same gamma. At the same gamma |xi|^2 one rule (a plain integrator) "
+        f"gives {found['error_1_rule']:.3g} and the state {found['state_25_rules_matched']:.3g}: what differs is the loop "
         "gain, not the input."
     )
     if found["state_25_rules"] <= found["error_5_rules"]:

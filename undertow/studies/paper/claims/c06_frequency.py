@@ -1,12 +1,13 @@
 """C6: the scheme copes with uncertainty of high frequency. Up to which?"""
 
+import itertools
 import math
 
 import numpy as np
 
 from undertow.analysis.linear import crossing_frequency, estimation_response
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
-from undertow.studies.paper.setup import GOAL, scenario
+from undertow.studies.paper.setup import GOAL, law_of, scenario
 
 CLAIM = "The scheme estimates uncertainties of large amplitude and high frequency."
 
@@ -36,7 +37,7 @@ def judge(runs: Runs) -> Finding:
             ratios = np.divide(found["estimation_rms_axes"], found["uncertainty_rms_axes"])
             points += zip(block, ratios.tolist(), strict=True)
     points.sort()
-    law = runs["ideal_rcafc"].built.closed_loop.controller
+    law = law_of(runs["ideal_rcafc"])
     predicted = np.abs(estimation_response(law, np.array([w for w, _ in points]))).tolist()
     numbers = {
         "frequency": [w for w, _ in points],
@@ -61,7 +62,7 @@ def _name(block: int) -> str:
 
 def _crossing(points: list[tuple[float, float]]) -> float:
     """Frequency at which the measured ratio passes 1, interpolated on logarithmic axes; infinite if nowhere."""
-    for (w0, r0), (w1, r1) in zip(points, points[1:], strict=False):
+    for (w0, r0), (w1, r1) in itertools.pairwise(points):
         if r0 < 1 <= r1:
             share = -math.log(r0) / (math.log(r1) - math.log(r0))
             return w0 * (w1 / w0) ** share

@@ -37,5 +37,7 @@ def judge(runs: Runs) -> Finding:
             numbers[f"ended_{name}"] = float(run.outcome.ended)
             text += f"On the whole motor the {name} variant is unstable (ends at {float(run.outcome.ended):.2f} s). "
     if all(run.status is not Status.OK for run in full.values()):
-        return Finding("holds if the motor has no dynamics; with them both are unstable", text.strip(), _SENSOR, numbers)
+        return Finding(
+            "holds if the motor has no dynamics; with them both are unstable", text.strip(), _SENSOR, numbers
+        )
     return Finding("holds if the motor has no dynamics", text.strip(), _SENSOR, numbers)

@@ -2,7 +2,7 @@
 
 from undertow.core.status import Status
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
-from undertow.studies.paper.setup import scenario
+from undertow.studies.paper.setup import plant_of, scenario
 
 CLAIM = "The scheme works for square and non-square gain matrices (Eqs. (22)-(28))."
 
@@ -44,7 +44,7 @@ def judge(runs: Runs) -> Finding:
         if _name(key) not in runs:
             continue
         run = runs[_name(key)]
-        plant = run.built.closed_loop.plant
+        plant = plant_of(run)
         count, rank = plant.inputs(), plant.rank()
         lost = run.status is not Status.OK
         error = None if lost else steady(run)["tracking_rms"]

@@ -63,12 +63,14 @@ def judge(runs: Runs) -> Finding:
     noise = runs[_NOISE]
     numbers = {"ratios": ratios, "failed": failed, "noise_ended": float(noise.outcome.ended)}
     text = (
-        f"Continuous and without noise: halving or doubling any gain of Table 1, or starting elsewhere ({len(swept)} runs), "
-        f"changes the tracking rms by factors from {ratios[low]:.2f} ({low[4:]}) to {ratios[high]:.2f} ({high[4:]})"
+        f"Continuous and without noise: halving or doubling any gain of Table 1, or starting elsewhere "
+        f"({len(swept)} runs), changes the tracking rms by factors from {ratios[low]:.2f} ({low[4:]}) to {ratios[high]:.2f} ({high[4:]})"
         + (f"; {len(failed)} runs end early. " if failed else ". ")
     )
     if noise.status is Status.OK:
-        return Finding("holds" if not failed else "fails", text + "Velocity noise of 1 cm/s is survived.", _NOISE, numbers)
+        return Finding(
+            "holds" if not failed else "fails", text + "Velocity noise of 1 cm/s is survived.", _NOISE, numbers
+        )
     text += (
         f"With 1 cm/s of velocity noise at 1 kHz and sets spaced 0.1 the weights drift and the run ends at "
         f"{float(noise.outcome.ended):.1f} s ({noise.status.word})."

@@ -20,7 +20,9 @@ def judge(runs: Runs) -> Finding:
     numbers = {law.text: {"long": law.error_long, "short": law.error_short} for law in laws}
     text = "rms error in % of the signal at V = 10 sin t and 10 sin 10t: "
     text += "; ".join(f"{law.text} {law.error_long:.0f} and {law.error_short:.0f}" for law in laws)
-    text += ". In the loop the same difference separates rung static, which works, from electromechanical, which does not."
+    text += (
+        ". In the loop the same difference separates rung static, which works, from electromechanical, which does not."
+    )
     valid = [law.text for law in laws if law.error_long < _VALID]
     fails_short = all(law.error_short > _VALID for law in laws)
     if len(valid) == len(laws) and fails_short:

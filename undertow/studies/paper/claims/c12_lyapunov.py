@@ -2,7 +2,7 @@
 
 from undertow.analysis.certificate import lyapunov_function, minimax_weight, share_increasing
 from undertow.studies.paper.claims.finding import Finding, Runs
-from undertow.studies.paper.setup import scenario
+from undertow.studies.paper.setup import law_of, scenario
 
 CLAIM = "V_dot <= 0 along every solution (Eqs. (46)-(58))."
 
@@ -22,14 +22,14 @@ def scenarios(quick: bool) -> dict:
 def judge(runs: Runs) -> Finding:
     """Share of 10 ms steps at which V_f grows: constant d with theta* = d, and suite U1 with the minimax theta*."""
     constant, varying = runs["c12_constant"], runs["ideal_rcafc"]
-    law = varying.built.closed_loop.controller
+    law = law_of(varying)
     steps = {
         "constant": share_increasing(lyapunov_function(law, constant.dataset, minimax_weight(constant.dataset))),
         "u1": share_increasing(lyapunov_function(law, varying.dataset, minimax_weight(varying.dataset))),
     }
     text = (
-        f"Constant d: V_f grows at {100 * steps['constant']:.2g} % of the 10 ms steps. Suite U1, with the best constant "
-        f"theta* there is: at {100 * steps['u1']:.0f} %. The bound needs omega_bar > |omega|, half the range of d, "
+        f"Constant d: V_f grows at {100 * steps['constant']:.2g} % of the 10 ms steps. Suite U1, with the best "
+        f"constant theta* there is: at {100 * steps['u1']:.0f} %. The bound needs omega_bar > |omega|, half the range of d, "
         "which Table 1 (0.1) does not give."
     )
     if steps["constant"] > 0:

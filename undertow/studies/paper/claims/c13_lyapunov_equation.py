@@ -3,6 +3,7 @@
 import numpy as np
 
 from undertow.studies.paper.claims.finding import Finding, Runs
+from undertow.studies.paper.setup import law_of
 
 CLAIM = "A positive definite P solves Eq. (21) for the gains of Table 1."
 
@@ -14,7 +15,7 @@ def scenarios(quick: bool) -> dict:
 
 def judge(runs: Runs) -> Finding:
     """Residual and eigenvalues."""
-    law = runs["ideal_rcafc"].built.closed_loop.controller
+    law = law_of(runs["ideal_rcafc"])
     p, (k1, k2), q = np.asarray(law.lyapunov()), np.asarray(law.feedback), np.asarray(law.weight)
     a = np.array([[0.0, 1.0], [-k1, -k2]])
     residual = float(np.abs(a.T @ p + p @ a + q).max())

@@ -1,10 +1,12 @@
 """What judging a claim yields, and the comparisons that several claims share."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from undertow.analysis.linear import gains
-from undertow.controllers.law import RCAF
+from undertow.controllers.rcaf import rcaf
+from undertow.plants.double_integrator import double_integrator
 from undertow.scenario.execute import Executed
 from undertow.studies.paper.setup import RAFC, scenario
 
@@ -17,7 +19,7 @@ class Finding(NamedTuple):
     verdict: str
     evidence: str
     shown_by: str | None  # name of the scenario that shows it
-    numbers: dict[str, Any] = {}
+    numbers: Mapping[str, Any] = MappingProxyType({})
 
 
 # RAFC with gamma raised until its loop gain at low frequency is RCAFC's: the fair opponent.
@@ -39,11 +41,7 @@ def equal_gain_scenario() -> dict[str, Any]:
 
 def equal_gain_ratio() -> float:
     """How much larger the low-frequency loop gain of RCAFC is than that of RAFC, at Table 1: about 68."""
-    from undertow.controllers.rcaf import rcaf
-    from undertow.plants.double_integrator import double_integrator
-
-    law: RCAF = rcaf(double_integrator(1).model())
-    g = gains(law)
+    g = gains(rcaf(double_integrator(1).model()))
     tracking_branch = g.p12 / g.stiffness
     return (tracking_branch + g.composite / g.pole) / tracking_branch
 
@@ -51,7 +49,7 @@ def equal_gain_ratio() -> float:
 def pair(runs: Runs, metric: str) -> tuple[float, float, float]:
     """A steady metric of RCAFC and RAFC at Table 1, and of RAFC at equal loop gain (Example 1)."""
     names = ("ideal_rcafc", "ideal_rafc", EQUAL_GAIN)
-    return tuple(steady(runs[name])[metric] for name in names)  # pyright: ignore[reportReturnType]
+    return tuple(steady(runs[name])[metric] for name in names)
 
 
 def steady(run: Executed) -> dict[str, Any]:
