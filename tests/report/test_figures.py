@@ -64,7 +64,7 @@ def test_units_follow_the_axis(figures):
 def test_lines_are_the_data(figures, runs):
     for column, axis in enumerate(AXES):
         upper, lower = titled(figures["fig06"], axis)
-        pick = lambda run, name, column=column: run[name].values[:, column]  # noqa: E731
+        pick = lambda run, name, column=column: run[name].values[:, column]
         np.testing.assert_array_equal(line(upper, "RAFC").get_ydata(), pick(runs["rafc"], "position"))
         np.testing.assert_array_equal(line(upper, "wanted $x_d$").get_ydata(), pick(runs["rcafc"], "target"))
         np.testing.assert_array_equal(line(lower, "RCAFC").get_ydata(), abs(pick(runs["rcafc"], "error")))

@@ -25,7 +25,7 @@ def test_periods_are_the_papers_voltages_and_close(response):
 def test_motor_obeys_eqs_8_to_11(response):
     period = response.short
     step = period.time[1] - period.time[0]
-    slope = lambda x: (np.roll(x, -1) - np.roll(x, 1)) / (2 * step)  # noqa: E731
+    slope = lambda x: (np.roll(x, -1) - np.roll(x, 1)) / (2 * step)
     speed = np.sign(period.thrust) * np.sqrt(np.abs(period.thrust) / MOTOR.thrust_coefficient)
     volts = (
         MOTOR.inductance * slope(period.current) + MOTOR.resistance * period.current + MOTOR.back_emf_constant * speed

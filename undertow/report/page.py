@@ -43,7 +43,7 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
         numeric: columns set to the right.
         wide: too wide for a phone; keeps its width and scrolls.
     """
-    style = lambda column: {"class_": "number"} if column in numeric else {}  # noqa: E731
+    style = lambda column: {"class_": "number"} if column in numeric else {}
     titles = tag("tr", *(tag("th", cell, scope="col", **style(i)) for i, cell in enumerate(head)))
     head_rows = (tag("thead", titles),) if any(head) else ()
     body = []

@@ -49,7 +49,8 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
             _single(two, "model_rms", "Rms of the modelling error in velocity after 10 s"),
         ),
         "fig12": join(
-            "The motor's curve now is part of d, which is larger than in Fig. 7.",
+            "The motor's curve now is part of d, which is larger than in Fig. 7 and has kinks where a thruster changes "
+            "direction: near zero volts the motor gives almost no thrust.",
             _single(two, "uncertainty_rms", "Rms of d after 10 s"),
             _single(two, "estimation_rms", "Rms error of the estimate"),
         ),

@@ -29,12 +29,13 @@ def ladder_figure(ladder: Mapping[str, Mapping[str, Any]], datasets: Runs | None
         ladder: by rung and controller, `status`, `diverged_at` (s or None), `steady` (metrics or None).
         datasets: the runs, by rung and controller; without them only the metrics are drawn.
     """
-    tall = 1.75 if datasets else 0.0
+    runs = datasets or {}
+    tall = 1.75 if runs else 0.0
     figure = style.blank(9.6, 0.55 + tall + 1.95)
     style.head(figure, "Fidelity ladder: one law, four thrusters", dict(style.CONTROLLERS.values()))
-    for number, rung in enumerate(ladder if datasets else ()):
+    for number, rung in enumerate(rung for rung in ladder if rung in runs):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.58, 1.75, 1.25)
-        _errors(panel, rung, ladder[rung], datasets[rung])
+        _errors(panel, rung, ladder[rung], runs[rung])
         style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", rung)
     for number, (metric, text) in enumerate(_SHOWN.items()):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.68 + tall, 1.75, 1.35)
