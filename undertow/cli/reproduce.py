@@ -8,9 +8,10 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from undertow.cli.results_folder import results_folder
 from undertow.cli.tables import wide_console
-from undertow.studies.paper import reproduce as study
+from undertow.report import reproduction
+from undertow.report.reproduction import write
 
-_WRITTEN = ("report.html", "results.json", "figures", "runs")
+_WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios")
 
 
 def reproduce(out: Path, quick: bool) -> None:
@@ -33,7 +34,9 @@ def _watched(console: Console, folder: Path, quick: bool) -> Path:
             if not console.is_terminal:
                 console.print(f"{fraction:4.0%} {message}", markup=False, highlight=False)
 
-        return study.reproduce(folder, quick, progress)
+        found = reproduction.reproduce(folder, quick, progress)
+        progress("drawing", 0.9)
+        return write(found, folder)
 
 
 def _verdicts(results: Path) -> list[str]:

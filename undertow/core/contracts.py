@@ -77,7 +77,7 @@ class AbstractModel(eqx.Module):
 
     def difference(self, target: Outputs, actual: Outputs) -> Outputs:
         """target - actual, angles the short way round."""
-        turn = 2 * jnp.pi * jnp.asarray(self.angles)
+        turn = 2 * jnp.pi * jnp.asarray(self.angles, dtype=float)
         raw = target - actual
         return raw - turn * jnp.round(raw / (2 * jnp.pi))
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -68,7 +69,7 @@ def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]
 
 
 def _to_array(value: Any) -> Any:
-    return value if eqx.is_array(value) else jnp.asarray(value, dtype=float)
+    return value if isinstance(value, jax.Array) else jnp.asarray(value, dtype=float)
 
 
 def _freeze(sources: Mapping[str, str] | tuple) -> tuple:

@@ -27,10 +27,10 @@ class SuiteU1(AbstractDisturbance):
         swell, fast, ripple, slow, square, pulse, chirp = jnp.sin(_RATES * t + _SWEEPS * t**2)
         signals = jnp.stack(
             [
-                4 * swell + 6 * (t >= 8) - 9 * (t >= 14),
+                4 * swell + _step(t, 8.0, 6.0) - _step(t, 14.0, 9.0),
                 3 * fast + 2 * ripple,
                 -3 + 2 * slow + jnp.where(square >= 0, 3.0, -3.0),
-                2 * pulse + 4 * (t >= 6) - 4 * (t >= 10),
+                2 * pulse + _step(t, 6.0, 4.0) - _step(t, 10.0, 4.0),
                 4 * (t / 10 - jnp.floor(t / 10)),
                 2 * chirp,
             ]
@@ -42,6 +42,10 @@ class SuiteU1(AbstractDisturbance):
         square = {2.0 * k for k in range(1, int(duration // 2) + 1)}
         resets = {10.0 * k for k in range(1, int(duration // 10) + 1)}
         return tuple(sorted(t for t in steps | square | resets if t < duration))
+
+
+def _step(t: Float[Array, ""], at: float, size: float) -> Float[Array, ""]:
+    return jnp.where(t >= at, size, 0.0)
 
 
 def u1(scale: float = 1.0) -> SuiteU1:

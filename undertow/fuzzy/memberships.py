@@ -27,7 +27,7 @@ def even_memberships(
     spacing, width = 2 * half / (count - 1), widths[0]
     offset = x - middle
     ratio = jnp.exp(-2 * spacing * (jnp.abs(offset) - half) / width**2)
-    inward = jnp.exp(-((jnp.arange(count) * spacing / width) ** 2))
+    inward = jnp.exp(-((jnp.arange(count, dtype=float) * spacing / width) ** 2))
     powers = [jnp.ones_like(ratio)]
     for _ in range(1, count):
         powers.append(powers[-1] * ratio)

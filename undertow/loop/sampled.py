@@ -87,7 +87,7 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
 
         def block(carry, first):
             """Record, then run to the next record; the last block only records."""
-            t = first * dt
+            t = _instant(first, dt)
             sample = drawn.sample(t, carry[0], drawn.decide(t, carry[0], carry[1]))
             until = jnp.minimum(first + record_every, ticks)
             return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), (t, sample)
@@ -100,7 +100,7 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
 def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     """Command, move the plant with the input held, then let the controller learn from what was applied."""
     x, z, gathered, status, ended = carry
-    loop, t = drawn.loop, k * dt
+    loop, t = drawn.loop, _instant(k, dt)
     decision = drawn.decide(t, x, z)
     if accumulators:
         sample = drawn.sample(t, x, decision)
@@ -119,3 +119,7 @@ def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
 
 def _motion(drawn: Drawn, applied, t, x):
     return drawn.loop.plant.dynamics(t, x, applied, drawn.load(t))
+
+
+def _instant(tick: Array, dt: Float[Array, ""]) -> Float[Array, ""]:
+    return jnp.asarray(tick, dtype=float) * dt

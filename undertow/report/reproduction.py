@@ -1,7 +1,6 @@
 """From what `undertow reproduce` found out to its figures and its page."""
 
 from pathlib import Path
-from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -21,19 +20,9 @@ def write(found: Reproduction, folder: Path) -> Path:
 
 def draw(found: Reproduction) -> dict[str, Figure]:
     """Every figure of the report, by name."""
-    figures = paper_figures(found.datasets(1), found.datasets(2), found.response)
+    numbers = {claim["id"]: claim["numbers"] for claim in found.results["claims"]}
     ladder = found.results["ladder"]
-    runs = {rung: {name: found.runs[f"{rung}_{name}"].dataset for name in entries} for rung, entries in ladder.items()}
-    figures["ladder"] = ladder_figure(ladder, runs)
-    sweep = _sweep(found.results)
-    return figures | ({"sweep": sweep_figure(sweep)} if sweep else {})
-
-
-def _sweep(results: dict[str, Any]) -> dict[str, Any]:
-    """The frequencies of claim C6."""
-    numbers = next((claim["numbers"] for claim in results["claims"] if claim["id"] == "C6"), None)
-    if numbers is None:
-        return {}
-    points = {"frequency": numbers["frequency"], "measured": numbers["error_ratio"]}
-    theory = {"theory_frequency": numbers["frequency"], "theory": numbers["error_ratio_predicted"]}
-    return {"rcafc": points | theory}
+    return paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
+        "ladder": ladder_figure(ladder, {rung: found.datasets(rung) for rung in ladder}),
+        "sweep": sweep_figure(numbers["C6"]["sweep"]),
+    }

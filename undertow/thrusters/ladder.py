@@ -28,10 +28,12 @@ def on_rung(motor: DCMotor, rung: str, supply: float = float(jnp.inf), dead_zone
         dead_zone: voltage below which nothing turns, V.
 
     Raises:
-        BadInput: unknown rung, supply not positive, dead zone negative.
+        BadInput: unknown rung, supply not positive, dead zone negative, no inductance on `electromechanical`.
     """
     checks.choice("rung", rung, tuple(RUNGS))
     if not supply > 0:
         checks.positive("supply", supply, "V")
     checks.not_negative("dead_zone", dead_zone, "V")
+    if rung == "electromechanical":
+        checks.positive("inductance", motor.inductance, "H")
     return RUNGS[rung](motor=motor, supply=supply, dead_zone=dead_zone)

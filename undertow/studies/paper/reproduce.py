@@ -3,11 +3,15 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import xarray as xr
+
+from undertow.scenario.execute import Executed
 from undertow.scenario.provenance import versions
 from undertow.studies.paper import claims, examples
 from undertow.studies.paper.experiments import run_all
+from undertow.studies.paper.setup import CONTROLLERS
 from undertow.studies.paper.thruster_response import ThrusterResponse, thruster_response
 
 Progress = Callable[[str, float], None]
@@ -16,16 +20,16 @@ Progress = Callable[[str, float], None]
 _RUNNING = 0.85
 
 
-class Reproduction:
+class Reproduction(NamedTuple):
     """Everything `undertow reproduce` finds out, before it is drawn."""
 
-    def __init__(self, results: dict[str, Any], runs: dict, response: ThrusterResponse):
-        self.results, self.runs, self.response = results, runs, response
+    results: dict[str, Any]  # what stands in results.json
+    runs: dict[str, Executed]
+    response: ThrusterResponse
 
-    def datasets(self, number: int) -> dict[str, Any]:
-        """Recorded series of Example 1 or 2, by controller."""
-        rung = ("ideal", "static")[number - 1]
-        return {name: self.runs[f"{rung}_{name}"].dataset for name in ("rcafc", "rafc")}
+    def datasets(self, rung: str) -> dict[str, xr.Dataset]:
+        """Recorded series on a rung of the ladder, by controller. Examples 1 and 2 are `ideal` and `static`."""
+        return {name: self.runs[f"{rung}_{name}"].dataset for name in CONTROLLERS}
 
 
 def reproduce(folder: Path, quick: bool, progress: Progress) -> Reproduction:

@@ -36,8 +36,8 @@ def judge(runs: Runs) -> Finding:
     text = (
         f"rms estimation error, m/s^2: modelling error with 5 rules {found['error_5_rules']:.3g}, state with 25 rules "
         f"{found['state_25_rules']:.3g} at the same gamma. At the same gamma |xi|^2 one rule (a plain integrator) "
-        f"gives {found['error_1_rule']:.3g} and the state {found['state_25_rules_matched']:.3g}: what differs is the loop "
-        "gain, not the input."
+        f"gives {found['error_1_rule']:.3g} and the state {found['state_25_rules_matched']:.3g}: what "
+        "differs is the loop gain, not the input."
     )
     if found["state_25_rules"] <= found["error_5_rules"]:
         return Finding("fails", text, "table2_rcafc_state", found)

@@ -2,12 +2,13 @@
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 
 from undertow.analysis.linear import crossing_frequency, estimation_response
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
-from undertow.studies.paper.setup import GOAL, law_of, scenario
+from undertow.studies.paper.setup import CONTROLLERS, GOAL, law_of, scenario
 
 CLAIM = "The scheme estimates uncertainties of large amplitude and high frequency."
 
@@ -19,45 +20,52 @@ _SWEEP = (*_QUICK, (0.5, 1.0, 2.0, 10.0, 35.0, 70.0), (90.0, 100.0, 115.0, 150.0
 def scenarios(quick: bool) -> dict:
     """Unit sinusoids of different frequency on the six axes, at the goal from the start."""
     return {
-        _name(i): scenario(
-            f"RCAFC against unit sinusoids of {', '.join(f'{w:g}' for w in block)} rad/s, one per axis",
-            disturbance={"kind": "sinusoid", "amplitude": 1.0, "frequency": list(block)},
+        _name(controller, i): scenario(
+            f"{controller.upper()} against unit sinusoids of {', '.join(f'{w:g}' for w in block)} rad/s, one per axis",
+            composite=composite,
+            disturbance={"kind": "sinusoid", "amplitude": 1.0, "frequency": list(block), "offset": [0.0] * 6},
             initial={"position": GOAL},
         )
+        for controller, composite in CONTROLLERS.items()
         for i, block in enumerate(_QUICK if quick else _SWEEP)
     }
 
 
 def judge(runs: Runs) -> Finding:
     """|d_hat - d| / |d| against frequency, measured and predicted."""
+    sweep = {controller: _sweep(runs, controller) for controller in CONTROLLERS}
+    points = list(zip(sweep["rcafc"]["frequency"], sweep["rcafc"]["measured"], strict=True))
+    crossing, predicted = _crossing(points), crossing_frequency(law_of(runs["ideal_rcafc"]))
+    below, above = points[0], points[-1]
+    text = (
+        f"The estimate is off by {100 * below[1]:.2g} % of d at {below[0]:g} rad/s and by {100 * above[1]:.0f} % at "
+        f"{above[0]:g} rad/s. From {crossing:.0f} rad/s on (in small signal {predicted:.0f}) it is worse than none."
+    )
+    numbers = {"sweep": sweep, "crossing_measured": crossing, "crossing_predicted": predicted}
+    return Finding(f"holds if d stays well below {crossing:.0f} rad/s", text, _name("rcafc", 0), numbers)
+
+
+def _name(controller: str, block: int) -> str:
+    return f"c06_{controller}_{block + 1}"
+
+
+def _sweep(runs: Runs, controller: str) -> dict[str, Any]:
+    """Measured points in order of frequency, and the small-signal curve."""
     points = []
     for i, block in enumerate(_SWEEP):
-        if _name(i) in runs:
-            found = steady(runs[_name(i)])
+        if _name(controller, i) in runs:
+            found = steady(runs[_name(controller, i)])
             ratios = np.divide(found["estimation_rms_axes"], found["uncertainty_rms_axes"])
             points += zip(block, ratios.tolist(), strict=True)
     points.sort()
-    law = law_of(runs["ideal_rcafc"])
-    predicted = np.abs(estimation_response(law, np.array([w for w, _ in points]))).tolist()
-    numbers = {
-        "frequency": [w for w, _ in points],
-        "error_ratio": [r for _, r in points],
-        "error_ratio_predicted": predicted,
-        "crossing_measured": _crossing(points),
-        "crossing_predicted": crossing_frequency(law),
+    curve = np.geomspace(0.5, 500.0, 120)
+    law = law_of(runs[_name(controller, 0)])
+    return {
+        "frequency": [frequency for frequency, _ in points],
+        "measured": [ratio for _, ratio in points],
+        "theory_frequency": curve.tolist(),
+        "theory": np.abs(estimation_response(law, curve)).tolist(),
     }
-    below, above = points[0], points[-1]
-    text = (
-        f"The estimate is off by {100 * below[1]:.1f} % of d at {below[0]:g} rad/s and by {100 * above[1]:.0f} % at "
-        f"{above[0]:g} rad/s. From {numbers['crossing_measured']:.0f} rad/s on (predicted "
-        f"{numbers['crossing_predicted']:.0f}) it is worse than no estimate at all."
-    )
-    verdict = f"holds if d stays well below {numbers['crossing_measured']:.0f} rad/s"
-    return Finding(verdict, text, _name(0), numbers)
-
-
-def _name(block: int) -> str:
-    return f"c06_frequency_{block + 1}"
 
 
 def _crossing(points: list[tuple[float, float]]) -> float:

@@ -64,8 +64,8 @@ def judge(runs: Runs) -> Finding:
     numbers = {"ratios": ratios, "failed": failed, "noise_ended": float(noise.outcome.ended)}
     text = (
         f"Continuous and without noise: halving or doubling any gain of Table 1, or starting elsewhere "
-        f"({len(swept)} runs), changes the tracking rms by factors from {ratios[low]:.2f} ({low[4:]}) to {ratios[high]:.2f} ({high[4:]})"
-        + (f"; {len(failed)} runs end early. " if failed else ". ")
+        f"({len(swept)} runs), changes the tracking rms by factors from {ratios[low]:.2f} "
+        f"({low[4:]}) to {ratios[high]:.2f} ({high[4:]})" + (f"; {len(failed)} runs end early. " if failed else ". ")
     )
     if noise.status is Status.OK:
         return Finding(

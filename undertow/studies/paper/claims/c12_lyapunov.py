@@ -14,7 +14,7 @@ def scenarios(quick: bool) -> dict:
     return {
         "c12_constant": scenario(
             "RCAFC under constant uncertainty: the Lyapunov function only falls",
-            disturbance={"kind": "sinusoid", "amplitude": 0.0, "offset": _CONSTANT, "frequency": [1.0] * 6},
+            disturbance={"kind": "sinusoid", "amplitude": 0.0, "frequency": [1.0] * 6, "offset": _CONSTANT},
         )
     }
 
@@ -29,8 +29,8 @@ def judge(runs: Runs) -> Finding:
     }
     text = (
         f"Constant d: V_f grows at {100 * steps['constant']:.2g} % of the 10 ms steps. Suite U1, with the best "
-        f"constant theta* there is: at {100 * steps['u1']:.0f} %. The bound needs omega_bar > |omega|, half the range of d, "
-        "which Table 1 (0.1) does not give."
+        f"constant theta* there is: at {100 * steps['u1']:.0f} %. The bound needs omega_bar > |omega|, half the "
+        "range of d, which Table 1 (0.1) does not give."
     )
     if steps["constant"] > 0:
         return Finding("fails", text, "c12_constant", steps)
