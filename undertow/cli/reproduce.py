@@ -8,8 +8,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from undertow.cli.results_folder import results_folder
 from undertow.cli.tables import wide_console
-from undertow.report import reproduction
 from undertow.report.reproduction import write
+from undertow.studies.paper import reproduce as study
 
 _WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios")
 
@@ -34,7 +34,7 @@ def _watched(console: Console, folder: Path, quick: bool) -> Path:
             if not console.is_terminal:
                 console.print(f"{fraction:4.0%} {message}", markup=False, highlight=False)
 
-        found = reproduction.reproduce(folder, quick, progress)
+        found = study.reproduce(folder, quick, progress)
         progress("drawing", 0.9)
         return write(found, folder)
 
