@@ -52,7 +52,7 @@ class Run:
 
     def plot(self) -> "dict[str, Figure]":
         """Figures of the run, by name."""
-        from undertow.report.figures import run_figures  # noqa: PLC0415  (matplotlib, only when asked for)
+        from undertow.report.figures import run_figures
 
         return run_figures(self.dataset)
 
@@ -132,7 +132,8 @@ def simulate(
         wrong = complaint(errors, nowhere)
         raise BadInput("loop" if wrong.name == "kind" else wrong.name, wrong.must, wrong.got) from None
     except BadInput as error:
-        raise BadInput(error.name.rpartition(".")[2], error.must, error.got, hint=error.hint) from None
+        name = error.name.removeprefix("loop.").removeprefix("initial.")
+        raise BadInput(name, error.must, error.got, hint=error.hint) from error.__cause__
     outcome = execute.run_loop(closed_loop, settings, start, seed)
     attributes = {"title": "a closed loop run by undertow", "seed": seed}
     return _run(outcome, *label(closed_loop, outcome, (window.start, window.stop), attributes))

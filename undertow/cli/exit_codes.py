@@ -41,7 +41,7 @@ def _explain(error: Exception) -> tuple[int, str]:
         context = getattr(error, "ctx", None)
         path = context.command_path if context is not None else "undertow"
         return BAD_INPUT, f"{sentence}. See `{path} --help`"
-    from undertow.core.errors import BadInput  # noqa: PLC0415  (JAX comes with it: not needed for a mistyped option)
+    from undertow.core.errors import BadInput
 
     if isinstance(error, BadInput):
         return BAD_INPUT, str(error)
@@ -49,4 +49,4 @@ def _explain(error: Exception) -> tuple[int, str]:
         at = f" ({error.filename})" if error.filename else ""
         return FILES_FAILED, f"files could not be read or written: {error.strerror or error}{at}"
     hint = "To see where, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
-    return INTERNAL_ERROR, f"internal error, {type(error).__name__}: {error}. {hint}"
+    return INTERNAL_ERROR, f"internal error, {type(error).__name__}: {str(error).rstrip('.')}. {hint}"

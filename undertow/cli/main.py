@@ -1,7 +1,5 @@
 """`undertow`: what can be typed. The work is in one file per command, imported when the command runs."""
 
-# ruff: noqa: PLC0415  (imports inside the commands keep `undertow --help` under half a second)
-
 import os
 import sys
 import warnings

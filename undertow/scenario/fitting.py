@@ -24,6 +24,7 @@ def placed(text: Text, key: str, make: Callable[[], Any]) -> Any:
     except BadInput as error:
         complaint = error.at(key)
         path = tuple(part.split("[")[0] for part in complaint.name.split("."))
+        complaint.name = " ".join(complaint.name.split())
         raise complaint.at(where=text.where(path)) from error.__cause__
 
 
@@ -58,24 +59,34 @@ def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
     Raises:
         BadInput: they do not.
     """
-    axes, zero = len(loop.plant.outputs), jnp.zeros(())
+    axes, zero, what = len(loop.plant.outputs), jnp.zeros(()), "one per output of the plant"
     for key, value in start:
         if value is not None:
-            place = f"initial.{key}"
-            placed(text, place, lambda value=value: checks.length("", value, axes, "one per output of the plant"))
-            placed(text, place, lambda value=value: checks.finite("", value))
-    target = placed(text, "reference", lambda: jax.eval_shape(loop.reference.at, zero))
+            placed(text, "initial", lambda key=key, value=value: checks.length(key, value, axes, what))
+            placed(text, "initial", lambda key=key, value=value: checks.finite(key, value))
+    target = _traced(text, "reference", loop.reference.at, zero)
     if target.position.shape != (axes,):
         must, got = f"have {axes} entries, one per output of the plant", f"of shape {target.position.shape}"
         raise BadInput("reference.position", must, got, where=text.where(("reference", "position")))
-    drawn = jax.eval_shape(loop.draw, jax.random.PRNGKey(0))
-    load = placed(text, "disturbance", lambda: jax.eval_shape(lambda d: d.load(zero), drawn))
+    drawn = _traced(text, "disturbance", loop.draw, jax.random.PRNGKey(0))
+    load = _traced(text, "disturbance", lambda drawn: drawn.load(zero), drawn)
     if any(signal.shape != (axes,) for signal in load):
         got = f"of shapes {[signal.shape for signal in load]}"
         raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
 
-    def first_step(drawn: Any) -> Any:
-        x, z = drawn.start()
-        return drawn.decide(zero, x, z)
+    x, z = _traced(text, "sensor", lambda drawn: drawn.start(), drawn)
+    _traced(text, "controller", lambda drawn, x, z: drawn.decide(zero, x, z), drawn, x, z)
 
-    placed(text, "controller", lambda: jax.eval_shape(first_step, drawn))
+
+def _traced(text: Text, key: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Shapes of a result; whatever is raised on the way is a part that does not fit the others."""
+
+    def trace() -> Any:
+        try:
+            return jax.eval_shape(function, *arguments)
+        except BadInput:
+            raise
+        except Exception as error:
+            raise BadInput("", "fit the other parts", f"not: {type(error).__name__}: {error}") from error
+
+    return placed(text, key, trace)

@@ -120,9 +120,15 @@ def adjust(part: Any, changes: Mapping[str, Any]) -> Any:
         else:
             number = np.asarray(checked(key, change, None, 0.0), dtype=float)
             if number.shape != np.shape(values[key]):
-                raise BadInput(key, f"have shape {np.shape(values[key])}", f"of shape {number.shape}")
+                raise BadInput(
+                    key, _sized(np.shape(values[key])), f"of shape {number.shape}" if number.shape else change
+                )
             values[key] = number
     return _made(lambda: type(part)(**values))
+
+
+def _sized(shape: tuple[int, ...]) -> str:
+    return {0: "be one number", 1: f"be a list of {sum(shape)} numbers"}.get(len(shape), f"have shape {shape}")
 
 
 def _made(make: Callable[[], Any]) -> Any:

@@ -33,7 +33,7 @@ Numbers = list[float]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class Loop(_Strict):
@@ -44,7 +44,7 @@ class Loop(_Strict):
     dt: float = Field(1e-3, gt=0, le=10, description="sampling time of the controller, s (sampled)")
     record: float = Field(1e-2, gt=0, le=1e5, description="time between records, s")
     method: Literal["rk4", "euler"] = Field("rk4", description="integration of the plant (sampled)")
-    substeps: int = Field(1, ge=1, le=1000, description="plant steps per dt (sampled)")
+    substeps: int = Field(1, ge=1, le=100, description="plant steps per dt (sampled)")
     rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (continuous)")
     atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (continuous)")
 
@@ -75,9 +75,9 @@ class Scenario(_Strict):
     reference: NamedPart = Field(description="what to follow")
     disturbance: NamedPart = Field(Part(kind="none"), description="what the surroundings do")
     sensor: NamedPart = Field(Part(kind="perfect"), description="what stands before the measurement")
-    loop: Loop = Field(default_factory=Loop, description="how it is run")  # pyright: ignore[reportArgumentType]
-    initial: Initial = Field(default_factory=Initial, description="state at t = 0")  # pyright: ignore[reportArgumentType]
-    steady: Window = Field(default_factory=Window, description="window of the steady metrics")  # pyright: ignore[reportArgumentType]
+    loop: Loop = Field(default_factory=Loop, description="how it is run")
+    initial: Initial = Field(default_factory=Initial, description="state at t = 0")
+    steady: Window = Field(default_factory=Window, description="window of the steady metrics")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="of everything random")
     precision: Literal["float64", "float32"] = Field("float64", description="of all arithmetic")
 
@@ -95,23 +95,29 @@ def validate(text: Text) -> Scenario:
 
 
 def complaint(errors: ValidationError, text: Text) -> BadInput:
-    """The first of pydantic's errors in the house grammar."""
-    error: Any = errors.errors()[0]
+    """The first of pydantic's errors in the house grammar; a misspelt key before the key that it leaves missing."""
+    error: Any = min(errors.errors(), key=lambda each: each["type"] != "extra_forbidden")
     path = tuple(error["loc"])
-    name, where = ".".join(map(str, path)), text.where(path)
+    name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).lstrip(".")
+    name = " ".join(name.split())
+    where = text.where(path)
     if error["type"] == "extra_forbidden":
         hint = did_you_mean(str(path[-1]), _keys_beside(path))
         return BadInput(name, "be a key of the scenario", "unknown", hint=hint, where=where)
     if error["type"] == "missing":
         return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to the scenario", where=where)
     got = error["input"]
-    return BadInput(name, _must(error), f"{got!r}" if isinstance(got, str) else got, where=where)
+    return BadInput(name, _must(error), "empty" if got is None else repr(got), where=where)
 
 
 def _must(error: Any) -> str:
     """pydantic's 'Input should be ...' in the house grammar."""
     message = error["msg"].replace("Input should be a valid ", "be a ").replace("Input should be ", "be ")
-    return message.replace("be a integer", "be an integer").replace(" or instance of Part", "")
+    return (
+        message.replace("be a integer", "be an integer")
+        .replace("a dictionary", "a mapping of keys to values")
+        .replace(" or instance of Part", "")
+    )
 
 
 def _keys_beside(path: tuple) -> list[str]:

@@ -10,6 +10,9 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from undertow.core.errors import BadInput
 
 _WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "text", type(None): "null"}
+# Integers are sizes and counts that compiled code is unrolled over.
+_LARGEST_COUNT = 100
+
 _NUMBERS = float | list[float] | list[list[float]] | list[list[list[float]]]
 
 
@@ -34,6 +37,8 @@ def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
     except ValidationError:
         must = " or ".join(_WORDS[kind] for kind in kinds) if plain else "a number or a list of numbers"
         raise BadInput(name, f"be {must}", repr(value)) from None
+    if int in kinds and value is not None and abs(value) > _LARGEST_COUNT:
+        raise BadInput(name, f"be at most {_LARGEST_COUNT}", value)
     if not isinstance(value, str):
         try:
             numbers = np.asarray(value, dtype=float)

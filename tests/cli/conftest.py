@@ -1,0 +1,45 @@
+from typing import NamedTuple
+
+import jax
+import pytest
+
+from undertow.cli.main import run
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def undertow(tmp_path, monkeypatch, capsys):
+    """Run the command line in an empty folder, in this process, with JAX as users have it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("UNDERTOW_TRACEBACK", raising=False)
+
+    jax.config.update("jax_numpy_dtype_promotion", "standard")
+
+    def call(*arguments: str) -> Said:
+        code = run(arguments)
+        captured = capsys.readouterr()
+        return Said(code, captured.out, captured.err)
+
+    yield call
+    jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+
+@pytest.fixture
+def refused(undertow, tmp_path):
+    """Run the command line on bad input: exit code 2, one line, nothing left behind. Returns the complaint."""
+
+    def call(*arguments: str) -> str:
+        before = sorted(tmp_path.rglob("*"))
+        said = undertow(*arguments)
+        assert said.code == 2, said
+        assert said.err.startswith("Error: ") and said.err.count("\n") == 1, said.err
+        assert "Traceback" not in said.out + said.err
+        assert [path for path in sorted(tmp_path.rglob("*")) if "__pycache__" not in str(path)] == before
+        return said.err.removeprefix("Error: ").rstrip("\n")
+
+    return call

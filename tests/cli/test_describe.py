@@ -1,0 +1,69 @@
+"""What is there, with units and sources."""
+
+import pytest
+
+from undertow.analysis.meanings import MEANINGS
+from undertow.core import catalogue
+from undertow.scenario import describing
+from undertow.scenario.schema import keys
+
+PARTS = [(kind, name) for kind in catalogue.KINDS for name in catalogue.names(kind)]
+
+
+@pytest.mark.parametrize(("kind", "name"), PARTS)
+def test_every_part_is_listed_and_described(undertow, kind, name):
+    listed = undertow("list", kind)
+    assert listed.code == 0 and name in listed.out
+    described = undertow("describe", f"{kind}/{name}")
+    assert described.code == 0 and described.out.startswith(f"{name} {kind}")
+
+
+@pytest.mark.parametrize(("kind", "name"), PARTS)
+def test_every_option_has_a_meaning(kind, name):
+    for description in describing.describe(f"{kind}/{name}"):
+        assert description.summary
+        assert [option.name for option in description.options if not option.meaning] == []
+
+
+def test_list_shows_everything(undertow):
+    out = undertow("list").out
+    assert all(name in out for _, name in PARTS)
+
+
+def test_parameters_come_with_unit_symbol_and_source(undertow):
+    out = undertow("describe", "paper_table3").out
+    for word in ("motor.resistance", "1.2", "ohm", "R", "winding resistance", "the paper, Table 3"):
+        assert word in out
+    assert "Advice: torque constant / back-EMF constant is 117" in out
+
+
+def test_controller_shows_its_options_and_the_defaults_of_its_class():
+    (rcaf,) = describing.describe("rcaf")
+    options = {option.name: option for option in rcaf.options}
+    assert "model" not in options
+    assert options["composite"].default == 500.0 and "gamma_eps" in options["composite"].meaning
+    parameters = {parameter.name: parameter for parameter in rcaf.parameters}
+    assert parameters["feedback"].symbol == "K" and parameters["feedback"].source == "Table 1"
+
+
+def test_part_of_a_file(undertow, tmp_path):
+    (tmp_path / "mine.py").write_text(
+        'def part(size: float = 2.0):\n    """Mine.\n\n    Args:\n        size: m.\n    """\n'
+    )
+    out = undertow("describe", "./mine.py:part").out
+    assert "Mine." in out and "size" in out
+
+
+def test_scenario_keys(undertow):
+    out = undertow("describe", "scenario").out
+    assert all(key.path in out and key.meaning for key in keys())
+    assert "loop.duration" in out and "required" in out
+
+
+def test_metrics(undertow):
+    out = undertow("describe", "metrics").out
+    assert all(name in out and meaning.meaning in out for name, meaning in MEANINGS.items())
+
+
+def test_version(undertow):
+    assert undertow("version").out.startswith("undertow ")

@@ -1,0 +1,122 @@
+"""0 done, 1 a run failed, 2 bad input, 3 internal error, 4 files, 130 interrupted; one line each, no traceback."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+from good_scenario import SCENARIO
+
+from undertow.cli import simulate
+
+
+def write(tmp_path, text=SCENARIO):
+    (tmp_path / "s.yaml").write_text(text)
+
+
+def raising(error):
+    def fail(*arguments, **options):
+        raise error
+
+    return fail
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("simulat",), "No such command 'simulat'"),
+        (("simulate",), "Missing argument 'SCENARIO'. See `undertow simulate --help`"),
+        (("simulate", "s.yaml", "--ou", "o"), "No such option: --ou"),
+        (("simulate", "s.yaml", "more"), "Got unexpected extra argument(s) (more). See `undertow simulate --help`"),
+        (("simulate", "s.yaml", "--out"), "Option '--out' requires an argument. See `undertow --help`"),
+        (("list", "thruster"), "`KIND` must be a kind of part, but is thruster. Did you mean `thrusters`?"),
+        (("describe", "odn"), "`NAME` must be a part, but is odn. Did you mean `odin`?"),
+        (("describe", "./none.py:none"), "`name` must name an existing file, but is ./none.py"),
+    ],
+)
+def test_mistyped_command(refused, arguments, said):
+    assert refused(*arguments).startswith(said)
+
+
+def test_no_command_shows_the_help(undertow):
+    said = undertow()
+    assert said.code == 0 and "simulate" in said.out
+
+
+@pytest.mark.filterwarnings("ignore:Data has no positive values")  # the run ends within its first record
+def test_run_that_fails_is_1_and_keeps_its_results(undertow, tmp_path):
+    text = SCENARIO.replace("feedback: [1, 2]", "composite: 1e7").replace("duration: 0.1", "duration: 1")
+    write(tmp_path, text)
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    errors = [line for line in said.err.splitlines() if not line.startswith("Advice: ")]
+    assert said.code == 1
+    assert len(errors) == 1 and errors[0].startswith("Error: the run ended as `")
+    assert " s of 1 s. " in errors[0]
+    assert (tmp_path / "out" / "run.nc").is_file()
+
+
+def test_internal_error_is_3(undertow, tmp_path, monkeypatch):
+    monkeypatch.setattr(simulate, "execute", raising(RuntimeError("broken\nin two lines")))
+    write(tmp_path)
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    line = (
+        "Error: internal error, RuntimeError: broken in two lines. "
+        "To see where, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
+    )
+    assert said.code == 3
+    assert said.err.splitlines()[-1] == line
+    assert "Traceback" not in said.err
+    assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
+
+
+@pytest.mark.parametrize("way", ["option", "environment"])
+def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
+    monkeypatch.setenv("UNDERTOW_TRACEBACK", "1" if way == "environment" else "")
+    monkeypatch.setattr(simulate, "execute", raising(RuntimeError("broken")))
+    write(tmp_path)
+    said = undertow(*(["--traceback"] if way == "option" else []), "simulate", "s.yaml", "--out", "out")
+    assert said.code == 3 and "Traceback" in said.err
+
+
+def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
+    monkeypatch.setattr(simulate, "save", raising(OSError(28, "No space left on device", "run.nc")))
+    write(tmp_path)
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    line = "Error: files could not be read or written: No space left on device (run.nc)"
+    assert said.code == 4
+    assert said.err.splitlines()[-1] == line
+    assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
+
+
+def test_interrupt_is_130(undertow, tmp_path, monkeypatch):
+    monkeypatch.setattr(simulate, "execute", raising(KeyboardInterrupt()))
+    write(tmp_path)
+    assert undertow("simulate", "s.yaml", "--out", "out").code == 130
+    assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
+
+
+def test_interrupt_of_compiled_code(tmp_path):
+    """An hour of simulated time ends at once, and leaves nothing."""
+    write(tmp_path, SCENARIO.replace("duration: 0.1", "duration: 9000").replace("seed: 3", ""))
+    command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml", "--out", "out"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line.startswith("building"):
+                break
+        time.sleep(1)
+        process.send_signal(2)
+        _, err = process.communicate(timeout=10)
+    assert process.returncode == 130, err
+    assert "Traceback" not in err
+    assert os.listdir(tmp_path) == ["s.yaml"]
+
+
+def test_bad_input_as_a_process(tmp_path):
+    write(tmp_path, SCENARIO.replace("mass: 125", "mass: -1"))
+    command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "Error: `plant.vehicle.mass` must be positive, but is -1 kg (s.yaml, line 2)\n"
+    assert os.listdir(tmp_path) == ["s.yaml"]

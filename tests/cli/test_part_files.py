@@ -1,0 +1,62 @@
+"""Parts from a file of the user's own: `./my_rov.py:my_rov`."""
+
+import pytest
+from good_scenario import SCENARIO
+
+GOOD = """
+import undertow as ut
+
+
+def my_rov(mass: float = 130.0):
+    import equinox as eqx
+
+    return eqx.tree_at(lambda rov: rov.mass, ut.vehicles.odin(), mass)
+"""
+
+
+def scenario(tmp_path, part="./my_rov.py:my_rov", code=GOOD):
+    (tmp_path / "my_rov.py").write_text(code)
+    (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: odin, mass: 125", f"kind: {part}"))
+
+
+def test_part_from_a_file_runs(undertow, tmp_path):
+    scenario(tmp_path)
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    assert said.code == 0, said.err
+    assert f"{tmp_path / 'my_rov.py'}:my_rov" in (tmp_path / "out" / "scenario.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("part", "code", "said"),
+    [
+        ("./his_rov.py:my_rov", GOOD, "`plant.vehicle.kind` must name an existing file, but is ./his_rov.py"),
+        ("./my_rov.py:my_rv", GOOD, "`plant.vehicle.kind` must name a callable of my_rov.py, but is my_rv"),
+        (
+            "./my_rov.py:my_rov",
+            "1 / 0",
+            "`plant.vehicle.kind` must name a file that Python can run, but is ./my_rov.py",
+        ),
+        ("./my_rov.py:my_rov", "def my_rov(:", "`plant.vehicle.kind` must name a file that Python can run"),
+        (
+            "./my_rov.py:my_rov",
+            "def my_rov():\n    return 1 / 0",
+            "`plant.vehicle` must be something that can be made, but is not: ZeroDivisionError: division by zero",
+        ),
+        (
+            "./my_rov.py:my_rov",
+            "def my_rov():\n    return 7",
+            "`plant.vehicle.kind` must name a function that returns a Vehicle, but is ./my_rov.py:my_rov: 7",
+        ),
+    ],
+)
+def test_part_that_does_not_work(refused, tmp_path, part, code, said):
+    scenario(tmp_path, part, code)
+    complaint = refused("simulate", "s.yaml")
+    assert complaint.startswith(said)
+    assert "(s.yaml, line 2)" in complaint
+
+
+def test_option_of_a_part_from_a_file(refused, tmp_path):
+    scenario(tmp_path, "./my_rov.py:my_rov, mass: heavy")
+    said = "`plant.vehicle.mass` must be a number, but is 'heavy' (s.yaml, line 2)"
+    assert refused("simulate", "s.yaml") == said

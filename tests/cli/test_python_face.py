@@ -1,0 +1,78 @@
+"""The same one level down: `import undertow as ut`."""
+
+import jax
+import numpy as np
+import pytest
+from good_scenario import SCENARIO
+
+import undertow as ut
+
+
+@pytest.fixture(autouse=True)
+def jax_as_users_have_it():
+    jax.config.update("jax_numpy_dtype_promotion", "standard")
+    yield
+    jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+
+@pytest.fixture(scope="module")
+def parts():
+    plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3(rung="ideal"))
+    return plant, ut.rcaf(plant.model(), preset="paper"), ut.references.setpoint([2, 3, 4, 0, 0, 1])
+
+
+def test_run_has_series_metrics_and_figures(parts, tmp_path):
+    run = ut.simulate(*parts, duration=0.1, seed=7)
+    assert isinstance(run, ut.Run) and run.status == 0
+    assert run.dataset["position"].shape == (11, 6) and run.dataset.attrs["seed"] == 7
+    assert run.metrics["whole"]["tracking_max"] == pytest.approx(4.0)
+    assert run.metrics["steady"]["tracking_max"] < 4.0
+    assert "tracking_rms" in repr(run) and "ok at 0.1 s" in repr(run)
+    assert "tracking" in run.plot()
+    run.save(tmp_path / "run.nc")
+    assert (tmp_path / "run.nc").is_file()
+
+
+def test_python_and_scenario_agree_bit_for_bit(parts, tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    from_file = ut.simulate_scenario(tmp_path / "s.yaml")
+    run = ut.simulate(*parts, disturbance=ut.disturbances.u1(), duration=0.1, seed=3, position=np.zeros(6))
+    assert run.dataset.attrs["content_hash"] == from_file.dataset.attrs["content_hash"]
+
+
+def test_scenario_as_data():
+    run = ut.simulate_scenario({"reference": {"kind": "setpoint", "position": [1] * 6}, "loop": {"duration": 0.02}})
+    assert run.status == 0 and run.metrics["steady"] is None
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"duration": -1.0}, "`duration` must be greater than 0, but is -1.0"),
+        ({"loop": "both"}, "`loop` must be 'sampled' or 'continuous', but is 'both'"),
+        ({"position": [1, 2]}, "`position` must have 6 entries (one per output of the plant), but is 2 long"),
+        ({"record": 1.5e-3}, "`record` must be a whole number of sampling times (0.001 s), but is 0.0015 s"),
+        (
+            {"disturbance": ut.disturbances.wrench([1.0])},
+            "`disturbance.value` must have 6 entries, but is of shape (1,)",
+        ),
+        ({"sensor": 3}, "`sensor` must be an AbstractSensor, but is a int"),
+    ],
+)
+def test_bad_argument_is_one_line(parts, options, said):
+    with pytest.raises(ut.BadInput) as caught:
+        ut.simulate(*parts, **options)
+    assert str(caught.value) == said
+
+
+def test_public_names():
+    for name in dir(ut):
+        assert getattr(ut, name) is not None
+    assert ut.rcaf is ut.controllers.rcaf
+    with pytest.raises(AttributeError, match="undertow has no `simulat`"):
+        _ = ut.simulat
+
+
+def test_samples(tmp_path):
+    (tmp_path / "d.csv").write_text("t,d1\n0,1\n2,3\n")
+    assert ut.read_samples(tmp_path / "d.csv") == [[0.0, 1.0], [2.0, 3.0]]

@@ -1,0 +1,112 @@
+"""What a run leaves behind, and that its result file repeats it bit for bit."""
+
+import json
+
+import pytest
+import xarray as xr
+from good_scenario import SCENARIO
+from ruamel.yaml import YAML
+
+from undertow.analysis.meanings import MEANINGS, PER_AXIS
+from undertow.scenario.provenance import content_hash
+
+NOISY = SCENARIO.replace("seed: 3", "seed: 3\nsensor: white_noise\nsteady: {start: 0.05, stop: 0.1}")
+
+
+@pytest.fixture
+def ran(undertow, tmp_path):
+    (tmp_path / "s.yaml").write_text(NOISY)
+    said = undertow("simulate", "s.yaml")
+    assert said.code == 0, said.err
+    return said
+
+
+def test_files_of_a_run(ran, tmp_path):
+    folder = tmp_path / "runs" / "s"
+    assert sorted(path.name for path in folder.iterdir()) == ["figures", "metrics.json", "run.nc", "scenario.yaml"]
+    assert {".png", ".svg"} == {path.suffix for path in (folder / "figures").iterdir()}
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert metrics["status"] == "ok" and metrics["ended"] == pytest.approx(0.1)
+    assert set(metrics["whole"]) == {*MEANINGS, *(f"{name}_axes" for name in PER_AXIS)} == set(metrics["steady"])
+    resolved = YAML(typ="safe", pure=True).load((folder / "scenario.yaml").read_text())
+    assert resolved["controller"]["adaptation"] == 100.0
+    with xr.open_dataset(folder / "run.nc") as dataset:
+        assert dataset.attrs["content_hash"] == content_hash(dataset)
+        assert dataset.attrs["seed"] == 3
+        assert {"version_jax", "machine", "scenario_hash", "metrics"} <= set(dataset.attrs)
+    assert "tracking_rms" in ran.out and "Status: ok. Results: runs/s" in ran.out
+    assert ran.err.startswith("Advice: torque constant / back-EMF constant is 117")
+
+
+def test_result_file_repeats_bit_for_bit(ran, undertow, tmp_path):
+    said = undertow("simulate", "runs/s/run.nc", "--out", "again")
+    assert said.code == 0
+    assert "run.nc was repeated bit for bit" in said.out
+    with xr.open_dataset(tmp_path / "runs/s/run.nc") as first, xr.open_dataset(tmp_path / "again/run.nc") as second:
+        assert first.attrs == second.attrs
+        assert first.identical(second)
+    assert (tmp_path / "runs/s/scenario.yaml").read_text() == (tmp_path / "again/scenario.yaml").read_text()
+    resolved = undertow("simulate", "again/scenario.yaml", "--out", "third")
+    assert resolved.code == 0
+    with xr.open_dataset(tmp_path / "again/run.nc") as second, xr.open_dataset(tmp_path / "third/run.nc") as third:
+        assert second.attrs["content_hash"] == third.attrs["content_hash"]
+
+
+def changed(tmp_path, change):
+    with xr.open_dataset(tmp_path / "runs/s/run.nc") as dataset:
+        copy = dataset.load()
+    change(copy)
+    copy.to_netcdf(tmp_path / "changed.nc", engine="netcdf4")
+
+
+def test_changed_numbers_are_noticed(ran, undertow, tmp_path):
+    changed(tmp_path, lambda dataset: dataset["position"].values.__setitem__((3, 2), 1.0))
+    said = undertow("simulate", "changed.nc", "--out", "again")
+    assert said.code == 1
+    line = "Error: changed.nc was changed after it was written: its numbers do not match its hash"
+    assert said.err.splitlines()[-1] == line
+
+
+def other_numbers(dataset):
+    dataset["position"].values[3, 2] = 1.0
+    dataset.attrs["content_hash"] = content_hash(dataset)
+
+
+def test_other_numbers_with_equal_versions_are_a_failure(ran, undertow, tmp_path):
+    changed(tmp_path, other_numbers)
+    said = undertow("simulate", "changed.nc", "--out", "again")
+    assert said.code == 1
+    assert said.err.splitlines()[-1] == "Error: changed.nc was not repeated bit for bit, with the same versions."
+
+
+def test_other_numbers_with_other_versions_are_explained(ran, undertow, tmp_path):
+    def other(dataset):
+        other_numbers(dataset)
+        dataset.attrs["version_jax"] = "0.0"
+
+    changed(tmp_path, other)
+    said = undertow("simulate", "changed.nc", "--out", "again")
+    assert said.code == 0
+    assert "changed.nc was not repeated bit for bit; other versions: jax 0.0 then, " in said.out
+
+
+def test_default_folder_is_one_that_is_free(ran, undertow, tmp_path):
+    assert undertow("simulate", "s.yaml").code == 0
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["s", "s-2"]
+
+
+def test_overwrite(ran, undertow, tmp_path):
+    (tmp_path / "runs/s/notes.txt").write_text("mine")
+    (tmp_path / "runs/s/metrics.json").write_text("old")
+    assert undertow("simulate", "s.yaml", "--out", "runs/s", "--overwrite").code == 0
+    assert (tmp_path / "runs/s/metrics.json").read_text() != "old"
+    assert (tmp_path / "runs/s/notes.txt").read_text() == "mine"
+
+
+def test_continuous_loop_and_short_run(undertow, tmp_path):
+    text = SCENARIO.replace("dt: 1e-3", "kind: continuous").replace("seed: 3", "")
+    (tmp_path / "s.yaml").write_text(text)
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    assert said.code == 0
+    assert "Advice: the steady window starts at 10 s, the run ends at 0.1 s: no steady metrics" in said.err
+    assert json.loads((tmp_path / "out/metrics.json").read_text())["steady"] is None

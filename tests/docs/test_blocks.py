@@ -1,0 +1,65 @@
+"""Every Python block, and every `undertow` command, that README.md and docs/*.md show runs as it stands.
+
+Blocks of one page run in order, in one folder, with one namespace. A block that cannot run here (a set-up command,
+an output) is not marked python or bash, or stands after a line `<!-- not run -->`.
+"""
+
+import re
+import shlex
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from undertow.cli.main import run
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
+BLOCK = re.compile(r"(?P<skip><!-- not run -->\s*\n)?^```(?P<language>python|bash)\n(?P<code>.*?)^```", re.S | re.M)
+
+# Commands with tests of their own that take minutes.
+LONG = {"reproduce"}
+
+
+class Block(NamedTuple):
+    language: str
+    code: str
+    line: int
+
+
+def blocks(page: Path) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    return [
+        Block(found["language"], found["code"], text[: found.start("code")].count("\n") + 1)
+        for found in BLOCK.finditer(text)
+        if not found["skip"]
+    ]
+
+
+def commands(code: str) -> list[list[str]]:
+    """Arguments of the lines that are nothing but an undertow command."""
+    lines = [shlex.split(line, comments=True) for line in code.replace("\\\n", " ").splitlines()]
+    return [words[1:] for words in lines if words[:1] == ["undertow"] and not LONG & set(words) and "&&" not in words]
+
+
+@pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_blocks_run(page, tmp_path, monkeypatch, as_users_have_it):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    namespace = {"__name__": "__docs__"}
+    for block in blocks(page):
+        if block.language == "python":
+            exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
+        else:
+            for arguments in commands(block.code):
+                assert run(arguments) in (0, 1), f"{page.name}, line {block.line}: undertow {shlex.join(arguments)}"
+
+
+def test_blocks_are_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "a\n```python\nx = 1\n```\n<!-- not run -->\n```bash\nrm\n```\n```bash\nundertow list  # all\npip\n```\n"
+    )
+    assert blocks(page) == [Block("python", "x = 1\n", 3), Block("bash", "undertow list  # all\npip\n", 10)]
+    assert commands("undertow list  # all\nundertow reproduce\npip install undertow\n") == [["list"]]

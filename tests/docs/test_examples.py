@@ -1,0 +1,43 @@
+"""Every example runs; the paper's two give the paper's numbers (benchmark, section 4)."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+from undertow.cli.main import run
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+# Exit code 0, and what else is known: metric -> (value, relative tolerance), over the steady window.
+KNOWN = {
+    "paper_example1": {"tracking_rms": (1.6e-4, 0.02), "estimation_rms": (0.201, 0.02), "robust_rms": (0.144, 0.02)},
+    "paper_example2": {},
+    "w1": {"tracking_rms": (4.3e-3, 0.02)},
+    "voltage_limited": {"voltage_peak": (24.0, 1e-12)},
+    "recorded_disturbance": {},
+}
+
+
+def test_every_example_is_tested():
+    assert {path.stem for path in EXAMPLES.glob("*.yaml")} == set(KNOWN)
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_scenario(name, tmp_path, as_users_have_it):
+    assert run(["simulate", str(EXAMPLES / f"{name}.yaml"), "--out", str(tmp_path / "out")]) == 0
+    steady = json.loads((tmp_path / "out" / "metrics.json").read_text())["steady"]
+    for metric, (value, tolerance) in KNOWN[name].items():
+        assert steady[metric] == pytest.approx(value, rel=tolerance)
+    if name == "voltage_limited":
+        assert steady["saturated_fraction"] > 0.05
+
+
+def test_python_api(as_users_have_it, capsys):
+    spec = importlib.util.spec_from_file_location("python_api", EXAMPLES / "python_api.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.main(fast=True).status == 0
+    assert "tracking_rms" in capsys.readouterr().out
