@@ -66,7 +66,7 @@ def test_s_branch_spoils_it(rails):
 def test_commanded_instead_of_applied_spoils_it(rails, free):
     """Negative control: told the command, the same law winds up against the limit."""
     loop = rails(2, disturbance=sinusoid(**PROBES), **(COMPOSITE_ONLY | CASES["hard against the stop"]))
-    deaf = eqx.tree_at(lambda l: l.controller, loop, DeafToLimits(loop.controller, loop.controller.model))
+    deaf = eqx.tree_at(lambda loop: loop.controller, loop, DeafToLimits(loop.controller, loop.controller.model))
     outcome = sampled.simulate(deaf, duration=4.0, record_every=1)
     eps = jnp.abs(outcome.samples.modelling_error - free[0])
     assert float(eps.max()) > 1e-3

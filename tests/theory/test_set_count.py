@@ -29,7 +29,7 @@ def rms(rails, **choices):
     loop = rails(2, disturbance=sinusoid(**PROBES), **choices)
     outcome = sampled.simulate(loop, duration=5.0, dt=5e-4, record_every=1)
     samples = jax.tree.map(np.asarray, outcome.samples)
-    root = lambda series: np.sqrt((series**2).mean(0))  # noqa: E731
+    root = lambda series: np.sqrt((series**2).mean(0))
     peak = np.abs(samples.modelling_error).max()
     return root(samples.estimate - samples.uncertainty), root(samples.error), peak
 

@@ -16,7 +16,7 @@ AXES = 24
 def draws():
     """Gains per axis over one to three decades, and disturbances that just meet the hypothesis."""
     random = np.random.default_rng(22)
-    spread = lambda low, high: np.exp(random.uniform(np.log(low), np.log(high), AXES))  # noqa: E731
+    spread = lambda low, high: np.exp(random.uniform(np.log(low), np.log(high), AXES))
     gains = {
         "robust_gain": spread(0.1, 3.0),
         "compensation_gain": spread(0.1, 1.0),

@@ -1,0 +1,50 @@
+"""Every part of the catalogue, made once: what a part requires is found by the name of the argument."""
+
+import functools
+import inspect
+
+import numpy as np
+import pytest
+
+from undertow.core import catalogue
+from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.thrusters.paper_table3 import paper_table3
+from undertow.vehicles.odin import odin
+
+
+@functools.cache
+def required(argument):
+    """A value for an argument without a default, whichever part asks for it."""
+    thruster = paper_table3()
+    rows = np.column_stack([np.linspace(0.0, 2.0, 5), np.random.default_rng(0).normal(size=(5, 6))])
+    return {
+        "vehicle": odin,
+        "thruster": lambda: thruster,
+        "model": lambda: hybrid_vehicle(odin(), thruster).model(),
+        "position": lambda: np.linspace(-0.5, 0.5, 6),
+        "samples": lambda: rows,
+    }[argument]()
+
+
+@functools.cache
+def make(kind, name):
+    """Part `name` of a kind, with its defaults."""
+    part = catalogue.names(kind)[name]
+    empty = inspect.Parameter.empty
+    needed = [p.name for p in inspect.signature(part).parameters.values() if p.default is empty]
+    return part(**{argument: required(argument) for argument in needed})
+
+
+ALL = [(kind, name) for kind in catalogue.KINDS for name in catalogue.names(kind)]
+
+
+def pytest_generate_tests(metafunc):
+    """Tests with the argument `part` run for every part there is."""
+    if "part" in metafunc.fixturenames:
+        metafunc.parametrize("part", ALL, ids=["/".join(pair) for pair in ALL], indirect=True)
+
+
+@pytest.fixture
+def part(request):
+    kind, name = request.param
+    return kind, make(kind, name)

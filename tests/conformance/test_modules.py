@@ -1,0 +1,77 @@
+"""The package: every module imports, everything public is documented, every class is abstract or final."""
+
+import importlib
+import inspect
+import pkgutil
+from pathlib import Path
+
+import equinox as eqx
+import pytest
+
+import undertow
+
+NAMES = sorted(info.name for info in pkgutil.walk_packages(undertow.__path__, "undertow."))
+
+
+def modules():
+    return [importlib.import_module(name) for name in NAMES if not name.endswith("__main__")]
+
+
+def public(module):
+    """Functions and classes that a module defines and does not hide."""
+    for name, thing in vars(module).items():
+        defined = getattr(thing, "__module__", None) == module.__name__
+        if defined and not name.startswith("_") and (inspect.isclass(thing) or inspect.isroutine(thing)):
+            yield name, thing
+
+
+def classes():
+    found = {cls for module in modules() for _, cls in inspect.getmembers(module, inspect.isclass)}
+    return sorted((cls for cls in found if issubclass(cls, eqx.Module)), key=lambda cls: cls.__qualname__)
+
+
+def is_abstract(cls):
+    """Whether something is left open: it cannot be made."""
+    return bool(cls.__abstractmethods__ or getattr(cls, "__abstractvars__", ()))
+
+
+def test_every_module_imports():
+    assert len(modules()) > 50
+    assert all(module.__doc__ for module in modules()), [m.__name__ for m in modules() if not m.__doc__]
+
+
+def test_everything_public_is_documented():
+    missing = [f"{m.__name__}.{name}" for m in modules() for name, thing in public(m) if not inspect.getdoc(thing)]
+    assert not missing
+
+
+def test_everything_is_ascii():
+    files = [Path(module.__file__) for module in modules() if module.__file__]
+    assert not [file for file in files if not file.read_text(encoding="utf-8").isascii()]
+
+
+def test_classes_are_abstract_or_final():
+    ours = [cls for cls in classes() if cls.__module__.startswith("undertow.")]
+    assert len(ours) > 20
+    for cls in ours:
+        for base in cls.__mro__[1:]:
+            if base is not eqx.Module and issubclass(base, eqx.Module):
+                assert is_abstract(base), f"{cls.__qualname__} inherits from {base.__qualname__}, which is final"
+
+
+def test_abstract_classes_say_so():
+    for cls in classes():
+        if cls.__module__.startswith("undertow."):
+            assert cls.__name__.startswith("Abstract") == is_abstract(cls), cls.__qualname__
+
+
+def test_the_check_sees_an_heir_of_a_final_class():
+    """Negative control."""
+    final = next(cls for cls in classes() if cls.__module__.startswith("undertow.") and not is_abstract(cls))
+    assert not is_abstract(type("Heir", (final,), {"__module__": __name__}))
+
+
+@pytest.mark.parametrize("name", ["vehicles", "thrusters", "plants", "controllers"])
+def test_unknown_part_is_named_in_the_error(name):
+    with pytest.raises(AttributeError, match="has no part `nothing_like_it`"):
+        _ = importlib.import_module(f"undertow.{name}").nothing_like_it

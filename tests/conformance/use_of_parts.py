@@ -1,0 +1,82 @@
+"""What each kind of part is for, as one pure function of the part and a vector of 64 numbers in (-1, 1)."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from undertow.core.contracts import Load, Measurement, Target
+
+NUMBERS = 64
+
+
+def vehicles(vehicle, v):
+    body = vehicle.body()
+    own = body.free_acceleration(v[:6], v[6:9] / jnp.linalg.norm(v[6:9]))
+    return own, vehicle.thruster_matrix() @ v[: vehicle.thrusters], body.kinetic_energy(v[:6])
+
+
+def thrusters(thruster, v):
+    volts = 10 * v[:3]
+    state = _filled(thruster.initial_state(3), v[3:])
+    return (
+        thruster.dynamics(state, volts),
+        thruster.thrust(state, volts),
+        thruster.current(state, volts),
+        thruster.report(state),
+        thruster.voltage_gain(),
+    )
+
+
+def plants(plant, v):
+    n, m, t = len(plant.outputs), plant.inputs(), jnp.abs(v[0])
+    x = _filled(plant.initial_state(v[1 : 1 + n], v[7 : 7 + n]), v[13:], only_zeros=True)
+    load = Load(v[30 : 30 + n], v[36 : 36 + n])
+    u = plant.admissible(10 * v[42 : 42 + m])
+    return (
+        plant.dynamics(t, x, u, load),
+        plant.output(t, x),
+        plant.acceleration(t, x, u, load),
+        plant.effort(x, u),
+        plant.no_load(),
+    )
+
+
+def controllers(controller, v):
+    n = len(controller.model.angles)
+    rest = Measurement(v[:n], v[6 : 6 + n])
+    wanted = Target(v[12 : 12 + n], v[18 : 18 + n], v[24 : 24 + n])
+    z = _filled(controller.init(rest, wanted), v)
+    u, telemetry = controller.command(z, rest, wanted)
+    return u, telemetry, controller.advance(z, rest, wanted, u, jnp.asarray(1e-3))
+
+
+def disturbances(disturbance, v):
+    calm = Load(v[:6], v[6:12])
+    return disturbance.at(disturbance.draw(jax.random.PRNGKey(1)), 1.0 + v[12], calm)
+
+
+def references(reference, v):
+    return reference.at(5.0 + v[0])
+
+
+def sensors(sensor, v):
+    truth = Measurement(v[:6], v[6:12])
+    return sensor.measure(sensor.draw(jax.random.PRNGKey(2)), jnp.abs(v[12]), truth)
+
+
+USES = {use.__name__: use for use in (vehicles, thrusters, plants, controllers, disturbances, references, sensors)}
+
+
+def numbers(kind, part, v):
+    """Everything that a part computes, flattened into floats."""
+    leaves = jax.tree.leaves(USES[kind](part, v))
+    return jnp.concatenate([jnp.ravel(leaf).astype(float) for leaf in leaves if eqx.is_array(leaf)] or [jnp.zeros(0)])
+
+
+def _filled(state, v, only_zeros=False):
+    """The same state with other numbers in it, so that nothing hides at rest."""
+    leaves, tree = jax.tree.flatten(state)
+    moved = [leaf + 0.5 * jnp.resize(v, leaf.shape) for leaf in leaves]
+    if only_zeros:
+        moved = [jnp.where(leaf == 0, new, leaf) for leaf, new in zip(leaves, moved, strict=True)]
+    return jax.tree.unflatten(tree, moved)

@@ -1,0 +1,98 @@
+"""A run that fails keeps its last sound state, says when and why, and does not hurt its neighbours in a batch."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jaxtyping import Array, Float
+
+from undertow.controllers.rcaf import rcaf
+from undertow.core.contracts import AbstractDisturbance
+from undertow.core.status import Status
+from undertow.loop import continuous, sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.double_integrator import double_integrator
+from undertow.references.setpoint import setpoint
+from undertow.sensors.perfect import perfect
+
+
+class Breaks(AbstractDisturbance):
+    """0.5 m/s^2 until BREAK, then `value`."""
+
+    value: Float[Array, ""]
+
+    def draw(self, key):
+        return ()
+
+    def at(self, path, t, calm):
+        return calm._replace(acceleration=calm.acceleration + jnp.where(t < BREAK, 0.5, self.value))
+
+    def jumps(self, duration):
+        return (BREAK,)
+
+
+def loop_with(value):
+    plant = double_integrator(1)
+    load = Breaks(jnp.asarray(value))
+    return ClosedLoop(plant, rcaf(plant.model()), setpoint(np.ones(1)), load, perfect())
+
+
+BREAK = 0.2512  # s; inside a tick and between two records
+RUNS = {
+    "sampled": lambda loop: sampled.simulate(loop, duration=0.5, dt=2.0**-10, record_every=16),
+    "continuous": lambda loop: continuous.simulate(loop, duration=0.5, record_step=2.0**-6),
+}
+ENDINGS = {
+    "sampled": {0.5: Status.OK, float("nan"): Status.NOT_FINITE, 1e12: Status.DIVERGED},
+    "continuous": {0.5: Status.OK, 1e12: Status.DIVERGED},
+}
+
+
+@pytest.fixture(scope="module", params=RUNS)
+def batch(request):
+    """The endings side by side in one batch, and the sound one alone."""
+    run = RUNS[request.param]
+    loops = [loop_with(value) for value in ENDINGS[request.param]]
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(eqx.filter(loop, eqx.is_array) for loop in loops))
+    together = eqx.filter_vmap(run)(eqx.combine(stacked, eqx.filter(loops[0], eqx.is_array, inverse=True)))
+    one = lambda i: jax.tree.map(lambda leaf: np.asarray(leaf)[i], together)
+    return request.param, [one(i) for i in range(len(loops))], run(loops[0])
+
+
+def test_codes_and_times(batch):
+    name, together, _ = batch
+    assert [Status(int(o.status)) for o in together] == list(ENDINGS[name].values())
+    assert float(together[0].ended) == 0.5
+    for outcome in together[1:]:
+        assert BREAK <= float(outcome.ended) <= BREAK + 2.0**-6
+
+
+def test_last_sound_state_is_kept(batch):
+    name, (sound, *failed), _ = batch
+    for outcome in failed:
+        before, after = outcome.time < BREAK, outcome.time > BREAK + 2.0**-6
+        np.testing.assert_allclose(outcome.samples.position[before], sound.samples.position[before], rtol=1e-6)
+        for series in (outcome.samples.position, outcome.samples.velocity, outcome.samples.weights):
+            assert np.isfinite(series).all()
+            assert (series[after] == series[after][0]).all(), "records after the failure repeat the last sound one"
+        if name == "sampled":
+            assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(outcome.final))
+            at_break = np.interp(BREAK, sound.time, sound.samples.position[:, 0])
+            assert outcome.final[0].position[0] == pytest.approx(at_break, rel=1e-2)
+
+
+def test_continuous_loop_ends_when_nothing_is_finite():
+    """The adaptive integrator rejects every step into the undefined; it gives up, and says so."""
+    outcome = RUNS["continuous"](loop_with(float("nan")))
+    assert Status(int(outcome.status)) in (Status.NOT_FINITE, Status.STEPS_EXHAUSTED)
+    assert float(outcome.ended) == pytest.approx(BREAK, abs=1e-6)
+    assert np.isfinite(np.asarray(outcome.samples.position)).all()
+
+
+def test_neighbours_are_not_hurt(batch):
+    name, together, alone = batch
+    pairs = zip(jax.tree.leaves(together[0].samples), jax.tree.leaves(alone.samples), strict=True)
+    for one, other in pairs:
+        np.testing.assert_allclose(one, np.asarray(other), rtol=1e-9, atol=1e-9)
+    assert np.abs(together[0].samples.velocity).max() > 0.1, name

@@ -1,0 +1,96 @@
+"""Noise is a function of key and time alone; limits are respected, and the law learns from what was applied."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.controllers.rcaf import rcaf
+from undertow.core.contracts import Measurement
+from undertow.disturbances.sinusoid import sinusoid
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.double_integrator import double_integrator
+from undertow.references.setpoint import setpoint
+from undertow.sensors.perfect import perfect
+from undertow.sensors.white_noise import white_noise
+
+LIMIT, DT = 3.0, 1e-3
+
+
+def measured(key, times, sensor=None, truth=0.0):
+    sensor = sensor or white_noise(0.1, 0.2)
+    path = sensor.draw(key)
+    still = Measurement(jnp.full(3, truth), jnp.full(3, truth))
+    return jax.vmap(lambda t: sensor.measure(path, t, still))(jnp.asarray(times))
+
+
+def test_noise_depends_on_key_and_time_only(key):
+    coarse, fine = measured(key, np.arange(50) * 4e-3), measured(key, np.arange(200) * 1e-3)
+    np.testing.assert_array_equal(coarse.position, fine.position[::4])
+    np.testing.assert_array_equal(coarse.velocity, fine.velocity[::4])
+    again = measured(key, np.arange(200)[::-1] * 1e-3)
+    np.testing.assert_array_equal(again.velocity[::-1], fine.velocity, err_msg="whatever was asked before")
+    moved = measured(key, np.arange(50) * 4e-3, truth=7.0)
+    np.testing.assert_allclose(moved.position - 7.0, coarse.position, atol=1e-14)
+    other = measured(jax.random.fold_in(key, 1), np.arange(50) * 4e-3)
+    assert (np.asarray(other.position) != np.asarray(coarse.position)).all()
+
+
+def test_noise_is_white_with_the_given_deviations(key):
+    y = measured(key, np.arange(20_000) * 1e-3)
+    for series, deviation in ((np.asarray(y.position), 0.1), (np.asarray(y.velocity), 0.2)):
+        assert series.std(0) == pytest.approx(deviation, rel=0.03)
+        assert np.abs(series.mean(0)).max() < 5 * deviation / np.sqrt(20_000)
+        neighbours = (series[1:] * series[:-1]).mean(0) / deviation**2
+        assert np.abs(neighbours).max() < 5 / np.sqrt(20_000)
+
+
+def test_two_laws_meet_the_same_noise(key):
+    """From eps = x_hat_dot - (x_dot + noise), both runs give back the same noise at every tick."""
+    plant = double_integrator(2)
+
+    def noise(**gains):
+        law = rcaf(plant.model(), **gains)
+        loop = ClosedLoop(plant, law, setpoint(np.ones(2)), sinusoid(), white_noise(0.0, 0.01))
+        samples = sampled.simulate(loop, duration=0.2, dt=DT, record_every=1, key=key).samples
+        return np.asarray(samples.predicted_velocity - samples.modelling_error - samples.velocity)
+
+    one, other = noise(), noise(composite=0.0, feedback=(4.0, 4.0))
+    np.testing.assert_allclose(one, other, atol=1e-12)
+    assert 0.005 < one.std() < 0.02
+
+
+@pytest.fixture(scope="module")
+def limited():
+    plant = double_integrator(2, LIMIT)
+    law = rcaf(plant.model(), sets=3)
+    loop = ClosedLoop(plant, law, setpoint(np.array([2.0, -1.0])), sinusoid(1.0, 2.0), perfect())
+    samples = sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).samples
+    return law, jax.tree.map(np.asarray, samples)
+
+
+def test_limits_are_respected(limited):
+    _, samples = limited
+    assert np.abs(samples.command).max() > 3 * LIMIT, "the law does ask for more"
+    np.testing.assert_array_equal(samples.voltage, np.clip(samples.command, -LIMIT, LIMIT))
+    np.testing.assert_array_equal(samples.saturated, (np.abs(samples.voltage) >= LIMIT).astype(float))
+    assert 0 < samples.saturated.mean() < 1
+
+
+def test_law_is_advanced_with_what_was_applied(limited):
+    """One Euler step of Eq. (32) from record to record: right with the applied input, wrong with the command."""
+    law, samples = limited
+    eps, now = samples.modelling_error, samples.predicted_velocity
+    own = -150.0 * eps + samples.estimate - 0.1 * np.tanh(eps / 0.5)
+    told = {name: now + DT * (own + getattr(samples, name)) for name in ("voltage", "command")}
+    np.testing.assert_allclose(told["voltage"][:-1], now[1:], atol=1e-12)
+    assert np.abs(told["command"][:-1] - now[1:]).max() > 1e-3
+    xi_sum = samples.weights.shape[-1]
+    assert xi_sum == law.fuzzy.rules
+
+
+def test_plant_moves_with_what_was_applied(limited):
+    _, samples = limited
+    acceleration = samples.voltage + np.sin(2.0 * DT * np.arange(len(samples.voltage)))[:, None]
+    np.testing.assert_allclose(np.diff(samples.velocity, axis=0) / DT, acceleration[:-1], atol=2e-3)

@@ -1,0 +1,137 @@
+"""I33: under a controller of fixed rate the plant is integrated at fourth order, and jumps of the load are met."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jaxtyping import Array, Float
+
+from undertow.controllers.rcaf import rcaf
+from undertow.core.contracts import AbstractDisturbance, AbstractPlant
+from undertow.disturbances.sinusoid import sinusoid
+from undertow.loop import continuous, sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.double_integrator import double_integrator
+from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.references.setpoint import setpoint
+from undertow.sensors.perfect import perfect
+from undertow.thrusters.paper_table3 import paper_table3
+from undertow.vehicles.odin import odin
+
+GENTLE = {"adaptation": 1.0, "composite": 1.0, "robust_gain": 0.0, "pole": 5.0}  # stable at 20 Hz
+
+
+class Step(AbstractDisturbance):
+    """`size` between `start` and `end`, nothing else; whether it says so is another matter."""
+
+    size: Float[Array, ""]
+    start: float = eqx.field(static=True)
+    end: float = eqx.field(static=True)
+    declared: bool = eqx.field(static=True, default=True)
+
+    def draw(self, key):
+        return ()
+
+    def at(self, path, t, calm):
+        on = (t >= self.start) & (t < self.end)
+        return calm._replace(acceleration=calm.acceleration + jnp.where(on, self.size, 0.0))
+
+    def jumps(self, duration):
+        return (self.start, self.end) if self.declared else ()
+
+
+def rail(disturbance, limit=float("inf"), **gains):
+    plant = double_integrator(1, limit)
+    return ClosedLoop(plant, rcaf(plant.model(), **gains), setpoint(np.zeros(1)), disturbance, perfect())
+
+
+class Pendulum(AbstractPlant):
+    """x_ddot = -20 sin x + u + d, smooth; a double integrator in everything else."""
+
+    rail: AbstractPlant
+    outputs: tuple[str, ...] = eqx.field(static=True, default=("angle",))
+    output_units: tuple[str, ...] = eqx.field(static=True, default=("rad",))
+    input_unit: str = eqx.field(static=True, default="rad/s^2")
+
+    def initial_state(self, position=None, velocity=None):
+        return self.rail.initial_state(position, velocity)
+
+    def acceleration(self, t, x, u, d):
+        return self.rail.acceleration(t, x, u, d) - 20 * jnp.sin(x.position)
+
+    def dynamics(self, t, x, u, d):
+        return type(x)(x.velocity, self.acceleration(t, x, u, d))
+
+    def output(self, t, x):
+        return self.rail.output(t, x)
+
+    def admissible(self, u):
+        return self.rail.admissible(u)
+
+    def effort(self, x, u):
+        return self.rail.effort(x, u)
+
+    def inputs(self):
+        return 1
+
+    def health(self, x):
+        return self.rail.health(x)
+
+    def advice(self):
+        return ()
+
+
+def swinging():
+    plant = Pendulum(double_integrator(1))
+    law = rcaf(double_integrator(1).model(), **GENTLE)
+    return ClosedLoop(plant, law, setpoint(np.zeros(1)), sinusoid(1.0, 15.0), perfect()), np.ones(1)
+
+
+def swimming():
+    """ODIN moving on every axis, so that |nu| nu is smooth."""
+    plant = hybrid_vehicle(odin(), paper_table3("ideal"))
+    loop = ClosedLoop(plant, rcaf(plant.model(), **GENTLE), setpoint(np.full(6, 0.5)), sinusoid(1.0, 15.0), perfect())
+    return loop, np.full(6, 0.8)
+
+
+@pytest.mark.parametrize("make", [swinging, pytest.param(swimming, marks=pytest.mark.slow)])
+def test_fourth_order_in_the_step_of_the_plant(make):
+    """1, 2 and 4 steps of RK4 per tick; the control rate stays 20 Hz."""
+    loop, velocity = make()
+    ends = {}
+    for substeps in (1, 2, 4):
+        outcome = sampled.simulate(loop, duration=0.4, dt=0.05, record_every=0, velocity=velocity, substeps=substeps)
+        ends[substeps] = np.concatenate([np.asarray(leaf).ravel() for leaf in outcome.final[0]])
+    coarse, fine = np.abs(ends[1] - ends[2]).max(), np.abs(ends[2] - ends[4]).max()
+    assert fine > 1e-10, "far above rounding"
+    assert 3.8 <= np.log2(coarse / fine) <= 4.6, (coarse, fine)
+
+
+def test_a_jump_at_a_tick_is_met_exactly():
+    """No input, constant load within a tick: the motion is a parabola, and RK4 has it to rounding."""
+    outcome = sampled.simulate(
+        rail(Step(jnp.asarray(3.0), 0.25, 0.75), limit=0.0), duration=1.0, dt=2.0**-6, record_every=1
+    )
+    t = np.asarray(outcome.time)
+    pushed = np.clip(t - 0.25, 0.0, 0.5)
+    exact = 1.5 * pushed**2 + 1.5 * np.clip(t - 0.75, 0.0, None)
+    assert np.abs(np.asarray(outcome.samples.position)[:, 0] - exact).max() < 1e-8
+    # Negative control: a jump inside a tick is smeared.
+    inside = sampled.simulate(
+        rail(Step(jnp.asarray(3.0), 0.255, 0.75), limit=0.0), duration=1.0, dt=2.0**-6, record_every=1
+    )
+    late = np.clip(t - 0.255, 0.0, 0.495)
+    smeared = 1.5 * late**2 + 3.0 * 0.495 * np.clip(t - 0.75, 0.0, None)
+    assert np.abs(np.asarray(inside.samples.position)[:, 0] - smeared).max() > 1e-4
+
+
+def test_declared_jumps_are_met_by_the_continuous_loop():
+    """A pulse of 0.1 ms after a long calm: only an integrator that was told of it sees it."""
+    slow = {"adaptation": 0.0, "robust_gain": 0.0, "pole": 1.0, "compensation_gain": 0.0}
+    speeds = {}
+    for declared in (True, False):
+        loop = rail(Step(jnp.asarray(1000.0), 5.0, 5.0001, declared), **slow)
+        outcome = continuous.simulate(loop, duration=5.02, record_step=0.01)
+        speeds[declared] = float(outcome.samples.velocity[-1, 0])
+    assert 0.09 < speeds[True] < 0.1
+    assert abs(speeds[False]) < 1e-6, "negative control: undeclared, it is stepped over"

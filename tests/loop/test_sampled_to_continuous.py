@@ -1,0 +1,54 @@
+"""The sampled loop tends to the continuous one at first order: on halving dt the error ratio tends to 2."""
+
+import jax
+import numpy as np
+
+from undertow.controllers.rcaf import rcaf
+from undertow.disturbances.sinusoid import sinusoid
+from undertow.loop import continuous, sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.references.setpoint import setpoint
+from undertow.sensors.perfect import perfect
+from undertow.thrusters.paper_table3 import paper_table3
+from undertow.vehicles.odin import odin
+
+DURATION, RECORD = 1.0, 0.05
+STEPS = RECORD / np.array([25, 50, 100, 200, 400])  # 2 ms down to 1/8 ms
+
+
+def odin_loop():
+    plant = hybrid_vehicle(odin(), paper_table3("ideal"))
+    goal = setpoint(np.array([0.2, 0.3, -0.2, 0.1, -0.1, 0.2]))
+    load = sinusoid(np.array([2.0, 1.0, 3.0, 1.0, 0.5, 1.0]), np.array([1.0, 5.0, 2.0, 3.0, 7.0, 4.0]))
+    return ClosedLoop(plant, rcaf(plant.model(), sets=3), goal, load, perfect())
+
+
+def test_first_order():
+    loop = odin_loop()
+    truth = continuous.simulate(loop, duration=DURATION, record_step=RECORD, rtol=1e-10, atol=1e-12)
+    assert int(truth.status) == 0
+
+    def gaps(dt):
+        outcome = sampled.simulate(loop, duration=DURATION, dt=dt, record_every=round(RECORD / dt))
+        assert int(outcome.status) == 0
+        np.testing.assert_allclose(outcome.time, truth.time, atol=1e-12)
+        names = ("position", "velocity", "estimate", "predicted_velocity")
+        pairs = [(getattr(outcome.samples, name), getattr(truth.samples, name)) for name in names]
+        return np.array([float(np.abs(np.asarray(a) - np.asarray(b)).max()) for a, b in pairs])
+
+    errors = np.stack([gaps(dt) for dt in STEPS])
+    ratios = errors[:-1] / errors[1:]
+    assert (np.abs(ratios[-1] - 2) < 0.1).all(), ratios
+    assert (np.abs(ratios[-1] - 2) <= np.abs(ratios[0] - 2) + 0.02).all(), ratios
+    assert (errors[-1] < errors[0] / 8).all(), errors
+
+
+def test_run_twice_same_bits():
+    loop = odin_loop()
+    for simulate in (
+        lambda: sampled.simulate(loop, duration=DURATION, dt=STEPS[0], record_every=25),
+        lambda: continuous.simulate(loop, duration=DURATION, record_step=RECORD, rtol=1e-10, atol=1e-12),
+    ):
+        for one, other in zip(*map(jax.tree.leaves, (simulate(), simulate())), strict=True):
+            np.testing.assert_array_equal(np.asarray(one), np.asarray(other))
