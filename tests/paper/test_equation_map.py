@@ -54,4 +54,4 @@ def test_no_tag_outside_the_paper():
 
 def test_the_reader_of_tags_reads():
     assert numbers("(1)-(3), (5)") == {1, 2, 3, 5}
-    assert _TAG.findall("see Eqs. (8), (9) and Eq. (44).") == ["(8), (9) ", "(44)"]
+    assert _TAG.findall("see Eqs. (8), (9) and Eq. (44).") == ["(8), (9) and ", "(44)"]

@@ -1,0 +1,49 @@
+"""Examples 1 and 2 against an independent plain-NumPy solution, and against the published reference figures."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from undertow.scenario.execute import execute
+from undertow.studies.paper.setup import CONTROLLERS, scenario
+
+_FILE = Path(__file__).parents[2] / "benchmarks" / "plain_numpy.py"
+_SPEC = importlib.util.spec_from_file_location("plain_numpy", _FILE)
+plain_numpy = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(plain_numpy)
+
+# Benchmark definitions, section 4: tracking, estimation, uncertainty and robust rms on rung `ideal`, suite U1.
+REFERENCE = {
+    "rcafc": {"tracking_rms": 1.6e-4, "estimation_rms": 0.201, "uncertainty_rms": 3.224, "robust_rms": 0.144},
+    "rafc": {"tracking_rms": 7.22e-3, "estimation_rms": 1.607, "uncertainty_rms": 3.224, "robust_rms": 1.579},
+}
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_example_1_gives_the_reference_figures(controller):
+    run = execute(scenario("", composite=CONTROLLERS[controller]))
+    for metric, expected in REFERENCE[controller].items():
+        np.testing.assert_allclose(run.steady[metric], expected, rtol=0.02)
+
+
+def check(run, solution):
+    for metric, series in zip(("tracking_rms", "estimation_rms", "robust_rms"), solution, strict=True):
+        np.testing.assert_allclose(run[metric], np.sqrt((series**2).mean()), rtol=0.02)
+
+
+# From 10 s to 12 s with steps of 2 ms, because plain NumPy takes its time; the slow run does the whole of it.
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_example_2_agrees_with_plain_numpy(controller):
+    loop = {"kind": "continuous", "duration": 12.0}
+    run = execute(scenario("", rung="static", composite=CONTROLLERS[controller], loop=loop))
+    check(run.steady, plain_numpy.paper_example("static", CONTROLLERS[controller], duration=12.0, h=2e-3, every=5))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rung", ["ideal", "static"])
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_examples_agree_with_plain_numpy_throughout(rung, controller):
+    run = execute(scenario("", rung=rung, composite=CONTROLLERS[controller]))
+    check(run.steady, plain_numpy.paper_example(rung, CONTROLLERS[controller]))
