@@ -1,6 +1,5 @@
 from typing import NamedTuple
 
-import jax
 import pytest
 
 from undertow.cli.main import run
@@ -14,19 +13,16 @@ class Said(NamedTuple):
 
 @pytest.fixture
 def undertow(tmp_path, monkeypatch, capsys):
-    """Run the command line in an empty folder, in this process, with JAX as users have it."""
+    """Run the command line in an empty folder, in this process."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("UNDERTOW_TRACEBACK", raising=False)
-
-    jax.config.update("jax_numpy_dtype_promotion", "standard")
 
     def call(*arguments: str) -> Said:
         code = run(arguments)
         captured = capsys.readouterr()
         return Said(code, captured.out, captured.err)
 
-    yield call
-    jax.config.update("jax_numpy_dtype_promotion", "strict")
+    return call
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 from good_scenario import SCENARIO
@@ -32,7 +33,7 @@ def raising(error):
         (("simulate", "s.yaml", "--out"), "Option '--out' requires an argument. See `undertow --help`"),
         (("list", "thruster"), "`KIND` must be a kind of part, but is thruster. Did you mean `thrusters`?"),
         (("describe", "odn"), "`NAME` must be a part, but is odn. Did you mean `odin`?"),
-        (("describe", "./none.py:none"), "`name` must name an existing file, but is ./none.py"),
+        (("describe", "./none.py:none"), "`NAME` must name an existing file, but is ./none.py"),
     ],
 )
 def test_mistyped_command(refused, arguments, said):
@@ -80,6 +81,7 @@ def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
 
 
 def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
+    monkeypatch.setattr(simulate, "execute", lambda built: SimpleNamespace(dataset=None))
     monkeypatch.setattr(simulate, "save", raising(OSError(28, "No space left on device", "run.nc")))
     write(tmp_path)
     said = undertow("simulate", "s.yaml", "--out", "out")

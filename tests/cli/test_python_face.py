@@ -1,18 +1,10 @@
 """The same one level down: `import undertow as ut`."""
 
-import jax
 import numpy as np
 import pytest
 from good_scenario import SCENARIO
 
 import undertow as ut
-
-
-@pytest.fixture(autouse=True)
-def jax_as_users_have_it():
-    jax.config.update("jax_numpy_dtype_promotion", "standard")
-    yield
-    jax.config.update("jax_numpy_dtype_promotion", "strict")
 
 
 @pytest.fixture(scope="module")

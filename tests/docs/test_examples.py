@@ -25,7 +25,7 @@ def test_every_example_is_tested():
 
 
 @pytest.mark.parametrize("name", KNOWN)
-def test_scenario(name, tmp_path, as_users_have_it):
+def test_scenario(name, tmp_path):
     assert run(["simulate", str(EXAMPLES / f"{name}.yaml"), "--out", str(tmp_path / "out")]) == 0
     steady = json.loads((tmp_path / "out" / "metrics.json").read_text())["steady"]
     for metric, (value, tolerance) in KNOWN[name].items():
@@ -34,7 +34,7 @@ def test_scenario(name, tmp_path, as_users_have_it):
         assert steady["saturated_fraction"] > 0.05
 
 
-def test_python_api(as_users_have_it, capsys):
+def test_python_api(capsys):
     spec = importlib.util.spec_from_file_location("python_api", EXAMPLES / "python_api.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -43,7 +43,10 @@ def describe(name: str) -> tuple[Description, ...]:
         BadInput: no such part.
     """
     if ".py:" in name:
-        return (_describe("", name, catalogue.find("", name)),)
+        try:
+            return (_describe("", name, catalogue.find("", name)),)
+        except BadInput as error:
+            raise BadInput("NAME", error.must, error.got, hint=error.hint) from error.__cause__
     wanted, _, short = name.rpartition("/")
     kinds = [kind for kind in catalogue.KINDS if wanted in ("", kind)]
     known = {kind: catalogue.names(kind) for kind in kinds}
@@ -75,10 +78,10 @@ def _describe(kind: str, name: str, part: Any) -> Description:
 
 
 def _instance(kind: str, name: str, part: Any) -> Any:
-    """The part with all its defaults; None when it needs something to be given."""
+    """The part with all its defaults; None when it cannot be made of them."""
     try:
         return parts.make(kind, name, Path())[0] if kind else part()
-    except (BadInput, TypeError):
+    except Exception:
         return None
 
 
