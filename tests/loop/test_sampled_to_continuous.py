@@ -14,7 +14,7 @@ from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
 DURATION, RECORD = 1.0, 0.05
-STEPS = RECORD / np.array([25, 50, 100, 200, 400])  # 2 ms down to 1/8 ms
+STEPS = RECORD / np.array([50, 100, 200, 400])  # 1 ms down to 1/8 ms
 
 
 def odin_loop():
@@ -41,13 +41,13 @@ def test_first_order():
     ratios = errors[:-1] / errors[1:]
     assert (np.abs(ratios[-1] - 2) < 0.1).all(), ratios
     assert (np.abs(ratios[-1] - 2) <= np.abs(ratios[0] - 2) + 0.02).all(), ratios
-    assert (errors[-1] < errors[0] / 8).all(), errors
+    assert (errors[-1] < errors[0] / 6).all(), errors
 
 
 def test_run_twice_same_bits():
     loop = odin_loop()
     for simulate in (
-        lambda: sampled.simulate(loop, duration=DURATION, dt=STEPS[0], record_every=25),
+        lambda: sampled.simulate(loop, duration=DURATION, dt=STEPS[0], record_every=50),
         lambda: continuous.simulate(loop, duration=DURATION, record_step=RECORD, rtol=1e-10, atol=1e-12),
     ):
         for one, other in zip(*map(jax.tree.leaves, (simulate(), simulate())), strict=True):
