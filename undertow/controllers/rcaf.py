@@ -65,7 +65,7 @@ def rcaf(
     checks.choice("method", method, ("euler", "rk4"))
     if substeps < 1:
         raise BadInput("substeps", "be 1 or more", substeps)
-    reach = _REACH[fuzzy_input] if reach is None else tuple(reach)
+    reach = _REACH[fuzzy_input] if reach is None else reach
     checks.length("reach", reach, len(_REACH[fuzzy_input]), f"one per input of fuzzy_input = {fuzzy_input}")
     try:
         identification = SeriesParallel(pole, compensation_gain, compensation_layer, switching)
@@ -73,7 +73,7 @@ def rcaf(
         raise BadInput(error.name.replace("layer", "compensation_layer"), error.must, error.got) from None
     return RCAF(
         model=model,
-        fuzzy=gaussian_sets(sets, reach, width),
+        fuzzy=gaussian_sets(sets, tuple(reach), width),
         identification=identification,
         feedback=feedback,
         weight=weight,

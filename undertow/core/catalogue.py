@@ -9,6 +9,7 @@ import importlib
 import importlib.metadata
 import importlib.util
 import pkgutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -71,13 +72,14 @@ def _from_file(name: str, folder: Path) -> Part:
     path = (folder / path_text).resolve()
     if not path.is_file():
         raise BadInput("name", "name an existing file", path_text)
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    spec = importlib.util.spec_from_file_location(f"undertow_part_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise BadInput("name", "name a Python file", path_text)
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where annotations of the file are looked up
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise BadInput("name", "name a file that Python can run", f"{path_text}: {error!r}") from error
     part = getattr(module, attribute, None)
     if not callable(part):

@@ -176,6 +176,8 @@ class AbstractReference(eqx.Module):
 class AbstractSensor(eqx.Module):
     """What stands between the truth and the measurement."""
 
+    smooth: eqx.AbstractVar[bool]  # whether measurements change smoothly with the truth, as one ODE needs
+
     @abc.abstractmethod
     def draw(self, key: PRNGKeyArray) -> PyTree:
         """Path: everything random about one realisation."""

@@ -28,7 +28,7 @@ class BadInput(ValueError):
         got = "" if self.got is None else f", but is {_one_line(self.got)}"
         where = f" ({self.where})" if self.where else ""
         hint = f". {self.hint}" if self.hint else ""
-        return f"`{self.name}` must {self.must}{got}{where}{hint}"
+        return f"`{_one_line(self.name)}` must {self.must}{got}{where}{hint}"
 
     def at(self, prefix: str = "", where: str = "") -> "BadInput":
         """Same complaint, seen from further out: with a key prefix and a place in a file."""

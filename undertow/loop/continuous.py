@@ -44,10 +44,9 @@ def simulate(
         Outcome; records after a failure repeat the last sound one.
 
     Raises:
-        BadInput: duration or record_step not positive, or a law that exists only sampled.
+        BadInput: duration or record_step not positive, or as `check`.
     """
-    if not isinstance(loop.controller, AbstractContinuousController):
-        raise BadInput("loop", "be sampled for this controller", "continuous")
+    check(loop)
     records = round(duration / record_step) if 0 < duration < float("inf") and record_step > 0 else 0
     if records < 1:
         raise BadInput("duration", f"be at least one record ({record_step:g} s)", f"{duration:g} s")
@@ -56,6 +55,20 @@ def simulate(
     times = jnp.asarray(np.arange(records + 1) * record_step, dtype=float)
     jumps = jnp.asarray([0.0, *loop.disturbance.jumps(duration)])
     return _run(loop, key, start, times, times[-1], jumps, rtol, atol)
+
+
+def check(loop: ClosedLoop) -> None:
+    """Whether a closed loop can be one ODE.
+
+    Raises:
+        BadInput: a law that exists only sampled, or a sensor that is not smooth.
+    """
+    for obstacle, what in (
+        (not isinstance(loop.controller, AbstractContinuousController), "controller, which exists only sampled"),
+        (not loop.sensor.smooth, "sensor, whose noise is new at every sample"),
+    ):
+        if obstacle:
+            raise BadInput("kind", f"be sampled with this {what}", "continuous")
 
 
 @eqx.filter_jit

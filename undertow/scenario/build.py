@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from undertow.core import runtime
+from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario import parts
 from undertow.scenario.fitting import check_fit, check_times, placed
@@ -50,6 +51,8 @@ def build(source: Text | Mapping[str, Any]) -> Built:
     model, resolved["model"] = placed(text, "model", lambda: parts.call(plant.model, scenario.model))
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), make("disturbance"), make("sensor"))
+    if scenario.loop.kind == "continuous":
+        placed(text, "loop", lambda: continuous.check(loop))
     check_times(text, scenario.loop, scenario.steady)
     check_fit(text, loop, scenario.initial)
     return Built(loop, scenario, resolved)

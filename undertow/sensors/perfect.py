@@ -1,10 +1,14 @@
 """The truth."""
 
+import equinox as eqx
+
 from undertow.core.contracts import AbstractSensor, Measurement
 
 
 class Perfect(AbstractSensor):
     """Measures exactly."""
+
+    smooth: bool = eqx.field(static=True, default=True)
 
     def draw(self, key) -> tuple[()]:
         return ()

@@ -1,5 +1,6 @@
 """White noise on position and velocity."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -18,6 +19,8 @@ class WhiteNoise(AbstractSensor):
 
     position: Float[Array, "..."] = param("m, rad", "standard deviation on position")
     velocity: Float[Array, "..."] = param("m/s, rad/s", "standard deviation on velocity")
+
+    smooth: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
         checks.not_negative("position", self.position)

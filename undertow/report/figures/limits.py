@@ -34,10 +34,10 @@ def fit_log(panel: Axes, series: Named, start: float) -> None:
     del start
     sizes = _finite([values for _, _, values in series])
     sizes = sizes[sizes > 0]
-    panel.set_yscale("log", nonpositive="mask")
-    panel.yaxis.set_major_locator(LogLocator(numticks=5))
-    panel.yaxis.set_minor_locator(NullLocator())
-    if sizes.size:
+    if sizes.size:  # nothing positive has no logarithm
+        panel.set_yscale("log", nonpositive="mask")
+        panel.yaxis.set_major_locator(LogLocator(numticks=5))
+        panel.yaxis.set_minor_locator(NullLocator())
         panel.set_ylim(float(np.quantile(sizes, 0.02)) / 2, 2 * float(sizes.max()))
 
 
