@@ -188,12 +188,12 @@ MISTAKES = {
     "record not a multiple of dt": (
         "record: 1e-2",
         "record: 1.5e-3",
-        "`loop.record` must be a whole number of sampling times (0.001 s), but is 0.0015 s (s.yaml, line 9)",
+        "`loop.record` must be a whole number of steps (0.001 s), but is 0.0015 s (s.yaml, line 9)",
     ),
     "record shorter than dt": (
         "record: 1e-2",
         "record: 1e-4",
-        "`loop.record` must be a whole number of sampling times (0.001 s), but is 0.0001 s (s.yaml, line 9)",
+        "`loop.record` must be a whole number of steps (0.001 s), but is 0.0001 s (s.yaml, line 9)",
     ),
     "unknown loop": (
         "dt: 1e-3",

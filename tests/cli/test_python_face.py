@@ -43,7 +43,7 @@ def test_scenario_as_data():
         ({"duration": -1.0}, "`duration` must be greater than 0, but is -1.0"),
         ({"loop": "both"}, "`loop` must be 'sampled' or 'continuous', but is 'both'"),
         ({"position": [1, 2]}, "`position` must have 6 entries (one per output of the plant), but is 2 long"),
-        ({"record": 1.5e-3}, "`record` must be a whole number of sampling times (0.001 s), but is 0.0015 s"),
+        ({"record": 1.5e-3}, "`record` must be a whole number of steps (0.001 s), but is 0.0015 s"),
         (
             {"disturbance": ut.disturbances.wrench([1.0])},
             "`disturbance.value` must have 6 entries, but is of shape (1,)",

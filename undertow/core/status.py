@@ -25,8 +25,8 @@ class Status(enum.IntEnum):
 
 _SENTENCES = {
     Status.OK: "The run reached its end.",
-    Status.DIVERGED: "A position or velocity left the envelope in which the run means anything: the loop is unstable.",
+    Status.DIVERGED: "A position or velocity left every sensible envelope: the loop is unstable.",
     Status.NOT_FINITE: "A state became infinite or undefined; the last finite state was kept.",
     Status.PITCH_SINGULAR: "Pitch came within 0.06 degrees of +-90, where Euler angles, and so Eq. (1), are undefined.",
-    Status.STEPS_EXHAUSTED: "The adaptive integrator used up its steps: the closed loop became too stiff to follow.",
+    Status.STEPS_EXHAUSTED: "The adaptive integrator could go no further: the closed loop became too stiff, or a rate undefined.",
 }

@@ -33,7 +33,7 @@ def even_memberships(
         powers.append(powers[-1] * ratio)
     weights = jnp.stack(powers, -1) * inward
     weights = weights / weights.sum(-1, keepdims=True)
-    return jnp.where((offset > 0)[..., None], weights[..., ::-1], weights)
+    return jnp.where((offset >= 0)[..., None], weights[..., ::-1], weights)
 
 
 def is_even(centres: np.ndarray, widths: np.ndarray) -> bool:

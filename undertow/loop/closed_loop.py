@@ -128,3 +128,7 @@ class Drawn(NamedTuple):
             power=effort.power,
             saturated=effort.saturated,
         )
+
+    def look(self, t: Time, x: PyTree, z: PyTree) -> Sample:
+        """`sample` of the decision taken at time t."""
+        return self.sample(t, x, self.decide(t, x, z))

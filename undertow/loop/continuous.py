@@ -1,8 +1,7 @@
-"""The continuous loop: plant and law as one ODE, the paper's own setting and the reference for the sampled loop."""
+"""The continuous loop: plant and law as one ODE, the paper's own setting."""
 
-from typing import Any, cast
+from typing import Any
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,11 +11,11 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop, Drawn
-from undertow.loop.outcome import Outcome, health
-
-_MAX_STEPS = 2**20
-_FIRST_STEP = 1e-4  # s; the integrator finds its own from there
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.one_ode import flow
+from undertow.loop.outcome import Outcome
+from undertow.loop.recording import instant, keep_sound, record
+from undertow.numerics.integrators import rk4_compact
 
 
 def simulate(
@@ -27,24 +26,25 @@ def simulate(
     key: PRNGKeyArray | None = None,
     position: Any = None,
     velocity: Any = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-9,
+    dt: float = 1e-3,
+    tolerances: tuple[float, float] | None = None,
 ) -> Outcome:
-    """Integrate plant and law together, with adaptive steps that meet every jump of the disturbance.
+    """Integrate plant and law together.
 
     Args:
         loop: the five roles; the controller must be written in continuous time.
         duration: s; rounded to whole records.
-        record_step: time between records, s.
+        record_step: time between records, s; with fixed steps a multiple of dt.
         key: for everything random; None for key 0.
         position, velocity: outputs at t = 0; None for zero.
-        rtol, atol: tolerances of the integrator.
+        dt: fixed step of the classical Runge-Kutta method, s. Jumps of the disturbance are met if they fall on it.
+        tolerances: relative and absolute, for adaptive steps that meet every jump, instead of fixed ones.
 
     Returns:
-        Outcome; records after a failure repeat the last sound one.
+        Outcome; records after a failure repeat the last sound state.
 
     Raises:
-        BadInput: duration or record_step not positive, or as `check`.
+        BadInput: duration, record_step or dt not positive, or as `check`.
     """
     check(loop)
     records = round(duration / record_step) if 0 < duration < float("inf") and record_step > 0 else 0
@@ -52,9 +52,16 @@ def simulate(
         raise BadInput("duration", f"be at least one record ({record_step:g} s)", f"{duration:g} s")
     key = jax.random.PRNGKey(0) if key is None else key
     start = loop.outputs_at_start(position, velocity)
-    times = jnp.asarray(np.arange(records + 1) * record_step, dtype=float)
-    jumps = jnp.asarray([0.0, *loop.disturbance.jumps(duration)])
-    return _run(loop, key, start, times, times[-1], jumps, rtol, atol)
+    if tolerances is not None:
+        from undertow.loop.adaptive import solve
+
+        times = jnp.asarray(np.arange(records + 1) * record_step, dtype=float)
+        jumps = jnp.asarray([0.0, *loop.disturbance.jumps(duration)])
+        return solve(loop, key, start, times, jumps, *tolerances)
+    if not 0 < dt <= record_step * (1 + 1e-9):
+        raise BadInput("dt", f"be positive and at most one record ({record_step:g} s)", f"{dt:g} s")
+    every = round(record_step / dt)
+    return _run(loop, key, start, jnp.asarray(record_step / every, dtype=float), (records * every, every))
 
 
 def check(loop: ClosedLoop) -> None:
@@ -72,47 +79,20 @@ def check(loop: ClosedLoop) -> None:
 
 
 @eqx.filter_jit
-def _run(loop, key, start, times, duration, jumps, rtol, atol) -> Outcome:
+def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, int]) -> Outcome:
+    ticks, every = plan
     drawn = loop.draw(key)
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(_flow),
-        diffrax.Tsit5(),
-        t0=0.0,
-        t1=duration,
-        dt0=_FIRST_STEP,
-        y0=drawn.start(*start),
-        args=drawn,
-        saveat=diffrax.SaveAt(subs=(diffrax.SubSaveAt(ts=times), diffrax.SubSaveAt(t1=True))),
-        stepsize_controller=diffrax.ClipStepSizeController(diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=jumps),
-        event=diffrax.Event(_is_unsound),
-        max_steps=_MAX_STEPS,
-        throw=False,
-    )
-    states, final = cast(tuple[Any, Any], solution.ys)
-    ended = cast(tuple[Array, Array], solution.ts)[1][0]
-    code = health(loop.plant, *jax.tree.map(lambda leaf: leaf[0], final))
-    out_of_steps = (solution.result != diffrax.RESULTS.successful) & (code == int(Status.OK))
-    status = jnp.where(out_of_steps, int(Status.STEPS_EXHAUSTED), code)
-    last = jnp.maximum(jnp.sum(times <= ended) - 1, 0)
-    index = jnp.minimum(jnp.arange(times.shape[0]), last)
-    held = jax.tree.map(lambda leaf: leaf[index], states)
-    samples = jax.vmap(lambda t, state: _sample(drawn, t, state))(times[index], held)
-    return Outcome(times, samples, (), jax.tree.map(lambda leaf: leaf[0], final), status, ended)
 
+    def tick(carry, k):
+        state, status, ended = carry
+        t = instant(k, dt)
+        new = rk4_compact(lambda s, state: flow(s, state, drawn), t, state, dt)
+        return keep_sound(loop.plant, state, new, status, ended, t + dt)
 
-@jax.jit  # traced once, although the integrator's stages call it many times
-def _flow(t: Float[Array, ""], state, drawn: Drawn):
-    x, z = state
-    controller = cast(AbstractContinuousController, drawn.loop.controller)
-    decision = drawn.decide(t, x, z)
-    x_rate = drawn.loop.plant.dynamics(t, x, decision.applied, drawn.load(t))
-    return x_rate, controller.flow(z, decision.y, decision.r, decision.applied)
+    def look(carry, k):
+        t = instant(k, dt)
+        return t, drawn.look(t, *carry[0])
 
-
-def _is_unsound(t, y, args: Drawn, **_):
-    return health(args.loop.plant, *y) != int(Status.OK)
-
-
-def _sample(drawn: Drawn, t, state):
-    x, z = state
-    return drawn.sample(t, x, drawn.decide(t, x, z))
+    carry = (drawn.start(*start), jnp.asarray(int(Status.OK)), jnp.zeros(()))
+    (final, status, ended), (time, samples) = record(tick, look, carry, ticks, every)
+    return Outcome(time, samples, (), final, status, jnp.where(status == int(Status.OK), time[-1], ended))

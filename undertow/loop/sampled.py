@@ -12,7 +12,8 @@ from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
-from undertow.loop.outcome import Outcome, health
+from undertow.loop.outcome import Outcome
+from undertow.loop.recording import instant, keep_sound, record
 from undertow.numerics.integrators import METHODS
 
 
@@ -76,31 +77,28 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
     drawn = loop.draw(key)
     x, z = drawn.start(*start)
     tick = partial(_tick, drawn, accumulators, dt, METHODS[method], substeps)
-    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.sample, dt, x, jax.eval_shape(drawn.decide, dt, x, z)))
+    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.look, dt, x, z))
     gathered = tuple(a.init(blank) for a in accumulators)
-    carry = (x, z, gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
+    carry = ((x, z), gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
     if record_every == 0:
         carry = jax.lax.fori_loop(0, ticks, lambda k, c: tick(c, k), carry)
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
     else:
+
+        def look(carry, k):
+            t = instant(k, dt)
+            return t, drawn.look(t, *carry[0])
+
         ticks -= ticks % record_every
-
-        def block(carry, first):
-            """Record, then run to the next record; the last block only records."""
-            t = _instant(first, dt)
-            sample = drawn.sample(t, carry[0], drawn.decide(t, carry[0], carry[1]))
-            until = jnp.minimum(first + record_every, ticks)
-            return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), (t, sample)
-
-        carry, (time, samples) = jax.lax.scan(block, carry, jnp.arange(0, ticks + 1, record_every))
-    x, z, gathered, status, ended = carry
-    return Outcome(time, samples, gathered, (x, z), status, jnp.where(status == int(Status.OK), ticks * dt, ended))
+        carry, (time, samples) = record(tick, look, carry, ticks, record_every)
+    final, gathered, status, ended = carry
+    return Outcome(time, samples, gathered, final, status, jnp.where(status == int(Status.OK), ticks * dt, ended))
 
 
 def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     """Command, move the plant with the input held, then let the controller learn from what was applied."""
-    x, z, gathered, status, ended = carry
-    loop, t = drawn.loop, _instant(k, dt)
+    (x, z), gathered, status, ended = carry
+    loop, t = drawn.loop, instant(k, dt)
     decision = drawn.decide(t, x, z)
     if accumulators:
         sample = drawn.sample(t, x, decision)
@@ -109,17 +107,9 @@ def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     for i in range(substeps):
         new_x = step(partial(_motion, drawn, decision.applied), t + i * h, new_x, h)
     new_z = loop.controller.advance(z, decision.y, decision.r, decision.applied, dt)
-    code = health(loop.plant, new_x, new_z)
-    failing = (status == int(Status.OK)) & (code != int(Status.OK))
-    status, ended = jnp.where(failing, code, status), jnp.where(failing, t + dt, ended)
-    sound = status == int(Status.OK)
-    x, z = jax.tree.map(lambda new, old: jnp.where(sound, new, old), (new_x, new_z), (x, z))
-    return x, z, gathered, status, ended
+    state, status, ended = keep_sound(loop.plant, (x, z), (new_x, new_z), status, ended, t + dt)
+    return state, gathered, status, ended
 
 
 def _motion(drawn: Drawn, applied, t, x):
     return drawn.loop.plant.dynamics(t, x, applied, drawn.load(t))
-
-
-def _instant(tick: Array, dt: Float[Array, ""]) -> Float[Array, ""]:
-    return jnp.asarray(tick, dtype=float) * dt

@@ -59,9 +59,8 @@ def run_loop(loop: ClosedLoop, settings: Loop, start: Initial, seed: int) -> Out
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
     common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
     if settings.kind == "continuous":
-        outcome = continuous.simulate(
-            loop, record_step=settings.record, rtol=settings.rtol, atol=settings.atol, **common
-        )
+        adaptive = (settings.rtol, settings.atol) if settings.method == "adaptive" else None
+        outcome = continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
     else:
         outcome = sampled.simulate(
             loop,

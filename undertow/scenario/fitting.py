@@ -37,19 +37,23 @@ def check_times(text: Text, loop: Loop, window: Window) -> None:
     if not window.start < window.stop:
         must, got = f"be later than steady.start ({window.start:g} s)", f"{window.stop:g} s"
         raise BadInput("steady.stop", must, got, where=text.where(("steady", "stop")))
-    sampled = loop.kind == "sampled"
-    shortest = max(loop.record, loop.dt if sampled else 0.0)
+    allowed = {"sampled": ("rk4", "euler"), "continuous": ("rk4", "adaptive")}[loop.kind]
+    if loop.method not in allowed:
+        where = text.where(("loop", "method"))
+        raise BadInput("loop.method", f"be {' or '.join(allowed)} when {loop.kind}", loop.method, where=where)
+    stepped = loop.method != "adaptive"
+    shortest = max(loop.record, loop.dt if stepped else 0.0)
     if loop.duration < shortest:
         must, got = f"be at least one record ({shortest:g} s)", f"{loop.duration:g} s"
         raise BadInput("loop.duration", must, got, where=text.where(("loop", "duration")))
     for key, most, what in (("record", MOST_RECORDS, "records"), ("dt", MOST_TICKS, "sampling times")):
         step = getattr(loop, key)
-        if loop.duration / step > most and (sampled or key == "record"):
+        if loop.duration / step > most and (stepped or key == "record"):
             must = f"be at least {loop.duration / most:g} s, so that the run has at most {most} {what}"
             raise BadInput(f"loop.{key}", must, f"{step:g} s", where=text.where(("loop", key)))
     ratio = loop.record / loop.dt
-    if sampled and (round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6 * ratio):
-        must, got = f"be a whole number of sampling times ({loop.dt:g} s)", f"{loop.record:g} s"
+    if stepped and (round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6 * ratio):
+        must, got = f"be a whole number of steps ({loop.dt:g} s)", f"{loop.record:g} s"
         raise BadInput("loop.record", must, got, where=text.where(("loop", "record")))
 
 

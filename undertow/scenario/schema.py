@@ -41,12 +41,14 @@ class Loop(_Strict):
 
     kind: Literal["sampled", "continuous"] = Field("sampled", description="a scan at dt, or one ODE")
     duration: float = Field(20.0, gt=0, le=1e6, description="s")
-    dt: float = Field(1e-3, gt=0, le=10, description="sampling time of the controller, s (sampled)")
+    dt: float = Field(1e-3, gt=0, le=10, description="sampling time of the controller, or step of the ODE, s")
     record: float = Field(1e-2, gt=0, le=1e5, description="time between records, s")
-    method: Literal["rk4", "euler"] = Field("rk4", description="integration of the plant (sampled)")
+    method: Literal["rk4", "euler", "adaptive"] = Field(
+        "rk4", description="integration: rk4; euler (sampled); adaptive, to rtol and atol (continuous)"
+    )
     substeps: int = Field(1, ge=1, le=100, description="plant steps per dt (sampled)")
-    rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (continuous)")
-    atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (continuous)")
+    rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (adaptive)")
+    atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (adaptive)")
 
 
 class Initial(_Strict):

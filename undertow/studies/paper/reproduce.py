@@ -41,7 +41,7 @@ def reproduce(folder: Path, quick: bool, progress: Progress) -> Reproduction:
         progress: told a message and the share done.
     """
     wanted = examples.scenarios() | claims.scenarios(quick)
-    runs = run_all(wanted, folder, lambda message, share: progress(f"ran {message}", _RUNNING * share))
+    runs = run_all(wanted, folder, lambda message, share: progress(message, _RUNNING * share))
     progress("judging the claims", _RUNNING)
     results = {
         "provenance": {"quick": quick, "scenarios": sorted(wanted), **versions()},

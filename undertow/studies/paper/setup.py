@@ -47,6 +47,14 @@ def scenario(
     } | changes
 
 
+# Six independent axes x_ddot = u + d: what rung `ideal` amounts to for a law whose model is exact.
+SIX_AXES = {
+    "plant": {"kind": "double_integrator", "axes": 6},
+    "model": {},
+    "reference": {"kind": "setpoint", "position": [0.0] * 6},
+}
+
+
 def law_of(run: Executed) -> RCAF:
     """The law that ran."""
     return cast(RCAF, run.built.closed_loop.controller)

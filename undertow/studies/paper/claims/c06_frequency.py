@@ -8,23 +8,23 @@ import numpy as np
 
 from undertow.analysis.linear import crossing_frequency, estimation_response
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
-from undertow.studies.paper.setup import CONTROLLERS, GOAL, law_of, scenario
+from undertow.studies.paper.setup import CONTROLLERS, SIX_AXES, law_of, scenario
 
 CLAIM = "The scheme estimates uncertainties of large amplitude and high frequency."
 
-# rad/s; six at a time, one per axis: the axes are independent on rung `ideal`.
+# rad/s; six at a time, one per axis.
 _QUICK = ((5.0, 20.0, 50.0, 95.0, 105.0, 200.0),)
 _SWEEP = (*_QUICK, (0.5, 1.0, 2.0, 10.0, 35.0, 70.0), (90.0, 100.0, 115.0, 150.0, 300.0, 400.0))
 
 
 def scenarios(quick: bool) -> dict:
-    """Unit sinusoids of different frequency on the six axes, at the goal from the start."""
+    """Unit sinusoids of different frequency on six independent axes, at the goal from the start."""
     return {
         _name(controller, i): scenario(
             f"{controller.upper()} against unit sinusoids of {', '.join(f'{w:g}' for w in block)} rad/s, one per axis",
             composite=composite,
             disturbance={"kind": "sinusoid", "amplitude": 1.0, "frequency": list(block), "offset": [0.0] * 6},
-            initial={"position": GOAL},
+            **SIX_AXES,
         )
         for controller, composite in CONTROLLERS.items()
         for i, block in enumerate(_QUICK if quick else _SWEEP)

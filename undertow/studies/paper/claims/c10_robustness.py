@@ -4,7 +4,7 @@ import numpy as np
 
 from undertow.core.status import Status
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
-from undertow.studies.paper.setup import scenario
+from undertow.studies.paper.setup import SIX_AXES, scenario
 
 CLAIM = "The performance is fully robust to the design parameters and to the initial conditions."
 
@@ -44,7 +44,8 @@ def scenarios(quick: bool) -> dict:
             controller={"sets": 3, "reach": [0.1], "width": 1.0},
             disturbance="none",
             sensor={"kind": "white_noise", "velocity": 0.01},
-            loop={"kind": "sampled", "duration": 20.0, "record": 0.01},
+            loop={"kind": "sampled", "duration": 20.0},
+            **SIX_AXES,
         )
     }
     if quick:

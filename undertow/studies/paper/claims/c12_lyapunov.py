@@ -2,7 +2,7 @@
 
 from undertow.analysis.certificate import lyapunov_function, minimax_weight, share_increasing
 from undertow.studies.paper.claims.finding import Finding, Runs
-from undertow.studies.paper.setup import law_of, scenario
+from undertow.studies.paper.setup import GOAL, SIX_AXES, law_of, scenario
 
 CLAIM = "V_dot <= 0 along every solution (Eqs. (46)-(58))."
 
@@ -15,6 +15,7 @@ def scenarios(quick: bool) -> dict:
         "c12_constant": scenario(
             "RCAFC under constant uncertainty: the Lyapunov function only falls",
             disturbance={"kind": "sinusoid", "amplitude": 0.0, "frequency": [1.0] * 6, "offset": _CONSTANT},
+            **(SIX_AXES | {"reference": {"kind": "setpoint", "position": GOAL}}),
         )
     }
 

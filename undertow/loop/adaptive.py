@@ -1,0 +1,54 @@
+"""The continuous loop with adaptive steps that meet every jump of the disturbance: the reference for all others."""
+
+from typing import Any, cast
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.flatten_util import ravel_pytree
+
+from undertow.core.status import Status
+from undertow.loop.one_ode import flow
+from undertow.loop.outcome import Outcome, health
+
+_MAX_STEPS = 2**20
+_FIRST_STEP = 1e-4  # s; the integrator finds its own from there
+
+
+@eqx.filter_jit
+def solve(loop, key, start, times, jumps, rtol, atol) -> Outcome:
+    """Integrate from `start` over `times` (s, records); arguments as in `continuous.simulate`."""
+    drawn = loop.draw(key)
+    # One flat vector: the integrator's own arithmetic is then compiled once, not once per piece of state.
+    flat, unravel = ravel_pytree(drawn.start(*start))
+
+    def flat_flow(t, flat, drawn):
+        return ravel_pytree(flow(t, unravel(flat), drawn))[0]
+
+    def is_unsound(t, y, args, **_):
+        return health(args.loop.plant, *unravel(y)) != int(Status.OK)
+
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(flat_flow),
+        diffrax.Tsit5(),
+        t0=0.0,
+        t1=times[-1],
+        dt0=_FIRST_STEP,
+        y0=flat,
+        args=drawn,
+        saveat=diffrax.SaveAt(subs=(diffrax.SubSaveAt(ts=times), diffrax.SubSaveAt(t1=True))),
+        stepsize_controller=diffrax.ClipStepSizeController(diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=jumps),
+        event=diffrax.Event(is_unsound),
+        max_steps=_MAX_STEPS,
+        throw=False,
+    )
+    (states, final), (_, ended) = cast(tuple[Any, Any], solution.ys), cast(tuple[Any, Any], solution.ts)
+    code = health(loop.plant, *unravel(final[0]))
+    out_of_steps = (solution.result != diffrax.RESULTS.successful) & (code == int(Status.OK))
+    status = jnp.where(out_of_steps, int(Status.STEPS_EXHAUSTED), code)
+    last = jnp.maximum(jnp.isfinite(states).all(axis=1).sum() - 1, 0)  # what was never saved is infinite
+    index = jnp.minimum(jnp.arange(times.shape[0]), last)
+    samples = jax.lax.map(lambda at: drawn.look(at[0], *unravel(at[1])), (times[index], states[index]))
+    sound = jnp.where(status == int(Status.OK), final[0], states[last])
+    return Outcome(times, samples, (), unravel(sound), status, ended[0])

@@ -1,0 +1,56 @@
+"""Ticking and recording: what the fixed-step loops have in common."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from undertow.core.status import Status
+from undertow.loop.closed_loop import Sample
+from undertow.loop.outcome import health
+
+
+def record(
+    tick: Callable[[Any, Int[Array, ""]], Any],
+    look: Callable[[Any, Int[Array, ""]], tuple[Float[Array, ""], Sample]],
+    carry: Any,
+    ticks: int,
+    every: int,
+) -> tuple[Any, tuple[Float[Array, " records"], Sample]]:
+    """Run `ticks` ticks and look at every `every`-th instant, first and last included.
+
+    Args:
+        tick: carry and number of the tick -> carry one tick later.
+        look: carry and number of the tick -> time and sample.
+        carry: what goes from tick to tick.
+        ticks: how many; rounded down to whole records.
+        every: ticks per record.
+    """
+    ticks -= ticks % every
+
+    def block(carry, first):
+        """Record, then run to the next record; the last block only records."""
+        until = jnp.minimum(first + every, ticks)
+        return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), look(carry, first)
+
+    return jax.lax.scan(block, carry, jnp.arange(0, ticks + 1, every))
+
+
+def keep_sound(plant, old: Any, new: Any, status: Int[Array, ""], ended: Float[Array, ""], t: Float[Array, ""]):
+    """States (x, z) after a tick that ends at t: the new ones, or for ever the old ones once something is wrong.
+
+    Returns:
+        States, status and time of the end.
+    """
+    code = health(plant, *new)
+    failing = (status == int(Status.OK)) & (code != int(Status.OK))
+    status, ended = jnp.where(failing, code, status), jnp.where(failing, t, ended)
+    sound = status == int(Status.OK)
+    return jax.tree.map(lambda n, o: jnp.where(sound, n, o), new, old), status, ended
+
+
+def instant(tick: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:
+    """Time of a tick, s."""
+    return jnp.asarray(tick, dtype=float) * dt
