@@ -41,7 +41,7 @@ def loop_with(value):
 BREAK = 0.2512  # s; inside a tick and between two records
 RUNS = {
     "sampled": lambda loop: sampled.simulate(loop, duration=0.5, dt=2.0**-10, record_every=16),
-    "continuous": lambda loop: continuous.simulate(loop, duration=0.5, record_step=2.0**-6),
+    "continuous": lambda loop: continuous.simulate(loop, duration=0.5, record_step=2.0**-6, tolerances=(1e-8, 1e-9)),
 }
 ENDINGS = {
     "sampled": {0.5: Status.OK, float("nan"): Status.NOT_FINITE, 1e12: Status.DIVERGED},

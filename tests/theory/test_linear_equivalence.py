@@ -29,7 +29,7 @@ def record():
     law = rcaf(plant.model(), sets=3)
     goal = setpoint(np.zeros(len(FREQUENCIES)))
     loop = ClosedLoop(plant, law, goal, sinusoid(1.0, FREQUENCIES), perfect())
-    outcome = continuous.simulate(loop, duration=16.0, rtol=1e-7)
+    outcome = continuous.simulate(loop, duration=16.0, tolerances=(1e-7, 1e-9))
     assert int(outcome.status) == 0
     return law, np.asarray(outcome.time), jax.tree.map(np.asarray, outcome.samples)
 
