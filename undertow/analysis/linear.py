@@ -130,10 +130,11 @@ def peak_gains(law: RCAF, axis: int = 0) -> tuple[float, float]:
         BadInput: the linearised law is unstable.
     """
     values, vectors = np.linalg.eig(system_matrix(law, axis))
-    if not values.real.max() < 0:
-        raise BadInput("law", "be stable in small signal", f"of rightmost pole {values.real.max():.3g} 1/s")
+    growth = np.real(values)
+    if not growth.max() < 0:
+        raise BadInput("law", "be stable in small signal", f"of rightmost pole {growth.max():.3g} 1/s")
     modes = vectors * np.linalg.solve(vectors, np.array([0.0, 0.0, 0.0, 1.0]))
-    end = 40 / abs(values.real).min()
+    end = 40 / np.abs(growth).min()
     times = np.concatenate([[0.0], np.geomspace(1e-4 / abs(values).max(), end, 200_000)])
     impulse = np.abs((np.exp(np.outer(times, values)) @ modes[[0, 3]].T).real)
     e, d_til = np.trapezoid(impulse, times, axis=0)

@@ -28,5 +28,5 @@ _SENTENCES = {
     Status.DIVERGED: "A position or velocity left every sensible envelope: the loop is unstable.",
     Status.NOT_FINITE: "A state became infinite or undefined; the last finite state was kept.",
     Status.PITCH_SINGULAR: "Pitch came within 0.06 degrees of +-90, where Euler angles, and so Eq. (1), are undefined.",
-    Status.STEPS_EXHAUSTED: "The adaptive integrator could go no further: the loop became too stiff, or a rate undefined.",
+    Status.STEPS_EXHAUSTED: "The adaptive integrator could go no further: too stiff a loop, or an undefined rate.",
 }
