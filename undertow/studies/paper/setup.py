@@ -17,6 +17,9 @@ CONTROLLERS = {"rcafc": RCAFC, "rafc": RAFC}
 
 RUNGS = ("ideal", "static", "shaft", "electromechanical")
 
+# Once the loop with the whole motor is unstable, the drag of its propellers is too stiff for fixed steps of 1 ms.
+_METHODS = {"electromechanical": "adaptive"}
+
 
 def scenario(
     description: str,
@@ -43,7 +46,7 @@ def scenario(
         "controller": {"kind": "rcaf", "composite": composite, **(controller or {})},
         "reference": {"kind": "setpoint", "position": GOAL},
         "disturbance": {"kind": "u1"},
-        "loop": {"kind": "continuous", "duration": 20.0},
+        "loop": {"kind": "continuous", "duration": 20.0, "method": _METHODS.get(rung, "rk4")},
     } | changes
 
 
