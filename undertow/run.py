@@ -100,7 +100,7 @@ def simulate(
         sensor: what stands before the measurement; None for the truth.
         duration: s. The steady metrics are taken over its second half.
         loop: `sampled` (input held over each dt) or `continuous` (one ODE, the paper's setting).
-        dt: sampling time of the controller, s; sampled loop only.
+        dt: sampling time of the controller, or step of the ODE, s.
         record: time between records, s.
         seed: of everything random.
         position: outputs at t = 0, shape (n,), m and rad; None for zero.

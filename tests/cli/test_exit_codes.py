@@ -45,7 +45,6 @@ def test_no_command_shows_the_help(undertow):
     assert said.code == 0 and "simulate" in said.out
 
 
-@pytest.mark.filterwarnings("ignore:Data has no positive values")  # the run ends within its first record
 def test_run_that_fails_is_1_and_keeps_its_results(undertow, tmp_path):
     text = SCENARIO.replace("feedback: [1, 2]", "composite: 1e7").replace("duration: 0.1", "duration: 1")
     write(tmp_path, text)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 
 from undertow.controllers.law import RCAF
 from undertow.core.errors import BadInput
@@ -104,14 +105,10 @@ def crossing_frequency(law: RCAF, axis: int = 0) -> float:
     Near sqrt(gamma gamma_eps rho / 2) when the composite branch dominates.
     """
 
-    def worse(frequency):
-        return np.abs(estimation_response(law, frequency, axis)) > 1
+    def worse(frequency: float) -> bool:
+        return bool(np.abs(estimation_response(law, frequency, axis)) > 1)
 
-    grid = np.geomspace(1e-3, 1e5, 4001)
-    above = np.flatnonzero(worse(grid))
-    if len(above) == 0:
-        return float("inf")
-    return bisect(worse, *grid[[max(above[0] - 1, 0), above[0]]])
+    return first_crossing(worse, np.geomspace(1e-3, 1e5, 4001))
 
 
 def ramp_error(law: RCAF, axis: int = 0) -> tuple[float, float]:
@@ -169,15 +166,17 @@ def largest_sampling_time(law: RCAF, rule: str = "euler", axis: int = 0) -> floa
     def unstable(dt: float) -> bool:
         return bool(np.abs(np.linalg.eigvals(_tick(g, dt, rule))).max() > 1)
 
-    grid = np.geomspace(1e-6, 1e2, 2001)
-    first = next((i for i, dt in enumerate(grid) if unstable(dt)), None)
+    return first_crossing(unstable, np.geomspace(1e-6, 1e2, 2001))
+
+
+def first_crossing(beyond: Callable[[float], bool], grid: np.ndarray) -> float:
+    """Where `beyond` first turns true along a rising grid, to rounding; 0 if from the start, infinite if nowhere."""
+    first = next((i for i, point in enumerate(grid) if beyond(point)), None)
     if first is None:
         return float("inf")
-    return 0.0 if first == 0 else bisect(unstable, grid[first - 1], grid[first])
-
-
-def bisect(beyond: Callable[[float], bool], low: float, high: float) -> float:
-    """Where `beyond` turns true between low and high, to rounding."""
+    if first == 0:
+        return 0.0
+    low, high = grid[first - 1], grid[first]
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if beyond(middle) else (middle, high)
@@ -192,7 +191,7 @@ def _tick(g: Gains, dt: float, rule: str) -> np.ndarray:
     flow = np.zeros((4, 4))
     flow[0] = -g.pole, 1.0, 0.0, 1.0
     flow[1] = -g.b2, 0.0, -g.adaptation, 0.0
-    across = unit + dt * flow if rule == "euler" else _exponential(dt * flow)
+    across = unit + dt * flow if rule == "euler" else expm(dt * flow)
     learned = across[:2] @ np.stack([unit[2], unit[3], sliding, push])
     rate = unit[1] - dt * push  # e_dot one tick later; x_dot moves by dt u
     return np.stack([unit[0] + dt * unit[1] - dt**2 / 2 * push, rate, learned[0] - dt * push, learned[1]])
@@ -211,16 +210,3 @@ def _of_axis(value, axis: int, rank: int) -> np.ndarray:
 
 def _number(value, axis: int) -> float:
     return float(_of_axis(value, axis, 0))
-
-
-def _exponential(matrix: np.ndarray) -> np.ndarray:
-    """e^matrix by scaling and squaring of a Taylor series; accurate to rounding for these small matrices."""
-    halvings = max(0, int(np.ceil(np.log2(max(np.abs(matrix).sum(1).max(), 1e-300)))) + 4)
-    small = matrix / 2**halvings
-    result = term = np.eye(len(matrix))
-    for k in range(1, 13):
-        term = term @ small / k
-        result = result + term
-    for _ in range(halvings):
-        result = result @ result
-    return result

@@ -7,7 +7,7 @@ so what follows holds for any vehicle.
 
 import numpy as np
 
-from undertow.analysis.linear import Gains, bisect, gains
+from undertow.analysis.linear import Gains, first_crossing, gains
 from undertow.controllers.law import RCAF
 from undertow.thrusters.motor import DCMotor
 
@@ -69,11 +69,7 @@ def critical_lag(law: RCAF, gain: float = 1.0, axis: int = 0) -> float:
     def unstable(lag: float) -> bool:
         return rightmost(_lagged(g, lag, gain)).real > 0
 
-    grid = np.geomspace(1e-6, 1e2, 1601)
-    first = next((i for i, lag in enumerate(grid) if unstable(lag)), None)
-    if first is None:
-        return float("inf")
-    return 0.0 if first == 0 else bisect(unstable, grid[first - 1], grid[first])
+    return first_crossing(unstable, np.geomspace(1e-6, 1e2, 1601))
 
 
 def critical_observer_lag(law: RCAF, axis: int = 0) -> float:

@@ -89,10 +89,6 @@ def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, in
         new = rk4_compact(lambda s, state: flow(s, state, drawn), t, state, dt)
         return keep_sound(loop.plant, state, new, status, ended, t + dt)
 
-    def look(carry, k):
-        t = instant(k, dt)
-        return t, drawn.look(t, *carry[0])
-
     carry = (drawn.start(*start), jnp.asarray(int(Status.OK)), jnp.zeros(()))
-    (final, status, ended), (time, samples) = record(tick, look, carry, ticks, every)
+    (final, status, ended), (time, samples) = record(drawn, tick, carry, dt, ticks, every)
     return Outcome(time, samples, (), final, status, jnp.where(status == int(Status.OK), time[-1], ended))

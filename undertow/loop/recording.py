@@ -8,32 +8,29 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core.status import Status
-from undertow.loop.closed_loop import Sample
+from undertow.loop.closed_loop import Drawn, Sample
 from undertow.loop.outcome import health
 
 
 def record(
-    tick: Callable[[Any, Int[Array, ""]], Any],
-    look: Callable[[Any, Int[Array, ""]], tuple[Float[Array, ""], Sample]],
-    carry: Any,
-    ticks: int,
-    every: int,
+    drawn: Drawn, tick: Callable[[Any, Int[Array, ""]], Any], carry: Any, dt: Float[Array, ""], ticks: int, every: int
 ) -> tuple[Any, tuple[Float[Array, " records"], Sample]]:
     """Run `ticks` ticks and look at every `every`-th instant, first and last included.
 
     Args:
+        drawn: what is run.
         tick: carry and number of the tick -> carry one tick later.
-        look: carry and number of the tick -> time and sample.
-        carry: what goes from tick to tick.
-        ticks: how many; rounded down to whole records.
+        carry: what goes from tick to tick; the states (x, z) first.
+        dt: time between ticks, s.
+        ticks: how many; whole records.
         every: ticks per record.
     """
-    ticks -= ticks % every
 
     def block(carry, first):
         """Record, then run to the next record; the last block only records."""
-        until = jnp.minimum(first + every, ticks)
-        return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), look(carry, first)
+        t, until = instant(first, dt), jnp.minimum(first + every, ticks)
+        sample = drawn.look(t, *carry[0])
+        return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), (t, sample)
 
     return jax.lax.scan(block, carry, jnp.arange(0, ticks + 1, every))
 

@@ -84,13 +84,8 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
         carry = jax.lax.fori_loop(0, ticks, lambda k, c: tick(c, k), carry)
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
     else:
-
-        def look(carry, k):
-            t = instant(k, dt)
-            return t, drawn.look(t, *carry[0])
-
         ticks -= ticks % record_every
-        carry, (time, samples) = record(tick, look, carry, ticks, record_every)
+        carry, (time, samples) = record(drawn, tick, carry, dt, ticks, record_every)
     final, gathered, status, ended = carry
     return Outcome(time, samples, gathered, final, status, jnp.where(status == int(Status.OK), ticks * dt, ended))
 

@@ -23,7 +23,6 @@ def placed(text: Text, key: str, make: Callable[[], Any]) -> Any:
         return make()
     except BadInput as error:
         complaint = error.at(key)
-        complaint.name = " ".join(complaint.name.split())  # keys are the user's
         path = tuple(part.split("[")[0] for part in complaint.name.split("."))
         raise complaint.at(where=text.where(path)) from error.__cause__
 

@@ -1,6 +1,5 @@
 """`undertow reproduce`: every figure and table of the paper, and the audit of its claims."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -8,6 +7,7 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from undertow.scenario.execute import Executed
+from undertow.scenario.labelling import to_json
 from undertow.scenario.provenance import versions
 from undertow.studies.paper import claims, examples
 from undertow.studies.paper.experiments import run_all
@@ -51,17 +51,5 @@ def reproduce(folder: Path, quick: bool, progress: Progress) -> Reproduction:
         "ladder": examples.ladder(runs),
         "claims": claims.audit(runs),
     }
-    text = json.dumps(_finite(results), indent=1, allow_nan=False)
-    (folder / "results.json").write_text(text + "\n", encoding="utf-8")
+    (folder / "results.json").write_text(to_json(results, indent=1) + "\n", encoding="utf-8")
     return Reproduction(results, runs, thruster_response())
-
-
-def _finite(value: Any) -> Any:
-    """Same data with numbers that JSON cannot hold replaced by null."""
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(entry) for entry in value]
-    if isinstance(value, float) and not abs(value) < float("inf"):
-        return None
-    return value

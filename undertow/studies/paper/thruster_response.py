@@ -1,5 +1,6 @@
 """Fig. 2: what the paper's motor does with a slow and a fast voltage, and how well static laws describe it."""
 
+import functools
 from typing import NamedTuple
 
 import equinox as eqx
@@ -50,6 +51,7 @@ class ThrusterResponse(NamedTuple):
     laws: tuple[Law, Law, Law]
 
 
+@functools.cache  # a figure and a claim ask for the same
 def thruster_response(rung: str = "electromechanical") -> ThrusterResponse:
     """Drive the motor of Table 3 with the two voltages of Fig. 2 and fit the static laws. Eqs. (8)-(11).
 
