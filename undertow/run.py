@@ -125,7 +125,7 @@ def simulate(
         times = {"duration": _plain(duration), "dt": _plain(dt), "record": _plain(record)}
         settings = Loop.model_validate({"kind": loop, **times})
         start = Initial(position=_plain(position), velocity=_plain(velocity))
-        window = Window(start=settings.duration / 2, stop=settings.duration)
+        window = Window()
         check_times(nowhere, settings, window)
         check_fit(nowhere, closed_loop, start)
     except ValidationError as errors:
@@ -136,7 +136,7 @@ def simulate(
         raise BadInput(name, error.must, error.got, hint=error.hint) from error.__cause__
     outcome = execute.run_loop(closed_loop, settings, start, seed)
     attributes = {"title": "a closed loop run by undertow", "seed": seed}
-    return _run(outcome, *label(closed_loop, outcome, (window.start, window.stop), attributes))
+    return _run(outcome, *label(closed_loop, outcome, window.of_run(settings.duration), attributes))
 
 
 def simulate_scenario(scenario: str | Path | Mapping[str, Any]) -> Run:

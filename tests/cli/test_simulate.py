@@ -103,8 +103,15 @@ def test_overwrite(ran, undertow, tmp_path):
     assert (tmp_path / "runs/s/notes.txt").read_text() == "mine"
 
 
-def test_continuous_loop_and_short_run(undertow, tmp_path):
-    text = SCENARIO.replace("dt: 1e-3", "kind: continuous").replace("seed: 3", "")
+def test_steady_metrics_are_those_of_the_second_half(undertow, tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    assert undertow("simulate", "s.yaml", "--out", "out").code == 0
+    metrics = json.loads((tmp_path / "out/metrics.json").read_text())
+    assert 0 < metrics["steady"]["tracking_max"] < metrics["whole"]["tracking_max"]
+
+
+def test_continuous_loop_and_late_window(undertow, tmp_path):
+    text = SCENARIO.replace("dt: 1e-3", "kind: continuous").replace("seed: 3", "steady: {start: 10, stop: 20}")
     (tmp_path / "s.yaml").write_text(text)
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0

@@ -43,6 +43,9 @@ class PlainRAFC(AbstractContinuousController):
             weights=-(law.adaptation * s)[:, None] * xi,
         )
 
+    def project(self, z):
+        return z
+
 
 def trajectory(make, key):
     plant = double_integrator(3)

@@ -1,7 +1,8 @@
-"""I15: for constant d the composite function Vf of Eq. (46) never increases, and estimate and error converge.
+"""I15, I16: for constant d the composite function Vf of Eq. (46) never increases, and estimate and error converge.
 
-Classical RK4 with 0.1 ms on plant and law together; a batch of gains and disturbances per fuzzy layout. I16, the same
-under projection, waits for a projection. Negative control: for a d that moves, Vf does increase.
+Classical RK4 with 0.1 ms on plant and law together; a batch of gains and disturbances per fuzzy layout; without
+(I15) and with (I16) weights projected into a box that contains d. Negative controls: for a d that moves, Vf does
+increase; without the box, the estimate leaves it.
 """
 
 import equinox as eqx
@@ -17,6 +18,7 @@ from undertow.references.setpoint import setpoint
 STEP, START = 1e-4, 2.0
 CONSTANTS = np.array([0.0, 3.0, -20.0, 50.0, 0.5, -50.0])
 ROBUST = np.array([0.0, 10.0, 10.0, 0.0, 1.0, 10.0])  # w_bar; 0 leaves the switch out
+BOX = np.abs(CONSTANTS) + 0.5  # theta_max
 LAYOUTS = {
     "one set": {"sets": 1},
     "narrow sets": {"sets": 5, "reach": (0.1,)},
@@ -37,7 +39,7 @@ def lyapunov(law, truth, state, d):
 
 @eqx.filter_jit
 def watch(loop, ticks):
-    """Largest increase of Vf in one step over Vf(0); final e and d_til; each per axis."""
+    """Largest increase of Vf in one step over Vf(0); largest |d_hat|; final e and d_til; each per axis."""
     drawn = loop.draw(jax.random.PRNGKey(0))
 
     def flow(t, state):
@@ -50,39 +52,50 @@ def watch(loop, ticks):
         return lyapunov(loop.controller, loop.reference.at(t), state, drawn.load(t).acceleration)
 
     def tick(k, carry):
-        state, before, worst = carry
+        (x, z), before, worst, peak = carry
         t = k.astype(float) * STEP
-        state = rk4(flow, t, state, STEP)
+        peak = jnp.maximum(peak, jnp.abs(drawn.decide(t, x, z).telemetry.estimate))
+        x, z = rk4(flow, t, (x, z), STEP)
+        state = x, loop.controller.project(z)
         after = value(t + STEP, state)
-        return state, after, jnp.maximum(worst, after - before)
+        return state, after, jnp.maximum(worst, after - before), peak
 
     start = drawn.start()
     first = value(jnp.zeros(()), start)
-    (x, z), _, worst = jax.lax.fori_loop(0, ticks, tick, (start, first, jnp.full_like(first, -jnp.inf)))
+    nothing = jnp.full_like(first, -jnp.inf)
+    (x, z), _, worst, peak = jax.lax.fori_loop(0, ticks, tick, (start, first, nothing, nothing))
     end = jnp.asarray(ticks * STEP)
     sample = drawn.sample(end, x, drawn.decide(end, x, z))
-    return worst / first, sample.error, sample.estimate - sample.uncertainty
+    return worst / first, peak, sample.error, sample.estimate - sample.uncertainty
+
+
+def watched(rails, layout, **choices):
+    d = sinusoid(0.0, 1.0, offset=CONSTANTS)
+    loop = rails(len(CONSTANTS), goal=START, disturbance=d, robust_gain=ROBUST, **LAYOUTS[layout], **choices)
+    return map(np.asarray, watch(loop, jnp.asarray(100_000)))
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_never_increases_for_constant_disturbance(rails, layout):
-    loop = rails(
-        len(CONSTANTS),
-        goal=START,
-        disturbance=sinusoid(0.0, 1.0, offset=CONSTANTS),
-        robust_gain=ROBUST,
-        **LAYOUTS[layout],
-    )
-    worst, error, d_til = map(np.asarray, watch(loop, jnp.asarray(100_000)))
+    worst, peak, error, d_til = watched(rails, layout)
     assert (worst <= 1e-10).all(), worst
     assert (np.abs(error) <= 1.1 * START * np.exp(-10) * (1 + 10)).all(), error
     assert (np.abs(d_til) <= 1e-3).all(), d_til
+    assert (peak > BOX)[[0, 2, 4, 5]].all(), peak  # what the next test prevents
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_never_increases_under_projection(rails, layout):
+    worst, peak, error, _ = watched(rails, layout, weights_bound=BOX)
+    assert (worst <= 1e-10).all(), worst
+    assert (peak <= BOX * (1 + 1e-15)).all(), peak
+    assert (np.abs(error) <= 1.1 * START * np.exp(-10) * (1 + 10)).all(), error
 
 
 def test_increases_when_the_disturbance_moves(rails):
     """Negative control: the theorem needs a constant d, and the check sees it."""
     loop = rails(2, goal=0.0, disturbance=sinusoid(5.0, np.array([1.0, 20.0]), offset=1.0))
-    worst, _, _ = watch(loop, jnp.asarray(5_000))
+    worst, *_ = watch(loop, jnp.asarray(5_000))
     assert (np.asarray(worst) > 1e-6).all()
 
 

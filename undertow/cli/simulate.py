@@ -32,8 +32,7 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool) -> int:
         with stages("figures and files"):
             _write(executed, staging)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
-    window, duration = executed.built.scenario.steady, executed.built.scenario.loop.duration
-    console.print(metrics_table(executed.steady, executed.whole, (window.start, min(window.stop, duration))))
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window()))
     console.print(f"Status: {executed.status.word}. Results: {folder}", highlight=False, soft_wrap=True)
     codes = [_judge_ending(executed)] + ([_judge(repetition, console)] if repetition else [])
     return max(codes)

@@ -18,13 +18,14 @@ from undertow.fuzzy.tsk import FuzzySystem
 from undertow.identification.series_parallel import SeriesParallel
 from undertow.numerics.linear import matvec
 from undertow.numerics.lyapunov import companion_lyapunov
+from undertow.numerics.projection import projected_rate
 from undertow.numerics.smoothing import SWITCHES, switch
 
 PerAxis = Float[Array, " n"]
 
 FUZZY_INPUTS = ("error", "state")
 
-_PER_AXIS = ("adaptation", "composite", "robust_gain", "layer")
+_PER_AXIS = ("adaptation", "composite", "robust_gain", "layer", "weights_bound")
 _PER_AXIS_IDENTIFICATION = ("pole", "compensation_gain", "layer")
 
 
@@ -63,6 +64,9 @@ class RCAF(AbstractContinuousController):
     layer: Float[Array, "..."] = param(
         "unit of s", "boundary layer of the robust term", symbol="phi", default=0.5, source="Table 1"
     )
+    weights_bound: Float[Array, "..."] = param(
+        "m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=jnp.inf
+    )
     switching: str = eqx.field(static=True, default="tanh")
     fuzzy_input: str = eqx.field(static=True, default="error")
     method: str = eqx.field(static=True, default="euler")
@@ -72,6 +76,7 @@ class RCAF(AbstractContinuousController):
         for name in ("adaptation", "composite", "robust_gain"):
             checks.not_negative(name, getattr(self, name))
         checks.positive("layer", self.layer)
+        checks.positive("weights_bound", self.weights_bound, finite=False)
         checks.choice("switching", self.switching, SWITCHES)
         checks.choice("fuzzy_input", self.fuzzy_input, FUZZY_INPUTS)
         if self.fuzzy.inputs != 1 + FUZZY_INPUTS.index(self.fuzzy_input):
@@ -118,12 +123,20 @@ class RCAF(AbstractContinuousController):
         return RCAFState(
             predicted_position=z.predicted_velocity,
             predicted_velocity=self.identification.acceleration(eps, known, d_hat),
-            weights=theta_rate,
+            weights=projected_rate(z.weights, theta_rate, self._box()),
         )
+
+    def project(self, z: RCAFState) -> RCAFState:
+        """Weights back inside their box: |d_hat| stays below `weights_bound`, and no weight drifts away."""
+        return z._replace(weights=jnp.clip(z.weights, -self._box(), self._box()))
 
     def lyapunov(self) -> Float[Array, "*n 2 2"]:
         """P of Eq. (21)."""
         return companion_lyapunov(self.feedback, self.weight)
+
+    def _box(self) -> Float[Array, "..."]:
+        """theta_max, shaped to stand beside theta."""
+        return self.weights_bound[..., None]
 
     def _tracking(self, y: Measurement, r: Target) -> tuple[PerAxis, PerAxis, PerAxis]:
         """e, e_dot of Eq. (19) and the filtered error s = E^T P b."""

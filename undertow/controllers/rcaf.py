@@ -1,5 +1,7 @@
 """The paper's controller, ready to use: Table 1, its fuzzy sets, and what may be chosen differently."""
 
+import math
+
 from undertow.controllers.law import FUZZY_INPUTS, RCAF
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel
@@ -27,6 +29,7 @@ def rcaf(
     pole=150.0,
     compensation_gain=0.1,
     compensation_layer=0.5,
+    weights_bound=math.inf,
     switching: str = "tanh",
     fuzzy_input: str = "error",
     sets: int = 5,
@@ -49,6 +52,8 @@ def rcaf(
         pole: alpha_F of the identification model, 1/s.
         compensation_gain: omega_bar, m/s^2 and rad/s^2.
         compensation_layer: boundary layer of the compensation.
+        weights_bound: theta_max, m/s^2 and rad/s^2; weights are projected into +-theta_max, and with them the
+            estimate. The paper has none.
         switching: tanh (Remark 5) or sign (as in Eqs. (33), (43)).
         fuzzy_input: error (the modelling error) or state (position and velocity).
         sets: fuzzy sets per input; any number from 1.
@@ -81,6 +86,7 @@ def rcaf(
         composite=composite,
         robust_gain=robust_gain,
         layer=layer,
+        weights_bound=weights_bound,
         switching=switching,
         fuzzy_input=fuzzy_input,
         method=method,

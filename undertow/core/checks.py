@@ -9,14 +9,14 @@ from jax.core import Tracer
 from undertow.core.errors import BadInput
 
 
-def positive(name: str, value: Any, unit: str = "") -> None:
-    """Every entry finite and > 0."""
-    _each(name, value, lambda x: x > 0, "be positive", unit)
+def positive(name: str, value: Any, unit: str = "", finite: bool = True) -> None:
+    """Every entry > 0, and finite unless told otherwise."""
+    _each(name, value, lambda x: (x > 0) & (np.isfinite(x) | (not finite)), "be positive", unit)
 
 
 def not_negative(name: str, value: Any, unit: str = "") -> None:
     """Every entry finite and >= 0."""
-    _each(name, value, lambda x: x >= 0, "be zero or positive", unit)
+    _each(name, value, lambda x: (x >= 0) & np.isfinite(x), "be zero or positive", unit)
 
 
 def finite(name: str, value: Any, unit: str = "") -> None:
@@ -80,7 +80,7 @@ def _each(name: str, value: Any, good: Any, must: str, unit: str) -> None:
     if isinstance(value, Tracer):
         return
     array = np.asarray(value)
-    bad = ~(np.isfinite(array) & good(array))
+    bad = ~good(array)
     if bad.any():
         index = tuple(int(i) for i in np.argwhere(bad)[0])
         at = f"[{', '.join(map(str, index))}]" if index else ""

@@ -24,10 +24,15 @@ class AbstractContinuousController(AbstractController):
     def flow(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs) -> PyTree:
         """dz/dt."""
 
+    @abc.abstractmethod
+    def project(self, z: PyTree) -> PyTree:
+        """z moved back to where it must stay, after a step of finite length; z itself if it may be anywhere."""
+
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
         """State one sampling time later, y, r and u held."""
         step = METHODS[self.method]
         start = jnp.zeros(())
         for _ in range(self.substeps):
             z = step(lambda _, z: self.flow(z, y, r, u_applied), start, z, dt / self.substeps)
+            z = self.project(z)
         return z

@@ -1,6 +1,6 @@
 """The continuous loop: plant and law as one ODE, the paper's own setting."""
 
-from typing import Any
+from typing import Any, cast
 
 import equinox as eqx
 import jax
@@ -81,13 +81,13 @@ def check(loop: ClosedLoop) -> None:
 @eqx.filter_jit
 def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, int]) -> Outcome:
     ticks, every = plan
-    drawn = loop.draw(key)
+    drawn, controller = loop.draw(key), cast(AbstractContinuousController, loop.controller)
 
     def tick(carry, k):
         state, status, ended = carry
         t = instant(k, dt)
-        new = rk4_compact(lambda s, state: flow(s, state, drawn), t, state, dt)
-        return keep_sound(loop.plant, state, new, status, ended, t + dt)
+        x, z = rk4_compact(lambda s, state: flow(s, state, drawn), t, state, dt)
+        return keep_sound(loop.plant, state, (x, controller.project(z)), status, ended, t + dt)
 
     carry = (drawn.start(*start), jnp.asarray(int(Status.OK)), jnp.zeros(()))
     (final, status, ended), (time, samples) = record(drawn, tick, carry, dt, ticks, every)

@@ -21,9 +21,13 @@ class Built(NamedTuple):
 
     def advice(self) -> tuple[str, ...]:
         """What is odd about it, though it can be run."""
-        window, loop = self.scenario.steady, self.scenario.loop
-        late = f"the steady window starts at {window.start:g} s, the run ends at {loop.duration:g} s: no steady metrics"
-        return self.closed_loop.plant.advice() + ((late,) if window.start >= loop.duration else ())
+        (start, _), end = self.window(), self.scenario.loop.duration
+        late = f"the steady window starts at {start:g} s, the run ends at {end:g} s: no steady metrics"
+        return self.closed_loop.plant.advice() + ((late,) if start >= end else ())
+
+    def window(self) -> tuple[float, float]:
+        """Start and stop of the steady metrics, s."""
+        return self.scenario.steady.of_run(self.scenario.loop.duration)
 
 
 def build(source: Text | Mapping[str, Any]) -> Built:
@@ -39,7 +43,10 @@ def build(source: Text | Mapping[str, Any]) -> Built:
     scenario = validate(text)
     if scenario.precision == "float32":
         runtime.use_single_precision()
-    resolved = scenario.model_dump(include={"description", "loop", "initial", "steady", "seed", "precision"})
+    resolved = scenario.model_dump(include={"description", "loop", "initial", "seed", "precision"})
+
+    start, stop = scenario.steady.of_run(scenario.loop.duration)
+    resolved["steady"] = {"start": start, "stop": stop}
 
     def make(key: str, given: tuple = ()) -> Any:
         description = getattr(scenario, key).model_dump()

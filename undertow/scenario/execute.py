@@ -50,8 +50,7 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
         "scenario_hash": text_hash(text),
         "seed": scenario.seed,
     }
-    window = (scenario.steady.start, scenario.steady.stop)
-    return Executed(built, outcome, *label(built.closed_loop, outcome, window, attributes))
+    return Executed(built, outcome, *label(built.closed_loop, outcome, built.window(), attributes))
 
 
 def run_loop(loop: ClosedLoop, settings: Loop, start: Initial, seed: int) -> Outcome:

@@ -33,8 +33,9 @@ def check_times(text: Text, loop: Loop, window: Window) -> None:
     Raises:
         BadInput: they do not.
     """
-    if not window.start < window.stop:
-        must, got = f"be later than steady.start ({window.start:g} s)", f"{window.stop:g} s"
+    start, stop = window.of_run(loop.duration)
+    if not start < stop:
+        must, got = f"be later than steady.start ({start:g} s)", f"{stop:g} s"
         raise BadInput("steady.stop", must, got, where=text.where(("steady", "stop")))
     allowed = {"sampled": ("rk4", "euler"), "continuous": ("rk4", "adaptive")}[loop.kind]
     if loop.method not in allowed:

@@ -61,8 +61,13 @@ class Initial(_Strict):
 class Window(_Strict):
     """Part of the run that the metrics `steady` are taken over."""
 
-    start: float = Field(10.0, ge=0, description="s")
-    stop: float = Field(20.0, gt=0, description="s")
+    start: float | None = Field(default=None, ge=0, description="s; half of the duration unless given")
+    stop: float | None = Field(default=None, gt=0, description="s; the end unless given")
+
+    def of_run(self, duration: float) -> "tuple[float, float]":
+        """Start and stop, s."""
+        start = duration / 2 if self.start is None else self.start
+        return start, duration if self.stop is None else self.stop
 
 
 class Scenario(_Strict):
@@ -164,5 +169,6 @@ def _type_name(annotation: Any) -> str:
         str: "text",
         Numbers: "list of numbers",
         Numbers | None: "list of numbers",
+        float | None: "number",
     }
     return words.get(annotation, "mapping")

@@ -17,7 +17,7 @@ def judge(runs: Runs) -> Finding:
     """How far thrust is from the alpha V that G takes for granted, in Example 2."""
     run = runs["static_rcafc"]
     thruster = plant_of(run).thruster
-    late = run.dataset.sel(time=slice(run.built.scenario.steady.start, None))
+    late = run.dataset.sel(time=slice(run.built.window()[0], None))
     voltage = late["voltage"].values
     thrust = np.asarray(thruster.thrust(np.zeros(0), voltage))
     assumed = float(thruster.voltage_gain()) * voltage
