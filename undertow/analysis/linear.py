@@ -80,12 +80,12 @@ def poles(law: RCAF, axis: int = 0) -> np.ndarray:
 
 def estimation_response(law: RCAF, frequency: np.ndarray | float, axis: int = 0) -> np.ndarray:
     """d_til / d at angular frequencies in rad/s: complex, shaped like `frequency`. Section 3.4."""
-    return _response(law, frequency, axis)[..., 3]
+    return _response(system_matrix(law, axis), frequency)[..., 3]
 
 
 def tracking_response(law: RCAF, frequency: np.ndarray | float, axis: int = 0) -> np.ndarray:
     """e / d, m per m/s^2, at angular frequencies in rad/s: complex, shaped like `frequency`. Section 3.4."""
-    return _response(law, frequency, axis)[..., 0]
+    return _response(system_matrix(law, axis), frequency)[..., 0]
 
 
 def observer_frequency(law: RCAF, axis: int = 0) -> float:
@@ -104,9 +104,10 @@ def crossing_frequency(law: RCAF, axis: int = 0) -> float:
 
     Near sqrt(gamma gamma_eps rho / 2) when the composite branch dominates.
     """
+    matrix = system_matrix(law, axis)
 
     def worse(frequency: float) -> bool:
-        return bool(np.abs(estimation_response(law, frequency, axis)) > 1)
+        return bool(np.abs(_response(matrix, frequency)[3]) > 1)
 
     return first_crossing(worse, np.geomspace(1e-3, 1e5, 4001))
 
@@ -197,10 +198,11 @@ def _tick(g: Gains, dt: float, rule: str) -> np.ndarray:
     return np.stack([unit[0] + dt * unit[1] - dt**2 / 2 * push, rate, learned[0] - dt * push, learned[1]])
 
 
-def _response(law: RCAF, frequency, axis: int) -> np.ndarray:
+def _response(matrix: np.ndarray, frequency: np.ndarray | float) -> np.ndarray:
+    """(e, e_dot, eps, d_til) / d."""
     p = 1j * np.asarray(frequency, dtype=float)[..., None, None]
     drive = np.array([[0.0], [0.0], [0.0], [-1.0]])
-    return (p * np.linalg.solve(p * np.eye(4) - system_matrix(law, axis), drive + 0 * p))[..., 0]
+    return (p * np.linalg.solve(p * np.eye(4) - matrix, drive + 0 * p))[..., 0]
 
 
 def _of_axis(value, axis: int, rank: int) -> np.ndarray:
