@@ -4,7 +4,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from undertow.core.contracts import Load, Measurement, Target
+from undertow.core.contracts import Load, Measurement, Place, Target
+from undertow.numerics.rotations import rotation_from_euler
 
 NUMBERS = 64
 
@@ -52,7 +53,9 @@ def controllers(controller, v):
 
 def disturbances(disturbance, v):
     calm = Load(v[:6], v[6:12])
-    return disturbance.at(disturbance.draw(jax.random.PRNGKey(1)), 1.0 + v[12], calm)
+    angles = jnp.stack([v[13], v[14], 3 * v[15]])
+    place = Place(jnp.stack([v[16], v[17], 3 + v[18]]), rotation_from_euler(angles), v[19:22])
+    return disturbance.at(disturbance.draw(jax.random.PRNGKey(1)), 1.0 + v[12], place, calm)
 
 
 def references(reference, v):

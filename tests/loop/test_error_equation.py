@@ -29,14 +29,14 @@ def terms(drawn, t, position, velocity, estimates):
     x, z = drawn.start(position, velocity)
     z = z._replace(weights=jnp.broadcast_to(estimates[:, None], z.weights.shape))
     seen = drawn.decide(t, x, z)
-    moved = loop.plant.dynamics(t, x, seen.applied, drawn.load(t))
+    moved = loop.plant.dynamics(t, x, seen.applied, drawn.load(t, x))
     _, acceleration = jax.jvp(lambda x: loop.plant.output(t, x).velocity, (x,), (moved,))
     sample = drawn.sample(t, x, seen)
     left = seen.r.acceleration - acceleration
     feedback = law.feedback[0] * sample.error + law.feedback[1] * (seen.r.velocity - sample.velocity)
     wanted = -model.drift(seen.y) - sample.estimate + feedback + seen.r.acceleration + sample.robust
     sigma = wanted - model.gain(seen.y) @ seen.command
-    prescribed = drawn.load(t).acceleration
+    prescribed = drawn.load(t, x).acceleration
     right = -feedback + sample.estimate - prescribed - sample.robust
     return left, right, sigma, sample.uncertainty, prescribed
 

@@ -25,7 +25,7 @@ class Breaks(AbstractDisturbance):
     def draw(self, key):
         return ()
 
-    def at(self, path, t, calm):
+    def at(self, path, t, place, calm):
         return calm._replace(acceleration=calm.acceleration + jnp.where(t < BREAK, 0.5, self.value))
 
     def jumps(self, duration):

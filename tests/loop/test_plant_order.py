@@ -32,7 +32,7 @@ class Step(AbstractDisturbance):
     def draw(self, key):
         return ()
 
-    def at(self, path, t, calm):
+    def at(self, path, t, place, calm):
         on = (t >= self.start) & (t < self.end)
         return calm._replace(acceleration=calm.acceleration + jnp.where(on, self.size, 0.0))
 
@@ -64,6 +64,9 @@ class Pendulum(AbstractPlant):
 
     def output(self, t, x):
         return self.rail.output(t, x)
+
+    def place(self, x):
+        return None
 
     def admissible(self, u):
         return self.rail.admissible(u)

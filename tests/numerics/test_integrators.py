@@ -82,7 +82,7 @@ def test_suite_u1_keeps_rk4_at_fourth_order_across_all_of_its_jumps():
     calm = Load(jnp.zeros(6), jnp.zeros(6))
 
     def motion(t, x):
-        return plant.dynamics(t, x, jnp.zeros(6), suite.at((), t, calm))
+        return plant.dynamics(t, x, jnp.zeros(6), suite.at((), t, None, calm))
 
     start = plant.initial_state()
     truth = integrate(rk4, motion, start, 15.0, 48000)

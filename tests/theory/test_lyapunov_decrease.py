@@ -45,11 +45,11 @@ def watch(loop, ticks):
     def flow(t, state):
         x, z = state
         seen = drawn.decide(t, x, z)
-        moved = loop.plant.dynamics(t, x, seen.applied, drawn.load(t))
+        moved = loop.plant.dynamics(t, x, seen.applied, drawn.load(t, x))
         return moved, loop.controller.flow(z, seen.y, seen.r, seen.applied)
 
     def value(t, state):
-        return lyapunov(loop.controller, loop.reference.at(t), state, drawn.load(t).acceleration)
+        return lyapunov(loop.controller, loop.reference.at(t), state, drawn.load(t, state[0]).acceleration)
 
     def tick(k, carry):
         (x, z), before, worst, peak = carry

@@ -30,7 +30,7 @@ class Stairs(AbstractDisturbance):
     def draw(self, key):
         return ()
 
-    def at(self, path, t, calm):
+    def at(self, path, t, place, calm):
         index = jnp.floor((t - self.start) * 8).astype(int)
         value = jnp.where(index >= 0, self.values[jnp.clip(index, 0, self.values.size - 1)], 0.0)
         return calm._replace(acceleration=calm.acceleration + value)

@@ -105,7 +105,7 @@ def test_linear_model_is_the_jacobian_of_the_code():
     def flow(flat):
         x, z = restore(flat)
         seen = drawn.decide(jnp.zeros(()), x, z)
-        moved = plant.dynamics(jnp.zeros(()), x, seen.applied, drawn.load(jnp.zeros(())))
+        moved = plant.dynamics(jnp.zeros(()), x, seen.applied, drawn.load(jnp.zeros(()), x))
         return ravel_pytree((moved, law.flow(z, seen.y, seen.r, seen.applied)))[0]
 
     assert np.abs(flow(flat)).max() < 1e-9, "this is an equilibrium"

@@ -52,7 +52,7 @@ def test_jacobian_is_that_of_the_code(rails, rule):
     def tick(flat, step):
         x, z = restore(flat)
         seen = drawn.decide(zero, x, z)
-        moved = rk4(lambda t, x: loop.plant.dynamics(t, x, seen.applied, drawn.load(t)), zero, x, step)
+        moved = rk4(lambda t, x: loop.plant.dynamics(t, x, seen.applied, drawn.load(t, x)), zero, x, step)
         after = moved, loop.controller.advance(z, seen.y, seen.r, seen.applied, step)
         return ravel_pytree(after)[0]
 

@@ -33,11 +33,46 @@ class Target(NamedTuple):
     acceleration: Outputs
 
 
+class Place(NamedTuple):
+    """Where a body is and how it moves, for loads that depend on it. World axes north, east, down."""
+
+    position: Float[Array, "3"]  # m
+    rotation: Float[Array, "3 3"]  # body -> world
+    velocity: Float[Array, "3"]  # m/s
+
+
+class Water(NamedTuple):
+    """How the water moves where the body is, as if the body were not there. World axes."""
+
+    velocity: Float[Array, "3"]  # m/s
+    acceleration: Float[Array, "3"]  # m/s^2
+
+
+class Factors(NamedTuple):
+    """By how much the true body differs from the one the controller was told: factors, 1 for not at all."""
+
+    mass: Float[Array, ""]  # on M, and with it on C
+    damping: Float[Array, ""]  # on D
+    restoring: Float[Array, ""]  # on g
+    thrust: Float[Array, ""]  # on what every thruster gives
+
+
+class Payload(NamedTuple):
+    """A point mass carried along."""
+
+    mass: Float[Array, ""]  # kg
+    weight: Float[Array, ""]  # N, in water
+    point: Float[Array, "3"]  # m, body axes
+
+
 class Load(NamedTuple):
-    """What the surroundings do to a plant. Loads add."""
+    """What the surroundings do to a plant. Loads add; None stands for nothing and costs nothing."""
 
     acceleration: Outputs  # lumped, added to x_ddot; m/s^2, rad/s^2
     wrench: Outputs  # w_d of Eq. (2), on the left side: it opposes; N, N m (body axes for a vehicle)
+    water: Water | None = None
+    factors: Factors | None = None
+    payload: Payload | None = None
 
 
 class Effort(NamedTuple):
@@ -106,6 +141,10 @@ class AbstractPlant(eqx.Module):
         """x_ddot of the outputs, m/s^2 and rad/s^2."""
 
     @abc.abstractmethod
+    def place(self, x: PyTree) -> Place | None:
+        """Where the body is; None for plants that are not bodies in water."""
+
+    @abc.abstractmethod
     def admissible(self, u: Inputs) -> Inputs:
         """What reaches the actuators when u is commanded (limits)."""
 
@@ -157,8 +196,8 @@ class AbstractDisturbance(eqx.Module):
         """Path: everything random about one realisation."""
 
     @abc.abstractmethod
-    def at(self, path: PyTree, t: Time, calm: Load) -> Load:
-        """Load at time t, starting from that of calm surroundings."""
+    def at(self, path: PyTree, t: Time, place: Place | None, calm: Load) -> Load:
+        """`calm`, which is what the surroundings do without this disturbance, with it added, at time t."""
 
     @abc.abstractmethod
     def jumps(self, duration: float) -> tuple[float, ...]:

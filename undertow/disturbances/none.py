@@ -9,7 +9,7 @@ class NoDisturbance(AbstractDisturbance):
     def draw(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, calm: Load) -> Load:
+    def at(self, path, t, place, calm: Load) -> Load:
         return calm
 
     def jumps(self, duration: float) -> tuple[float, ...]:

@@ -18,7 +18,7 @@ class Sinusoid(AbstractDisturbance):
     def draw(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, calm: Load) -> Load:
+    def at(self, path, t, place, calm: Load) -> Load:
         signal = self.offset + self.amplitude * jnp.sin(self.frequency * t + self.phase)
         return calm._replace(acceleration=calm.acceleration + signal)
 

@@ -34,7 +34,7 @@ class Table(AbstractDisturbance):
     def draw(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, calm: Load) -> Load:
+    def at(self, path, t, place, calm: Load) -> Load:
         axes = calm.acceleration.shape[0]
         if self.samples.shape[1] != 1 + axes:
             raise BadInput("samples", f"have columns t, d1..d{axes}", f"a table of {self.samples.shape[1]} columns")

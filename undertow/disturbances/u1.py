@@ -21,7 +21,7 @@ class SuiteU1(AbstractDisturbance):
     def draw(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, calm: Load) -> Load:
+    def at(self, path, t, place, calm: Load) -> Load:
         if calm.acceleration.shape != (6,):
             raise BadInput("disturbance", "fit the plant", "u1, which has 6 axes", hint="Use kind: table")
         swell, fast, ripple, slow, square, pulse, chirp = jnp.sin(_RATES * t + _SWEEPS * t**2)

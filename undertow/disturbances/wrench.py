@@ -20,7 +20,7 @@ class ConstantWrench(AbstractDisturbance):
     def draw(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, calm: Load) -> Load:
+    def at(self, path, t, place, calm: Load) -> Load:
         if jnp.shape(self.value) != calm.wrench.shape:
             raise BadInput("value", f"have {calm.wrench.shape[0]} entries", f"of shape {jnp.shape(self.value)}")
         return calm._replace(wrench=calm.wrench + self.value)

@@ -91,9 +91,10 @@ class Drawn(NamedTuple):
         y = self.loop.sensor.measure(self.sensor_path, zero, truth)
         return x, self.loop.controller.init(y, self.loop.reference.at(zero))
 
-    def load(self, t: Time) -> Load:
-        """What the surroundings do at time t."""
-        return self.loop.disturbance.at(self.disturbance_path, t, self.loop.plant.no_load())
+    def load(self, t: Time, x: PyTree) -> Load:
+        """What the surroundings do to the plant at time t."""
+        plant = self.loop.plant
+        return self.loop.disturbance.at(self.disturbance_path, t, plant.place(x), plant.no_load())
 
     def decide(self, t: Time, x: PyTree, z: PyTree) -> Decision:
         """Measure, compare, command, limit."""
@@ -115,7 +116,7 @@ class Drawn(NamedTuple):
             velocity=truth.velocity,
             target=r.position,
             error=model.difference(r.position, truth.position),
-            uncertainty=plant.acceleration(t, x, applied, self.load(t)) - known,
+            uncertainty=plant.acceleration(t, x, applied, self.load(t, x)) - known,
             estimate=telemetry.estimate,
             robust=telemetry.robust,
             modelling_error=telemetry.modelling_error,

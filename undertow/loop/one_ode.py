@@ -15,5 +15,5 @@ def flow(t: Float[Array, ""], state: tuple[PyTree, PyTree], drawn: Drawn) -> tup
     x, z = state
     controller = cast(AbstractContinuousController, drawn.loop.controller)
     decision = drawn.decide(t, x, z)
-    x_rate = drawn.loop.plant.dynamics(t, x, decision.applied, drawn.load(t))
+    x_rate = drawn.loop.plant.dynamics(t, x, decision.applied, drawn.load(t, x))
     return x_rate, controller.flow(z, decision.y, decision.r, decision.applied)

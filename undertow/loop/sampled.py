@@ -107,4 +107,4 @@ def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
 
 
 def _motion(drawn: Drawn, applied, t, x):
-    return drawn.loop.plant.dynamics(t, x, applied, drawn.load(t))
+    return drawn.loop.plant.dynamics(t, x, applied, drawn.load(t, x))

@@ -56,6 +56,9 @@ class DoubleIntegrator(AbstractPlant):
     def acceleration(self, t, x: AxisState, u, d: Load):
         return u + d.acceleration - d.wrench
 
+    def place(self, x: AxisState) -> None:
+        return None
+
     def admissible(self, u):
         return jnp.clip(u, -self.limit, self.limit)
 

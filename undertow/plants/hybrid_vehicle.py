@@ -9,7 +9,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement
+from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Place
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import (
@@ -21,7 +21,9 @@ from undertow.numerics.rotations import (
 )
 from undertow.plants.hybrid_model import HybridModel
 from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.alteration import altered
 from undertow.vehicles.body import Body
+from undertow.vehicles.moving_water import seen_from_water
 from undertow.vehicles.vehicle import Vehicle
 
 _ENVELOPE = 1e3  # m, m/s, rad/s; far beyond any vehicle
@@ -94,13 +96,21 @@ class HybridVehicle(AbstractPlant):
 
     def _body_acceleration(self, kinematics: Kinematics, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
         """nu_dot of Eq. (2): thrust (6), the body's own motion, and the loads."""
+        body = altered(self.body, d.factors, d.payload)
         thrust = self.thruster.thrust(x.thrusters, u)
+        if d.factors is not None:
+            thrust = d.factors.thrust * thrust
         wrench = matvec(self.thruster_matrix, thrust) - d.wrench
         prescribed = d.acceleration
         if self.thruster.has_prescribed_acceleration:
             prescribed = prescribed - kinematics.rate_term(x.nu)
-        own = self.body.free_acceleration(x.nu, kinematics.rotation[2])
-        return own + self.body.accelerate(wrench) + kinematics.to_body(prescribed)
+        seen = seen_from_water(d.water, kinematics.rotation, x.nu, body.gravity)
+        own = body.free_acceleration(seen.nu, seen.down) + seen.rate
+        return own + body.accelerate(wrench) + kinematics.to_body(prescribed)
+
+    def place(self, x: VehicleState) -> Place:
+        rotation = rotation_from_quaternion(x.attitude)
+        return Place(x.position, rotation, matvec(rotation, x.nu[:3]))
 
     def admissible(self, u):
         return jnp.clip(u, -self.thruster.supply, self.thruster.supply)

@@ -73,12 +73,11 @@ def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
         must, got = f"have {axes} entries, one per output of the plant", f"of shape {target.position.shape}"
         raise BadInput("reference.position", must, got, where=text.where(("reference", "position")))
     drawn = _traced(text, "disturbance", loop.draw, jax.random.PRNGKey(0))
-    load = _traced(text, "disturbance", lambda drawn: drawn.load(zero), drawn)
-    if any(signal.shape != (axes,) for signal in load):
-        got = f"of shapes {[signal.shape for signal in load]}"
-        raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
-
     x, z = _traced(text, "sensor", lambda drawn: drawn.start(), drawn)
+    load = _traced(text, "disturbance", lambda drawn, x: drawn.load(zero, x), drawn, x)
+    if any(signal.shape != (axes,) for signal in load[:2]):
+        got = f"of shapes {[signal.shape for signal in load[:2]]}"
+        raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
     _traced(text, "controller", lambda drawn, x, z: drawn.decide(zero, x, z), drawn, x, z)
 
 

@@ -27,6 +27,7 @@ class Body(eqx.Module):
     buoyancy: Float[Array, ""] = param("N", "buoyancy", symbol="B")
     r_g: Vector3 = param("m", "centre of gravity", symbol="r_g")
     r_b: Vector3 = param("m", "centre of buoyancy", symbol="r_b")
+    gravity: Float[Array, ""] = param("m/s^2", "gravity, weight per dry mass", symbol="g", default=9.81)
 
     def coriolis(self, nu: Vector6) -> Vector6:
         """C(nu) nu, N and N m; does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, multiplied out."""
@@ -42,7 +43,7 @@ class Body(eqx.Module):
         """g, N and N m, on the left side of Eq. (2).
 
         Args:
-            down: the world's down axis seen from the body: third row of R.
+            down: direction of gravity seen from the body: third row of R in water that does not accelerate.
         """
         force = (self.weight - self.buoyancy) * down
         moment = cross(self.weight * self.r_g - self.buoyancy * self.r_b, down)

@@ -41,8 +41,8 @@ class Vehicle(eqx.Module):
             checks.length(name, getattr(self, name), 3, "forward, starboard, down")
             checks.finite(name, getattr(self, name), "m")
         checks.positive("mass", self.mass, "kg")
-        checks.not_negative("weight", self.weight, "N")
-        checks.not_negative("buoyancy", self.buoyancy, "N")
+        checks.positive("weight", self.weight, "N")
+        checks.positive("buoyancy", self.buoyancy, "N")
         self._check_thrusters()
         for name, size in (("inertia", 3), ("added_mass", 6), ("linear_damping", 6), ("quadratic_damping", 6)):
             shape = jnp.shape(getattr(self, name))
@@ -89,6 +89,7 @@ class Vehicle(eqx.Module):
             buoyancy=self.buoyancy,
             r_g=self.r_g,
             r_b=self.r_b,
+            gravity=self.weight / self.mass,
         )
 
     def with_thrusters(self, numbers) -> "Vehicle":

@@ -1,0 +1,65 @@
+"""A body that is not what the controller was told: coefficients off by factors, or a load carried along."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import Factors, Payload
+from undertow.vehicles.body import Body, rigid_body_mass
+
+
+def altered(body: Body, factors: Factors | None, payload: Payload | None) -> Body:
+    """The body with its coefficients scaled, and then with a payload attached; None leaves it as it is."""
+    if factors is not None:
+        body = _scaled(body, factors)
+    return body if payload is None else _carrying(body, payload)
+
+
+def point_inertia(mass: Float[Array, ""], point: Float[Array, "3"]) -> Float[Array, "3 3"]:
+    """Inertia (kg m^2) about the origin of a point mass (kg) at a point (m)."""
+    return mass * ((point @ point) * jnp.eye(3) - jnp.outer(point, point))
+
+
+def _scaled(body: Body, factors: Factors) -> Body:
+    return eqx.tree_at(
+        lambda b: (
+            b.mass_matrix,
+            b.inverse_mass_matrix,
+            b.linear_damping,
+            b.quadratic_damping,
+            b.weight,
+            b.buoyancy,
+            b.gravity,
+        ),
+        body,
+        (
+            factors.mass * body.mass_matrix,
+            body.inverse_mass_matrix / factors.mass,
+            factors.damping * body.linear_damping,
+            factors.damping * body.quadratic_damping,
+            factors.restoring * body.weight,
+            factors.restoring * body.buoyancy,
+            factors.restoring * body.gravity,  # mass = weight / gravity stays
+        ),
+    )
+
+
+def _carrying(body: Body, payload: Payload) -> Body:
+    mass_matrix = body.mass_matrix + rigid_body_mass(
+        payload.mass, payload.point, point_inertia(payload.mass, payload.point)
+    )
+    in_air = payload.mass * body.gravity
+    lift = in_air - payload.weight
+    weight, buoyancy = body.weight + in_air, body.buoyancy + lift
+    return eqx.tree_at(
+        lambda b: (b.mass_matrix, b.inverse_mass_matrix, b.weight, b.buoyancy, b.r_g, b.r_b),
+        body,
+        (
+            mass_matrix,
+            jnp.linalg.inv(mass_matrix),
+            weight,
+            buoyancy,
+            (body.weight * body.r_g + in_air * payload.point) / weight,
+            (body.buoyancy * body.r_b + lift * payload.point) / buoyancy,
+        ),
+    )
