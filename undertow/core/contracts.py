@@ -66,13 +66,13 @@ class Payload(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What the surroundings do to a plant. Loads add; None stands for nothing and costs nothing."""
+    """What the surroundings do to a plant. Loads add; None and () stand for nothing and cost nothing."""
 
     acceleration: Outputs  # lumped, added to x_ddot; m/s^2, rad/s^2
     wrench: Outputs  # w_d of Eq. (2), on the left side: it opposes; N, N m (body axes for a vehicle)
     water: Water | None = None
     factors: Factors | None = None
-    payload: Payload | None = None
+    payloads: tuple[Payload, ...] = ()
 
 
 class Effort(NamedTuple):

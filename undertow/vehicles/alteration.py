@@ -1,5 +1,7 @@
 """A body that is not what the controller was told: coefficients off by factors, or a load carried along."""
 
+import functools
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -8,11 +10,11 @@ from undertow.core.contracts import Factors, Payload
 from undertow.vehicles.body import Body, rigid_body_mass
 
 
-def altered(body: Body, factors: Factors | None, payload: Payload | None) -> Body:
-    """The body with its coefficients scaled, and then with a payload attached; None leaves it as it is."""
+def altered(body: Body, factors: Factors | None, payloads: tuple[Payload, ...]) -> Body:
+    """The body with its coefficients scaled, and then with payloads attached; None and () leave it as it is."""
     if factors is not None:
         body = _scaled(body, factors)
-    return body if payload is None else _carrying(body, payload)
+    return functools.reduce(_carrying, payloads, body)
 
 
 def point_inertia(mass: Float[Array, ""], point: Float[Array, "3"]) -> Float[Array, "3 3"]:

@@ -1,0 +1,60 @@
+"""A vehicle that is not quite what its data sheet says."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractDisturbance, Factors, Load
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.disturbances.adding import with_factors
+
+_RANGES = ("mass", "damping", "restoring", "thrust")
+
+
+class ParameterError(AbstractDisturbance):
+    """Factors on M, D, g and thrust of the true vehicle, each drawn uniformly from a range; the model keeps 1.
+
+    Raises:
+        BadInput: a range that is not low <= high, or a mass not positive.
+    """
+
+    mass: Float[Array, "2"] = param("", "range of the factor on M and C")
+    damping: Float[Array, "2"] = param("", "range of the factor on D")
+    restoring: Float[Array, "2"] = param("", "range of the factor on g")
+    thrust: Float[Array, "2"] = param("", "range of the factor on thrust")
+
+    def __check_init__(self):
+        for name in _RANGES:
+            span = getattr(self, name)
+            checks.length(name, span, 2, "lowest, highest")
+            checks.not_negative(name, span)
+            if not isinstance(span, Tracer) and np.asarray(span)[0] > np.asarray(span)[1]:
+                raise BadInput(name, "be (lowest, highest)", np.asarray(span).tolist())
+        checks.positive("mass", self.mass)
+
+    def draw(self, key) -> Factors:
+        shares = jax.random.uniform(key, (4,), dtype=self.mass.dtype)
+        low, high = jnp.stack([getattr(self, name) for name in _RANGES]).T
+        return Factors(*(low + shares * (high - low)))
+
+    def at(self, path: Factors, t, place, calm: Load) -> Load:
+        return with_factors(calm, place, path)
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return ()
+
+
+def parameter_error(mass=(0.9, 1.1), damping=(0.7, 1.3), restoring=(0.9, 1.1), thrust=(0.9, 1.1)) -> ParameterError:
+    """True vehicle that differs from the one the controller was told; another one for every seed.
+
+    Args:
+        mass: lowest and highest factor on M (and C); equal for a fixed error.
+        damping: likewise on D.
+        restoring: likewise on g.
+        thrust: likewise on what every thruster gives.
+    """
+    return ParameterError(mass, damping, restoring, thrust)

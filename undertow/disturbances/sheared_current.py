@@ -1,0 +1,59 @@
+"""A steady current that changes with depth."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.disturbances.adding import body_of, with_water
+
+
+class ShearedCurrent(AbstractDisturbance):
+    """Horizontal velocities at some depths, linear in between, held above and below.
+
+    The water is taken as uniform over the vehicle, with the velocity at its origin.
+
+    Raises:
+        BadInput: depths that do not increase, or velocities that do not belong to them.
+    """
+
+    depths: Float[Array, " k"] = param("m", "depths, increasing")
+    velocities: Float[Array, "k 2"] = param("m/s", "velocity there: north, east")
+
+    def __check_init__(self):
+        shape = jnp.shape(self.depths)
+        if len(shape) != 1 or shape[0] < 2:
+            raise BadInput("depths", "be a list of two or more depths", f"of shape {shape}")
+        if jnp.shape(self.velocities) != (shape[0], 2):
+            got = f"of shape {jnp.shape(self.velocities)}"
+            raise BadInput("velocities", f"have {shape[0]} rows (north, east), one per depth", got)
+        checks.finite("depths", self.depths, "m")
+        checks.finite("velocities", self.velocities, "m/s")
+        if not isinstance(self.depths, Tracer) and not (np.diff(np.asarray(self.depths)) > 0).all():
+            raise BadInput("depths", "increase", np.asarray(self.depths).tolist())
+
+    def draw(self, key) -> tuple[()]:
+        return ()
+
+    def at(self, path, t, place, calm: Load) -> Load:
+        down = body_of(place).position[2]
+        north, east = jax.vmap(jnp.interp, in_axes=(None, None, 1))(down, self.depths, self.velocities)
+        return with_water(calm, place, jnp.stack([north, east, jnp.zeros_like(north)]), jnp.zeros(3))
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return ()
+
+
+def sheared_current(depths=(0.0, 20.0), velocities=((0.8, 0.0), (0.1, 0.0))) -> ShearedCurrent:
+    """Current that changes with depth.
+
+    Args:
+        depths: m below the origin, increasing.
+        velocities: m/s, one pair (north, east) per depth.
+    """
+    return ShearedCurrent(depths, velocities)

@@ -1,0 +1,98 @@
+"""Waves: what a JONSWAP sea does to the water at depth."""
+
+import math
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.disturbances.adding import body_of, with_water
+from undertow.disturbances.jonswap import frequencies_of_shares
+
+_GRAVITY = 9.81  # m/s^2
+
+
+class Sea(NamedTuple):
+    """One realisation: long-crested waves of equal amplitude."""
+
+    frequency: Float[Array, " k"]  # rad/s
+    phase: Float[Array, " k"]  # rad
+    heading: Float[Array, " k"]  # where each runs to, rad from north
+
+
+class Waves(AbstractDisturbance):
+    """Linear (Airy) waves in deep water, as a sum of components that carry equal shares of the energy.
+
+    Orbital velocity and acceleration decay as e^(-k depth). The water is taken as uniform over the vehicle, which
+    holds for waves much longer than it is.
+
+    Raises:
+        BadInput: height or period not positive, peakedness below 1, spreading negative.
+    """
+
+    height: Float[Array, ""] = param("m", "significant wave height", symbol="H_s")
+    period: Float[Array, ""] = param("s", "peak period", symbol="T_p")
+    heading: Float[Array, ""] = param("rad", "where the waves run to, from north")
+    spreading: Float[Array, ""] = param("rad", "standard deviation of the heading")
+    peakedness: Float[Array, ""] = param("", "peak enhancement", symbol="gamma")
+    depth: Float[Array, ""] = param("m", "depth of the world's origin")
+    components: int = eqx.field(static=True, default=32)
+
+    def __check_init__(self):
+        for name, unit in (("height", "m"), ("period", "s")):
+            checks.positive(name, getattr(self, name), unit)
+        checks.finite("heading", self.heading, "rad")
+        checks.finite("depth", self.depth, "m")
+        checks.not_negative("spreading", self.spreading, "rad")
+        checks.positive("peakedness", self.peakedness)
+
+    def draw(self, key) -> Sea:
+        """Frequencies anywhere in their share of the energy, phases anywhere, headings about the mean one."""
+        shares, phases, headings = jax.random.split(key, 3)
+        kind = self.height.dtype
+        uniform = jax.random.uniform(shares, (self.components,), dtype=kind)
+        share = (jnp.arange(self.components, dtype=kind) + uniform) / self.components
+        return Sea(
+            frequency=frequencies_of_shares(share, self.period, self.peakedness),
+            phase=jax.random.uniform(phases, (self.components,), dtype=kind, maxval=2 * jnp.pi),
+            heading=self.heading + self.spreading * jax.random.normal(headings, (self.components,), dtype=kind),
+        )
+
+    def at(self, path: Sea, t, place, calm: Load) -> Load:
+        north, east, down = body_of(place).position
+        amplitude = self.height / 4 * math.sqrt(2 / self.components)  # m; sum of a^2 / 2 = (H_s / 4)^2
+        number = path.frequency**2 / _GRAVITY  # 1/m, deep water
+        cosine, sine = jnp.cos(path.heading), jnp.sin(path.heading)
+        angle = number * (north * cosine + east * sine) - path.frequency * t + path.phase
+        speed = amplitude * path.frequency * jnp.exp(-number * jnp.maximum(self.depth + down, 0.0))
+        along, up = speed * jnp.cos(angle), speed * jnp.sin(angle)
+        velocity = jnp.stack([(along * cosine).sum(), (along * sine).sum(), -up.sum()])
+        gain_along, gain_up = path.frequency * up, -path.frequency * along
+        acceleration = jnp.stack([(gain_along * cosine).sum(), (gain_along * sine).sum(), -gain_up.sum()])
+        return with_water(calm, place, velocity, acceleration)
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return ()
+
+
+def waves(height=0.5, period=5.0, heading=0.0, spreading=0.0, peakedness=3.3, depth=3.0, components: int = 32) -> Waves:
+    """Sea state by its JONSWAP spectrum (Hasselmann et al. 1973); another realisation for every seed.
+
+    Args:
+        height: significant wave height, m.
+        period: peak period, s.
+        heading: where the waves run to, rad from north.
+        spreading: standard deviation of the heading, rad.
+        peakedness: 3.3 for a young sea, 1 for a fully developed one (Pierson-Moskowitz).
+        depth: of the world's origin below the surface, m.
+        components: number of waves, 1 to 100.
+    """
+    if components < 1:
+        raise BadInput("components", "be 1 or more", components)
+    return Waves(height, period, heading, spreading, peakedness, depth, components)
