@@ -23,6 +23,7 @@ def required(argument):
         "model": lambda: hybrid_vehicle(odin(), thruster).model(),
         "position": lambda: np.linspace(-0.5, 0.5, 6),
         "samples": lambda: rows,
+        "points": lambda: rows[:, 1:4],
     }[argument]()
 
 

@@ -96,7 +96,7 @@ class HybridVehicle(AbstractPlant):
 
     def _body_acceleration(self, kinematics: Kinematics, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
         """nu_dot of Eq. (2): thrust (6), the body's own motion, and the loads."""
-        body = altered(self.body, d.factors, d.payload)
+        body = altered(self.body, d.factors, d.payloads)
         thrust = self.thruster.thrust(x.thrusters, u)
         if d.factors is not None:
             thrust = d.factors.thrust * thrust

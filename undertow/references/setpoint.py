@@ -1,34 +1,77 @@
-"""A fixed goal."""
+"""A fixed goal, at once or reached smoothly."""
 
+import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
+from undertow.core.errors import BadInput
 from undertow.core.param import param
+from undertow.numerics.motion_laws import quintic, with_rates
+
+
+class Transition(eqx.Module):
+    """The way to a goal: a straight line in all outputs, along the quintic at rest at both ends.
+
+    Raises:
+        BadInput: not finite, or a negative settling time.
+    """
+
+    settling: Float[Array, ""] = param("s", "time of the transition; 0 for a step")
+    start: Float[Array, " n"] = param("m, rad", "position at t = 0")
+
+    def __check_init__(self):
+        checks.not_negative("settling", self.settling, "s")
+        checks.finite("start", self.start)
+
+    def to(self, goal, t) -> Target:
+        """Target at time t on the way to a goal."""
+        smooth = self.settling > 0
+        duration = jnp.where(smooth, self.settling, 1.0)
+        share, rate, second = with_rates(lambda t: jnp.where(smooth, quintic(t / duration), 1.0), t)
+        change = goal - self.start
+        return Target((1 - share) * self.start + share * goal, change * rate, change * second)
 
 
 class Setpoint(AbstractReference):
-    """The same position for ever, at rest.
+    """The same position for ever, at rest; or from the end of a transition on.
 
     Raises:
-        BadInput: not finite.
+        BadInput: not finite, or a transition with another number of outputs.
     """
 
     position: Float[Array, " n"] = param("m, rad", "wanted position", symbol="x_d")
+    transition: Transition | None = None
 
     def __check_init__(self):
         checks.finite("position", self.position)
+        if self.transition is not None and self.transition.start.shape != self.position.shape:
+            must = f"have shape {self.position.shape}, as `position` has"
+            raise BadInput("start", must, f"of shape {self.transition.start.shape}")
 
     def at(self, t) -> Target:
+        if self.transition is not None:
+            return self.transition.to(self.position, t)
         zero = jnp.zeros_like(self.position)
         return Target(self.position, zero, zero)
 
 
-def setpoint(position) -> Setpoint:
+def setpoint(position, settling: float = 0.0, start=None) -> Setpoint:
     """Go to a position and stay.
+
+    A step asks for more than the motors have, so they saturate. A transition that takes its time does not, and its
+    velocity and acceleration are known to the law beforehand.
 
     Args:
         position: one entry per output, m and rad.
+        settling: time of the transition from `start`, s; 0 for a step. Its largest velocity is 1.875 times
+            distance / settling, its largest acceleration 5.77 times distance / settling^2.
+        start: position at t = 0, one entry per output, m and rad; None for zero. A step has no use for it.
     """
-    return Setpoint(position)
+    # Without a transition compiled loops know that the goal never moves.
+    if not isinstance(settling, Tracer) and settling == 0:
+        return Setpoint(position)
+    return Setpoint(position, Transition(settling, jnp.zeros(np.shape(position)) if start is None else start))
