@@ -1,7 +1,7 @@
 """One closed loop from Python: what `undertow simulate` does, one level down."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,6 +19,7 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
+from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
@@ -80,7 +81,7 @@ def simulate(
     controller: AbstractController,
     reference: AbstractReference,
     *,
-    disturbance: AbstractDisturbance | None = None,
+    disturbance: AbstractDisturbance | Sequence[AbstractDisturbance] | None = None,
     sensor: AbstractSensor | None = None,
     duration: float = 20.0,
     loop: Literal["sampled", "continuous"] = "sampled",
@@ -96,7 +97,7 @@ def simulate(
         plant: what is controlled.
         controller: the law, made from `plant.model()`.
         reference: what to follow.
-        disturbance: what the surroundings do; None for nothing.
+        disturbance: what the surroundings do; several as a list, None for nothing.
         sensor: what stands before the measurement; None for the truth.
         duration: s. The steady metrics are taken over its second half.
         loop: `sampled` (input held over each dt) or `continuous` (one ODE, the paper's setting).
@@ -109,6 +110,8 @@ def simulate(
     Raises:
         BadInput: something given cannot be used, or does not fit the rest.
     """
+    if isinstance(disturbance, list | tuple):
+        disturbance = Together(tuple(disturbance))
     roles = {
         "plant": (plant, AbstractPlant),
         "controller": (controller, AbstractController),

@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from undertow.core import runtime
+from undertow.core.contracts import AbstractDisturbance
+from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario import parts
 from undertow.scenario.fitting import check_fit, check_times, placed
 from undertow.scenario.reading import Text, from_data
-from undertow.scenario.schema import Scenario, validate
+from undertow.scenario.schema import Part, Scenario, validate
 
 
 class Built(NamedTuple):
@@ -49,15 +51,23 @@ def build(source: Text | Mapping[str, Any]) -> Built:
     resolved["steady"] = {"start": start, "stop": stop}
 
     def make(key: str, given: tuple = ()) -> Any:
-        description = getattr(scenario, key).model_dump()
-        kind = f"{key}s"
-        part, resolved[key] = placed(text, key, lambda: parts.make(kind, description, text.folder, given))
+        part, resolved[key] = one(key, key, getattr(scenario, key), given)
         return part
+
+    def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
+        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given))
+
+    def disturbance() -> AbstractDisturbance:
+        if isinstance(scenario.disturbance, Part):
+            return make("disturbance")
+        pairs = [one("disturbance", f"disturbance[{i}]", part) for i, part in enumerate(scenario.disturbance)]
+        resolved["disturbance"] = [description for _, description in pairs]
+        return Together(tuple(member for member, _ in pairs))
 
     plant = make("plant")
     model, resolved["model"] = placed(text, "model", lambda: parts.call(plant.model, scenario.model))
     controller = make("controller", (model,))
-    loop = ClosedLoop(plant, controller, make("reference"), make("disturbance"), make("sensor"))
+    loop = ClosedLoop(plant, controller, make("reference"), disturbance(), make("sensor"))
     if scenario.loop.kind == "continuous":
         placed(text, "loop", lambda: continuous.check(loop))
     check_times(text, scenario.loop, scenario.steady)

@@ -1,5 +1,6 @@
 """Whether times and parts fit together: shapes only, nothing is computed."""
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -23,7 +24,7 @@ def placed(text: Text, key: str, make: Callable[[], Any]) -> Any:
         return make()
     except BadInput as error:
         complaint = error.at(key)
-        path = tuple(part.split("[")[0] for part in complaint.name.split("."))
+        path = tuple(int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", complaint.name))
         raise complaint.at(where=text.where(path)) from error.__cause__
 
 

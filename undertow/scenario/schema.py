@@ -4,7 +4,7 @@ import typing
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario.reading import Text
@@ -29,6 +29,12 @@ class Part(BaseModel):
 
 
 NamedPart = Annotated[Part, _named()]
+# Tags tell pydantic which of the two is meant, so that it complains about that one only.
+_ONE, _SEVERAL = "(one part)", "(several parts)"
+OneOrMore = Annotated[
+    Annotated[NamedPart, Tag(_ONE)] | Annotated[list[NamedPart], Tag(_SEVERAL)],
+    Discriminator(lambda given: _SEVERAL if isinstance(given, list) else _ONE),
+]
 Numbers = list[float]
 
 
@@ -80,7 +86,9 @@ class Scenario(_Strict):
     model: dict[str, Any] = Field(default_factory=dict, description="what the controller may know of the plant")
     controller: Annotated[Part, _named("rcaf")] = Field(Part(kind="rcaf"), description="the law")
     reference: NamedPart = Field(description="what to follow")
-    disturbance: NamedPart = Field(Part(kind="none"), description="what the surroundings do")
+    disturbance: OneOrMore = Field(
+        Part(kind="none"), description="what the surroundings do; several as a list"
+    )
     sensor: NamedPart = Field(Part(kind="perfect"), description="what stands before the measurement")
     loop: Loop = Field(default_factory=Loop, description="how it is run")
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")
@@ -104,7 +112,7 @@ def validate(text: Text) -> Scenario:
 def complaint(errors: ValidationError, text: Text) -> BadInput:
     """The first of pydantic's errors in the house grammar; a misspelt key before the key that it leaves missing."""
     error: Any = min(errors.errors(), key=lambda each: each["type"] != "extra_forbidden")
-    path = tuple(error["loc"])
+    path = tuple(step for step in error["loc"] if step not in (_ONE, _SEVERAL))
     name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).lstrip(".")
     name = " ".join(name.split())
     where = text.where(path)
@@ -170,5 +178,6 @@ def _type_name(annotation: Any) -> str:
         Numbers: "list of numbers",
         Numbers | None: "list of numbers",
         float | None: "number",
+        typing.get_args(OneOrMore)[0]: "part or list of parts",
     }
     return words.get(annotation, "mapping")

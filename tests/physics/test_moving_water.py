@@ -1,0 +1,163 @@
+"""Currents and waves: Galileo's and Einstein's principles, the sea's statistics, orbital decay."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.core.contracts import Place, Water
+from undertow.core.errors import BadInput
+from undertow.disturbances.adding import Together
+from undertow.disturbances.current import current
+from undertow.disturbances.gauss_markov_current import gauss_markov_current
+from undertow.disturbances.jonswap import spectrum
+from undertow.disturbances.sheared_current import sheared_current
+from undertow.disturbances.waves import waves
+from undertow.numerics.integrators import rk4
+from undertow.numerics.rotations import rotation_from_euler
+from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.thrusters.paper_table3 import paper_table3
+from undertow.vehicles.odin import odin
+
+PLANT = hybrid_vehicle(odin(), paper_table3("shaft"))
+CALM = PLANT.no_load()
+POSE = jnp.array([1.0, -2.0, 3.0, 0.3, -0.5, 2.0])
+RATES = jnp.array([0.4, -0.2, 0.1, 0.05, 0.1, -0.2])
+VOLTS = jnp.linspace(-6.0, 8.0, 8)
+STEP, TICKS = 2e-3, 2500
+
+
+def at(position):
+    return Place(jnp.asarray(position), rotation_from_euler(POSE[3:]), jnp.zeros(3))
+
+
+def fly(disturbance, velocity):
+    """Outputs after five seconds."""
+    path = disturbance.draw(jax.random.PRNGKey(0))
+
+    def rate(t, x):
+        return PLANT.dynamics(t, x, VOLTS, disturbance.at(path, t, PLANT.place(x), CALM))
+
+    def tick(k, x):
+        return rk4(rate, k.astype(float) * STEP, x, jnp.asarray(STEP))
+
+    x = jax.jit(lambda x: jax.lax.fori_loop(0, TICKS, tick, x))(PLANT.initial_state(POSE, velocity))
+    y = PLANT.output(0.0, x)
+    return np.concatenate([y.position, y.velocity])
+
+
+def test_galileo():
+    """In a constant current everything happens as in still water, carried along."""
+    flow = np.array([0.7, -0.4, 0.2])
+    still = fly(current(np.zeros(3)), RATES)
+    carried = fly(current(flow), RATES.at[:3].add(flow))
+    shift = np.concatenate([flow * STEP * TICKS, np.zeros(3), flow, np.zeros(3)])
+    np.testing.assert_allclose(carried - shift, still, rtol=0, atol=1e-10)
+
+
+def test_still_water_is_no_water():
+    np.testing.assert_allclose(fly(current(np.zeros(3)), RATES), fly(Together(()), RATES), rtol=0, atol=1e-12)
+
+
+def accelerating(acceleration):
+    return CALM._replace(water=Water(jnp.zeros(3), jnp.asarray(acceleration)))
+
+
+def test_einstein():
+    """A neutral body with CB on CG, at rest in the water, goes where accelerating water takes it."""
+    neutral = eqx.tree_at(lambda p: (p.body.buoyancy, p.body.r_b), PLANT, (PLANT.body.weight, PLANT.body.r_g))
+    push = [0.3, -0.2, 0.1]
+    x = neutral.initial_state(POSE, jnp.zeros(6))
+    rate = neutral.acceleration(jnp.zeros(()), x, jnp.zeros(8), accelerating(push))
+    np.testing.assert_allclose(rate, [*push, 0, 0, 0], rtol=0, atol=1e-12)
+
+
+def test_morison():
+    """Held at rest in accelerating water: the displaced water's inertia at CB and the added mass, as a wrench."""
+    body, push = odin(), np.array([0.5, -0.3, 0.2])
+    x = PLANT.initial_state(jnp.zeros(6), jnp.zeros(6))
+    rate = PLANT.dynamics(jnp.zeros(()), x, jnp.zeros(8), accelerating(push)).nu
+    still = PLANT.dynamics(jnp.zeros(()), x, jnp.zeros(8), CALM).nu
+    displaced = float(body.buoyancy / (body.weight / body.mass)) * push
+    expected = np.concatenate([displaced, np.cross(body.r_b, displaced)])
+    expected += np.asarray(body.added_mass) @ np.concatenate([push, np.zeros(3)])
+    np.testing.assert_allclose(np.asarray(body.mass_matrix()) @ (rate - still), expected, rtol=0, atol=1e-10)
+
+
+def water_of(disturbance, key, t, position):
+    return disturbance.at(disturbance.draw(key), t, at(position), CALM).water
+
+
+def test_wave_acceleration_is_the_rate_of_the_velocity():
+    sea = waves(spreading=0.3)
+    key, position = jax.random.PRNGKey(5), jnp.array([3.0, -2.0, 1.0])
+    for t in (0.0, 7.3, 100.0):
+        rate = jax.jacfwd(lambda t: water_of(sea, key, t, position).velocity)(jnp.asarray(t))
+        np.testing.assert_allclose(water_of(sea, key, t, position).acceleration, rate, rtol=0, atol=1e-12)
+
+
+def test_waves_are_incompressible_and_free_of_rotation():
+    sea = waves(spreading=0.5)
+    gradient = jax.jacfwd(lambda p: water_of(sea, jax.random.PRNGKey(1), 4.0, p).velocity)(jnp.array([3.0, -2.0, 1.0]))
+    assert abs(np.trace(gradient)) < 1e-12 and np.abs(gradient).max() > 1e-3
+    np.testing.assert_allclose(gradient, gradient.T, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("depth", [0.0, 3.0])
+def test_variance_of_orbital_velocity(depth):
+    """Over 400 seas: the integral of omega^2 S(omega) e^(-2 k z), S scaled to (H_s / 4)^2; at the surface its H_s."""
+    sea = waves(height=0.5, period=5.0, depth=depth)
+    keys = jax.random.split(jax.random.PRNGKey(2), 400)
+    times = jnp.linspace(0.0, 50.0, 20)
+    velocity = jax.jit(jax.vmap(lambda k: jax.vmap(lambda t: water_of(sea, k, t, jnp.zeros(3)).velocity)(times)))(keys)
+    omega = np.linspace(0.4, 8.0, 20_000) * 2 * np.pi / 5
+    energy = np.array(spectrum(omega, 5.0, 3.3))
+    energy *= (0.5 / 4) ** 2 / np.trapezoid(energy, omega)
+    expected = np.trapezoid(omega**2 * energy * np.exp(-2 * omega**2 / 9.81 * depth), omega)
+    found = np.asarray(velocity).var(axis=(0, 1))
+    np.testing.assert_allclose(found[[0, 2]], expected, rtol=0.05)
+    assert found[1] < 1e-20  # all run north
+
+
+def test_wandering_current_has_its_variance_and_correlation():
+    process = gauss_markov_current(mean=(0.3, 0.0, 0.0), deviation=(0.1, 0.2, 0.0), correlation_time=10.0, step=0.5)
+    paths = np.asarray(jax.vmap(process.draw)(jax.random.split(jax.random.PRNGKey(3), 500)))
+    np.testing.assert_allclose(paths.std(axis=(0, 1)), [0.1, 0.2, 0.0], rtol=0.02)
+    lag = 20  # 10 s
+    correlation = (paths[:, :-lag, :2] * paths[:, lag:, :2]).mean(axis=(0, 1)) / paths[..., :2].var(axis=(0, 1))
+    np.testing.assert_allclose(correlation, np.exp(-1), rtol=0.05)
+
+
+def test_wandering_current_is_its_samples_and_linear_between():
+    process = gauss_markov_current(span=10.0, step=0.5)
+    key = jax.random.PRNGKey(4)
+    path = np.asarray(process.draw(key)) + [0.3, 0.0, 0.0]
+    for t, expected, slope in (
+        (2.0, path[4], (path[5] - path[4]) / 0.5),
+        (2.25, path[4:6].mean(0), (path[5] - path[4]) / 0.5),
+        (99.0, path[-1], np.zeros(3)),
+    ):
+        water = water_of(process, key, jnp.asarray(t), np.zeros(3))
+        np.testing.assert_allclose(water.velocity, expected, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(water.acceleration, slope, rtol=0, atol=1e-12)
+    assert process.jumps(1.2) == (0.5, 1.0)
+
+
+@pytest.mark.parametrize(("down", "north"), [(-1.0, 0.8), (0.0, 0.8), (10.0, 0.45), (20.0, 0.1), (50.0, 0.1)])
+def test_sheared_current(down, north):
+    water = water_of(sheared_current(), jax.random.PRNGKey(0), 0.0, [0.0, 0.0, down])
+    np.testing.assert_allclose(water.velocity, [north, 0, 0], rtol=0, atol=1e-12)
+
+
+def test_currents_add_and_each_member_has_its_own_randomness():
+    two = Together((gauss_markov_current(), gauss_markov_current(), current((0.0, 0.2, 0.0))))
+    path = two.draw(jax.random.PRNGKey(0))
+    assert np.abs(path[0] - path[1]).max() > 0.01
+    water = two.at(path, jnp.asarray(3.0), at(jnp.zeros(3)), CALM).water
+    np.testing.assert_allclose(water.velocity, np.array([0.6, 0.2, 0.0]) + path[0][6] + path[1][6], rtol=0, atol=1e-12)
+
+
+def test_water_needs_a_body():
+    with pytest.raises(BadInput, match="`disturbance` must act on a body in water"):
+        current().at((), 0.0, None, CALM)
