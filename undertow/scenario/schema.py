@@ -86,9 +86,7 @@ class Scenario(_Strict):
     model: dict[str, Any] = Field(default_factory=dict, description="what the controller may know of the plant")
     controller: Annotated[Part, _named("rcaf")] = Field(Part(kind="rcaf"), description="the law")
     reference: NamedPart = Field(description="what to follow")
-    disturbance: OneOrMore = Field(
-        Part(kind="none"), description="what the surroundings do; several as a list"
-    )
+    disturbance: OneOrMore = Field(Part(kind="none"), description="what the surroundings do; several as a list")
     sensor: NamedPart = Field(Part(kind="perfect"), description="what stands before the measurement")
     loop: Loop = Field(default_factory=Loop, description="how it is run")
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")
