@@ -1,7 +1,8 @@
-"""ODIN's equation of motion, term by term, against numbers computed independently (data/odin_body_dynamics.json)."""
+"""Equation of motion of three vehicles, term by term, against numbers computed independently (data/*_body_dynamics.json)."""
 
 import json
 from pathlib import Path
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -13,18 +14,31 @@ from undertow.core.contracts import Load
 from undertow.numerics.rotations import rotation_from_euler
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import paper_table3
-from undertow.vehicles import odin
+from undertow.vehicles import Vehicle, bluerov2_heavy, odin, rexrov
 
-PEER = json.loads((Path(__file__).parent / "data" / "odin_body_dynamics.json").read_text())
-CASES = {name: np.array([case[name] for case in PEER["cases"]]) for name in PEER["cases"][0]}
+
+class Peer(NamedTuple):
+    """A vehicle as undertow has it, and the file's numbers for all states at once."""
+
+    vehicle: Vehicle
+    file: dict
+    cases: dict
+
+
+@pytest.fixture(scope="module", params=[odin, bluerov2_heavy, rexrov], ids=lambda make: make.__name__)
+def peer(request):
+    data = Path(__file__).parent / "data" / f"{request.param.__name__}_body_dynamics.json"
+    file = json.loads(data.read_text())
+    cases = {name: np.array([case[name] for case in file["cases"]]) for name in file["cases"][0]}
+    return Peer(request.param(), file, cases)
 
 
 @pytest.fixture(scope="module")
-def terms():
+def terms(peer):
     """The same names as in the file, for all states at once."""
-    plant = hybrid_vehicle(odin(), paper_table3("shaft"))
+    plant = hybrid_vehicle(peer.vehicle, paper_table3("shaft"))
     # The file's accelerations were computed with its own thruster matrix, rounded to 8 decimals.
-    plant = eqx.tree_at(lambda p: p.thruster_matrix, plant, jnp.asarray(PEER["thruster_matrix"]))
+    plant = eqx.tree_at(lambda p: p.thruster_matrix, plant, jnp.asarray(peer.file["thruster_matrix"]))
     motor = plant.thruster.motor
 
     def evaluate(eta, nu, thrust):
@@ -40,23 +54,24 @@ def terms():
             "nu_dot": plant.dynamics(jnp.zeros(()), x, jnp.zeros(8), Load(jnp.zeros(6), jnp.zeros(6))).nu,
         }
 
-    return jax.jit(jax.vmap(evaluate))(CASES["eta"], CASES["nu"], CASES["thrust"])
+    return jax.jit(jax.vmap(evaluate))(peer.cases["eta"], peer.cases["nu"], peer.cases["thrust"])
 
 
-def test_there_are_fifty_states():
-    assert CASES["eta"].shape == (50, 6)
+def test_there_are_fifty_states(peer):
+    assert peer.cases["eta"].shape == (50, 6)
 
 
-def test_mass_matrix():
-    np.testing.assert_allclose(odin().mass_matrix(), PEER["M"], rtol=1e-10)
+def test_mass_matrix(peer):
+    np.testing.assert_allclose(peer.vehicle.mass_matrix(), peer.file["M"], rtol=1e-10)
 
 
-def test_thruster_matrix_to_its_printed_digits():
-    np.testing.assert_allclose(odin().thruster_matrix(), PEER["thruster_matrix"], rtol=0, atol=1e-8)
+def test_thruster_matrix_to_its_printed_digits(peer):
+    np.testing.assert_allclose(peer.vehicle.thruster_matrix(), peer.file["thruster_matrix"], rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["eta_dot", "C_nu", "D_nu", "g", "nu_dot"])
-def test_term_of_the_equation_of_motion(terms, name):
+def test_term_of_the_equation_of_motion(peer, terms, name):
     """Relative to the length of each vector: single entries cancel."""
-    difference = np.linalg.norm(np.asarray(terms[name]) - CASES[name], axis=1)
-    assert (difference <= 1e-10 * np.linalg.norm(CASES[name], axis=1)).all()
+    expected = peer.cases[name]
+    difference = np.linalg.norm(np.asarray(terms[name]) - expected, axis=1)
+    assert (difference <= 1e-10 * np.linalg.norm(expected, axis=1)).all()
