@@ -6,6 +6,7 @@ import jax.numpy as jnp
 
 from undertow.core.contracts import Load, Measurement, Place, Target
 from undertow.numerics.rotations import rotation_from_euler
+from undertow.power import ESC
 
 NUMBERS = 64
 
@@ -32,7 +33,7 @@ def plants(plant, v):
     n, m, t = len(plant.outputs), plant.inputs(), jnp.abs(v[0])
     x = _filled(plant.initial_state(v[1 : 1 + n], v[7 : 7 + n]), v[13:], only_zeros=True)
     load = Load(v[30 : 30 + n], v[36 : 36 + n])
-    u = plant.admissible(10 * v[42 : 42 + m])
+    u = plant.admissible(x, 10 * v[42 : 42 + m])
     return (
         plant.dynamics(t, x, u, load),
         plant.output(t, x),
@@ -58,16 +59,28 @@ def disturbances(disturbance, v):
     return disturbance.at(disturbance.draw(jax.random.PRNGKey(1)), 1.0 + v[12], place, calm)
 
 
+def power(part, v):
+    drawn, watts, bus = 1e4 * (1 + v[0]), 500 * v[1], 14.0 + v[2]
+    if isinstance(part, ESC):
+        pulse = part.pulse(10 * v[3:6], bus)
+        return pulse, part.voltage(pulse, bus)
+    limit = part.limit(drawn, lambda volts: 20 * volts**2, 20 * jnp.abs(v[3]))
+    told = part.bus_voltage, part.current, part.loss
+    return limit, part.energy(drawn), *[tell(drawn, watts) for tell in told]
+
+
 def references(reference, v):
     return reference.at(5.0 + v[0])
 
 
 def sensors(sensor, v):
     truth = Measurement(v[:6], v[6:12])
-    return sensor.measure(sensor.draw(jax.random.PRNGKey(2)), jnp.abs(v[12]), truth)
+    state = sensor.init(Measurement(v[13:19], v[19:25]))
+    return sensor.measure(sensor.draw(jax.random.PRNGKey(2)), state, jnp.abs(v[12]), truth)
 
 
-USES = {use.__name__: use for use in (vehicles, thrusters, plants, controllers, disturbances, references, sensors)}
+KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, sensors)
+USES = {use.__name__: use for use in KINDS}
 
 
 def numbers(kind, part, v):

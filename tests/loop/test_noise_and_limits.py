@@ -22,7 +22,7 @@ def measured(key, times, sensor=None, truth=0.0):
     sensor = sensor or white_noise(0.1, 0.2)
     path = sensor.draw(key)
     still = Measurement(jnp.full(3, truth), jnp.full(3, truth))
-    return jax.vmap(lambda t: sensor.measure(path, t, still))(jnp.asarray(times))
+    return jax.vmap(lambda t: sensor.measure(path, (), t, still)[0])(jnp.asarray(times))
 
 
 def test_noise_depends_on_key_and_time_only(key):

@@ -68,8 +68,8 @@ class Pendulum(AbstractPlant):
     def place(self, x):
         return None
 
-    def admissible(self, u):
-        return self.rail.admissible(u)
+    def admissible(self, x, u):
+        return self.rail.admissible(x, u)
 
     def effort(self, x, u):
         return self.rail.effort(x, u)

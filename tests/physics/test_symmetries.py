@@ -97,9 +97,10 @@ def in_centimetres(plant):
         ),
     )
     electrical = ("resistance", "inductance", "torque_constant", "back_emf_constant")
-    mechanical = ("friction", "rotor_inertia", "torque_coefficient")
+    mechanical = ("friction", "rotor_inertia", "torque_coefficient", "reverse_torque_coefficient")
     scaled = {name: area * getattr(motor, name) for name in electrical + mechanical}
-    scaled["thrust_coefficient"] = length * motor.thrust_coefficient
+    for name in ("thrust_coefficient", "reverse_thrust_coefficient"):
+        scaled[name] = length * getattr(motor, name)
     motor = eqx.tree_at(lambda m: [getattr(m, name) for name in scaled], motor, list(scaled.values()))
     return hybrid_vehicle(vehicle, eqx.tree_at(lambda t: t.motor, plant.thruster, motor))
 

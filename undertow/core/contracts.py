@@ -145,8 +145,8 @@ class AbstractPlant(eqx.Module):
         """Where the body is; None for plants that are not bodies in water."""
 
     @abc.abstractmethod
-    def admissible(self, u: Inputs) -> Inputs:
-        """What reaches the actuators when u is commanded (limits)."""
+    def admissible(self, x: PyTree, u: Inputs) -> Inputs:
+        """What reaches the actuators when u is commanded in state x (limits)."""
 
     @abc.abstractmethod
     def effort(self, x: PyTree, u: Inputs) -> Effort:
@@ -163,6 +163,14 @@ class AbstractPlant(eqx.Module):
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:
         """What a user should know before running this plant; each with the numbers that caused it."""
+
+    def books(self, x: PyTree, u: Inputs) -> dict[str, Array]:
+        """Scalars that this plant alone has and that are worth recording, by name."""
+        return {}
+
+    def columns(self) -> dict[str, tuple[str, str]]:
+        """Meaning and unit of each entry of `books`."""
+        return {}
 
     def no_load(self) -> Load:
         """Load of calm surroundings."""
@@ -215,12 +223,16 @@ class AbstractReference(eqx.Module):
 class AbstractSensor(eqx.Module):
     """What stands between the truth and the measurement."""
 
-    smooth: eqx.AbstractVar[bool]  # whether measurements change smoothly with the truth, as one ODE needs
+    smooth: eqx.AbstractVar[bool]  # whether it has no memory and changes smoothly with the truth, as one ODE needs
 
     @abc.abstractmethod
     def draw(self, key: PRNGKeyArray) -> PyTree:
         """Path: everything random about one realisation."""
 
     @abc.abstractmethod
-    def measure(self, path: PyTree, t: Time, truth: Measurement) -> Measurement:
-        """Measurement at time t."""
+    def init(self, truth: Measurement) -> PyTree:
+        """State at t = 0: what it remembers; () for nothing."""
+
+    @abc.abstractmethod
+    def measure(self, path: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
+        """Measurement at time t, and the state after it."""

@@ -42,6 +42,7 @@ class Sample(NamedTuple):
     command: Inputs  # asked for
     power: Inputs
     saturated: Inputs
+    books: dict[str, Array]  # what this plant alone has to tell, by name
 
 
 class Decision(NamedTuple):
@@ -52,6 +53,7 @@ class Decision(NamedTuple):
     command: Inputs
     applied: Inputs
     telemetry: Telemetry
+    heard: PyTree  # state of the sensor afterwards
 
 
 class ClosedLoop(eqx.Module):
@@ -88,27 +90,31 @@ class Drawn(NamedTuple):
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
         truth = self.loop.plant.output(zero, x)
-        y = self.loop.sensor.measure(self.sensor_path, zero, truth)
+        y, _ = self.loop.sensor.measure(self.sensor_path, self.loop.sensor.init(truth), zero, truth)
         return x, self.loop.controller.init(y, self.loop.reference.at(zero))
+
+    def listen(self, x: PyTree) -> PyTree:
+        """State of the sensor at t = 0."""
+        return self.loop.sensor.init(self.loop.plant.output(jnp.zeros(()), x))
 
     def load(self, t: Time, x: PyTree) -> Load:
         """What the surroundings do to the plant at time t."""
         plant = self.loop.plant
         return self.loop.disturbance.at(self.disturbance_path, t, plant.place(x), plant.no_load())
 
-    def decide(self, t: Time, x: PyTree, z: PyTree) -> Decision:
-        """Measure, compare, command, limit."""
+    def decide(self, t: Time, x: PyTree, z: PyTree, heard: PyTree = ()) -> Decision:
+        """Measure, compare, command, limit; `heard` is the state of a sensor that has one."""
         truth = self.loop.plant.output(t, x)
-        y = self.loop.sensor.measure(self.sensor_path, t, truth)
+        y, heard = self.loop.sensor.measure(self.sensor_path, heard, t, truth)
         r = self.loop.reference.at(t)
         command, telemetry = self.loop.controller.command(z, y, r)
-        return Decision(y, r, command, self.loop.plant.admissible(command), telemetry)
+        return Decision(y, r, command, self.loop.plant.admissible(x, command), telemetry, heard)
 
     def sample(self, t: Time, x: PyTree, decision: Decision) -> Sample:
         """What is written down about time t. Errors are those of the truth, not of the measurement."""
         plant, model = self.loop.plant, self.loop.controller.model
         truth = plant.output(t, x)
-        _, r, command, applied, telemetry = decision
+        _, r, command, applied, telemetry, _ = decision
         known = model.drift(truth) + matvec(model.gain(truth), applied)
         effort = plant.effort(x, applied)
         return Sample(
@@ -128,8 +134,9 @@ class Drawn(NamedTuple):
             command=command,
             power=effort.power,
             saturated=effort.saturated,
+            books=plant.books(x, applied),
         )
 
-    def look(self, t: Time, x: PyTree, z: PyTree) -> Sample:
+    def look(self, t: Time, x: PyTree, z: PyTree, heard: PyTree = ()) -> Sample:
         """`sample` of the decision taken at time t."""
-        return self.sample(t, x, self.decide(t, x, z))
+        return self.sample(t, x, self.decide(t, x, z, heard))

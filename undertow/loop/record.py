@@ -38,6 +38,9 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant) -> xr.Dataset:
         rates = ", ".join(f"{u}{rate}" for u in dict.fromkeys(units))
         shown = rates if "axis" in dims else rate or plant.input_unit
         variables[name] = (dims, values, {"long_name": meaning, "units": shown})
+    for name, values in outcome.samples.books.items():
+        meaning, unit = plant.columns()[name]
+        variables[name] = (("time",), np.asarray(values), {"long_name": meaning, "units": unit})
     status = Status(int(outcome.status))
     return xr.Dataset(
         variables,

@@ -20,7 +20,7 @@ def record(
     Args:
         drawn: what is run.
         tick: carry and number of the tick -> carry one tick later.
-        carry: what goes from tick to tick; the states (x, z) first.
+        carry: what goes from tick to tick; the states (x, z, ...) first.
         dt: time between ticks, s.
         ticks: how many; whole records.
         every: ticks per record.
@@ -36,12 +36,12 @@ def record(
 
 
 def keep_sound(plant, old: Any, new: Any, status: Int[Array, ""], ended: Float[Array, ""], t: Float[Array, ""]):
-    """States (x, z) after a tick that ends at t: the new ones, or for ever the old ones once something is wrong.
+    """States (x, z, ...) after a tick that ends at t: the new ones, or for ever the old ones once something is wrong.
 
     Returns:
         States, status and time of the end.
     """
-    code = health(plant, *new)
+    code = health(plant, *new[:2])
     failing = (status == int(Status.OK)) & (code != int(Status.OK))
     status, ended = jnp.where(failing, code, status), jnp.where(failing, t, ended)
     sound = status == int(Status.OK)

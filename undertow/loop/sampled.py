@@ -77,9 +77,9 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
     drawn = loop.draw(key)
     x, z = drawn.start(*start)
     tick = partial(_tick, drawn, accumulators, dt, METHODS[method], substeps)
-    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.look, dt, x, z))
+    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.look, dt, x, z, drawn.listen(x)))
     gathered = tuple(a.init(blank) for a in accumulators)
-    carry = ((x, z), gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
+    carry = ((x, z, drawn.listen(x)), gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
     if record_every == 0:
         carry = jax.lax.fori_loop(0, ticks, lambda k, c: tick(c, k), carry)
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
@@ -87,14 +87,14 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
         ticks -= ticks % record_every
         carry, (time, samples) = record(drawn, tick, carry, dt, ticks, record_every)
     final, gathered, status, ended = carry
-    return Outcome(time, samples, gathered, final, status, jnp.where(status == int(Status.OK), ticks * dt, ended))
+    return Outcome(time, samples, gathered, final[:2], status, jnp.where(status == int(Status.OK), ticks * dt, ended))
 
 
 def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     """Command, move the plant with the input held, then let the controller learn from what was applied."""
-    (x, z), gathered, status, ended = carry
+    (x, z, heard), gathered, status, ended = carry
     loop, t = drawn.loop, instant(k, dt)
-    decision = drawn.decide(t, x, z)
+    decision = drawn.decide(t, x, z, heard)
     if accumulators:
         sample = drawn.sample(t, x, decision)
         gathered = tuple(a.update(g, t, sample) for a, g in zip(accumulators, gathered, strict=True))
@@ -102,7 +102,7 @@ def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     for i in range(substeps):
         new_x = step(partial(_motion, drawn, decision.applied), t + i * h, new_x, h)
     new_z = loop.controller.advance(z, decision.y, decision.r, decision.applied, dt)
-    state, status, ended = keep_sound(loop.plant, (x, z), (new_x, new_z), status, ended, t + dt)
+    state, status, ended = keep_sound(loop.plant, (x, z, heard), (new_x, new_z, decision.heard), status, ended, t + dt)
     return state, gathered, status, ended
 
 

@@ -59,7 +59,7 @@ class DoubleIntegrator(AbstractPlant):
     def place(self, x: AxisState) -> None:
         return None
 
-    def admissible(self, u):
+    def admissible(self, x: AxisState, u):
         return jnp.clip(u, -self.limit, self.limit)
 
     def effort(self, x: AxisState, u) -> Effort:

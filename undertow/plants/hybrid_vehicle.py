@@ -1,7 +1,5 @@
 """The vehicle together with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
 
-from typing import Any, NamedTuple
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -10,32 +8,25 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Place
-from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import (
     Kinematics,
     euler_from_rotation,
-    quaternion_from_euler,
     quaternion_rate,
     rotation_from_quaternion,
 )
 from undertow.plants.hybrid_model import HybridModel
+from undertow.plants.hybrid_power import HybridPower, drive_power
+from undertow.plants.hybrid_state import VehicleState, state_at
+from undertow.plants.reachability import open_loop_advice
+from undertow.power import ESC, Battery
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.alteration import altered
 from undertow.vehicles.body import Body
 from undertow.vehicles.moving_water import seen_from_water
 from undertow.vehicles.vehicle import Vehicle
 
-_ENVELOPE = 1e3  # m, m/s, rad/s; far beyond any vehicle
-
-
-class VehicleState(NamedTuple):
-    """State of body and thrusters. The attitude is a quaternion: no singularity, no trigonometry."""
-
-    position: Float[Array, "3"]  # m, world
-    attitude: Float[Array, "4"]  # unit quaternion, body -> world
-    nu: Float[Array, "6"]  # m/s, rad/s, body
-    thrusters: Any
+_FREEDOMS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 class HybridVehicle(AbstractPlant):
@@ -47,37 +38,48 @@ class HybridVehicle(AbstractPlant):
     Args:
         vehicle: hull and thruster layout.
         thruster: what turns volts into thrust.
+        battery: what feeds the thrusters; None for the thruster's supply.
+        esc: speed controllers before them; None for none.
+        ledger: whether to keep account of the thrusters' energy along the run.
     """
 
     vehicle: Vehicle
     thruster: AbstractThruster
+    power: HybridPower
     body: Body
     thruster_matrix: Float[Array, "6 N"]
     outputs: tuple[str, ...] = eqx.field(static=True)
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True)
 
-    def __init__(self, vehicle: Vehicle, thruster: AbstractThruster):
-        self.vehicle, self.thruster = vehicle, thruster
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        thruster: AbstractThruster,
+        battery: Battery | None = None,
+        esc: ESC | None = None,
+        ledger: bool = False,
+    ):
+        self.vehicle, self.thruster, self.power = vehicle, thruster, HybridPower(battery, esc, ledger)
+        self.power.check(thruster)
         self.body, self.thruster_matrix = vehicle.body(), vehicle.thruster_matrix()
         self.outputs = ("north", "east", "down", "roll", "pitch", "yaw")
         self.output_units = ("m", "m", "m", "rad", "rad", "rad")
         self.input_unit = "V"
 
     def initial_state(self, position=None, velocity=None) -> VehicleState:
-        position = jnp.zeros(6) if position is None else position
-        velocity = jnp.zeros(6) if velocity is None else velocity
-        attitude = quaternion_from_euler(position[3:])
-        nu = Kinematics(rotation_from_quaternion(attitude)).to_body(velocity)
-        return VehicleState(position[:3], attitude, nu, self.thruster.initial_state(self.inputs()))
+        thrusters = self.thruster.initial_state(self.inputs())
+        return state_at(position, velocity, thrusters, self.power.initial_state())
 
     def dynamics(self, t, x: VehicleState, u, d: Load) -> VehicleState:
         kinematics = Kinematics(rotation_from_quaternion(x.attitude))
+        thruster_rates = self.thruster.dynamics(x.thrusters, u)
         return VehicleState(
             position=matvec(kinematics.rotation, x.nu[:3]),
             attitude=quaternion_rate(x.attitude, x.nu[3:]),
             nu=self._body_acceleration(kinematics, x, u, d),
-            thrusters=self.thruster.dynamics(x.thrusters, u),
+            thrusters=thruster_rates,
+            power=self.power.dynamics(self.thruster, x.thrusters, thruster_rates, x.power, u),
         )
 
     def output(self, t, x: VehicleState) -> Measurement:
@@ -109,34 +111,29 @@ class HybridVehicle(AbstractPlant):
         return own + body.accelerate(wrench) + kinematics.to_body(prescribed)
 
     def place(self, x: VehicleState) -> Place:
-        rotation = rotation_from_quaternion(x.attitude)
-        return Place(x.position, rotation, matvec(rotation, x.nu[:3]))
+        return x.place()
 
-    def admissible(self, u):
-        return jnp.clip(u, -self.thruster.supply, self.thruster.supply)
+    def admissible(self, x: VehicleState, u):
+        return self.power.admissible(self.thruster, x.thrusters, x.power, u)
 
     def effort(self, x: VehicleState, u) -> Effort:
-        current = self.thruster.current(x.thrusters, u)
-        limited = jnp.abs(u) >= self.thruster.supply
-        return Effort(power=u * current, saturated=limited.astype(u.dtype))
+        limited = self.power.saturated(self.thruster, x.thrusters, x.power, u)
+        return Effort(drive_power(self.thruster, x.thrusters, u), limited.astype(u.dtype))
+
+    def books(self, x: VehicleState, u):
+        return self.power.books(self.thruster, x.thrusters, x.power, u)
+
+    def columns(self):
+        return self.power.columns()
 
     def inputs(self) -> int:
         return self.vehicle.thrusters
 
     def health(self, x: VehicleState) -> Array:
-        third_row = rotation_from_quaternion(x.attitude)[2]
-        near_vertical = third_row[1] ** 2 + third_row[2] ** 2 < 1e-6
-        far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.nu) > _ENVELOPE).any()
-        code = jnp.where(near_vertical, int(Status.PITCH_SINGULAR), int(Status.OK))
-        return jnp.where(far, int(Status.DIVERGED), code)
+        return x.health()
 
     def advice(self) -> tuple[str, ...]:
-        rank = self.rank()
-        few = (
-            f"the thruster matrix has rank {rank} of 6: {6 - rank} direction(s) cannot be controlled "
-            "and stay in open loop",
-        )
-        return self.thruster.advice() + (few if rank < 6 else ())
+        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _FREEDOMS)
 
     def rank(self) -> int:
         """Rank of the thruster matrix; that of G too, wherever J is regular."""
@@ -175,17 +172,28 @@ class HybridVehicle(AbstractPlant):
         )
 
 
-def hybrid_vehicle(vehicle: Vehicle, thruster: AbstractThruster, thrusters=None) -> HybridVehicle:
+def hybrid_vehicle(
+    vehicle: Vehicle,
+    thruster: AbstractThruster,
+    thrusters=None,
+    battery: Battery | None = None,
+    esc: ESC | None = None,
+    ledger: bool = False,
+) -> HybridVehicle:
     """A vehicle with its thrusters, voltages in, pose out: the paper's hybrid system.
 
     Args:
         vehicle: hull and thruster layout.
         thruster: what turns volts into thrust.
         thrusters: numbers, from 1, of the thrusters that are fitted; None for all.
+        battery: what feeds them; its state is the charge drawn, its voltage limits the command. None for the
+            thruster's supply at any current.
+        esc: speed controllers, which round the command to pulses; None for none.
+        ledger: whether to keep account of the thrusters' energy along the run.
 
     Raises:
-        BadInput: a number that is not one of the vehicle's thrusters.
+        BadInput: a number that is not one of the vehicle's thrusters, or power parts that do not fit the thruster.
     """
     if thrusters is not None:
         vehicle = vehicle.with_thrusters(thrusters)
-    return HybridVehicle(vehicle, thruster)
+    return HybridVehicle(vehicle, thruster, battery, esc, ledger)

@@ -96,7 +96,7 @@ def _options(kind: str, part: Any) -> tuple[Option, ...]:
     for name, parameter in inspect.signature(part).parameters.items():
         default = "required" if parameter.default is inspect.Parameter.empty else parameter.default
         if name in parts.INNER:
-            default = parts.INNER[name][1]
+            default = parts.inner_default(name, parameter)
         if not (kind == "controllers" and name == "model"):  # comes from the plant, not from the user
             options.append(Option(name, default, meanings.get(name, "")))
     return tuple(options)

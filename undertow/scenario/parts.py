@@ -11,13 +11,19 @@ import numpy as np
 
 from undertow.core import catalogue, contracts
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
 from undertow.scenario.values import checked
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 
-# Arguments that are parts themselves: their kind, and what they are when nothing is said.
-INNER = {"vehicle": ("vehicles", "odin"), "thruster": ("thrusters", "paper_table3")}
+# Arguments that are parts themselves: their kind, and which one when no `kind` is said.
+INNER = {
+    "vehicle": ("vehicles", "odin"),
+    "thruster": ("thrusters", "paper_table3"),
+    "battery": ("power", "battery"),
+    "esc": ("power", "esc"),
+}
 
 # Kinds that are data: every declared parameter of theirs may be changed by name.
 _ADJUSTABLE = ("vehicles", "thrusters")
@@ -25,6 +31,7 @@ _ADJUSTABLE = ("vehicles", "thrusters")
 _CONTRACTS = {
     "vehicles": Vehicle,
     "thrusters": AbstractThruster,
+    "power": Battery | ESC,
     "plants": contracts.AbstractPlant,
     "controllers": contracts.AbstractController,
     "disturbances": contracts.AbstractDisturbance,
@@ -65,7 +72,7 @@ def make(
         table = _samples(options, folder)
     part, resolved = call(function, options, given, folder)
     if not isinstance(part, _CONTRACTS[kind]):
-        raise BadInput("kind", f"name a function that returns a {_CONTRACTS[kind].__name__}", f"{name}: {part!r}")
+        raise BadInput("kind", f"name a function that returns a {_title(_CONTRACTS[kind])}", f"{name}: {part!r}")
     if table:
         del resolved["samples"]
     return adjust(part, changes) if changes else part, {"kind": _portable(name, folder), **resolved, **changes, **table}
@@ -88,7 +95,9 @@ def call(
     arguments, resolved = {}, {}
     for name, parameter in known.items():
         if name in INNER:
-            arguments[name], resolved[name] = _inner(name, options.get(name, INNER[name][1]), folder or Path())
+            description = options.get(name, inner_default(name, parameter))
+            made = (None, None) if description is parameter.default is None else _inner(name, description, folder)
+            arguments[name], resolved[name] = made
         elif name in options:
             arguments[name] = resolved[name] = checked(name, options[name], hints.get(name), parameter.default)
         elif parameter.default is inspect.Parameter.empty:
@@ -127,6 +136,10 @@ def adjust(part: Any, changes: Mapping[str, Any]) -> Any:
     return _made(lambda: type(part)(**values))
 
 
+def _title(contract: Any) -> str:
+    return " or ".join(kind.__name__ for kind in typing.get_args(contract) or (contract,))
+
+
 def _sized(shape: tuple[int, ...]) -> str:
     return {0: "be one number", 1: f"be a list of {sum(shape)} numbers"}.get(len(shape), f"have shape {shape}")
 
@@ -141,14 +154,19 @@ def _made(make: Callable[[], Any]) -> Any:
         raise BadInput("", "be something that can be made", f"not: {type(error).__name__}: {error}") from error
 
 
-def _inner(name: str, description: Any, folder: Path) -> tuple[Any, dict[str, Any]]:
+def inner_default(name: str, parameter: inspect.Parameter) -> str | None:
+    """Which part an argument of INNER is when nothing is said about it; None for none."""
+    return INNER[name][1] if parameter.default is inspect.Parameter.empty else parameter.default
+
+
+def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[str, Any]]:
     kind, default = INNER[name]
     if isinstance(description, Mapping):
         description = {"kind": default, **description}
     elif not isinstance(description, str):
         raise BadInput(name, "be a name, or a mapping with `kind` and options", description)
     try:
-        return make(kind, description, folder)
+        return make(kind, description, folder or Path())
     except BadInput as error:
         raise error.at(name) from error.__cause__
 

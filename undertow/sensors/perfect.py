@@ -13,8 +13,11 @@ class Perfect(AbstractSensor):
     def draw(self, key) -> tuple[()]:
         return ()
 
-    def measure(self, path, t, truth: Measurement) -> Measurement:
-        return truth
+    def init(self, truth) -> tuple[()]:
+        return ()
+
+    def measure(self, path, state, t, truth: Measurement):
+        return truth, ()
 
 
 def perfect() -> Perfect:

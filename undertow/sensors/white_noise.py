@@ -29,14 +29,18 @@ class WhiteNoise(AbstractSensor):
     def draw(self, key):
         return key
 
-    def measure(self, path, t, truth: Measurement) -> Measurement:
+    def init(self, truth) -> tuple[()]:
+        return ()
+
+    def measure(self, path, state, t, truth: Measurement):
         # One draw per instant: the time in microseconds picks it, whatever the sampling rate.
         instant = jax.random.fold_in(path, jnp.round(t * 1e6).astype(jnp.uint32))
         errors = jax.random.normal(instant, (2, *truth.position.shape), dtype=truth.position.dtype)
-        return truth._replace(
+        noisy = truth._replace(
             position=truth.position + self.position * errors[0],
             velocity=truth.velocity + self.velocity * errors[1],
         )
+        return noisy, ()
 
 
 def white_noise(position=0.0, velocity=0.01) -> WhiteNoise:

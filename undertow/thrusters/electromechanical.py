@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.thruster import AbstractThruster, PerThruster, PropellerReport
+from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
 
 
 class ElectromechanicalState(NamedTuple):
@@ -40,6 +40,12 @@ class ElectromechanicalThruster(AbstractThruster):
 
     def current(self, state, voltage) -> PerThruster:
         return state.current
+
+    def powers(self, state, voltage) -> Powers:
+        return self.motor.powers(self.terminal(voltage), state.current, state.speed)
+
+    def stored(self, state) -> PerThruster:
+        return self.motor.inductance * state.current**2 / 2 + self.motor.rotor_energy(state.speed)
 
     def report(self, state) -> PropellerReport:
         return PropellerReport(state.speed, self._acceleration(state))

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.thruster import AbstractThruster, PerThruster
+from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
 class IdealThruster(AbstractThruster):
@@ -24,12 +24,22 @@ class IdealThruster(AbstractThruster):
         return jnp.zeros(0)
 
     def thrust(self, state, voltage) -> PerThruster:
-        return self.motor.voltage_gain * self.terminal(voltage)
+        return self.motor.ideal_thrust(self.terminal(voltage))
 
     def current(self, state, voltage) -> PerThruster:
-        thrust = self.thrust(state, voltage)
-        speed = jnp.sign(thrust) * jnp.sqrt(jnp.abs(thrust) / self.motor.thrust_coefficient)
-        return self.motor.steady_current(speed)
+        return self.motor.steady_current(self.motor.speed_at(self.thrust(state, voltage)))
+
+    def powers(self, state, voltage) -> Powers:
+        """As of the motor at its steady current; the volts R I + k_e Om that V lacks come out of nothing too."""
+        motor, volts = self.motor, self.terminal(voltage)
+        speed = motor.speed_at(self.thrust(state, voltage))
+        current = motor.steady_current(speed)
+        powers = motor.powers(volts, current, speed)
+        lacking = motor.resistance * current + motor.back_emf_constant * speed - volts
+        return powers._replace(conversion=powers.conversion + lacking * current)
+
+    def stored(self, state) -> PerThruster:
+        return jnp.zeros(())
 
     def report(self, state) -> None:
         return None

@@ -42,6 +42,12 @@ class MemorylessThruster(AbstractThruster):
     def current(self, state, voltage) -> PerThruster:
         return self.current_per_thrust * self.thrust(state, voltage)
 
+    def powers(self, state, voltage) -> None:
+        return None
+
+    def stored(self, state) -> PerThruster:
+        return jnp.zeros(())
+
     def report(self, state) -> None:
         return None
 

@@ -7,13 +7,17 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.param import param, sources_field
+from undertow.thrusters.thruster import PerThruster, Powers
 
 Scalar = Float[Array, ""]
-PerThruster = Float[Array, " N"]
 
 
 class DCMotor(eqx.Module):
     """Motor and propeller constants, one value for all thrusters or one per thruster.
+
+    A propeller gives less thrust in reverse than forward, and may take another torque for it: coefficients of their
+    own, equal to the forward ones where None. The gains of the control law (`torque_per_thrust`, `voltage_gain`) are
+    those of forward motion.
 
     Raises:
         BadInput: a constant is not positive (inductance, friction: negative).
@@ -27,7 +31,15 @@ class DCMotor(eqx.Module):
     rotor_inertia: Scalar = param("kg m^2", "inertia of rotor and propeller", symbol="J")
     thrust_coefficient: Scalar = param("N s^2/rad^2", "thrust per speed squared", symbol="c_t")
     torque_coefficient: Scalar = param("N m s^2/rad^2", "shaft torque per speed squared", symbol="c_q")
+    reverse_thrust_coefficient: Scalar = param("N s^2/rad^2", "the same in reverse", symbol="c_t-", default=None)
+    reverse_torque_coefficient: Scalar = param("N m s^2/rad^2", "the same in reverse", symbol="c_q-", default=None)
     sources: tuple = sources_field()
+
+    def __post_init__(self):
+        if self.reverse_thrust_coefficient is None:
+            self.reverse_thrust_coefficient = self.thrust_coefficient
+        if self.reverse_torque_coefficient is None:
+            self.reverse_torque_coefficient = self.torque_coefficient
 
     def __check_init__(self):
         for name in ("inductance", "friction"):
@@ -36,6 +48,7 @@ class DCMotor(eqx.Module):
             checks.positive(name, getattr(self, name))
         for name in ("thrust_coefficient", "torque_coefficient"):
             checks.positive(name, getattr(self, name))
+            checks.positive(f"reverse_{name}", getattr(self, f"reverse_{name}"))
 
     @property
     def k1(self) -> Scalar:
@@ -64,15 +77,26 @@ class DCMotor(eqx.Module):
 
     def torque(self, speed: PerThruster) -> PerThruster:
         """Shaft torque Q, N m, at a propeller speed in rad/s. Eq. (10)."""
-        return self.torque_coefficient * speed * jnp.abs(speed)
+        signed = jnp.where(speed < 0, -self.reverse_torque_coefficient, self.torque_coefficient)
+        return signed * speed * speed
 
     def thrust(self, speed: PerThruster) -> PerThruster:
         """Thrust T, N, at a propeller speed in rad/s. Eq. (11)."""
-        return self.thrust_coefficient * speed * jnp.abs(speed)
+        signed = jnp.where(speed < 0, -self.reverse_thrust_coefficient, self.thrust_coefficient)
+        return signed * speed * speed
+
+    def ideal_thrust(self, voltage: PerThruster) -> PerThruster:
+        """Thrust, N, if the whole voltage overcame propeller torque: alpha V, with the alpha of each direction."""
+        return self._gain(voltage) * voltage
+
+    def speed_at(self, thrust: PerThruster) -> PerThruster:
+        """Propeller speed, rad/s, that gives a thrust in N: Eq. (11) solved."""
+        coefficient = jnp.where(thrust < 0, self.reverse_thrust_coefficient, self.thrust_coefficient)
+        return jnp.sign(thrust) * jnp.sqrt(jnp.abs(thrust) / coefficient)
 
     def steady_speed(self, voltage: PerThruster) -> PerThruster:
         """Speed, rad/s, with k_3 c_q speed|speed| + k_2 speed = voltage: Eq. (13) at rest."""
-        quadratic = self.k3 * self.torque_coefficient
+        quadratic = self.k3 * jnp.where(voltage < 0, self.reverse_torque_coefficient, self.torque_coefficient)
         root = jnp.sqrt(self.k2**2 + 4 * quadratic * jnp.abs(voltage))
         return 2 * voltage / (self.k2 + root)
 
@@ -81,8 +105,26 @@ class DCMotor(eqx.Module):
         return (self.friction * speed + self.torque(speed)) / self.torque_constant
 
     def speed_term(self, speed: PerThruster, acceleration: PerThruster) -> PerThruster:
-        """phi = -alpha (k_1 speed_dot + k_2 speed), N. Eq. (15)."""
-        return -self.voltage_gain * (self.k1 * acceleration + self.k2 * speed)
+        """phi = -alpha (k_1 speed_dot + k_2 speed), N. Eq. (15).
+
+        In reverse, where the gain is another than the alpha that stands before V, the difference is made up here.
+        """
+        phi = -self.voltage_gain * (self.k1 * acceleration + self.k2 * speed)
+        return phi + (1 - self.voltage_gain / self._gain(speed)) * self.thrust(speed)
+
+    def powers(self, voltage: PerThruster, current: PerThruster, speed: PerThruster) -> Powers:
+        """Where the power goes that a voltage drives through the winding. Eqs. (8), (9) times Om, I."""
+        return Powers(
+            source=voltage * current,
+            copper=self.resistance * current**2,
+            friction=self.friction * speed**2,
+            water=self.torque(speed) * speed,
+            conversion=(self.torque_constant - self.back_emf_constant) * current * speed,
+        )
+
+    def rotor_energy(self, speed: PerThruster) -> PerThruster:
+        """J Om^2 / 2, J."""
+        return self.rotor_inertia * speed**2 / 2
 
     def advice(self) -> tuple[str, ...]:
         """What is odd about these constants."""
@@ -94,3 +136,7 @@ class DCMotor(eqx.Module):
             f"torque constant / back-EMF constant is {worst:.3g}, but a DC motor in SI units has 1: "
             "the shaft would give more power than the supply puts in, or less. Check k_t and k_e.",
         )
+
+    def _gain(self, direction: PerThruster) -> PerThruster:
+        reverse = 1 / (self.k3 * (self.reverse_torque_coefficient / self.reverse_thrust_coefficient))
+        return jnp.where(direction < 0, reverse, self.voltage_gain)

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.thruster import AbstractThruster, PerThruster
+from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
 class ShaftState(NamedTuple):
@@ -40,6 +40,12 @@ class ShaftThruster(AbstractThruster):
     def current(self, state, voltage) -> PerThruster:
         motor = self.motor
         return (self.terminal(voltage) - motor.back_emf_constant * state.speed) / motor.resistance
+
+    def powers(self, state, voltage) -> Powers:
+        return self.motor.powers(self.terminal(voltage), self.current(state, voltage), state.speed)
+
+    def stored(self, state) -> PerThruster:
+        return self.motor.rotor_energy(state.speed)
 
     def report(self, state) -> None:
         return None

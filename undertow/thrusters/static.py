@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.thruster import AbstractThruster, PerThruster
+from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
 class StaticThruster(AbstractThruster):
@@ -29,6 +29,14 @@ class StaticThruster(AbstractThruster):
 
     def current(self, state, voltage) -> PerThruster:
         return self.motor.steady_current(self.motor.steady_speed(self.terminal(voltage)))
+
+    def powers(self, state, voltage) -> Powers:
+        volts = self.terminal(voltage)
+        speed = self.motor.steady_speed(volts)
+        return self.motor.powers(volts, self.motor.steady_current(speed), speed)
+
+    def stored(self, state) -> PerThruster:
+        return jnp.zeros(())
 
     def report(self, state) -> None:
         return None

@@ -17,6 +17,16 @@ class PropellerReport(NamedTuple):
     acceleration: PerThruster
 
 
+class Powers(NamedTuple):
+    """Where each thruster's power comes from and goes, W: source + conversion = the others + d(stored)/dt."""
+
+    source: PerThruster  # V I, what the drive takes
+    copper: PerThruster  # R I^2
+    friction: PerThruster  # k_f Om^2
+    water: PerThruster  # Q Om, given to the water
+    conversion: PerThruster  # (k_t - k_e) I Om, out of nothing unless k_t = k_e
+
+
 class AbstractThruster(eqx.Module):
     """A set of N thrusters of one kind; every array has one entry per thruster."""
 
@@ -40,6 +50,14 @@ class AbstractThruster(eqx.Module):
     @abc.abstractmethod
     def current(self, state: Any, voltage: PerThruster) -> PerThruster:
         """I, A."""
+
+    @abc.abstractmethod
+    def powers(self, state: Any, voltage: PerThruster) -> Powers | None:
+        """Where the power goes; None where no motor stands behind the thrust."""
+
+    @abc.abstractmethod
+    def stored(self, state: Any) -> PerThruster:
+        """Energy in windings and rotors, J; zero at rest."""
 
     @abc.abstractmethod
     def report(self, state: Any) -> PropellerReport | None:

@@ -1,0 +1,130 @@
+"""The electrical side of a vehicle: battery, speed controllers and energy ledger, each of them optional."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+from undertow.core.errors import BadInput
+from undertow.power import ledger as books
+from undertow.power.battery import Battery
+from undertow.power.esc import ESC
+from undertow.thrusters.thruster import AbstractThruster, Powers
+
+Scalar = Float[Array, ""]
+
+_AT_LIMIT = 0.005  # share of the largest voltage within which a thruster counts as limited: two steps of a pulse
+
+
+class PowerState(NamedTuple):
+    """What the electrical side remembers; None for what is not there."""
+
+    drawn: Any = None  # charge, C
+    ledger: Any = None  # J, a Ledger
+
+
+class HybridPower(eqx.Module):
+    """Between the commanded voltages and those that the thrusters get. The voltage is held over a sampling time.
+
+    Raises:
+        BadInput: speed controllers without a bus voltage, or a ledger for thrusters without a motor.
+    """
+
+    battery: Battery | None
+    esc: ESC | None
+    ledger: bool = eqx.field(static=True)
+
+    def check(self, thruster: AbstractThruster) -> None:
+        """Whether it goes together with these thrusters."""
+        for name, kind in (("battery", Battery), ("esc", ESC)):
+            part = getattr(self, name)
+            if part is not None and not isinstance(part, kind):
+                raise BadInput(name, f"be a {kind.__name__}", type(part).__name__)
+        if self.esc is not None and self.battery is None and not _finite(thruster.supply):
+            hint = "Give the thruster a supply, or the vehicle a battery"
+            raise BadInput("esc", "have a bus voltage to share out", "on an infinite supply", hint=hint)
+        if self.ledger and thruster.powers(thruster.initial_state(1), jnp.zeros(1)) is None:
+            hint = "There is no motor behind this thruster whose books could be kept"
+            raise BadInput("ledger", "be false", "true", hint=hint)
+
+    def initial_state(self) -> PowerState:
+        """Full battery, empty ledger."""
+        return PowerState(None if self.battery is None else jnp.zeros(()), books.opened() if self.ledger else None)
+
+    def dynamics(self, thruster: AbstractThruster, state: Any, rates: Any, power: PowerState, u) -> PowerState:
+        """Rates of the electrical state, with those of the thrusters given."""
+        taken = drive_power(thruster, state, u).sum()
+        current = loss = None
+        if self.battery is not None:
+            current, loss = self.battery.current(power.drawn, taken), self.battery.loss(power.drawn, taken)
+        flows = thruster.powers(state, u) if self.ledger else None
+        if flows is None:
+            return PowerState(current)
+        _, into_store = jax.jvp(lambda s: thruster.stored(s).sum(), (state,), (rates,))
+        heat = jnp.zeros(()) if loss is None else loss
+        return PowerState(current, books.Ledger(**_summed(flows), stored=into_store, battery=heat))
+
+    def admissible(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
+        """Voltages within the supply, within what the battery can give, in whole pulses."""
+        wanted = jnp.clip(u, -thruster.supply, thruster.supply)
+        if self.battery is not None:
+            within = lambda voltage: jnp.clip(wanted, -voltage, voltage)
+            taken = lambda voltage: drive_power(thruster, state, within(voltage)).sum()
+            wanted = within(self.battery.limit(power.drawn, taken, jnp.abs(wanted).max()))
+        if self.esc is not None:
+            bus = self.bus_voltage(thruster, state, power, wanted)
+            wanted = self.esc.voltage(self.esc.pulse(wanted, bus), bus)
+        return wanted
+
+    def saturated(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
+        """True where an applied voltage is at the limit of the supply, or of the battery."""
+        limited = jnp.abs(u) >= thruster.supply
+        if self.battery is None:
+            return limited
+        top, more = jnp.abs(u).max(), (1 + _AT_LIMIT) * u
+        spare = self.battery.allows(power.drawn, jnp.abs(more).max(), drive_power(thruster, state, more).sum())
+        return limited | ((jnp.abs(u) >= (1 - _AT_LIMIT) * top) & ~spare)
+
+    def bus_voltage(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> Scalar:
+        """Voltage of the bus, V, while the thrusters get u."""
+        if self.battery is None:
+            return thruster.supply
+        return self.battery.bus_voltage(power.drawn, drive_power(thruster, state, u).sum())
+
+    def books(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> dict[str, Scalar]:
+        """What is worth recording, by name."""
+        found, cells = {}, None
+        if self.battery is not None:
+            cells = self.battery.energy(power.drawn)
+            found["bus_voltage"] = self.bus_voltage(thruster, state, power, u)
+            found["charge_drawn"] = power.drawn
+            found["state_of_charge"] = self.battery.state_of_charge(power.drawn)
+        if self.ledger:
+            found |= books.columns(power.ledger, thruster.stored(state).sum(), cells)
+        return found
+
+    def columns(self) -> dict[str, tuple[str, str]]:
+        """Meaning and unit of each entry of `books`."""
+        battery = {
+            "bus_voltage": ("voltage of the bus under load", "V"),
+            "charge_drawn": ("charge drawn from the battery", "C"),
+            "state_of_charge": ("1 when the battery is full, 0 when empty", "1"),
+        }
+        energies = {name: (meaning, "J") for name, meaning in books.COLUMNS.items()}
+        return (battery if self.battery is not None else {}) | (energies if self.ledger else {})
+
+
+def drive_power(thruster: AbstractThruster, state: Any, u):
+    """Electrical power of each thruster, W: no voltage, no power, though a spinning motor may carry a current."""
+    return thruster.terminal(u) * thruster.current(state, u)
+
+
+def _summed(flows: Powers) -> dict[str, Scalar]:
+    return {name: value.sum() for name, value in flows._asdict().items()}
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, Tracer) or bool(jnp.isfinite(value).all())

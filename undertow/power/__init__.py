@@ -1,0 +1,7 @@
+"""Power: what stands between a battery and the thrusters, and the books about it. One file per part."""
+
+from undertow.core.catalogue import publish
+from undertow.power.battery import Battery as Battery
+from undertow.power.esc import ESC as ESC
+
+__getattr__ = publish(__name__)

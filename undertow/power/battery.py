@@ -1,0 +1,106 @@
+"""A battery: open-circuit voltage that falls with the charge drawn, behind an internal resistance."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+
+Scalar = Float[Array, ""]
+
+_HALVINGS = 30  # of the interval in which the voltage limit is sought: 20 V / 2^30 is 20 nV
+_KNEE = 1e-12  # of E^2; keeps the gradient finite where the most power is drawn
+
+
+class Battery(eqx.Module):
+    """E(q) in series with R, feeding lossless converters. Its state is the charge drawn q, C (A s).
+
+    The converters take a power P, whatever the voltage: v^2 - E v + R P = 0 for the voltage v of the bus. More than
+    E^2 / (4 R) cannot be drawn. An empty battery is not cut off: its voltage falls on along the same line.
+
+    Raises:
+        BadInput: a value that is not positive (resistance: negative), or an empty battery with more volts than a full.
+    """
+
+    full_voltage: Scalar = param("V", "open-circuit voltage when full", symbol="E_1")
+    empty_voltage: Scalar = param("V", "open-circuit voltage when empty", symbol="E_0")
+    resistance: Scalar = param("ohm", "internal resistance, leads included", symbol="R")
+    capacity: Scalar = param("A h", "charge from full to empty", symbol="Q")
+
+    def __check_init__(self):
+        for name in ("full_voltage", "empty_voltage", "capacity"):
+            checks.positive(name, getattr(self, name))
+        checks.not_negative("resistance", self.resistance, "ohm")
+        if not isinstance(self.full_voltage, Tracer) and (self.full_voltage < self.empty_voltage).any():
+            must = f"be at most the full voltage ({float(self.full_voltage):g} V)"
+            raise BadInput("empty_voltage", must, f"{float(self.empty_voltage):g} V")
+
+    def state_of_charge(self, drawn: Scalar) -> Scalar:
+        """1 when full, 0 when empty."""
+        return 1 - drawn / (3600 * self.capacity)
+
+    def open_circuit_voltage(self, drawn: Scalar) -> Scalar:
+        """E, V, linear in the state of charge."""
+        return self.empty_voltage + (self.full_voltage - self.empty_voltage) * self.state_of_charge(drawn)
+
+    def bus_voltage(self, drawn: Scalar, power: Scalar) -> Scalar:
+        """v, V, while the converters take a power in W: the larger root; E / 2 from E^2 / (4 R) on."""
+        emf = self.open_circuit_voltage(drawn)
+        under_root = emf**2 - 4 * self.resistance * power
+        return (emf + jnp.sqrt(jnp.maximum(under_root, _KNEE * emf**2))) / 2
+
+    def current(self, drawn: Scalar, power: Scalar) -> Scalar:
+        """dq/dt = P / v, A."""
+        return power / self.bus_voltage(drawn, power)
+
+    def loss(self, drawn: Scalar, power: Scalar) -> Scalar:
+        """Heat in the battery, W: E i - P, which is R i^2 wherever the power can be drawn."""
+        return self.open_circuit_voltage(drawn) * self.current(drawn, power) - power
+
+    def energy(self, drawn: Scalar) -> Scalar:
+        """Energy that has left the cells when a charge has been drawn: the integral of E dq, J."""
+        return drawn * (self.full_voltage + self.open_circuit_voltage(drawn)) / 2
+
+    def allows(self, drawn: Scalar, voltage: Scalar, power: Scalar) -> Array:
+        """Whether a power can be taken, in W, with at least this voltage left on the bus."""
+        emf = self.open_circuit_voltage(drawn)
+        lowest = jnp.maximum(voltage, emf / 2)
+        return self.resistance * power <= lowest * (emf - lowest)
+
+    def limit(self, drawn: Scalar, power_at: Callable[[Scalar], Scalar], top: Scalar) -> Scalar:
+        """Largest voltage up to `top` that the battery can give to loads that take power_at(voltage).
+
+        Found by halving, on its safe side: load and bus voltage belong together, and neither is known before the other.
+        """
+
+        def possible(voltage):
+            return self.allows(drawn, voltage, power_at(voltage))
+
+        def halve(_, bounds):
+            low, high = bounds
+            middle = (low + high) / 2
+            good = possible(middle)
+            return jnp.where(good, middle, low), jnp.where(good, high, middle)
+
+        low, _ = jax.lax.fori_loop(0, _HALVINGS, halve, (jnp.zeros_like(top), top))
+        return jnp.where(possible(top), top, low)
+
+
+def battery(
+    full_voltage: float = 16.8, empty_voltage: float = 13.2, resistance: float = 0.02, capacity: float = 18.0
+) -> Battery:
+    """A lithium battery of four cells in series (4.2 V to 3.3 V each), 18 A h: the usual one of a small vehicle.
+
+    Args:
+        full_voltage: open-circuit voltage when full, V.
+        empty_voltage: open-circuit voltage when empty, V; linear in between.
+        resistance: internal resistance with leads, ohm; 20 mohm is a guess, not a data sheet's.
+        capacity: charge from full to empty, A h.
+    """
+    return Battery(full_voltage, empty_voltage, resistance, capacity)

@@ -1,0 +1,52 @@
+"""An electronic speed controller: pulses of whole microseconds in, a share of the bus voltage out."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.param import param
+
+Scalar = Float[Array, ""]
+PerThruster = Float[Array, " N"]
+
+
+class ESC(eqx.Module):
+    """Duty = (pulse - neutral) / span, V = duty times bus voltage; no loss, and nothing inside the dead band.
+
+    Raises:
+        BadInput: neutral, span or resolution not positive, dead band negative.
+    """
+
+    neutral: Scalar = param("us", "pulse that means stop")
+    span: Scalar = param("us", "from stop to full voltage, either way")
+    dead_band: Scalar = param("us", "distance from neutral up to which nothing turns")
+    resolution: Scalar = param("us", "step of the pulses")
+
+    def __check_init__(self):
+        for name in ("neutral", "span", "resolution"):
+            checks.positive(name, getattr(self, name), "us")
+        checks.not_negative("dead_band", self.dead_band, "us")
+
+    def pulse(self, voltage: PerThruster, bus: Scalar) -> PerThruster:
+        """Pulse, us, that asks for a voltage in V: within the span, rounded."""
+        wanted = self.neutral + self.span * jnp.clip(voltage / bus, -1.0, 1.0)
+        return self.resolution * jnp.round(wanted / self.resolution)
+
+    def voltage(self, pulse: PerThruster, bus: Scalar) -> PerThruster:
+        """Voltage, V, that a pulse in us gives."""
+        offset = pulse - self.neutral
+        duty = jnp.where(jnp.abs(offset) > self.dead_band, offset / self.span, 0.0)
+        return jnp.clip(duty, -1.0, 1.0) * bus
+
+
+def esc(neutral: float = 1500.0, span: float = 400.0, dead_band: float = 25.0, resolution: float = 1.0) -> ESC:
+    """Speed controllers as hobby electronics has them. Rounding makes steps: use it with the sampled loop.
+
+    Args:
+        neutral: pulse that means stop, us.
+        span: from stop to full voltage, either way, us.
+        dead_band: distance from neutral up to which nothing turns, us; the T200's table at 20 V says 24 to 28.
+        resolution: step of the pulses, us.
+    """
+    return ESC(neutral, span, dead_band, resolution)
