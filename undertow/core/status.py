@@ -11,6 +11,7 @@ class Status(enum.IntEnum):
     NOT_FINITE = 2
     PITCH_SINGULAR = 3
     STEPS_EXHAUSTED = 4
+    OUT_OF_RANGE = 5
 
     @property
     def word(self) -> str:
@@ -29,4 +30,6 @@ _SENTENCES = {
     Status.NOT_FINITE: "A state became infinite or undefined; the last finite state was kept.",
     Status.PITCH_SINGULAR: "Pitch came within 0.06 degrees of +-90, where Euler angles, and so Eq. (1), are undefined.",
     Status.STEPS_EXHAUSTED: "The adaptive integrator could go no further: too stiff a loop, or an undefined rate.",
+    Status.OUT_OF_RANGE: "An output left the range in which the plant can be held: a ball touched its magnet, "
+    "or a pendulum fell flat.",
 }

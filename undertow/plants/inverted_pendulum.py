@@ -1,0 +1,158 @@
+"""Inverted pendulum on a cart: the standard plant of adaptive fuzzy control, n = m = 1."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.param import param
+from undertow.core.status import Status
+from undertow.plants.nominal import as_told
+
+_FLAT = 0.01  # rad short of 90 deg, where the force has all but lost its grip: G is 1 % of what it is upright
+
+_WANG = "Wang 1993, as in the codes that go with Liu's textbooks"
+
+
+class CartPole(eqx.Module):
+    """Cart and uniform pole: angle_ddot = f + b u, the cart's own motion eliminated. Wang 1993.
+
+    Raises:
+        BadInput: a constant is not positive.
+    """
+
+    cart_mass: Float[Array, ""] = param("kg", "mass of the cart", symbol="m_c", source=_WANG)
+    pole_mass: Float[Array, ""] = param("kg", "mass of the pole", symbol="m", source=_WANG)
+    half_length: Float[Array, ""] = param("m", "half the length of the pole", symbol="l", source=_WANG)
+    gravity: Float[Array, ""] = param("m/s^2", "gravity", symbol="g", source=_WANG)
+
+    def __check_init__(self):
+        for name in ("cart_mass", "pole_mass", "half_length", "gravity"):
+            checks.positive(name, getattr(self, name))
+
+    def inertia(self, angle):
+        """Torque on the pole per angular acceleration while the cart gives way, kg m^2."""
+        share = self.pole_mass / (self.cart_mass + self.pole_mass)
+        return self.pole_mass * self.half_length**2 * (4 / 3 - share * jnp.cos(angle) ** 2)
+
+    def gain(self, angle):
+        """b, angular acceleration per force, 1/(kg m)."""
+        arm = self.pole_mass * self.half_length * jnp.cos(angle)
+        return arm / (self.cart_mass + self.pole_mass) / self.inertia(angle)
+
+    def drift(self, angle, rate):
+        """f, rad/s^2: weight, less what swinging pushes the cart away."""
+        weight = self.pole_mass * self.gravity * self.half_length * jnp.sin(angle) / self.inertia(angle)
+        return weight - self.gain(angle) * self.swing(angle, rate)
+
+    def swing(self, angle, rate):
+        """Horizontal force that the swinging pole takes from the cart, N."""
+        return self.pole_mass * self.half_length * rate**2 * jnp.sin(angle)
+
+    def cart_acceleration(self, angle, rate, angle_acceleration, force):
+        """m/s^2, along the force."""
+        lift = self.pole_mass * self.half_length * jnp.cos(angle) * angle_acceleration
+        return (force - self.swing(angle, rate) + lift) / (self.cart_mass + self.pole_mass)
+
+
+class PendulumState(NamedTuple):
+    """Angle from upright (rad), its rate (rad/s), and the speed of the cart (m/s), which nobody controls."""
+
+    angle: Float[Array, "1"]
+    rate: Float[Array, "1"]
+    cart_speed: Float[Array, "1"]
+
+
+class InvertedPendulumModel(AbstractModel):
+    """F = f, G = b of the cart and pole that the controller was told of."""
+
+    cart_pole: CartPole
+    angles: tuple[bool, ...] = eqx.field(static=True, default=(True,))
+
+    def drift(self, y: Measurement):
+        return self.cart_pole.drift(y.position, y.velocity)
+
+    def gain(self, y: Measurement):
+        return self.cart_pole.gain(y.position)[:, None]
+
+    def invert(self, y: Measurement, acceleration):
+        return acceleration / self.cart_pole.gain(y.position)
+
+
+class InvertedPendulum(AbstractPlant):
+    """The angle of a pole, moved by a force on its cart; the force turns the pole towards positive angles."""
+
+    cart_pole: CartPole
+    limit: Float[Array, ""] = param("N", "largest force")
+    outputs: tuple[str, ...] = eqx.field(static=True, default=("angle",))
+    output_units: tuple[str, ...] = eqx.field(static=True, default=("rad",))
+    input_unit: str = eqx.field(static=True, default="N")
+
+    def initial_state(self, position=None, velocity=None) -> PendulumState:
+        zero = jnp.zeros(1)
+        return PendulumState(zero if position is None else position, zero if velocity is None else velocity, zero)
+
+    def dynamics(self, t, x: PendulumState, u, d: Load) -> PendulumState:
+        turning = self.acceleration(t, x, u, d)
+        return PendulumState(x.rate, turning, self.cart_pole.cart_acceleration(x.angle, x.rate, turning, u))
+
+    def output(self, t, x: PendulumState) -> Measurement:
+        return Measurement(x.angle, x.rate)
+
+    def acceleration(self, t, x: PendulumState, u, d: Load):
+        own = self.cart_pole.drift(x.angle, x.rate) + self.cart_pole.gain(x.angle) * u
+        return own + d.acceleration - d.wrench / self.cart_pole.inertia(x.angle)
+
+    def place(self, x: PendulumState) -> None:
+        return None
+
+    def admissible(self, x: PendulumState, u):
+        return jnp.clip(u, -self.limit, self.limit)
+
+    def effort(self, x: PendulumState, u) -> Effort:
+        return Effort(power=u * x.cart_speed, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
+
+    def inputs(self) -> int:
+        return 1
+
+    def health(self, x: PendulumState) -> Array:
+        flat = (jnp.abs(x.angle) > jnp.pi / 2 - _FLAT).any()
+        return jnp.where(flat, int(Status.OUT_OF_RANGE), int(Status.OK))
+
+    def advice(self) -> tuple[str, ...]:
+        return ()
+
+    def model(
+        self, *, cart_mass: float | None = None, pole_mass: float | None = None, half_length: float | None = None
+    ) -> InvertedPendulumModel:
+        """What a controller is told of this plant; what is not given is the truth.
+
+        Args:
+            cart_mass: kg.
+            pole_mass: kg.
+            half_length: half the length of the pole, m.
+        """
+        told = as_told(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
+        return InvertedPendulumModel(cart_pole=told)
+
+
+def inverted_pendulum(
+    cart_mass: float = 1.0,
+    pole_mass: float = 0.1,
+    half_length: float = 0.5,
+    gravity: float = 9.8,
+    limit: float = float("inf"),
+) -> InvertedPendulum:
+    """Pole on a cart, angle 0 upright, force in. Defaults are Wang's; a run ends where the pole lies flat.
+
+    Args:
+        cart_mass: kg.
+        pole_mass: kg.
+        half_length: half the length of the pole, m.
+        gravity: m/s^2.
+        limit: largest |force|, N.
+    """
+    return InvertedPendulum(cart_pole=CartPole(cart_mass, pole_mass, half_length, gravity), limit=limit)

@@ -1,0 +1,151 @@
+"""x_ddot = F x + H x_dot + G u with any matrix G: square, redundant, under-actuated or of deficient rank."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.core.status import Status
+from undertow.numerics.inverses import pseudo_inverse
+from undertow.numerics.linear import matvec
+from undertow.plants.nominal import as_told
+from undertow.plants.reachability import open_loop_advice
+
+_ENVELOPE = 1e6
+
+
+class LinearSystem(eqx.Module):
+    """The three matrices.
+
+    Raises:
+        BadInput: shapes that do not go together, or entries that are not finite.
+    """
+
+    gain: Float[Array, "n m"] = param("m/s^2", "acceleration per input", symbol="G")
+    position_term: Float[Array, "n n"] = param("1/s^2", "acceleration per position", symbol="F")
+    velocity_term: Float[Array, "n n"] = param("1/s", "acceleration per velocity", symbol="H")
+
+    def __check_init__(self):
+        if jnp.ndim(self.gain) != 2 or not jnp.size(self.gain):
+            raise BadInput("gain", "be a matrix with a row per output", f"of shape {jnp.shape(self.gain)}")
+        n = self.gain.shape[0]
+        for name in ("gain", "position_term", "velocity_term"):
+            value = getattr(self, name)
+            checks.finite(name, value)
+            if name != "gain" and value.shape != (n, n):
+                raise BadInput(name, f"be {n} x {n}, as `gain` has {n} rows", f"of shape {value.shape}")
+
+    def drift(self, position, velocity):
+        """F x + H x_dot, m/s^2."""
+        return matvec(self.position_term, position) + matvec(self.velocity_term, velocity)
+
+
+class LinearState(NamedTuple):
+    """Positions (m) and velocities (m/s)."""
+
+    position: Float[Array, " n"]
+    velocity: Float[Array, " n"]
+
+
+class LinearModel(AbstractModel):
+    """The matrices that the controller was told of; G# is the Moore-Penrose inverse, whatever the rank."""
+
+    system: LinearSystem
+    allocation: Float[Array, "m n"]  # G+; constant, so nothing is factorised in the loop
+    angles: tuple[bool, ...] = eqx.field(static=True)
+
+    def drift(self, y: Measurement):
+        return self.system.drift(y.position, y.velocity)
+
+    def gain(self, y: Measurement):
+        return self.system.gain
+
+    def invert(self, y: Measurement, acceleration):
+        return matvec(self.allocation, acceleration)
+
+
+class LinearPlant(AbstractPlant):
+    """Coupled axes pushed by inputs of no unit; what lies outside the range of G stays in open loop."""
+
+    system: LinearSystem
+    limit: Float[Array, ""] = param("1", "largest input")
+    outputs: tuple[str, ...] = eqx.field(static=True)
+    output_units: tuple[str, ...] = eqx.field(static=True)
+    input_unit: str = eqx.field(static=True, default="1")
+
+    def initial_state(self, position=None, velocity=None) -> LinearState:
+        zero = jnp.zeros(len(self.outputs))
+        return LinearState(zero if position is None else position, zero if velocity is None else velocity)
+
+    def dynamics(self, t, x: LinearState, u, d: Load) -> LinearState:
+        return LinearState(x.velocity, self.acceleration(t, x, u, d))
+
+    def output(self, t, x: LinearState) -> Measurement:
+        return Measurement(x.position, x.velocity)
+
+    def acceleration(self, t, x: LinearState, u, d: Load):
+        own = self.system.drift(x.position, x.velocity) + matvec(self.system.gain, u)
+        return own + d.acceleration - d.wrench
+
+    def place(self, x: LinearState) -> None:
+        return None
+
+    def admissible(self, x: LinearState, u):
+        return jnp.clip(u, -self.limit, self.limit)
+
+    def effort(self, x: LinearState, u) -> Effort:
+        """Power given to unit masses: u_j times the velocity that it works along."""
+        power = u * matvec(self.system.gain.T, x.velocity)
+        return Effort(power, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
+
+    def inputs(self) -> int:
+        return self.system.gain.shape[1]
+
+    def health(self, x: LinearState) -> Array:
+        far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
+        return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
+
+    def advice(self) -> tuple[str, ...]:
+        return open_loop_advice("the gain matrix", self.system.gain, self.outputs)
+
+    def model(self, *, gain=None, position_term=None, velocity_term=None) -> LinearModel:
+        """What a controller is told of this plant; what is not given is the truth.
+
+        Args:
+            gain: G, as many rows and columns as the true one.
+            position_term: F, 1/s^2.
+            velocity_term: H, 1/s.
+
+        Raises:
+            BadInput: another shape than the truth.
+        """
+        told = as_told(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
+        if told.gain.shape != self.system.gain.shape:
+            raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{told.gain.shape}")
+        return LinearModel(system=told, allocation=pseudo_inverse(told.gain), angles=(False,) * len(self.outputs))
+
+
+def linear_plant(
+    gain=((1.0, 0.0, 0.5), (0.0, 1.0, 0.5)), position_term=None, velocity_term=None, limit: float = float("inf")
+) -> LinearPlant:
+    """x_ddot = F x + H x_dot + G u: the number of outputs and inputs is that of the rows and columns of G.
+
+    Args:
+        gain: G, one row per output, m/s^2 per unit of input.
+        position_term: F, 1/s^2, negative where it pulls back; None for zero.
+        velocity_term: H, 1/s, negative where it brakes; None for zero.
+        limit: largest |u|.
+    """
+    n = len(gain) if np.ndim(gain) else 0
+    none = jnp.zeros((n, n))
+    system = LinearSystem(
+        gain, none if position_term is None else position_term, none if velocity_term is None else velocity_term
+    )
+    names = tuple(f"x{i + 1}" for i in range(n))
+    return LinearPlant(system=system, limit=limit, outputs=names, output_units=("m",) * n)

@@ -1,0 +1,51 @@
+"""A sinusoid on every output: what textbook plants are asked to follow."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractReference, Target
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+
+
+class Sine(AbstractReference):
+    """offset + amplitude sin(frequency t + phase) on each of n outputs.
+
+    Raises:
+        BadInput: not finite, or numbers of entries that do not go together.
+    """
+
+    amplitude: Float[Array, " n"] = param("m, rad", "amplitude")
+    frequency: Float[Array, " n"] = param("rad/s", "angular frequency")
+    offset: Float[Array, " n"] = param("m, rad", "middle")
+    phase: Float[Array, " n"] = param("rad", "phase at t = 0")
+
+    def __init__(self, amplitude, frequency, offset, phase):
+        given = {"amplitude": amplitude, "frequency": frequency, "offset": offset, "phase": phase}
+        axes = max(jnp.size(value) for value in given.values())
+        for name, value in given.items():
+            if jnp.shape(value) not in ((), (1,), (axes,)):
+                raise BadInput(
+                    name, f"be one number, or {axes} of them, one per output", f"of shape {jnp.shape(value)}"
+                )
+            checks.finite(name, value)
+            setattr(self, name, jnp.broadcast_to(jnp.asarray(value, dtype=float), (axes,)))
+
+    def at(self, t) -> Target:
+        angle = self.frequency * t + self.phase
+        swing = self.amplitude * jnp.sin(angle)
+        rate = self.amplitude * self.frequency * jnp.cos(angle)
+        return Target(self.offset + swing, rate, -(self.frequency**2) * swing)
+
+
+def sine(amplitude=0.1, frequency=1.0, offset=0.0, phase=0.0) -> Sine:
+    """Every output swings about its middle; as many outputs as the longest argument has entries.
+
+    Args:
+        amplitude: one number or one per output, m and rad.
+        frequency: likewise, rad/s.
+        offset: middle of the swing, likewise, m and rad.
+        phase: at t = 0, likewise, rad.
+    """
+    return Sine(amplitude, frequency, offset, phase)
