@@ -88,7 +88,10 @@ def list_parts(
 def describe(
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME", help="A part (see `undertow list`), ./file.py:function, scenario or metrics."),
+        typer.Argument(
+            metavar="NAME",
+            help="A part (see `undertow list`), ./file.py:function, a vehicle file, scenario or metrics.",
+        ),
     ],
 ) -> None:
     """Describe a part.
@@ -99,6 +102,27 @@ def describe(
     from undertow.cli.describe import describe
 
     describe(name)
+
+
+@app.command()
+def check(
+    thing: Annotated[
+        str,
+        typer.Argument(metavar="THING", help="A vehicle file, a scenario, a part by name, or ./file.py:function."),
+    ],
+    option: Annotated[
+        list[str] | None,
+        typer.Option("--option", metavar="KEY=VALUE", help="Option of the part, e.g. parameters=wu2018; repeatable."),
+    ] = None,
+) -> int:
+    """Check a vehicle, another part or a scenario.
+
+    Says what is wrong (error) or odd (advice) with it, with the numbers that caused it, and what follows from its
+    numbers. Exit code 2 when there are errors.
+    """
+    from undertow.cli.check import check
+
+    return check(thing, option or [])
 
 
 @app.command()

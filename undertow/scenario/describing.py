@@ -12,6 +12,7 @@ from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.param import Parameter, parameters
 from undertow.scenario import parts
+from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 
 
 class Option(NamedTuple):
@@ -37,11 +38,14 @@ def describe(name: str) -> tuple[Description, ...]:
     """Every part of that name; kinds are separate, so there may be more than one.
 
     Args:
-        name: of a part, `kind/name` for one kind only, or `./file.py:function`.
+        name: of a part, `kind/name` for one kind only, `./file.py:function`, or a vehicle file.
 
     Raises:
         BadInput: no such part.
     """
+    if is_vehicle_file(name):
+        found = read_vehicle(Path(name), what="NAME")
+        return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), ()),)
     if ".py:" in name:
         try:
             return (_describe("", name, catalogue.find("", name)),)

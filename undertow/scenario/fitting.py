@@ -1,6 +1,5 @@
 """Whether times and parts fit together: shapes only, nothing is computed."""
 
-import re
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +9,7 @@ import jax.numpy as jnp
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.scenario.reading import Text
+from undertow.scenario.reading import Text, key_path
 from undertow.scenario.schema import Initial, Loop, Window
 
 # A record takes about a kilobyte, a sampling time some microseconds.
@@ -24,8 +23,8 @@ def placed(text: Text, key: str, make: Callable[[], Any]) -> Any:
         return make()
     except BadInput as error:
         complaint = error.at(key)
-        path = tuple(int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", complaint.name))
-        raise complaint.at(where=text.where(path)) from error.__cause__
+        where = complaint.where or text.where(key_path(complaint.name))  # a file of its own knows better
+        raise complaint.at(where=where) from error.__cause__
 
 
 def check_times(text: Text, loop: Loop, window: Window) -> None:

@@ -14,6 +14,7 @@ from undertow.core.errors import BadInput, did_you_mean
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
 from undertow.scenario.values import checked
+from undertow.scenario.vehicle_file import is_vehicle_file, make_vehicle
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 
@@ -49,7 +50,7 @@ def make(
 
     Args:
         kind: folder of the catalogue.
-        description: name, or mapping of `kind` (the name) and options.
+        description: name, or mapping of `kind` (the name) and options; a vehicle's name may be that of a YAML file.
         folder: where relative file names start.
         given: leading arguments that are not the user's.
 
@@ -60,6 +61,8 @@ def make(
     name = options.pop("kind", None)
     if not isinstance(name, str):
         raise BadInput("kind", f"name one of the {kind}", name)
+    if kind == "vehicles" and is_vehicle_file(name):
+        return make_vehicle(name, options, folder)
     try:
         function = catalogue.find(kind, name, folder)
     except BadInput as error:
@@ -134,6 +137,11 @@ def adjust(part: Any, changes: Mapping[str, Any]) -> Any:
                 )
             values[key] = number
     return _made(lambda: type(part)(**values))
+
+
+def is_part(thing: Any) -> bool:
+    """Whether it keeps the contract of some kind of part."""
+    return isinstance(thing, tuple(_CONTRACTS.values()))
 
 
 def _title(contract: Any) -> str:

@@ -1,6 +1,7 @@
 """Reading scenario files: YAML 1.2 with line numbers, or the scenario inside a result file."""
 
 import io
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,23 +41,32 @@ def from_data(data: Mapping[str, Any]) -> Text:
     return Text(_plain(data), "", Path(), {})
 
 
-def read(path: Path) -> Text:
+def key_path(name: str) -> Path_:
+    """`thrusters[2].position` as ("thrusters", 2, "position")."""
+    return tuple(int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", name))
+
+
+def read(path: Path, what: str = "SCENARIO") -> Text:
     """A scenario from a .yaml file, or the resolved one from a .nc result file.
+
+    Args:
+        path: of the file.
+        what: the argument or key that names it, for messages.
 
     Raises:
         BadInput: missing, unreadable or malformed file.
     """
     if not path.is_file():
-        raise BadInput("SCENARIO", "be an existing file", str(path))
+        raise BadInput(what, "be an existing file", str(path))
     if path.suffix == ".nc":
-        return _from_result(path)
+        return _from_result(path, what)
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise BadInput("SCENARIO", "be a text file", path.name) from None
+        raise BadInput(what, "be a text file", path.name) from None
     except OSError as error:
-        raise BadInput("SCENARIO", "be a file that can be read", f"{path}: {error.strerror}") from None
-    return _parse(text, path.name, path.resolve().parent)
+        raise BadInput(what, "be a file that can be read", f"{path}: {error.strerror}") from None
+    return _parse(text, path.name, path.resolve().parent, what)
 
 
 def dump(data: Mapping[str, Any]) -> str:
@@ -70,40 +80,40 @@ def dump(data: Mapping[str, Any]) -> str:
     return stream.getvalue()
 
 
-def _from_result(path: Path) -> Text:
+def _from_result(path: Path, what: str) -> Text:
     try:
         with xr.open_dataset(path, engine="netcdf4") as dataset:
             text = dataset.attrs.get("scenario")
     except (OSError, ValueError) as error:
-        raise BadInput("SCENARIO", "be a result file of undertow", f"{path.name}: {error}") from None
+        raise BadInput(what, "be a result file of undertow", f"{path.name}: {error}") from None
     if text is None:
-        raise BadInput("SCENARIO", "be a result file of undertow", f"{path.name}, which holds no scenario")
-    return _parse(text, path.name, path.resolve().parent)
+        raise BadInput(what, "be a result file of undertow", f"{path.name}, which holds no scenario")
+    return _parse(text, path.name, path.resolve().parent, what)
 
 
-def _parse(text: str, name: str, folder: Path) -> Text:
+def _parse(text: str, name: str, folder: Path, what: str) -> Text:
     try:
         tree = YAML(typ="rt").load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"{name}, line {mark.line + 1}" if mark else name
         problem = " ".join((error.problem or "malformed").split())
-        raise BadInput("SCENARIO", "be valid YAML", f"not: {problem}", where=where) from None
+        raise BadInput(what, "be valid YAML", f"not: {problem}", where=where) from None
     except (YAMLError, ValueError) as error:
-        raise BadInput("SCENARIO", "be valid YAML", f"not: {error}", where=name) from None
+        raise BadInput(what, "be valid YAML", f"not: {error}", where=name) from None
     except RecursionError:
-        raise BadInput("SCENARIO", "be less deeply nested", where=name) from None
+        raise BadInput(what, "be less deeply nested", where=name) from None
     if not isinstance(tree, Mapping):
         got = "empty" if tree is None else "a list" if isinstance(tree, list) else f"a single {type(tree).__name__}"
-        raise BadInput("SCENARIO", "be a mapping of keys to values", got, where=name)
+        raise BadInput(what, "be a mapping of keys to values", got, where=name)
     lines: dict[Path_, int] = {}
-    return Text(_unwrapped(tree, (), lines, name), name, folder, lines)
+    return Text(_unwrapped(tree, (), lines, name, what), name, folder, lines)
 
 
-def _unwrapped(node: Any, path: Path_, lines: dict[Path_, int], name: str) -> Any:
+def _unwrapped(node: Any, path: Path_, lines: dict[Path_, int], name: str, what: str) -> Any:
     """Same data without the reader's own classes; notes the line of every key and entry."""
     if len(path) > _DEEPEST or len(lines) > _MOST_KEYS:
-        raise BadInput("SCENARIO", f"have at most {_MOST_KEYS} keys and {_DEEPEST} levels", "larger", where=name)
+        raise BadInput(what, f"have at most {_MOST_KEYS} keys and {_DEEPEST} levels", "larger", where=name)
     if not isinstance(node, Mapping | list):
         return _plain(node)
     items = node.items() if isinstance(node, Mapping) else enumerate(node)
@@ -113,7 +123,7 @@ def _unwrapped(node: Any, path: Path_, lines: dict[Path_, int], name: str) -> An
         place = (node.lc.data or {}).get(key)  # pyright: ignore[reportAttributeAccessIssue]  (none where merged in)
         if place is not None:
             lines[(*path, label)] = place[0] + 1
-        unwrapped[label] = _unwrapped(value, (*path, label), lines, name)
+        unwrapped[label] = _unwrapped(value, (*path, label), lines, name, what)
     return unwrapped if isinstance(node, Mapping) else list(unwrapped.values())
 
 

@@ -1,0 +1,45 @@
+"""`undertow check`: what is wrong or odd about a vehicle, another part, or a scenario."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from undertow.cli.exit_codes import BAD_INPUT, DONE
+from undertow.cli.tables import wide_console
+from undertow.core.errors import BadInput
+from undertow.scenario import checking
+
+
+def check(thing: str, options: Sequence[str]) -> int:
+    """Print what a check finds and what follows from the numbers; exit code."""
+    report = checking.check(thing, dict(map(_option, options)))
+    console = wide_console()
+    for sentence in report.sentences:
+        print(sentence)
+    for title, rows in report.tables:
+        table = Table("", "value", "unit", title=title, title_justify="left", title_style="bold")
+        for row in rows:
+            table.add_row(*map(Text, row))
+        console.print(table)
+    advice = len(report.sentences) - report.errors
+    print(f"{thing}: {_counted(report.errors, 'error')}, {_counted(advice, 'piece')} of advice")
+    return BAD_INPUT if report.errors else DONE
+
+
+def _option(text: str) -> tuple[str, Any]:
+    """KEY=VALUE, the value as YAML would read it."""
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise BadInput("--option", "be KEY=VALUE", text)
+    try:
+        return key, YAML(typ="safe", pure=True).load(value)
+    except YAMLError:
+        raise BadInput("--option", "have a value that YAML can read", text) from None
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,147 @@
+"""`undertow check`: from what the user names to everything that can be said against it."""
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.analysis.finding import Finding
+from undertow.analysis.part_check import check_contract
+from undertow.analysis.thruster_lint import derived_of_thruster, lint_thruster
+from undertow.analysis.vehicle_lint import Facts, derived, facts_of, lint
+from undertow.core import catalogue
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.scenario import parts
+from undertow.scenario.build import build
+from undertow.scenario.reading import Text, key_path, read
+from undertow.scenario.schema import Scenario
+from undertow.scenario.vehicle_data import KEYS, parse
+from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
+from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.vehicle import Vehicle
+
+Rows = tuple[tuple[str, str, str], ...]
+
+
+class Report(NamedTuple):
+    """What a check found."""
+
+    sentences: tuple[str, ...]  # errors and advice, one line each
+    errors: int
+    tables: tuple[tuple[str, Rows], ...]  # title, and what follows from the numbers
+
+
+def check(thing: str, options: Mapping[str, Any]) -> Report:
+    """Check a vehicle file, a scenario, a result file, a part by name, or `./file.py:function`.
+
+    Args:
+        thing: what to check.
+        options: of the part, or keys of the vehicle file to change.
+
+    Raises:
+        BadInput: it cannot be read or made at all.
+    """
+    if Path(thing).suffix == ".nc" or is_vehicle_file(thing):
+        return _check_file(Path(thing), options)
+    return _joined([_of_part(*_named(thing, options))])
+
+
+def _check_file(path: Path, options: Mapping[str, Any]) -> Report:
+    text = read(path, "THING")
+    own, scenario = (sum(key in known for key in text.data) for known in (KEYS, Scenario.model_fields))
+    if not own and not scenario:
+        hint = did_you_mean(next(iter(text.data), ""), {*KEYS, *Scenario.model_fields})
+        raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, without a key of either", hint=hint)
+    if own >= scenario:
+        return _joined([_of_vehicle_file(path, options)])
+    if options:
+        raise BadInput("--option", "be left out for a scenario", next(iter(options)))
+    return _joined(_of_scenario(text))
+
+
+def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
+    found = read_vehicle(path, options, "THING")
+    report = _of_vehicle(found.data.facts(), lambda key: found.text.where(key_path(key)))
+    if not report.errors:
+        found.vehicle()  # whatever it refuses and no rule has seen
+    return report
+
+
+def _of_vehicle(facts: Facts, where: Callable[[str], str] = lambda key: "") -> Report:
+    return _report(lint(facts), where, f"{facts.name} (vehicle)", derived(facts))
+
+
+def _of_part(name: str, part: Any) -> Report:
+    if isinstance(part, Vehicle):
+        return _of_vehicle(facts_of(part))
+    if isinstance(part, AbstractThruster):
+        return _report(lint_thruster(part), title=f"{name} (thruster)", rows=derived_of_thruster(part))
+    advice = [Finding("advice", "own", name, sentence) for sentence in getattr(part, "advice", tuple)()]
+    return _report([*check_contract(part), *advice], title=name)
+
+
+def _of_scenario(text: Text) -> list[Report]:
+    """The scenario itself, the vehicle and the thruster in it, and the plant and its references."""
+    built = build(text)
+    loop = built.closed_loop
+    said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
+    reports = [_report(said, title="scenario")]
+    vehicle = getattr(loop.plant, "vehicle", None)
+    if isinstance(vehicle, Vehicle):
+        reports.append(_of_vehicle(*_facts(text, built.resolved["plant"], vehicle)))
+    if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
+        reports.append(_report(lint_thruster(thruster), title="thruster", rows=derived_of_thruster(thruster)))
+    for part in (loop.plant, loop.reference, loop.controller):
+        reports.append(_report(check_contract(part)))
+    return reports
+
+
+def _facts(text: Text, plant: Mapping[str, Any], vehicle: Vehicle) -> tuple[Facts, Callable[[str], str]]:
+    """What is known of the vehicle of a scenario, and where its keys stand."""
+    description = plant.get("vehicle", {})
+    if "contents" not in description:
+        return facts_of(vehicle), lambda key: text.where(("plant", "vehicle"))
+    return parse(description["contents"]).facts(), lambda key: text.where(("plant", "vehicle"))
+
+
+def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any]:
+    """Name and instance of a part."""
+    if ".py:" in thing:
+        try:
+            function = catalogue.find("", thing)
+        except BadInput as error:
+            raise BadInput("THING", error.must, error.got, hint=error.hint) from error.__cause__
+        part = parts.call(function, options, _leading(function), Path())[0]
+        if not parts.is_part(part):
+            raise BadInput("THING", "return a vehicle, thruster, plant or other part", f"{thing}: {part!r}")
+        return thing.rpartition(":")[2], part
+    wanted, _, short = thing.rpartition("/")
+    known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if wanted in ("", kind)}
+    for kind, names in known.items():
+        if short in names:
+            return short, parts.make(kind, {"kind": short, **options}, Path(), _leading(names[short]))[0]
+    every = {name for names in known.values() for name in names}
+    raise BadInput("THING", "be a file or the name of a part", thing, hint=did_you_mean(short, every))
+
+
+def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:
+    """The model that a controller starts from: that of the default vehicle."""
+    if next(iter(inspect.signature(function).parameters), "") != "model":
+        return ()
+    return (parts.make("plants", "hybrid_vehicle", Path())[0].model(),)
+
+
+def _report(
+    findings: Iterable[Finding], where: Callable[[str], str] = lambda key: "", title: str = "", rows: Rows = ()
+) -> Report:
+    findings = list(findings)
+    sentences = tuple(finding.sentence(where(finding.key)) for finding in findings)
+    return Report(sentences, sum(f.level == "error" for f in findings), ((title, rows),) if rows else ())
+
+
+def _joined(reports: list[Report]) -> Report:
+    """All of them; what two say in the same words is said once, errors first."""
+    sentences = dict.fromkeys(sentence for report in reports for sentence in report.sentences)
+    ordered = sorted(sentences, key=lambda sentence: not sentence.startswith("Error"))
+    tables = tuple(table for report in reports for table in report.tables)
+    return Report(tuple(ordered), sum(sentence.startswith("Error") for sentence in ordered), tables)

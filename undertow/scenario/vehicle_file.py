@@ -1,0 +1,81 @@
+"""A vehicle of the user's own from a YAML file alone. See docs/your-own-vehicle.md."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+from undertow.core.errors import BadInput
+from undertow.scenario.reading import Text, from_data, key_path, read
+from undertow.scenario.vehicle_data import INSTEAD, VehicleData, parse
+from undertow.vehicles.vehicle import Vehicle
+
+Made = TypeVar("Made")
+
+
+class VehicleFile(NamedTuple):
+    """A vehicle file as read, some of its keys perhaps changed."""
+
+    data: VehicleData
+    contents: dict[str, Any]  # plain data from which the same vehicle can be made again
+    text: Text
+    changed: frozenset[str]  # keys that are no longer the file's
+
+    def vehicle(self) -> Vehicle:
+        """The vehicle.
+
+        Raises:
+            BadInput: numbers that cannot be a vehicle's, with their place in the file.
+        """
+        return _placed(self.text, self.changed, self.data.vehicle)
+
+
+def is_vehicle_file(name: str) -> bool:
+    """Whether the name of a part is that of a vehicle file."""
+    return Path(name).suffix in (".yaml", ".yml")
+
+
+def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str = "kind") -> VehicleFile:
+    """A vehicle file, read and checked for form.
+
+    Args:
+        path: of the file.
+        changes: other values for some of its keys, as if they stood there; or `contents`, the whole of it, and the
+            file need not exist.
+        what: the argument or key that names the file, for messages.
+
+    Raises:
+        BadInput: anything wrong, with the line in the file unless it is among the changes.
+    """
+    changes = dict(changes or {})
+    kept = changes.pop("contents", None)
+    if kept is not None and not isinstance(kept, Mapping):
+        raise BadInput("contents", "be a mapping, as in a vehicle file", kept)
+    text = read(path, what) if kept is None else from_data(kept)
+    forgotten = {other for key in changes for other in INSTEAD.get(key, ())} - set(changes)
+    contents = {"name": path.stem, **text.data, **changes}
+    contents = {key: value for key, value in contents.items() if key not in forgotten}
+    changed = frozenset(changes)
+    return VehicleFile(_placed(text, changed, lambda: parse(contents)), contents, text, changed)
+
+
+def make_vehicle(name: str, options: Mapping[str, Any], folder: Path) -> tuple[Vehicle, dict[str, Any]]:
+    """The vehicle of a file, and a description of it that does not need the file any more.
+
+    Args:
+        name: of the file, relative to `folder`.
+        options: see `changes` of `read_vehicle`.
+        folder: where the name starts.
+
+    Raises:
+        BadInput: see `read_vehicle`.
+    """
+    found = read_vehicle(folder / name, options)
+    return found.vehicle(), {"kind": Path(name).name, "contents": found.contents}
+
+
+def _placed(text: Text, changed: frozenset[str], make: Callable[[], Made]) -> Made:
+    try:
+        return make()
+    except BadInput as error:
+        path = key_path(error.name)
+        raise error.at(where="" if path[:1] and path[0] in changed else text.where(path)) from error.__cause__
