@@ -12,7 +12,7 @@ from undertow.core.errors import BadInput
 from undertow.power import ledger as books
 from undertow.power.battery import Battery
 from undertow.power.esc import ESC
-from undertow.thrusters.thruster import AbstractThruster, Powers
+from undertow.thrusters.thruster import AbstractThruster
 
 Scalar = Float[Array, ""]
 
@@ -46,13 +46,14 @@ class HybridPower(eqx.Module):
         if self.esc is not None and self.battery is None and not _finite(thruster.supply):
             hint = "Give the thruster a supply, or the vehicle a battery"
             raise BadInput("esc", "have a bus voltage to share out", "on an infinite supply", hint=hint)
-        if self.ledger and thruster.powers(thruster.initial_state(1), jnp.zeros(1)) is None:
+        if self.ledger and not has_motor(thruster):
             hint = "There is no motor behind this thruster whose books could be kept"
             raise BadInput("ledger", "be false", "true", hint=hint)
 
-    def initial_state(self) -> PowerState:
+    def initial_state(self, thrusters: int) -> PowerState:
         """Full battery, empty ledger."""
-        return PowerState(None if self.battery is None else jnp.zeros(()), books.opened() if self.ledger else None)
+        drawn = None if self.battery is None else jnp.zeros(())
+        return PowerState(drawn, books.opened(thrusters) if self.ledger else None)
 
     def dynamics(self, thruster: AbstractThruster, state: Any, rates: Any, power: PowerState, u) -> PowerState:
         """Rates of the electrical state, with those of the thrusters given."""
@@ -63,9 +64,10 @@ class HybridPower(eqx.Module):
         flows = thruster.powers(state, u) if self.ledger else None
         if flows is None:
             return PowerState(current)
-        _, into_store = jax.jvp(lambda s: thruster.stored(s).sum(), (state,), (rates,))
+        _, into_store = jax.jvp(thruster.stored, (state,), (rates,))
         heat = jnp.zeros(()) if loss is None else loss
-        return PowerState(current, books.Ledger(**_summed(flows), stored=into_store, battery=heat))
+        rows = books.Ledger(*flows, stored=jnp.broadcast_to(into_store, u.shape), battery=heat)
+        return PowerState(current, rows)
 
     def admissible(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
         """Voltages within the supply, within what the battery can give, in whole pulses."""
@@ -122,8 +124,9 @@ def drive_power(thruster: AbstractThruster, state: Any, u):
     return thruster.terminal(u) * thruster.current(state, u)
 
 
-def _summed(flows: Powers) -> dict[str, Scalar]:
-    return {name: value.sum() for name, value in flows._asdict().items()}
+def has_motor(thruster: AbstractThruster) -> bool:
+    """Whether a motor stands behind the thrust, so that books can be kept; traced, not computed."""
+    return jax.eval_shape(thruster.powers, thruster.initial_state(1), jnp.zeros(1)) is not None
 
 
 def _finite(value: Any) -> bool:

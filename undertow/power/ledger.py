@@ -9,36 +9,46 @@ Two numbers say whether it closes.
             falls with the step.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 Joule = Float[Array, ""]
+JoulePerThruster = Float[Array, "*N"]
+
+_HAIR = 1e-9  # s; times of records are multiples of a step in floating point
 
 
 class Ledger(NamedTuple):
-    """Energies of all thrusters together since the start, J; as rates, W."""
+    """Energies since the start, J; as rates, W. One entry per thruster, which costs less than summing at every step."""
 
-    source: Joule  # taken from the bus by the drives: V I
-    copper: Joule  # R I^2 of the windings
-    friction: Joule  # k_f Om^2
-    water: Joule  # Q Om, given to the water
-    conversion: Joule  # (k_t - k_e) I Om: out of nothing, unless k_t = k_e
-    stored: Joule  # gone into windings and rotors
+    source: JoulePerThruster  # taken from the bus by the drives: V I
+    copper: JoulePerThruster  # R I^2 of the windings
+    friction: JoulePerThruster  # k_f Om^2
+    water: JoulePerThruster  # Q Om, given to the water
+    conversion: JoulePerThruster  # (k_t - k_e) I Om: out of nothing, unless k_t = k_e
+    stored: JoulePerThruster  # gone into windings and rotors
     battery: Joule  # heat in the battery
 
-    def books(self) -> Joule:
+    def total(self) -> "Ledger":
+        """All thrusters together."""
+        return jax.tree.map(jnp.sum, self)
+
+    def books(self) -> JoulePerThruster:
         """What the integrated columns leave over, J."""
         return self.source + self.conversion - self.spent() - self.stored
 
-    def defect(self, stored: Joule, cells: Joule | None) -> Joule:
+    def defect(self, stored: JoulePerThruster, cells: Joule | None) -> JoulePerThruster:
         """What is left over against the state itself, J: stored energy now, and energy that left the cells."""
         drawn = self.source if cells is None else cells - self.battery
         return drawn + self.conversion - self.spent() - stored
 
-    def spent(self) -> Joule:
+    def spent(self) -> JoulePerThruster:
         """Copper, friction and water, J."""
         return self.copper + self.friction + self.water
 
@@ -57,21 +67,33 @@ COLUMNS = {
 }
 
 
-def opened() -> Ledger:
-    """An empty ledger."""
-    return Ledger(*[jnp.zeros(())] * len(Ledger._fields))
+def opened(thrusters: int) -> Ledger:
+    """An empty ledger for a number of thrusters."""
+    return Ledger(*[jnp.zeros(thrusters)] * (len(Ledger._fields) - 1), battery=jnp.zeros(()))
 
 
 def columns(ledger: Ledger, stored: Joule, cells: Joule | None) -> dict[str, Joule]:
-    """Entries of COLUMNS at one instant."""
-    kept = {f"energy_{name}": value for name, value in ledger._asdict().items()}
-    return kept | {"energy_books": ledger.books(), "energy_defect": ledger.defect(stored, cells)}
+    """Entries of COLUMNS at one instant, of all thrusters together."""
+    total = ledger.total()
+    kept = {f"energy_{name}": value for name, value in total._asdict().items()}
+    return kept | {"energy_books": total.books(), "energy_defect": total.defect(stored, cells)}
 
 
-def closure(recorded: Mapping[Any, Any]) -> dict[str, float]:
-    """Largest |books| and |defect| of a recorded run, as shares of the energy drawn by its end; {} without a ledger."""
+def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.inf) -> dict[str, float]:
+    """How far the books of a recorded run close between two times, s; {} without a ledger.
+
+    Returns:
+        Largest change of `books` and of `defect` since the start, as shares of the energy drawn until the stop.
+    """
     if "energy_source" not in recorded:
         return {}
-    drawn = abs(float(recorded["energy_source"][-1]))
-    share = lambda name: float(abs(recorded[name]).max()) / drawn if drawn > 0 else 0.0
-    return {"energy_books_share": share("energy_books"), "energy_defect_share": share("energy_defect")}
+    time = np.asarray(recorded["time"])
+    inside = (time >= start - _HAIR) & (time <= stop + _HAIR)
+
+    def change(name: str) -> np.ndarray:
+        values = np.asarray(recorded[f"energy_{name}"])[inside]
+        return np.abs(values - values[:1])
+
+    drawn = change("source")[-1:].sum()
+    share = lambda name: float(change(name).max() / drawn) if drawn else 0.0
+    return {f"energy_{name}_share": share(name) for name in ("books", "defect")}

@@ -11,6 +11,7 @@ from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.loop.record import to_dataset
+from undertow.power.ledger import closure
 from undertow.scenario.provenance import content_hash, versions
 
 
@@ -34,9 +35,9 @@ def label(loop: ClosedLoop, outcome: Outcome, window: tuple[float, float], attri
     """
     status, ended, rules = Status(int(outcome.status)), float(outcome.ended), _rules(loop)
     covered = status is Status.OK and window[0] < ended
-    steady = measure(outcome, *window) | rules if covered else None
-    whole = measure(outcome, 0.0, ended) | rules
     dataset = to_dataset(outcome, loop.plant)
+    over = lambda start, stop: measure(outcome, start, stop) | closure(dataset, start, stop) | rules
+    steady, whole = over(*window) if covered else None, over(0.0, ended)
     dataset.attrs |= attributes | versions()
     dataset.attrs |= {"metrics": to_json({"steady": steady, "whole": whole}), "content_hash": content_hash(dataset)}
     return Labelled(status, steady, whole, dataset)

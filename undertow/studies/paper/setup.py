@@ -38,7 +38,8 @@ def scenario(
         controller: further options of the law.
         changes: other keys of the scenario, replacing the paper's.
     """
-    plant = {"kind": "hybrid_vehicle", "vehicle": "odin", "thruster": {"kind": "paper_table3", "rung": rung}}
+    thruster = {"kind": "paper_table3", "rung": rung}
+    plant = {"kind": "hybrid_vehicle", "vehicle": "odin", "thruster": thruster, "ledger": False}  # these runs are timed
     return {
         "description": description,
         "plant": plant,
