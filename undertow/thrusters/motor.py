@@ -92,7 +92,8 @@ class DCMotor(eqx.Module):
     def speed_at(self, thrust: PerThruster) -> PerThruster:
         """Propeller speed, rad/s, that gives a thrust in N: Eq. (11) solved."""
         coefficient = jnp.where(thrust < 0, self.reverse_thrust_coefficient, self.thrust_coefficient)
-        return jnp.sign(thrust) * jnp.sqrt(jnp.abs(thrust) / coefficient)
+        size = jnp.abs(thrust) / coefficient
+        return jnp.sign(thrust) * jnp.sqrt(jnp.where(size > 0, size, 1.0))  # the root has no gradient at 0
 
     def steady_speed(self, voltage: PerThruster) -> PerThruster:
         """Speed, rad/s, with k_3 c_q speed|speed| + k_2 speed = voltage: Eq. (13) at rest."""

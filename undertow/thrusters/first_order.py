@@ -1,0 +1,120 @@
+"""A thruster of which only gain and time constant are known: thrust follows the voltage with a first-order lag."""
+
+import math
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.thrusters.thruster import AbstractThruster, PerThruster
+
+
+class LaggedThrust(NamedTuple):
+    """Thrust of each thruster, N."""
+
+    thrust: PerThruster
+
+
+class FirstOrderThruster(AbstractThruster):
+    """tau T_dot + T = c |V|^(p-1) V, less by a share in reverse; no motor behind it.
+
+    Raises:
+        BadInput: a coefficient is not positive.
+    """
+
+    thrust_per_volt: Float[Array, ""] = param("N/V^p", "steady thrust coefficient", symbol="c")
+    power: Float[Array, ""] = param("", "power of the voltage", symbol="p")
+    time_constant: Float[Array, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
+    reverse_share: Float[Array, ""] = param("", "thrust in reverse, as a share of that forward")
+    current_per_thrust: Float[Array, ""] = param("A/N", "current per steady thrust", symbol="c_I")
+    linear_gain: Float[Array, ""] = param("N/V", "gain the controller's model assumes", symbol="alpha")
+    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self):
+        for name in ("thrust_per_volt", "power", "time_constant", "reverse_share", "current_per_thrust", "linear_gain"):
+            checks.positive(name, getattr(self, name))
+        checks.positive("supply", self.supply, "V", finite=False)
+        checks.not_negative("dead_zone", self.dead_zone, "V")
+
+    def steady_thrust(self, voltage: PerThruster) -> PerThruster:
+        """Thrust, N, that a voltage in V leads to."""
+        volts = self.terminal(voltage)
+        share = jnp.where(volts < 0, self.reverse_share, 1.0)
+        return share * self.thrust_per_volt * jnp.sign(volts) * jnp.abs(volts) ** self.power
+
+    def initial_state(self, count) -> LaggedThrust:
+        return LaggedThrust(jnp.zeros(count))
+
+    def dynamics(self, state, voltage) -> LaggedThrust:
+        return LaggedThrust((self.steady_thrust(voltage) - state.thrust) / self.time_constant)
+
+    def thrust(self, state, voltage) -> PerThruster:
+        return state.thrust
+
+    def current(self, state, voltage) -> PerThruster:
+        """That of the steady state: it leads the thrust, so that no power comes back from a thruster being reversed."""
+        return self.current_per_thrust * self.steady_thrust(voltage)
+
+    def powers(self, state, voltage) -> None:
+        return None
+
+    def stored(self, state) -> PerThruster:
+        return jnp.zeros(())
+
+    def report(self, state) -> None:
+        return None
+
+    def voltage_gain(self):
+        return self.linear_gain
+
+    def speed_term(self, report):
+        hint = "This thruster has no propeller speed. Describe its motor (DCMotor), or leave its lag to the estimator"
+        raise BadInput("speed_sensor", "be false with thruster first_order", "true", hint=hint)
+
+    def advice(self):
+        return ()
+
+
+def first_order(
+    thrust_per_volt: float = 10.9,
+    time_constant: float = 0.1,
+    power: float = 1.0,
+    reverse_share: float = 1.0,
+    current_per_thrust: float = 0.072,
+    linear_gain: float | None = None,
+    supply: float = math.inf,
+    dead_zone: float = 0.0,
+) -> FirstOrderThruster:
+    """Thrust that follows T = c V (or c V|V|) with a first-order lag, for those who know no more of a thruster.
+
+    Default gain and current are those of the paper's motor at 10 V; the time constant is a guess, as it is for most
+    thrusters: published ones of small vehicles go from 0.05 s (RexROV, LAUV) to 0.2 s.
+
+    Args:
+        thrust_per_volt: c, N/V, or N/V^2 with power 2.
+        time_constant: from a step of voltage to 63 % of its thrust, s.
+        power: of the voltage in the steady thrust; 1 linear, 2 quadratic.
+        reverse_share: thrust in reverse as a share of that forward, at the same voltage.
+        current_per_thrust: c_I, A/N, in steady state.
+        linear_gain: alpha that the controller's model assumes, N/V; None for thrust_per_volt, when power is 1.
+        supply: voltage limit, V.
+        dead_zone: voltage below which nothing turns, V.
+
+    Raises:
+        BadInput: a value that is not positive, or no linear_gain for a thrust that is not linear.
+    """
+    if linear_gain is None:
+        if power != 1:
+            hint = (
+                f"The model is T = alpha V: give the slope that fits the voltages in use, {thrust_per_volt:g} V^(p-1)"
+            )
+            raise BadInput("linear_gain", "be given when `power` is not 1", hint=hint)
+        linear_gain = thrust_per_volt
+    known = (thrust_per_volt, power, time_constant, reverse_share, current_per_thrust, linear_gain)
+    return FirstOrderThruster(*known, supply, dead_zone)
