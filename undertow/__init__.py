@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from undertow import controllers as controllers
     from undertow import disturbances as disturbances
+    from undertow import instruments as instruments
     from undertow import plants as plants
+    from undertow import power as power
     from undertow import references as references
     from undertow import sensors as sensors
     from undertow import thrusters as thrusters
@@ -38,7 +40,17 @@ _HOMES = {
     "simulate": "undertow.run",
     "simulate_scenario": "undertow.run",
 }
-_PACKAGES = ("controllers", "disturbances", "plants", "references", "sensors", "thrusters", "vehicles")
+_PACKAGES = (
+    "controllers",
+    "disturbances",
+    "instruments",
+    "plants",
+    "power",
+    "references",
+    "sensors",
+    "thrusters",
+    "vehicles",
+)
 
 
 def __getattr__(name: str) -> Any:

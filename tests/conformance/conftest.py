@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from undertow.core import catalogue
+from undertow.instruments import compass, depth, dvl, imu, position_fix
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
@@ -23,6 +24,7 @@ def required(argument):
         "model": lambda: hybrid_vehicle(odin(), thruster).model(),
         "position": lambda: np.linspace(-0.5, 0.5, 6),
         "samples": lambda: rows,
+        "instruments": lambda: [imu(), dvl(), depth(), position_fix(), compass()],
         "points": lambda: rows[:, 1:4],
     }[argument]()
 

@@ -37,8 +37,8 @@ def test_parameters_are_double_precision_arrays(part):
     _, thing = part
     for parameter in parameters(thing):
         value = thing
-        for step in parameter.name.split("."):
-            value = getattr(value, step)
+        for step in parameter.name.replace("[", ".").replace("]", "").split("."):
+            value = value[int(step)] if step.isdigit() else getattr(value, step)
         assert isinstance(value, jax.Array) and value.dtype == np.float64, parameter.name
 
 

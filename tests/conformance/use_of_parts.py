@@ -5,8 +5,10 @@ import jax
 import jax.numpy as jnp
 
 from undertow.core.contracts import Load, Measurement, Place, Target
+from undertow.instruments.estimate import estimate_of, motion_of
 from undertow.numerics.rotations import rotation_from_euler
 from undertow.power import ESC
+from undertow.thrusters.thruster import PropellerReport
 
 NUMBERS = 64
 
@@ -69,17 +71,28 @@ def power(part, v):
     return limit, part.energy(drawn), *[tell(drawn, watts) for tell in told]
 
 
+def instruments(instrument, v):
+    truth = Measurement(v[:6], v[6:12], PropellerReport(100 * v[25:33], 10 * v[33:41]))
+    estimate = estimate_of(Measurement(v[13:19], v[19:25], truth.actuator))
+    motion = motion_of(truth, v[41:44], 0.01)
+    reading = instrument.reading(motion)
+    state = instrument.sampling.init(reading, v[: reading.size])
+    heard = instrument.sampling.hear(state, 1 + jnp.abs(v[12]), reading, v[: reading.size + 1])
+    later = instrument.foretell(estimate, heard[0].reading).predicted(0.01)
+    return heard, instrument.correct(later, heard[0].reading)
+
+
 def references(reference, v):
     return reference.at(5.0 + v[0])
 
 
 def sensors(sensor, v):
     truth = Measurement(v[:6], v[6:12])
-    state = sensor.init(Measurement(v[13:19], v[19:25]))
-    return sensor.measure(sensor.draw(jax.random.PRNGKey(2)), state, jnp.abs(v[12]), truth)
+    path = sensor.draw(jax.random.PRNGKey(2))
+    return sensor.measure(path, sensor.init(path, Measurement(v[13:19], v[19:25])), jnp.abs(v[12]), truth)
 
 
-KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, sensors)
+KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, instruments, sensors)
 USES = {use.__name__: use for use in KINDS}
 
 

@@ -17,7 +17,17 @@ from typing import Any
 
 from undertow.core.errors import BadInput, did_you_mean
 
-KINDS = ("vehicles", "thrusters", "power", "plants", "controllers", "disturbances", "references", "sensors")
+KINDS = (
+    "vehicles",
+    "thrusters",
+    "power",
+    "plants",
+    "controllers",
+    "disturbances",
+    "references",
+    "instruments",
+    "sensors",
+)
 
 Part = Callable[..., Any]
 

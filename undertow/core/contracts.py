@@ -230,7 +230,7 @@ class AbstractSensor(eqx.Module):
         """Path: everything random about one realisation."""
 
     @abc.abstractmethod
-    def init(self, truth: Measurement) -> PyTree:
+    def init(self, path: PyTree, truth: Measurement) -> PyTree:
         """State at t = 0: what it remembers; () for nothing."""
 
     @abc.abstractmethod

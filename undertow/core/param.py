@@ -66,6 +66,10 @@ def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]
             yield Parameter(name, shown, meta["unit"], meta["meaning"], meta["symbol"], own)
         elif isinstance(value, eqx.Module):
             yield from parameters(value, f"{name}.")
+        elif isinstance(value, tuple):
+            for i, member in enumerate(value):
+                if isinstance(member, eqx.Module):
+                    yield from parameters(member, f"{name}[{i}].")
 
 
 def _to_array(value: Any) -> Any:

@@ -90,12 +90,12 @@ class Drawn(NamedTuple):
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
         truth = self.loop.plant.output(zero, x)
-        y, _ = self.loop.sensor.measure(self.sensor_path, self.loop.sensor.init(truth), zero, truth)
+        y, _ = self.loop.sensor.measure(self.sensor_path, self.loop.sensor.init(self.sensor_path, truth), zero, truth)
         return x, self.loop.controller.init(y, self.loop.reference.at(zero))
 
     def listen(self, x: PyTree) -> PyTree:
         """State of the sensor at t = 0."""
-        return self.loop.sensor.init(self.loop.plant.output(jnp.zeros(()), x))
+        return self.loop.sensor.init(self.sensor_path, self.loop.plant.output(jnp.zeros(()), x))
 
     def load(self, t: Time, x: PyTree) -> Load:
         """What the surroundings do to the plant at time t."""

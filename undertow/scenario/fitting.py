@@ -78,7 +78,7 @@ def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
     if any(signal.shape != (axes,) for signal in load[:2]):
         got = f"of shapes {[signal.shape for signal in load[:2]]}"
         raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
-    _traced(text, "controller", lambda drawn, x, z: drawn.decide(zero, x, z), drawn, x, z)
+    _traced(text, "controller", lambda drawn, x, z: drawn.decide(zero, x, z, drawn.listen(x)), drawn, x, z)
 
 
 def _traced(text: Text, key: str, function: Callable[..., Any], *arguments: Any) -> Any:

@@ -13,7 +13,7 @@ class Perfect(AbstractSensor):
     def draw(self, key) -> tuple[()]:
         return ()
 
-    def init(self, truth) -> tuple[()]:
+    def init(self, path, truth) -> tuple[()]:
         return ()
 
     def measure(self, path, state, t, truth: Measurement):

@@ -29,7 +29,7 @@ class WhiteNoise(AbstractSensor):
     def draw(self, key):
         return key
 
-    def init(self, truth) -> tuple[()]:
+    def init(self, path, truth) -> tuple[()]:
         return ()
 
     def measure(self, path, state, t, truth: Measurement):

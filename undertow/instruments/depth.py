@@ -1,0 +1,42 @@
+"""Depth from pressure."""
+
+import jax.numpy as jnp
+
+from undertow.instruments.estimate import Estimate, Motion
+from undertow.instruments.instrument import AbstractInstrument
+from undertow.instruments.sampling import Sampling
+
+
+class Depth(AbstractInstrument):
+    """Down, m. The sensor is at the body origin, and waves do not press on it."""
+
+    def reading(self, motion: Motion):
+        return motion.position[2:]
+
+    def correct(self, estimate: Estimate, reading) -> Estimate:
+        then = estimate.position[2] - self.sampling.delay * estimate.velocity[2]
+        error = jnp.zeros(3).at[2].set(reading[0] - then)
+        return estimate.moved(error, self.blend, self.sampling.period)
+
+
+def depth(
+    period: float = 0.05,
+    noise: float = 2e-3,
+    bias: float = 0.0,
+    resolution: float = 1e-3,
+    delay: float = 0.0,
+    dropout: float = 0.0,
+    blend: float = 0.2,
+) -> Depth:
+    """Depth below the surface, by a pressure sensor at the body origin.
+
+    Args:
+        period: between samples, s.
+        noise: standard deviation, m.
+        bias: standard deviation of a constant offset, drawn once per run, m.
+        resolution: step of the reading, m; 0 for none.
+        delay: until a sample is delivered, s.
+        dropout: probability that a sample is lost.
+        blend: alpha of the alpha-beta filter that takes it in.
+    """
+    return Depth(Sampling(period, noise, bias, resolution, delay, dropout), blend)

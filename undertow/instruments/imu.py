@@ -1,0 +1,56 @@
+"""Inertial measurement unit: roll and pitch, angular rates, specific force."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.instruments.estimate import GRAVITY, Estimate, Motion
+from undertow.instruments.instrument import AbstractInstrument
+from undertow.instruments.sampling import Sampling
+from undertow.numerics.linear import matvec
+from undertow.numerics.rotations import euler_from_rotation, rotation_from_quaternion
+
+
+class IMU(AbstractInstrument):
+    """Roll, pitch (rad), p, q, r (rad/s), specific force (m/s^2, body axes, the mean since the last tick)."""
+
+    def reading(self, motion: Motion):
+        return jnp.concatenate([motion.angles[:2], motion.rates, motion.specific_force])
+
+    def foretell(self, estimate: Estimate, reading) -> Estimate:
+        rotation = rotation_from_quaternion(estimate.attitude)
+        return estimate._replace(rates=reading[2:5], acceleration=matvec(rotation, reading[5:]) + GRAVITY)
+
+    def correct(self, estimate: Estimate, reading) -> Estimate:
+        yaw = euler_from_rotation(rotation_from_quaternion(estimate.attitude))[2:]
+        return estimate.turned(jnp.concatenate([reading[:2], yaw]), self.blend)
+
+
+def imu(
+    period: float = 0.01,
+    angle_noise: float = 5e-3,
+    rate_noise: float = 2e-3,
+    force_noise: float = 0.02,
+    angle_bias: float = 0.0,
+    rate_bias: float = 0.0,
+    force_bias: float = 0.0,
+    delay: float = 0.0,
+    dropout: float = 0.0,
+    blend: float = 0.05,
+) -> IMU:
+    """Gyroscopes, accelerometers and the inclination that they are fused to. Defaults are of the cheap kind (MEMS).
+
+    Args:
+        period: between samples, s.
+        angle_noise: standard deviation of roll and pitch, rad.
+        rate_noise: of p, q and r, rad/s.
+        force_noise: of the specific force, m/s^2.
+        angle_bias: standard deviation of a constant offset of roll and pitch, drawn once per run, rad.
+        rate_bias: likewise of p, q and r, rad/s.
+        force_bias: likewise of the specific force, m/s^2; an error of roll of 0.01 rad acts like 0.1 m/s^2.
+        delay: until a sample is delivered, s.
+        dropout: probability that a sample is lost.
+        blend: share of each new inclination in the estimated one; the rest comes from the rates.
+    """
+    noise = np.repeat([angle_noise, rate_noise, force_noise], [2, 3, 3])
+    bias = np.repeat([angle_bias, rate_bias, force_bias], [2, 3, 3])
+    return IMU(Sampling(period, noise, bias, delay=delay, dropout=dropout), blend)

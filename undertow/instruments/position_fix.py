@@ -1,0 +1,42 @@
+"""Position fixes: acoustic positioning (USBL, LBL), or a satellite receiver at the surface."""
+
+import jax.numpy as jnp
+
+from undertow.instruments.estimate import Estimate, Motion
+from undertow.instruments.instrument import AbstractInstrument
+from undertow.instruments.sampling import Sampling
+
+
+class PositionFix(AbstractInstrument):
+    """North and east, m."""
+
+    def reading(self, motion: Motion):
+        return motion.position[:2]
+
+    def correct(self, estimate: Estimate, reading) -> Estimate:
+        then = estimate.position[:2] - self.sampling.delay * estimate.velocity[:2]
+        error = jnp.concatenate([reading - then, jnp.zeros(1)])
+        return estimate.moved(error, self.blend, self.sampling.period)
+
+
+def position_fix(
+    period: float = 1.0,
+    noise: float = 0.05,
+    bias: float = 0.0,
+    resolution: float = 0.0,
+    delay: float = 0.2,
+    dropout: float = 0.0,
+    blend: float = 0.2,
+) -> PositionFix:
+    """North and east at a low rate.
+
+    Args:
+        period: between fixes, s.
+        noise: standard deviation of each, m.
+        bias: standard deviation of a constant offset, drawn once per run, m.
+        resolution: step of the reading, m; 0 for none.
+        delay: until a fix is delivered, s.
+        dropout: probability that a fix is lost.
+        blend: alpha of the alpha-beta filter that takes it in.
+    """
+    return PositionFix(Sampling(period, noise, bias, resolution, delay, dropout), blend)

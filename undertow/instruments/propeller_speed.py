@@ -1,0 +1,49 @@
+"""Propeller speeds, as sensorless drives or encoders report them."""
+
+from undertow.core.errors import BadInput
+from undertow.instruments.estimate import Estimate, Motion
+from undertow.instruments.instrument import AbstractInstrument
+from undertow.instruments.sampling import Sampling
+
+
+class PropellerSpeed(AbstractInstrument):
+    """Speed of every propeller, rad/s; its rate of change is told from successive readings.
+
+    Raises:
+        BadInput: the thrusters have no speed that could be measured.
+    """
+
+    def reading(self, motion: Motion):
+        if motion.actuator is None:
+            hint = "Take a rung with a propeller speed (shaft, electromechanical), or leave propeller_speed out"
+            raise BadInput("propeller_speed", "have propellers that turn", "thrusters without a speed", hint=hint)
+        return motion.actuator.speed
+
+    def correct(self, estimate: Estimate, reading) -> Estimate:
+        before = estimate.actuator.speed
+        speed = before + self.blend * (reading - before)
+        acceleration = (speed - before) / self.sampling.period
+        return estimate._replace(actuator=estimate.actuator._replace(speed=speed, acceleration=acceleration))
+
+
+def propeller_speed(
+    period: float = 0.01,
+    noise: float = 0.5,
+    bias: float = 0.0,
+    resolution: float = 0.0,
+    delay: float = 0.0,
+    dropout: float = 0.0,
+    blend: float = 1.0,
+) -> PropellerSpeed:
+    """Speeds of all propellers.
+
+    Args:
+        period: between samples, s; not shorter than the sampling time of the loop.
+        noise: standard deviation, rad/s.
+        bias: standard deviation of a constant offset, drawn once per run, rad/s.
+        resolution: step of the reading, rad/s; 0 for none.
+        delay: until a sample is delivered, s.
+        dropout: probability that a sample is lost.
+        blend: share of each new reading in the estimate; 1 for no filter.
+    """
+    return PropellerSpeed(Sampling(period, noise, bias, resolution, delay, dropout), blend)
