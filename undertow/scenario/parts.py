@@ -11,6 +11,7 @@ import numpy as np
 
 from undertow.core import catalogue, contracts
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.instruments.instrument import AbstractInstrument
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
 from undertow.scenario.values import checked
@@ -18,12 +19,13 @@ from undertow.scenario.vehicle_file import is_vehicle_file, make_vehicle
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 
-# Arguments that are parts themselves: their kind, and which one when no `kind` is said.
+# Arguments that are parts themselves: their kind, and which one when no `kind` is said; a tuple for a list of parts.
 INNER = {
     "vehicle": ("vehicles", "odin"),
     "thruster": ("thrusters", "paper_table3"),
     "battery": ("power", "battery"),
     "esc": ("power", "esc"),
+    "instruments": ("instruments", ("imu", "dvl", "depth", "compass", "position_fix")),
 }
 
 # Kinds that are data: every declared parameter of theirs may be changed by name.
@@ -37,6 +39,7 @@ _CONTRACTS = {
     "controllers": contracts.AbstractController,
     "disturbances": contracts.AbstractDisturbance,
     "references": contracts.AbstractReference,
+    "instruments": AbstractInstrument,
     "sensors": contracts.AbstractSensor,
 }
 
@@ -162,15 +165,27 @@ def _made(make: Callable[[], Any]) -> Any:
         raise BadInput("", "be something that can be made", f"not: {type(error).__name__}: {error}") from error
 
 
-def inner_default(name: str, parameter: inspect.Parameter) -> str | None:
+def inner_default(name: str, parameter: inspect.Parameter) -> Any:
     """Which part an argument of INNER is when nothing is said about it; None for none."""
     return INNER[name][1] if parameter.default is inspect.Parameter.empty else parameter.default
 
 
 def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[str, Any]]:
     kind, default = INNER[name]
+    if isinstance(default, tuple):
+        if not isinstance(description, list | tuple):
+            raise BadInput(name, "be a list of parts", description)
+        pairs = [_at(f"{name}[{i}]", kind, {}, entry, folder) for i, entry in enumerate(description)]
+        return [part for part, _ in pairs], [resolved for _, resolved in pairs]
+    return _at(name, kind, {"kind": default}, description, folder)
+
+
+def _at(
+    name: str, kind: str, default: Mapping[str, str], description: Any, folder: Path | None
+) -> tuple[Any, dict[str, Any]]:
+    """The part that stands at a key."""
     if isinstance(description, Mapping):
-        description = {"kind": default, **description}
+        description = {**default, **description}
     elif not isinstance(description, str):
         raise BadInput(name, "be a name, or a mapping with `kind` and options", description)
     try:
