@@ -17,11 +17,23 @@ KNOWN = {
     "w1": {"tracking_rms": (4.3e-3, 0.02)},
     "voltage_limited": {"voltage_peak": (24.0, 1e-12)},
     "recorded_disturbance": {},
+    "inverted_pendulum": {},
+    "magnetic_levitation": {},
+    "two_link_arm": {},
+    "under_actuated": {},
+    "own_vehicle": {},
 }
+VEHICLES = ["my_rov"]  # not scenarios
 
 
 def test_every_example_is_tested():
-    assert {path.stem for path in EXAMPLES.glob("*.yaml")} == set(KNOWN)
+    assert {path.stem for path in EXAMPLES.glob("*.yaml")} == {*KNOWN, *VEHICLES}
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_vehicle(name, capsys):
+    assert run(["check", str(EXAMPLES / f"{name}.yaml")]) == 0
+    assert capsys.readouterr().out.endswith("0 errors, 0 pieces of advice\n")
 
 
 @pytest.mark.parametrize("name", KNOWN)

@@ -26,9 +26,19 @@ Rows = tuple[tuple[str, str, str], ...]
 class Report(NamedTuple):
     """What a check found."""
 
-    sentences: tuple[str, ...]  # errors and advice, one line each
-    errors: int
+    found: tuple[tuple[Finding, str], ...]  # with its place, when known
     tables: tuple[tuple[str, Rows], ...]  # title, and what follows from the numbers
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """One line each, errors first."""
+        ordered = sorted(self.found, key=lambda pair: pair[0].level != "error")
+        return tuple(finding.sentence(where) for finding, where in ordered)
+
+    @property
+    def errors(self) -> int:
+        """Number of errors."""
+        return sum(finding.level == "error" for finding, _ in self.found)
 
 
 def check(thing: str, options: Mapping[str, Any]) -> Report:
@@ -134,14 +144,11 @@ def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:
 def _report(
     findings: Iterable[Finding], where: Callable[[str], str] = lambda key: "", title: str = "", rows: Rows = ()
 ) -> Report:
-    findings = list(findings)
-    sentences = tuple(finding.sentence(where(finding.key)) for finding in findings)
-    return Report(sentences, sum(f.level == "error" for f in findings), ((title, rows),) if rows else ())
+    found = tuple((finding, where(finding.key)) for finding in findings)
+    return Report(found, ((title, rows),) if rows else ())
 
 
 def _joined(reports: list[Report]) -> Report:
-    """All of them; what two say in the same words is said once, errors first."""
-    sentences = dict.fromkeys(sentence for report in reports for sentence in report.sentences)
-    ordered = sorted(sentences, key=lambda sentence: not sentence.startswith("Error"))
-    tables = tuple(table for report in reports for table in report.tables)
-    return Report(tuple(ordered), sum(sentence.startswith("Error") for sentence in ordered), tables)
+    """All of them; what two say in the same words is said once, by the later one, which knows the place."""
+    found = {finding.says: (finding, where) for report in reports for finding, where in report.found}
+    return Report(tuple(found.values()), tuple(table for report in reports for table in report.tables))

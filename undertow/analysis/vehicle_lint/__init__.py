@@ -8,7 +8,7 @@ state that leaks between runs (tests/cli/test_simulate.py: a repeated run has th
 """
 
 from undertow.analysis.finding import Finding
-from undertow.analysis.vehicle_lint import hydrodynamics, layout, mass, printed_matrix, statics
+from undertow.analysis.vehicle_lint import copied, hydrodynamics, layout, mass, printed_matrix, statics
 from undertow.analysis.vehicle_lint.derived import derived as derived
 from undertow.analysis.vehicle_lint.facts import Facts as Facts
 from undertow.analysis.vehicle_lint.facts import facts_of as facts_of
@@ -19,6 +19,7 @@ _RULES = (
     *hydrodynamics.RULES,
     *layout.RULES,
     *printed_matrix.RULES,
+    *copied.RULES,
 )
 
 

@@ -33,8 +33,9 @@ class Facts(NamedTuple):
 
     @property
     def displaced_mass(self) -> float:
-        """Mass of the displaced water, kg: the buoyancy in terms of the vehicle's own gravity."""
-        return self.buoyancy * self.mass / self.weight
+        """Mass of the displaced water, kg; by the vehicle's own gravity, if that can be the earth's."""
+        gravity = self.weight / self.mass
+        return self.buoyancy / (gravity if 9 < gravity < 11 else 9.81)
 
     @property
     def scale(self) -> float:

@@ -62,7 +62,7 @@ def same_line(facts: Facts) -> Iterator[Finding]:
         for i in range(j):
             turned = min(np.abs(columns[j] - columns[i]).max(), np.abs(columns[j] + columns[i]).max())
             if turned < 1e-3:
-                got = f"on the line of thruster {i + 1}"
+                got = f"on that of `thrusters[{i}]`"
                 hint = "Has a direction or position lost a sign?"
                 yield advice("same_line", f"thrusters[{j}]", "have a line of action of its own", got, hint)
 
@@ -74,9 +74,8 @@ def mirror(facts: Facts) -> Iterator[Finding]:
     distance = np.minimum(*(np.abs(images[:, None] - sign * columns).max(axis=2) for sign in (1, -1)))
     alone = np.flatnonzero(distance.min(axis=1) > 0.02)
     if 0 < len(alone) <= len(columns) // 2 and len(columns) > 2:
-        shown = ", ".join(str(j + 1) for j in alone)
-        key = f"thrusters[{alone[0]}]"
-        got = f"alone (without one: {shown} of {len(columns)})"
+        others = f", like {', '.join(f'`thrusters[{j}]`' for j in alone[1:])}" if len(alone) > 1 else ""
+        key, got = f"thrusters[{alone[0]}]", f"without one{others}, of {len(columns)} thrusters"
         hint = "The others have one: is a sign or a number wrong?"
         yield advice("mirror", key, "have a mirror image on the other side", got, hint)
 

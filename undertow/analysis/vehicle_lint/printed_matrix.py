@@ -14,19 +14,19 @@ def printed_matrix(facts: Facts) -> Iterator[Finding]:
     """Each row against the poses; one finding per row that is off."""
     if facts.printed_matrix is None:
         return
-    expected = facts.thruster_matrix
+    expected = facts.thruster_matrix + 0.0  # no minus zeros
     for row, (printed, computed) in enumerate(zip(facts.printed_matrix, expected, strict=True)):
         largest = np.maximum(np.abs(printed), np.abs(computed)).max()
         off = np.flatnonzero(np.abs(printed - computed) > _ROUNDING * largest)
         if len(off):
             j = int(off[np.argmax(np.abs(printed - computed)[off])])
-            must = f"agree with the poses, which give {computed[j]:.4g} for thruster {j + 1} in {FREEDOMS[row]}"
+            must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {FREEDOMS[row]}"
             got = f"{printed[j]:.4g}{_others(off)}"
             yield error("printed_matrix", f"thruster_matrix[{row}]", must, got, _likely(printed[off], computed[off]))
 
 
 def _others(off: np.ndarray) -> str:
-    return f", and off for {len(off)} thrusters of this row" if len(off) > 1 else ""
+    return f" ({len(off)} entries of this row are off)" if len(off) > 1 else ""
 
 
 def _likely(printed: np.ndarray, computed: np.ndarray) -> str:
@@ -37,7 +37,7 @@ def _likely(printed: np.ndarray, computed: np.ndarray) -> str:
         ratio = np.abs(printed / computed)
     if np.all(np.abs(ratio - np.sqrt(2)) < 0.05 * np.sqrt(2)):
         return "The arm was not multiplied by sin 45 degrees"
-    if np.ptp(ratio) < 0.02 * ratio.max() < np.inf:
+    if np.all(np.isfinite(ratio)) and np.ptp(ratio) < 0.02 * ratio.max():
         return f"The arms are {ratio[0]:.3g} times too long: another vehicle's, or another unit"
     return "Is it the matrix of another layout, order or frame?"
 

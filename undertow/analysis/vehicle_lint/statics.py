@@ -35,7 +35,7 @@ def balance(facts: Facts) -> Iterator[Finding]:
     net = facts.buoyancy - facts.weight
     share = net / facts.weight
     got = (
-        f"{facts.buoyancy:.5g} N, {abs(net):.3g} N {'above' if net > 0 else 'below'} the weight ({100 * share:+.2g} %)"
+        f"{facts.buoyancy:.5g} N, {abs(net):.4g} N {'above' if net > 0 else 'below'} the weight ({100 * share:+.1f} %)"
     )
     radius = np.cbrt(facts.mass / FRESH_WATER / (4 / 3 * np.pi))
     if not -0.5 < share < 1.0:

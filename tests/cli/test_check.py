@@ -1,0 +1,151 @@
+"""`undertow check`: vehicle files, catalogue names, parts from a file, scenarios."""
+
+from pathlib import Path
+
+import pytest
+from good_scenario import SCENARIO
+
+from undertow.core import catalogue
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PARTS = [(kind, name) for kind in ("plants", "controllers", "disturbances") for name in catalogue.names(kind)]
+
+CIRCLE = """
+import jax.numpy as jnp
+from undertow.core.contracts import {contract}, Target
+
+
+class Mine({contract}):
+    def at(self, t):
+        return Target(jnp.sin(t) * jnp.ones(6), {velocity}, -jnp.sin(t) * jnp.ones(6))
+
+
+def mine():
+    return Mine()
+"""
+
+
+def test_sound_vehicle_file(undertow):
+    said = undertow("check", str(EXAMPLES / "my_rov.yaml"))
+    assert said.code == 0 and said.err == ""
+    assert said.out.splitlines()[-1].endswith("my_rov.yaml: 0 errors, 0 pieces of advice")
+    assert "righting moment" in said.out and "1.316" in said.out
+
+
+def test_vehicle_file_with_another_value(undertow):
+    said = undertow("check", str(EXAMPLES / "my_rov.yaml"), "--option", "r_b=[0, 0, 0.01]", "--option", "mass=14")
+    assert said.code == 2 and said.err == ""
+    first, *_, last = said.out.splitlines()
+    assert first.startswith(
+        "Error: `r_b` must be above the centre of gravity, but is 10 mm below it (my_rov.yaml, line 12)"
+    )
+    assert last.endswith(": 1 error, 1 piece of advice")
+
+
+def test_variant_of_a_catalogue_vehicle(undertow):
+    said = undertow("check", "bluerov2_heavy", "--option", "parameters=ng2024")
+    assert said.code == 0
+    assert said.out.startswith(
+        "Advice: `inertia` should give a radius of gyration below 0.225 m in yaw, but is one of 0.295 m"
+    )
+    assert undertow("check", "vehicles/bluerov2_heavy", "--option", "parameters=wu2018").out.count("Advice") == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["oddin"], "`THING` must be a file or the name of a part, but is oddin. Did you mean `odin`?"),
+        (["bluerov2_heavy", "--option", "parameters=wu"], "`parameters` must be one of vonbenzon2022, wu2018"),
+        (["bluerov2_heavy", "--option", "parameters"], "`--option` must be KEY=VALUE, but is parameters"),
+        (["bluerov2_heavy", "--option", "mas=3"], "`mas` must be an option or parameter here, but is unknown"),
+        (["./mine.py:mine"], "`THING` must name an existing file, but is ./mine.py"),
+        (["s.nc"], "`THING` must be an existing file, but is s.nc"),
+    ],
+)
+def test_bad_argument(refused, arguments, said):
+    assert refused("check", *arguments).startswith(said)
+
+
+def test_file_that_is_neither(refused, tmp_path):
+    (tmp_path / "x.yaml").write_text("masss: 3\n")
+    said = "`THING` must be a vehicle or scenario file, but is x.yaml, without a key of either. Did you mean `mass`?"
+    assert refused("check", "x.yaml") == said
+
+
+def test_scenario(undertow, tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    said = undertow("check", "s.yaml")
+    assert said.code == 0
+    assert said.out.count("torque constant / back-EMF constant is 117") == 1
+    assert "odin (vehicle)" in said.out
+
+
+def test_vehicle_of_a_scenario(undertow, tmp_path):
+    rov = (EXAMPLES / "my_rov.yaml").read_text()
+    (tmp_path / "my_rov.yaml").write_text(rov.replace("inertia: [0.26, 0.23, 0.37]", "inertia: [26, 23, 37]"))
+    (tmp_path / "s.yaml").write_text(SCENARIO.replace("{kind: odin, mass: 125}", "my_rov.yaml"))
+    said = undertow("check", "s.yaml")
+    assert said.code == 2
+    assert said.out.startswith(
+        "Error: `inertia` must give a radius of gyration below 0.261 m in pitch, but is one of 1.31 m (s.yaml, line 2)"
+    )
+
+
+def test_bad_scenario(refused, tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO.replace("duration: 0.1", "duration: -1"))
+    assert refused("check", "s.yaml").startswith("`loop.duration` must be greater than 0, but is -1")
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    said = "`--option` must be left out for a scenario, but is seed"
+    assert refused("check", "s.yaml", "--option", "seed=4") == said
+
+
+@pytest.mark.parametrize(("kind", "name"), PARTS)
+def test_parts_of_the_catalogue_keep_their_contract(undertow, kind, name):
+    needed = {"table": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]"]}
+    said = undertow("check", f"{kind}/{name}", *needed.get(name, []))
+    assert said.code == 0, said
+
+
+@pytest.mark.parametrize("name", sorted(catalogue.names("references")))
+def test_references_are_consistent(undertow, name):
+    samples = "[[0, 0, 0, 0, 0, 0, 0], [5, 1, 0, 1, 0, 0, 0.3], [10, 1, 2, 1, 0, 0, 0]]"
+    needed = {
+        "setpoint": ["position=[1, 2, 3, 0, 0, 0]"],
+        "waypoints": ["points=[[0, 0, 0], [2, 0, 1], [2, 2, 1]]"],
+        "recorded": [f"samples={samples}"],
+    }
+    options = [word for option in needed.get(name, []) for word in ("--option", option)]
+    said = undertow("check", f"references/{name}", *options)
+    assert said.code == 0, said
+
+
+def test_part_from_a_file_that_keeps_its_contract(undertow, tmp_path):
+    code = CIRCLE.format(contract="AbstractReference", velocity="jnp.cos(t) * jnp.ones(6)")
+    (tmp_path / "mine.py").write_text(code)
+    assert undertow("check", "./mine.py:mine").code == 0
+
+
+def test_part_from_a_file_that_does_not(undertow, tmp_path):
+    code = CIRCLE.format(contract="AbstractReference", velocity="-jnp.cos(t) * jnp.ones(6)")
+    (tmp_path / "mine.py").write_text(code)
+    said = undertow("check", "./mine.py:mine")
+    assert said.code == 2
+    assert said.out.startswith("Error: `at` must agree with the rate of the position at 0.37 s, but is -0.932")
+
+
+def test_part_from_a_file_that_is_none(refused, tmp_path):
+    (tmp_path / "mine.py").write_text("def mine():\n    return 7\n")
+    said = "`THING` must return a vehicle, thruster, plant or other part, but is ./mine.py:mine: 7"
+    assert refused("check", "./mine.py:mine") == said
+
+
+def test_vehicle_from_a_python_file(undertow, tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import equinox as eqx\nimport undertow as ut\n\n\n"
+        "def mine():\n    return eqx.tree_at(lambda v: v.weight, ut.vehicles.odin(), 125.0)\n"
+    )
+    said = undertow("check", "./mine.py:mine")
+    assert said.code == 2
+    assert said.out.startswith(
+        "Error: `weight` must be the weight of the mass, 1226 N, but is 125 N, 1 m/s^2 times 125 kg. Is"
+    )
