@@ -149,3 +149,18 @@ def test_vehicle_from_a_python_file(undertow, tmp_path):
     assert said.out.startswith(
         "Error: `weight` must be the weight of the mass, 1226 N, but is 125 N, 1 m/s^2 times 125 kg. Is"
     )
+
+
+def test_result_file_is_the_scenario_in_it(undertow, tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO.replace("rung: ideal", "rung: static"))
+    assert undertow("simulate", "s.yaml", "--out", "out").code == 0
+    said = undertow("check", "out/run.nc")
+    assert said.code == 0 and "odin (vehicle)" in said.out
+
+
+def test_thruster_from_a_python_file(undertow, tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import undertow as ut\n\n\ndef mine(gain: float = -5.0):\n    return ut.thrusters.linear_voltage(gain)\n"
+    )
+    said = undertow("check", "./mine.py:mine", "--option", "gain=5.0")
+    assert said.code == 0 and "mine (thruster)" in said.out

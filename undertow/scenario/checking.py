@@ -15,8 +15,9 @@ from undertow.scenario import parts
 from undertow.scenario.build import build
 from undertow.scenario.reading import Text, key_path, read
 from undertow.scenario.schema import Scenario
-from undertow.scenario.vehicle_data import KEYS, parse
+from undertow.scenario.vehicle_data import parse
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
+from undertow.scenario.vehicle_keys import KEYS
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 

@@ -11,6 +11,7 @@ from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario.values import checked
 
 _KEYS = ("position", "direction", "azimuth", "elevation")
+_FARTHEST = 1e9
 _AXES = "forward, starboard, down"
 
 
@@ -54,6 +55,8 @@ def _vector(name: str, entry: Mapping[str, Any], key: str) -> NDArray:
         raise BadInput(f"{name}.{key}", "be given", hint=hint)
     value = checked(f"{name}.{key}", entry[key], None, 0.0)
     checks.length(f"{name}.{key}", value, 3, _AXES)
+    if np.abs(np.asarray(value, dtype=float)).max() > _FARTHEST:
+        raise BadInput(f"{name}.{key}", f"hold numbers below {_FARTHEST:g}", value)
     return np.asarray(value, dtype=float)
 
 

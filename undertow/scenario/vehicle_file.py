@@ -6,7 +6,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import Text, from_data, key_path, read
-from undertow.scenario.vehicle_data import INSTEAD, VehicleData, parse
+from undertow.scenario.vehicle_data import VehicleData, parse
+from undertow.scenario.vehicle_keys import INSTEAD
 from undertow.vehicles.vehicle import Vehicle
 
 Made = TypeVar("Made")

@@ -1,10 +1,11 @@
 """Is this vehicle possible, and is it likely? Each rule looks at one thing and says what caused its finding.
 
-A linter sees numbers, not code. Of the defects found in published models it cannot see: integration errors and time
-steps (tests/loop/test_sampled_to_continuous.py: the answer converges as the step is halved), wrong kinematics
-(tests/numerics/test_rotations.py), Coriolis terms left out (tests/physics/test_inertia_forces.py), motion reversed
-or mirrored (tests/physics/test_symmetries.py), energy out of nothing (tests/physics/test_energy_balance.py),
-state that leaks between runs (tests/cli/test_simulate.py: a repeated run has the same bits).
+A linter sees numbers, not code. Of the defects found in published models it cannot see: wrong integration and time
+steps (tests/loop/test_sampled_to_continuous.py: answers converge as the step is halved; tests/numerics/
+test_integrators.py), wrong kinematics (tests/numerics/test_rotations.py, tests/physics/test_output_rates.py), Coriolis
+terms left out or doing work (tests/physics/test_inertia_forces.py), forces that change when motion is reversed or
+mirrored (tests/physics/test_mirror.py), energy out of nothing (tests/physics/test_energy_balance.py), state that
+leaks between runs (tests/loop/test_sampled_to_continuous.py: run twice, same bits).
 """
 
 from undertow.analysis.finding import Finding

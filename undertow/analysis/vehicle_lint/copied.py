@@ -29,6 +29,8 @@ def copied(facts: Facts) -> Iterator[Finding]:
 
 def _moved(mine: np.ndarray, theirs: np.ndarray) -> tuple[int, ...]:
     """The power of ten between two matrices, if that is all there is between them."""
+    if not np.any(mine):
+        return ()
     power = int(np.round(np.log10(np.abs(mine).max() / np.abs(theirs).max())))
     same = np.abs(mine - 10.0**power * theirs).max() < _DIGITS * np.abs(mine).max()
     plain = np.ptp(np.diag(theirs)) < 0.05 * np.abs(theirs).max()  # three times 8 may be chance, if moved
