@@ -20,6 +20,9 @@ def run_of(controller="rcafc", axes=6, inputs=8, status="ok", ended=20.0, sample
         d = d * np.exp(np.minimum(time, ended) * 4)[:, None]
     per_axis = {
         "position": wanted - error,
+        "velocity": error.copy(),
+        "measured_position": wanted - error,
+        "measured_velocity": error,
         "target": wanted,
         "error": error,
         "uncertainty": d,

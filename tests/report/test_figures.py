@@ -158,6 +158,20 @@ def test_run_figures_for_any_size(make_run, axes, inputs):
     assert last.get_ylabel() == "input, V"
 
 
+def test_a_sensor_that_errs_has_a_figure_of_its_own(make_run):
+    run = make_run()
+    run["measured_position"][:, 0] += 0.25
+    run["measured_position"][:, 5] += 2 * np.pi - 0.125  # the same heading but for an eighth
+    run["measured_velocity"][:, 2] -= 0.5
+    figures = run_figures(run)
+    assert list(figures) == ["tracking", "error", "estimate", "effort", "measurement"]
+    position, _ = titled(figures["measurement"], "north")
+    heading, _ = titled(figures["measurement"], "yaw")
+    _, sinking = titled(figures["measurement"], "down")
+    for panel, apart in ((position, 0.25), (heading, -0.125), (sinking, -0.5)):
+        np.testing.assert_allclose(panel.lines[0].get_ydata(), apart, atol=1e-12)
+
+
 def test_diverged_run_is_drawn_up_to_its_end(make_run):
     run = make_run(axes=2, inputs=2, status="diverged", ended=3.3)
     figures = run_figures(run)

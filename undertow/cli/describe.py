@@ -55,6 +55,8 @@ def _text(value: Any) -> str:
         return "none" if value is None else value
     if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
         return str(value).lower()
+    if isinstance(value, list | tuple) and any(isinstance(entry, str) for entry in value):
+        return ", ".join(value)
     array = np.asarray(value, dtype=float)
     if array.ndim == 0:
         return f"{array:.6g}"

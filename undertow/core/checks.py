@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
@@ -34,7 +33,7 @@ def length(name: str, value: Any, expected: int, what: str) -> None:
 
 def per_axis(name: str, value: Any, axes: int, entry: tuple[int, ...] = ()) -> None:
     """One entry of shape `entry`, or one such entry per axis."""
-    shape = jnp.shape(value)
+    shape = np.shape(value)
     if shape not in (entry, (axes, *entry)):
         what = "one number" if not entry else f"one entry of shape {entry}"
         raise BadInput(name, f"be {what}, or {axes} of them, one per axis", f"of shape {shape}")
@@ -63,7 +62,7 @@ def hurwitz(name: str, feedback: Any) -> None:
 
 def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
     """Square matrix, or a stack of them, symmetric with positive eigenvalues."""
-    shape = jnp.shape(matrix)
+    shape = np.shape(matrix)
     if isinstance(matrix, Tracer):
         return
     finite(name, matrix, unit)

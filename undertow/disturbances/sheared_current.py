@@ -26,11 +26,11 @@ class ShearedCurrent(AbstractDisturbance):
     velocities: Float[Array, "k 2"] = param("m/s", "velocity there: north, east")
 
     def __check_init__(self):
-        shape = jnp.shape(self.depths)
+        shape = np.shape(self.depths)
         if len(shape) != 1 or shape[0] < 2:
             raise BadInput("depths", "be a list of two or more depths", f"of shape {shape}")
-        if jnp.shape(self.velocities) != (shape[0], 2):
-            got = f"of shape {jnp.shape(self.velocities)}"
+        if np.shape(self.velocities) != (shape[0], 2):
+            got = f"of shape {np.shape(self.velocities)}"
             raise BadInput("velocities", f"have {shape[0]} rows (north, east), one per depth", got)
         checks.finite("depths", self.depths, "m")
         checks.finite("velocities", self.velocities, "m/s")

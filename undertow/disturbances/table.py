@@ -22,7 +22,7 @@ class Table(AbstractDisturbance):
     samples: Float[Array, "rows columns"] = param("s, then m/s^2 or rad/s^2", "rows (t, d1, d2, ...)")
 
     def __check_init__(self):
-        shape = jnp.shape(self.samples)
+        shape = np.shape(self.samples)
         if len(shape) != 2 or shape[0] < 2 or shape[1] < 2:
             raise BadInput("samples", "have two or more rows (t, d1, d2, ...)", f"of shape {shape}")
         checks.finite("samples", self.samples)

@@ -1,6 +1,6 @@
 """A constant external force and moment: w_d of Eq. (2)."""
 
-import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -21,8 +21,8 @@ class ConstantWrench(AbstractDisturbance):
         return ()
 
     def at(self, path, t, place, calm: Load) -> Load:
-        if jnp.shape(self.value) != calm.wrench.shape:
-            raise BadInput("value", f"have {calm.wrench.shape[0]} entries", f"of shape {jnp.shape(self.value)}")
+        if np.shape(self.value) != calm.wrench.shape:
+            raise BadInput("value", f"have {calm.wrench.shape[0]} entries", f"of shape {np.shape(self.value)}")
         return calm._replace(wrench=calm.wrench + self.value)
 
     def jumps(self, duration: float) -> tuple[float, ...]:

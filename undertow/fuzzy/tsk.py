@@ -26,7 +26,7 @@ class FuzzySystem(eqx.Module):
     evenly_spaced: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
-        shapes = jnp.shape(self.centres), jnp.shape(self.widths)
+        shapes = np.shape(self.centres), np.shape(self.widths)
         if len(shapes[0]) != 2 or shapes[0] != shapes[1] or 0 in shapes[0]:
             raise BadInput("centres", "have one row of sets per input, like widths", shapes)
         checks.finite("centres", self.centres)

@@ -28,6 +28,8 @@ class Sample(NamedTuple):
 
     position: Outputs
     velocity: Outputs
+    measured_position: Outputs  # what the controller was told
+    measured_velocity: Outputs
     target: Outputs
     error: Outputs
     uncertainty: Outputs  # d = x_ddot - F - G V, measured, never assumed; holds Delta of Eq. (3) and all else
@@ -114,12 +116,14 @@ class Drawn(NamedTuple):
         """What is written down about time t. Errors are those of the truth, not of the measurement."""
         plant, model = self.loop.plant, self.loop.controller.model
         truth = plant.output(t, x)
-        _, r, command, applied, telemetry, _ = decision
+        y, r, command, applied, telemetry, _ = decision
         known = model.drift(truth) + matvec(model.gain(truth), applied)
         effort = plant.effort(x, applied)
         return Sample(
             position=truth.position,
             velocity=truth.velocity,
+            measured_position=y.position,
+            measured_velocity=y.velocity,
             target=r.position,
             error=model.difference(r.position, truth.position),
             uncertainty=plant.acceleration(t, x, applied, self.load(t, x)) - known,

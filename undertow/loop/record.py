@@ -11,6 +11,8 @@ from undertow.loop.outcome import Outcome
 _MEANINGS = {
     "position": ("axis", "position", ""),
     "velocity": ("axis", "velocity", "/s"),
+    "measured_position": ("axis", "position as the controller was told", ""),
+    "measured_velocity": ("axis", "velocity as the controller was told", "/s"),
     "target": ("axis", "wanted position", ""),
     "error": ("axis", "tracking error x_d - x", ""),
     "uncertainty": ("axis", "lumped uncertainty d = x_ddot - F - G V, measured", "/s^2"),

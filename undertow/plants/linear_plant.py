@@ -32,8 +32,8 @@ class LinearSystem(eqx.Module):
     velocity_term: Float[Array, "n n"] = param("1/s", "acceleration per velocity", symbol="H")
 
     def __check_init__(self):
-        if jnp.ndim(self.gain) != 2 or not jnp.size(self.gain):
-            raise BadInput("gain", "be a matrix with a row per output", f"of shape {jnp.shape(self.gain)}")
+        if np.ndim(self.gain) != 2 or not np.size(self.gain):
+            raise BadInput("gain", "be a matrix with a row per output", f"of shape {np.shape(self.gain)}")
         n = self.gain.shape[0]
         for name in ("gain", "position_term", "velocity_term"):
             value = getattr(self, name)

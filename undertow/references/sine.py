@@ -1,6 +1,7 @@
 """A sinusoid on every output: what textbook plants are asked to follow."""
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -23,12 +24,10 @@ class Sine(AbstractReference):
 
     def __init__(self, amplitude, frequency, offset, phase):
         given = {"amplitude": amplitude, "frequency": frequency, "offset": offset, "phase": phase}
-        axes = max(jnp.size(value) for value in given.values())
+        axes = max(np.size(value) for value in given.values())
         for name, value in given.items():
-            if jnp.shape(value) not in ((), (1,), (axes,)):
-                raise BadInput(
-                    name, f"be one number, or {axes} of them, one per output", f"of shape {jnp.shape(value)}"
-                )
+            if np.shape(value) not in ((), (1,), (axes,)):
+                raise BadInput(name, f"be one number, or {axes} of them, one per output", f"of shape {np.shape(value)}")
             checks.finite(name, value)
             setattr(self, name, jnp.broadcast_to(jnp.asarray(value, dtype=float), (axes,)))
 

@@ -45,14 +45,14 @@ class Vehicle(eqx.Module):
         checks.positive("buoyancy", self.buoyancy, "N")
         self._check_thrusters()
         for name, size in (("inertia", 3), ("added_mass", 6), ("linear_damping", 6), ("quadratic_damping", 6)):
-            shape = jnp.shape(getattr(self, name))
+            shape = np.shape(getattr(self, name))
             if shape != (size, size):
                 raise BadInput(name, f"be a {size} x {size} matrix", f"of shape {shape}")
             checks.finite(name, getattr(self, name))
         checks.positive_definite("mass_matrix", self.mass_matrix())
 
     def _check_thrusters(self) -> None:
-        shapes = jnp.shape(self.thruster_positions), jnp.shape(self.thruster_directions)
+        shapes = np.shape(self.thruster_positions), np.shape(self.thruster_directions)
         if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3 or shapes[0][0] == 0:
             raise BadInput(
                 "thruster_positions", "have one row (x, y, z) per thruster, like thruster_directions", shapes

@@ -14,7 +14,7 @@ _RUNAWAY = 1e2
 
 
 def run_figures(run: xr.Dataset) -> dict[str, Figure]:
-    """Tracking, error, estimate and effort of one run, by these names."""
+    """Tracking, error, estimate and effort of one run, by these names; with a sensor that errs, `measurement` too."""
     outputs, columns = signals.axis_names(run), _columns(run.sizes["axis"])
     inputs = [f"input {number}" for number in run["input"].values]
     wanted = signals.curve(run, "wanted $x_d$", "target", style.TRUTH)
@@ -27,7 +27,7 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
     places, errors = signals.places(run), signals.per_axis(run, "|error|")
     rates = signals.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
     levels = [f"input, {run['voltage'].attrs['units']}"] * run.sizes["input"]
-    return {
+    figures = {
         "tracking": small_multiples(
             _titled(run, "Tracking"), outputs, [_block(run, [wanted, actual], places, 0.0)], columns
         ),
@@ -47,6 +47,21 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
             _columns(run.sizes["input"]),
         ),
     }
+    if (run["measured_position"] == run["position"]).all() and (run["measured_velocity"] == run["velocity"]).all():
+        return figures
+    return figures | {"measurement": small_multiples(_titled(run, "Measurement error"), outputs, _apart(run), columns)}
+
+
+def _apart(run: xr.Dataset) -> list[Block]:
+    """What the controller was told less the truth: position and, below it, velocity."""
+    blocks = []
+    for signal, symbol, rate in (("position", "x", ""), ("velocity", r"\dot{x}", "/s")):
+        apart = signals.difference(run, "told less true", f"measured_{signal}", signal, style.SOLID)
+        turns = np.array(["rad" in unit and not rate for unit in run["axis"].attrs["unit_of_each"].split(", ")])
+        wrapped = np.where(turns, (apart.values + np.pi) % (2 * np.pi) - np.pi, apart.values)
+        quantities = signals.per_axis(run, f"${symbol}$", rate)
+        blocks.append(_block(run, [apart._replace(values=wrapped)], quantities, 0.0)._replace(titled=not rate))
+    return blocks
 
 
 def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float) -> Block:
