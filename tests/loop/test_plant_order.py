@@ -13,6 +13,8 @@ from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.plants.inverted_pendulum import inverted_pendulum
+from undertow.plants.two_link_arm import two_link_arm
 from undertow.references.setpoint import setpoint
 from undertow.sensors.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
@@ -90,6 +92,21 @@ def swinging():
     return ClosedLoop(plant, law, setpoint(np.zeros(1)), sinusoid(1.0, 15.0), perfect()), np.ones(1)
 
 
+def of_plant(plant, velocity):
+    """A plant of the catalogue under a law that was told the truth."""
+    law = rcaf(plant.model(), **GENTLE)
+    n = len(plant.outputs)
+    return ClosedLoop(plant, law, setpoint(np.full(n, 0.2)), sinusoid(1.0, 15.0), perfect()), np.full(n, velocity)
+
+
+def balancing():
+    return of_plant(inverted_pendulum(), 1.0)
+
+
+def reaching():
+    return of_plant(two_link_arm(), 1.0)
+
+
 def swimming():
     """ODIN moving on every axis, so that |nu| nu is smooth."""
     plant = hybrid_vehicle(odin(), paper_table3("ideal"))
@@ -97,7 +114,7 @@ def swimming():
     return loop, np.full(6, 0.8)
 
 
-@pytest.mark.parametrize("make", [swinging, pytest.param(swimming, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("make", [swinging, balancing, reaching, pytest.param(swimming, marks=pytest.mark.slow)])
 def test_fourth_order_in_the_step_of_the_plant(make):
     """1, 2 and 4 steps of RK4 per tick; the control rate stays 20 Hz."""
     loop, velocity = make()

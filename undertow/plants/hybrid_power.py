@@ -71,14 +71,15 @@ class HybridPower(eqx.Module):
 
     def admissible(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
         """Voltages within the supply, within what the battery can give, in whole pulses."""
-        wanted = jnp.clip(u, -thruster.supply, thruster.supply)
+        wanted, limited = jnp.clip(u, -thruster.supply, thruster.supply), False
         if self.battery is not None:
             within = lambda voltage: jnp.clip(wanted, -voltage, voltage)
             taken = lambda voltage: drive_power(thruster, state, within(voltage)).sum()
-            wanted = within(self.battery.limit(power.drawn, taken, jnp.abs(wanted).max()))
+            most = self.battery.limit(power.drawn, taken, jnp.abs(wanted).max())
+            wanted, limited = within(most), most < jnp.abs(wanted).max()
         if self.esc is not None:
             bus = self.bus_voltage(thruster, state, power, wanted)
-            wanted = self.esc.voltage(self.esc.pulse(wanted, bus), bus)
+            wanted = self.esc.voltage(self.esc.pulse(wanted, bus, limited), bus)
         return wanted
 
     def saturated(self, thruster: AbstractThruster, state: Any, power: PowerState, u):

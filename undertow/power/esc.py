@@ -28,10 +28,11 @@ class ESC(eqx.Module):
             checks.positive(name, getattr(self, name), "us")
         checks.not_negative("dead_band", self.dead_band, "us")
 
-    def pulse(self, voltage: PerThruster, bus: Scalar) -> PerThruster:
-        """Pulse, us, that asks for a voltage in V: within the span, rounded."""
-        wanted = self.neutral + self.span * jnp.clip(voltage / bus, -1.0, 1.0)
-        return self.resolution * jnp.round(wanted / self.resolution)
+    def pulse(self, voltage: PerThruster, bus: Scalar, limited: Array | bool = False) -> PerThruster:
+        """Pulse, us, that asks for a voltage in V: within the span, rounded; towards neutral where there is no more."""
+        steps = self.neutral / self.resolution + self.span / self.resolution * jnp.clip(voltage / bus, -1.0, 1.0)
+        inward = jnp.where(voltage < 0, jnp.ceil(steps), jnp.floor(steps))
+        return self.resolution * jnp.where(limited, inward, jnp.round(steps))
 
     def voltage(self, pulse: PerThruster, bus: Scalar) -> PerThruster:
         """Voltage, V, that a pulse in us gives."""

@@ -1,0 +1,320 @@
+"""Battery, speed controllers and energy ledger: closed forms, limits that are met and never passed, books that close."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jaxtyping import Array, Float
+from scipy.integrate import quad
+
+from undertow.core.continuous import AbstractContinuousController
+from undertow.core.contracts import AbstractModel, Telemetry
+from undertow.core.errors import BadInput
+from undertow.disturbances.none import none
+from undertow.loop import continuous, sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.numerics.integrators import METHODS
+from undertow.plants import hybrid_vehicle
+from undertow.power import battery, esc
+from undertow.power.ledger import closure
+from undertow.references.setpoint import setpoint
+from undertow.sensors.perfect import perfect
+from undertow.thrusters import first_order, linear_voltage, paper_table3, t200
+from undertow.thrusters.ladder import RUNGS
+from undertow.vehicles import odin
+
+THRUSTERS = {"t200": t200, "table3": paper_table3}
+# Stiff enough for both: Table 3 takes 10 A a thruster at 12 V, eight of them.
+BATTERY = battery(resistance=0.01)
+
+
+class Driven(AbstractContinuousController):
+    """Voltages size * (bias + sin(7 t + phase)), whatever is measured; the state is the time."""
+
+    model: AbstractModel
+    size: Float[Array, ""]
+    bias: Float[Array, ""]
+    method: str = eqx.field(static=True, default="rk4")
+    substeps: int = eqx.field(static=True, default=1)
+
+    def init(self, y, r):
+        return jnp.zeros(())
+
+    def command(self, z, y, r):
+        zero = jnp.zeros_like(y.position)
+        volts = self.size * (self.bias + jnp.sin(7 * z + jnp.arange(8.0)))
+        return volts, Telemetry(zero, zero, zero, zero, zero, zero[:, None])
+
+    def flow(self, z, y, r, u_applied):
+        return jnp.ones(())
+
+    def project(self, z):
+        return z
+
+
+def loop_of(thruster, size=8.0, bias=0.0, **power):
+    plant = hybrid_vehicle(odin(), thruster, **power)
+    law = Driven(plant.model(), jnp.asarray(size), jnp.asarray(bias))
+    return ClosedLoop(plant, law, setpoint(np.zeros(6)), none(), perfect())
+
+
+def recorded(outcome):
+    return {"time": outcome.time, **outcome.samples.books}
+
+
+# ----------------------------------------------------------------------------------------------------- the books
+
+
+@pytest.mark.parametrize("rung", RUNGS)
+@pytest.mark.parametrize("name", THRUSTERS)
+def test_rates_of_the_ledger_cancel_at_every_instant(name, rung):
+    """source + conversion = copper + friction + water + d(stored)/dt at random states, in both directions."""
+    thruster, rng = THRUSTERS[name](rung), np.random.default_rng(1)
+    volts = 12 * rng.normal(size=400)
+    state = jax.tree.map(lambda leaf: leaf + 30 * rng.normal(size=leaf.shape), thruster.initial_state(400))
+    flows = thruster.powers(state, volts)
+    _, stored = jax.jvp(thruster.stored, (state,), (thruster.dynamics(state, volts),))
+    left = flows.source + flows.conversion - flows.copper - flows.friction - flows.water - stored
+    assert (np.abs(left) <= 1e-12 * np.max(np.abs(flows), axis=0)).all()
+    if name == "t200" and rung != "ideal":
+        np.testing.assert_array_equal(flows.conversion, 0.0, err_msg="k_t = k_e: nothing out of nothing")
+
+
+@pytest.mark.parametrize("kind", ["sampled", "continuous"])
+@pytest.mark.parametrize("rung", RUNGS)
+@pytest.mark.parametrize("name", THRUSTERS)
+def test_ledger_closes_in_both_loops(name, rung, kind):
+    """1e-8 of the energy drawn. Every rung and loop meets a battery with one thruster and none with the other."""
+    cells = BATTERY if (name == "t200") == (kind == "sampled") else None
+    loop, dt = loop_of(THRUSTERS[name](rung), battery=cells), 2e-4
+    if kind == "sampled":
+        outcome = sampled.simulate(loop, duration=0.5, dt=dt, record_every=50)
+    else:
+        outcome = continuous.simulate(loop, duration=0.5, record_step=1e-2, dt=dt)
+    assert int(outcome.status) == 0
+    books = recorded(outcome)
+    assert books["energy_source"][-1] > 1, "J: something was drawn"
+    assert ("state_of_charge" in books) == (cells is not None)
+    shares = closure(books)
+    assert shares["energy_books_share"] <= 1e-12, shares
+    assert shares["energy_defect_share"] <= 1e-5, shares
+    if cells is not None:
+        gone = cells.energy(books["charge_drawn"][-1])
+        np.testing.assert_allclose(gone, books["energy_source"][-1] + books["energy_battery"][-1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("cells", [None, BATTERY], ids=["supply", "battery"])
+@pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("euler", 1)])
+@pytest.mark.parametrize(("rung", "dt"), [("shaft", 0.02), ("electromechanical", 4e-3)])
+def test_defect_falls_with_the_step_at_the_order_of_the_integrator(rung, dt, method, order, cells):
+    """The plant under a constant voltage, by steps h, h/2, h/4 (Euler: from h/8). `books` do not care."""
+    plant, volts = hybrid_vehicle(odin(), paper_table3(rung), battery=cells), jnp.linspace(2.0, 6.0, 8)
+    step, first = METHODS[method], 1 if method == "rk4" else 8
+
+    @jax.jit
+    def books(dt, ticks):
+        field = lambda t, x: plant.dynamics(t, x, volts, plant.no_load())
+        move = lambda k, x: step(field, jnp.zeros(()), x, dt)
+        return plant.books(jax.lax.fori_loop(0, ticks, move, plant.initial_state()), volts)
+
+    ends = [books(dt / n, np.asarray(round(0.2 / dt * n))) for n in (first, 2 * first, 4 * first)]
+    assert all(abs(end["energy_books"]) < 1e-12 * end["energy_source"] for end in ends)
+    defects = np.abs([end["energy_defect"] / end["energy_source"] for end in ends])
+    assert defects[-1] > 1e-12, "above rounding"
+    slopes = np.log2(defects[:-1] / defects[1:])
+    assert abs(slopes[-1] - order) < 0.2, (defects, slopes)
+
+
+def test_closure_over_a_part_of_a_run():
+    time = np.arange(5.0)
+    books = {
+        "time": time,
+        "energy_source": 100 * time,
+        "energy_books": np.array([0.0, 1.0, -2.0, 0.5, 0.5]),
+        "energy_defect": np.array([0.0, 0.0, 0.0, 0.0, 8.0]),
+    }
+    assert closure(books) == {"energy_books_share": 0.005, "energy_defect_share": 0.02}
+    assert closure(books, 2.0, 3.0) == {"energy_books_share": 0.025, "energy_defect_share": 0.0}
+    assert closure(books, 2.2, 2.4) == {"energy_books_share": 0.0, "energy_defect_share": 0.0}, "no record, no claim"
+    assert closure({"time": time}) == {}
+
+
+def test_books_are_kept_wherever_there_is_a_motor():
+    assert hybrid_vehicle(odin(), t200()).power.ledger
+    assert not hybrid_vehicle(odin(), t200(), ledger=False).power.ledger
+    for without in (linear_voltage(), first_order()):
+        assert not hybrid_vehicle(odin(), without).power.ledger
+        with pytest.raises(BadInput, match="`ledger` must be false"):
+            hybrid_vehicle(odin(), without, ledger=True)
+
+
+def test_books_change_nothing_else():
+    """The same motion with and without, to rounding."""
+    ends = []
+    for ledger in (True, False):
+        outcome = sampled.simulate(loop_of(t200(), ledger=ledger), duration=0.5, record_every=0)
+        ends.append(np.concatenate([np.ravel(leaf) for leaf in jax.tree.leaves(outcome.final[0]._replace(power=()))]))
+    np.testing.assert_allclose(*ends, rtol=1e-12, atol=1e-14)
+
+
+# --------------------------------------------------------------------------------------------------- the battery
+
+CELLS = battery(full_voltage=16.8, empty_voltage=13.2, resistance=0.05, capacity=10.0)
+DRAWN = np.linspace(0.0, 36000.0, 7)  # C, full to empty
+
+
+def test_open_circuit_voltage_is_linear_in_the_charge():
+    np.testing.assert_allclose(CELLS.open_circuit_voltage(np.array([0.0, 18000.0, 36000.0])), [16.8, 15.0, 13.2])
+    np.testing.assert_allclose(CELLS.state_of_charge(np.array([0.0, 18000.0, 36000.0])), [1.0, 0.5, 0.0], atol=1e-15)
+
+
+@pytest.mark.parametrize("power", [-500.0, 0.0, 1.0, 400.0, 860.0])
+def test_bus_voltage_solves_its_quadratic(power):
+    """v^2 - E v + R P = 0, the larger root; current P / v, heat R i^2."""
+    emf, v = CELLS.open_circuit_voltage(DRAWN), CELLS.bus_voltage(DRAWN, power)
+    assert (v >= emf / 2).all()
+    np.testing.assert_allclose(v**2 - emf * v + 0.05 * power, 0.0, atol=1e-10)
+    current = CELLS.current(DRAWN, power)
+    np.testing.assert_allclose(emf - 0.05 * current, v, rtol=1e-11, err_msg="Ohm's law")
+    np.testing.assert_allclose(CELLS.loss(DRAWN, power), 0.05 * current**2, rtol=1e-9, atol=1e-9)
+
+
+def test_no_more_than_the_largest_power_can_be_drawn():
+    """E^2 / (4 R) at half the voltage; the search for the limit stops there."""
+    emf = np.asarray(CELLS.open_circuit_voltage(DRAWN))
+    most = emf**2 / (4 * 0.05)
+    np.testing.assert_allclose(CELLS.bus_voltage(DRAWN, most), emf / 2, rtol=1e-5)
+    np.testing.assert_allclose(CELLS.bus_voltage(DRAWN, 2 * most), emf / 2, rtol=1e-5)
+    for drawn, voltage, power in zip(DRAWN, emf / 2, most, strict=True):
+        assert CELLS.allows(drawn, voltage, 0.999999 * power)
+        assert not CELLS.allows(drawn, voltage, 1.000001 * power)
+
+
+def test_energy_of_the_cells_is_the_integral_of_voltage_over_charge():
+    for drawn in DRAWN[1:]:
+        expected, _ = quad(lambda q: float(CELLS.open_circuit_voltage(q)), 0.0, drawn)
+        np.testing.assert_allclose(CELLS.energy(drawn), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("ohms", [0.5, 4.0, 60.0])
+def test_limit_for_a_resistor_is_the_voltage_divider(ohms):
+    """P = v^2 / r behind R gives v = E r / (r + R), tight to the search's 20 nV; less is given as it is."""
+    expected = CELLS.open_circuit_voltage(9000.0) * ohms / (ohms + 0.05)
+    found = CELLS.limit(jnp.asarray(9000.0), lambda v: v**2 / ohms, jnp.asarray(40.0))
+    assert expected - 1e-7 < found <= expected + 1e-12
+    low = CELLS.limit(jnp.asarray(9000.0), lambda v: v**2 / ohms, jnp.asarray(5.0))
+    assert low == 5.0
+
+
+@pytest.mark.parametrize(
+    "wrong", [dict(resistance=-1.0), dict(capacity=0.0), dict(full_voltage=12.0, empty_voltage=13.0)]
+)
+def test_impossible_batteries_are_refused(wrong):
+    name = "empty_voltage" if "empty_voltage" in wrong else next(iter(wrong))
+    with pytest.raises(BadInput, match=f"`{name}` must be"):
+        battery(**wrong)
+
+
+def tight(plant, x, applied, slack):
+    """Whether the largest voltage is that of the bus, or the power the most that the battery has, up to a share."""
+    bus = float(plant.power.bus_voltage(plant.thruster, x.thrusters, x.power, applied))
+    emf = float(plant.power.battery.open_circuit_voltage(x.power.drawn))
+    power = float(plant.effort(x, applied).power.sum())
+    most = emf**2 / (4 * float(plant.power.battery.resistance))
+    return float(np.abs(applied).max()) >= bus * (1 - slack) or power >= most * (1 - 2 * slack)
+
+
+@pytest.mark.parametrize("rung", RUNGS)
+def test_voltages_stay_within_what_the_battery_gives_and_reach_it(rung):
+    """Asked for far too much: never above the bus under that load, as high as it goes, smaller ones untouched."""
+    plant = hybrid_vehicle(odin(), t200(rung, supply=30.0), battery=battery(resistance=0.1))
+    asked = jnp.array([40.0, -40.0, 25.0, 3.0, -3.0, 0.5, 0.0, 16.0])
+    x = plant.initial_state()
+    for drawn in (0.0, 30_000.0, 64_800.0):
+        at = x._replace(power=x.power._replace(drawn=jnp.asarray(drawn)))
+        applied = plant.admissible(at, asked)
+        bus = plant.power.bus_voltage(plant.thruster, at.thrusters, at.power, applied)
+        assert np.abs(applied).max() <= bus * (1 + 1e-12)
+        assert tight(plant, at, applied, 1e-6)
+        np.testing.assert_array_equal(applied[3:7], asked[3:7])
+        cut = np.abs(applied) < np.abs(asked)
+        assert cut[:3].all()
+        np.testing.assert_array_equal(plant.effort(at, applied).saturated, cut.astype(float))
+        assert plant.effort(at, 0.99 * applied).saturated.sum() == 0
+
+
+@pytest.mark.parametrize("rung", ["static", "shaft"])
+def test_limit_holds_along_a_run_and_the_battery_sags(rung):
+    """With speed controllers, which round down there: no voltage above the bus under the load that it makes."""
+    loop = loop_of(t200(rung, supply=30.0), size=40.0, battery=battery(resistance=0.1, capacity=0.2), esc=esc())
+    outcome = sampled.simulate(loop, duration=1.0, dt=5e-4, record_every=20)
+    top, bus = np.abs(outcome.samples.voltage).max(1), np.asarray(outcome.samples.books["bus_voltage"])
+    assert (top <= bus * (1 + 1e-12)).all()
+    assert np.asarray(outcome.samples.saturated).any(1).mean() > 0.9
+    x, _ = outcome.final
+    assert tight(loop.plant, x, outcome.samples.voltage[-1], 1 / 200)
+    assert outcome.samples.books["state_of_charge"][-1] < 0.9
+
+
+# ------------------------------------------------------------------------------------------------ speed controllers
+
+
+def test_pulses_are_whole_clipped_and_dead_near_neutral():
+    part, bus = esc(), jnp.asarray(16.0)
+    volts = np.array([0.0, 8.0, 8.013, 8.03, -8.0, 16.0, 99.0, -99.0])
+    np.testing.assert_array_equal(part.pulse(volts, bus), [1500, 1700, 1700, 1701, 1300, 1900, 1900, 1100])
+    pulses = np.array([1500.0, 1525.0, 1475.0, 1526.0, 1474.0, 1900.0, 2000.0, 1000.0])
+    np.testing.assert_allclose(part.voltage(pulses, bus), [0, 0, 0, 1.04, -1.04, 16, 16, -16], rtol=1e-14)
+    inward = part.pulse(np.array([8.03, -8.03, 8.0, -16.0]), bus, True)
+    np.testing.assert_array_equal(inward, [1700, 1300, 1700, 1100], err_msg="towards neutral when there is no more")
+    coarse = esc(resolution=4.0, dead_band=0.0)
+    np.testing.assert_array_equal(coarse.pulse(np.array([0.05, 0.09, -0.09]), bus), [1500, 1504, 1496])
+
+
+def test_applied_voltages_are_whole_pulses_and_pass_unchanged_a_second_time():
+    plant = hybrid_vehicle(odin(), t200("static", supply=16.0), esc=esc())
+    applied = plant.admissible(plant.initial_state(), jnp.linspace(-20.0, 20.0, 8))
+    pulses = np.asarray(applied) / 16 * 400
+    np.testing.assert_allclose(pulses, np.round(pulses), atol=1e-9)
+    np.testing.assert_allclose(plant.admissible(plant.initial_state(), applied), applied, rtol=1e-14)
+    np.testing.assert_array_equal(plant.effort(plant.initial_state(), applied).saturated, [1, 0, 0, 0, 0, 0, 0, 1])
+
+
+def test_speed_controllers_need_a_bus_voltage():
+    with pytest.raises(BadInput, match="`esc` must have a bus voltage"):
+        hybrid_vehicle(odin(), paper_table3(), esc=esc())
+    hybrid_vehicle(odin(), paper_table3(), esc=esc(), battery=battery())
+
+
+# ------------------------------------------------------------------------------------------------------- gradients
+
+
+def test_gradients_of_the_battery_are_finite_at_its_limit():
+    for power in (0.0, 16.8**2 / 0.2, 5000.0):
+        for of in (CELLS.bus_voltage, CELLS.current, CELLS.loss):
+            assert np.isfinite(jax.grad(of, argnums=(0, 1))(0.0, power)).all()
+
+
+@pytest.mark.parametrize("rung", RUNGS)
+def test_gradients_through_a_run_with_battery_and_books_are_finite(rung):
+    """From rest, where square roots have none: energies and motion by size of the voltage and internal resistance."""
+
+    @jax.jit
+    def gradient(size, resistance):
+        def total(size, resistance):
+            plant = hybrid_vehicle(odin(), t200(rung, dead_zone=0.0), battery=battery())
+            plant = eqx.tree_at(lambda of: of.power.battery.resistance, plant, resistance)
+            volts = size * jnp.linspace(-1.0, 1.0, 8)
+
+            def step(x, _):
+                applied = plant.admissible(x, volts)
+                return METHODS["euler"](lambda t, x: plant.dynamics(t, x, applied, plant.no_load()), 0.0, x, 1e-3), None
+
+            x, _ = jax.lax.scan(step, plant.initial_state(), None, length=10)
+            return sum(jnp.sum(leaf) for leaf in jax.tree.leaves((plant.books(x, volts), x)))
+
+        return jax.grad(total, argnums=(0, 1))(size, resistance)
+
+    for size in (0.0, 6.0, 60.0):
+        assert np.isfinite(gradient(jnp.asarray(size), jnp.asarray(0.02))).all()
