@@ -8,6 +8,7 @@ import pytest
 from jaxtyping import Array, Float
 from scipy.integrate import quad
 
+import undertow as ut
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.contracts import AbstractModel, Telemetry
 from undertow.core.errors import BadInput
@@ -147,6 +148,16 @@ def test_books_are_kept_wherever_there_is_a_motor():
         assert not hybrid_vehicle(odin(), without).power.ledger
         with pytest.raises(BadInput, match="`ledger` must be false"):
             hybrid_vehicle(odin(), without, ledger=True)
+
+
+def test_every_run_says_how_far_its_books_close():
+    """Under the paper's law, by default and in both windows; not where there are none."""
+    for ledger in (None, False):
+        plant = ut.HybridVehicle(odin(), paper_table3(), ledger=ledger)
+        run = ut.simulate(plant, ut.rcaf(plant.model(), composite=20.0), setpoint([2, 3, 4, 0, 0, 1]), duration=0.2)
+        for window in ("steady", "whole"):
+            share = run.metrics[window].get("energy_books_share")
+            assert share is None if ledger is False else 0 <= share <= 1e-8
 
 
 def test_books_change_nothing_else():
