@@ -98,9 +98,11 @@ def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     if accumulators:
         sample = drawn.sample(t, x, decision)
         gathered = tuple(a.update(g, t, sample) for a, g in zip(accumulators, gathered, strict=True))
-    new_x, h = x, dt / substeps
-    for i in range(substeps):
-        new_x = step(partial(_motion, drawn, decision.applied), t + i * h, new_x, h)
+    motion, h = partial(_motion, drawn, decision.applied), dt / substeps
+    if substeps == 1:
+        new_x = step(motion, t, x, h)
+    else:
+        new_x = jax.lax.fori_loop(0, substeps, lambda i, x: step(motion, t + instant(i, h), x, h), x)
     new_z = loop.controller.advance(z, decision.y, decision.r, decision.applied, dt)
     state, status, ended = keep_sound(loop.plant, (x, z, heard), (new_x, new_z, decision.heard), status, ended, t + dt)
     return state, gathered, status, ended
