@@ -1,116 +1,129 @@
 """Does a part keep its contract? It is used once, as the loop would use it, and its answers are compared."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.analysis.answers import agree, alike, is_a, shaped
 from undertow.analysis.finding import Finding, error
+from undertow.analysis.plant_check import check_plant
+from undertow.analysis.thruster_check import check_thruster
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
     AbstractPlant,
     AbstractReference,
+    AbstractSensor,
     Load,
     Measurement,
     Place,
     Target,
 )
+from undertow.core.foreign import python_says
+from undertow.thrusters.thruster import AbstractThruster
 
-_TOLERANCE = 1e-6
 _TIMES = (0.37, 1.93, 7.1)  # s; away from round numbers, where references may turn
 
 
-def check_contract(part: Any) -> tuple[Finding, ...]:
-    """What a part does that its contract does not allow; nothing for kinds whose contract is their data."""
+class Surroundings(NamedTuple):
+    """Where a part is used."""
+
+    truth: Measurement
+    place: Place | None
+
+
+_BODY = Surroundings(
+    truth=Measurement(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
+    place=Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
+)
+
+
+def of_plant(plant: AbstractPlant) -> Surroundings:
+    """With this plant, as it starts."""
+    x = plant.initial_state()
+    return Surroundings(plant.output(jnp.zeros(()), x), plant.place(x))
+
+
+def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ...]:
+    """What a part does that its contract does not allow; nothing for kinds whose contract is their data.
+
+    Args:
+        part: to be checked.
+        around: where it is used; a body in water unless said.
+    """
     for kind, use in _USES.items():
         if isinstance(part, kind):
             try:
-                return tuple(use(part))
+                return tuple(use(part, around))
             except Exception as complaint:
-                got = f"not: {type(complaint).__name__}: {' '.join(str(complaint).split())[:80]}"
+                got = f"not: {python_says(complaint)}"
                 return (error("contract", type(part).__name__, "be usable as its contract says", got),)
     return ()
 
 
-def _plant(plant: AbstractPlant) -> Iterator[Finding]:
-    n, m, t, calm = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
-    x = plant.initial_state(jnp.linspace(0.1, 0.5, n), jnp.linspace(0.2, -0.1, n))
-    u = plant.admissible(x, jnp.full(m, 0.1))
-    rate = plant.dynamics(t, x, u, calm)
-    yield from _like("dynamics", rate, x, "have the form of the state")
-    yield from _shaped("admissible", u, (m,))
-    yield from _shaped("acceleration", plant.acceleration(t, x, u, calm), (n,))
-    y, y_rate = jax.jvp(lambda x: plant.output(t, x)[:2], (x,), (rate,))
-    yield from _equal("output", y[1], y_rate[0], "the rate of its position")
-    yield from _equal("acceleration", plant.acceleration(t, x, u, calm), y_rate[1], "the rate of the output")
-
-
-def _controller(controller: AbstractController) -> Iterator[Finding]:
+def _controller(controller: AbstractController, around: Surroundings) -> Iterator[Finding]:
     n = len(controller.model.angles)
     y = Measurement(0.1 * jnp.ones(n), jnp.zeros(n))
     r = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n))
     z = controller.init(y, r)
     u, telemetry = controller.command(z, y, r)
-    yield from _shaped("command", u, (controller.model.gain(y).shape[1],))
-    yield from _shaped("command", telemetry.estimate, (n,))
-    yield from _like("advance", controller.advance(z, y, r, u, jnp.asarray(1e-3)), z, "have the form of the state")
+    yield from shaped("command", u, (controller.model.gain(y).shape[1],))
+    yield from shaped("command", telemetry.estimate, (n,))
+    yield from alike("advance", controller.advance(z, y, r, u, jnp.asarray(1e-3)), z, "have the form of the state")
 
 
-def _disturbance(disturbance: AbstractDisturbance) -> Iterator[Finding]:
-    calm = Load(jnp.zeros(6), jnp.zeros(6))
-    place = Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3))
-    path = disturbance.draw(jax.random.PRNGKey(0))
-    yield from _like("draw", disturbance.draw(jax.random.PRNGKey(0)), path, "give the same path for the same key", True)
-    for t in _TIMES:
-        load = disturbance.at(path, jnp.asarray(t), place, calm)
-        yield from _shaped("at", load.acceleration, (6,))
-        yield from _shaped("at", load.wrench, (6,))
-    if not all(0 < jump < 10 for jump in disturbance.jumps(10.0)):
-        yield error("contract", "jumps", "be times between 0 and the duration", str(disturbance.jumps(10.0)))
+def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iterator[Finding]:
+    n, place = len(around.truth.position), around.place
+    calm = Load(jnp.zeros(n), jnp.zeros(n))
+    busy = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
+    path, again = (disturbance.draw(jax.random.PRNGKey(0)) for _ in range(2))
+    yield from alike("draw", again, path, "give the same path for the same key")
+    if not all(map(np.array_equal, jax.tree.leaves(path), jax.tree.leaves(again))):
+        yield error("contract", "draw", "give the same path for the same key", "another one")
+    for t in map(jnp.asarray, _TIMES):
+        jax.eval_shape(lambda t: disturbance.at(path, t, place, calm), t)  # whether it compiles
+        load = disturbance.at(path, t, place, calm)
+        wrong = list(is_a("at", load, Load))
+        wrong = wrong or [*shaped("at", load.acceleration, (n,)), *shaped("at", load.wrench, (n,))]
+        if wrong:
+            yield from wrong
+            return
+        more = disturbance.at(path, t, place, busy)
+        for name in ("acceleration", "wrench"):
+            gained = getattr(more, name) - getattr(load, name)
+            yield from agree("at", gained, getattr(busy, name), f"what was there already: add to `calm.{name}`")
+    jumps = disturbance.jumps(10.0)
+    if not isinstance(jumps, tuple) or not all(0 < jump < 10 for jump in jumps):
+        yield error("contract", "jumps", "be a tuple of times between 0 and the duration", f"{jumps} for 10 s")
 
 
-def _reference(reference: AbstractReference) -> Iterator[Finding]:
+def _sensor(sensor: AbstractSensor, around: Surroundings) -> Iterator[Finding]:
+    path = sensor.draw(jax.random.PRNGKey(0))
+    state = sensor.init(path, around.truth)
+    jax.eval_shape(lambda t: sensor.measure(path, state, t, around.truth), jnp.zeros(()))  # whether it compiles
+    y, after = sensor.measure(path, state, jnp.asarray(_TIMES[0]), around.truth)
+    yield from alike("measure", after, state, "give the state in the form of `init`")
+    wrong, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
+    yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
+
+
+def _reference(reference: AbstractReference, around: Surroundings) -> Iterator[Finding]:
     for t in map(jnp.asarray, _TIMES):
         target, rate = jax.jvp(lambda t: tuple(reference.at(t)), (t,), (jnp.ones(()),))
         for value in target:
-            yield from _shaped("at", value, target[0].shape)
-        yield from _equal("at", target[1], rate[0], f"the rate of the position at {t:g} s")
-        yield from _equal("at", target[2], rate[1], f"the rate of the velocity at {t:g} s")
+            yield from shaped("at", value, target[0].shape)
+        yield from agree("at", target[1], rate[0], f"the rate of the position at {t:g} s")
+        yield from agree("at", target[2], rate[1], f"the rate of the velocity at {t:g} s")
 
 
-_USES: dict[type, Callable[[Any], Iterator[Finding]]] = {
-    AbstractPlant: _plant,
+_USES: dict[type, Callable[[Any, Surroundings], Iterator[Finding]]] = {
+    AbstractPlant: lambda plant, around: check_plant(plant),
     AbstractController: _controller,
     AbstractDisturbance: _disturbance,
     AbstractReference: _reference,
+    AbstractSensor: _sensor,
+    AbstractThruster: lambda thruster, around: check_thruster(thruster),
 }
-
-
-def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> Iterator[Finding]:
-    if jnp.shape(value) != shape:
-        yield error("contract", name, f"give arrays of shape {shape}", f"of shape {jnp.shape(value)}")
-    elif not np.all(np.isfinite(value)):
-        yield error("contract", name, "give finite numbers", str(np.asarray(value)))
-
-
-def _like(name: str, value: Any, model: Any, must: str, equal: bool = False) -> Iterator[Finding]:
-    forms = [jax.tree.structure(tree) for tree in (value, model)]
-    shapes = [[jnp.shape(leaf) for leaf in jax.tree.leaves(tree)] for tree in (value, model)]
-    if forms[0] != forms[1] or shapes[0] != shapes[1]:
-        yield error("contract", name, must, f"of shapes {shapes[0]} instead of {shapes[1]}")
-    elif equal:
-        pairs = zip(jax.tree.leaves(value), jax.tree.leaves(model), strict=True)
-        if not all(np.array_equal(a, b) for a, b in pairs):
-            yield error("contract", name, must, "another one")
-
-
-def _equal(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
-    off = np.abs(np.asarray(value) - np.asarray(other))
-    scale = max(1.0, float(np.abs(np.asarray(other)).max(initial=0.0)))
-    if off.max(initial=0.0) > _TOLERANCE * scale:
-        i = int(off.argmax())
-        got = f"{np.ravel(value)[i]:.6g} instead of {np.ravel(other)[i]:.6g} in entry {i + 1}"
-        yield error("contract", name, f"agree with {what}", got)

@@ -6,15 +6,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.finding import Finding, error
+from undertow.analysis.part_check import check_contract
+from undertow.analysis.thruster_check import full_voltage, settled_thrust
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import AbstractThruster
-
-_VOLTAGE = 10.0  # V, where a thruster has no limit
 
 
 def lint_thruster(thruster: AbstractThruster) -> tuple[Finding, ...]:
     """Everything that is wrong or odd about a thruster."""
-    return tuple(_findings(thruster))
+    broken = check_contract(thruster)
+    return broken if any(finding.level == "error" for finding in broken) else (*broken, *_findings(thruster))
 
 
 def _findings(thruster: AbstractThruster) -> Iterator[Finding]:
@@ -30,8 +31,7 @@ def _findings(thruster: AbstractThruster) -> Iterator[Finding]:
 
 def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str], ...]:
     """(what, value, unit), a row each."""
-    supply = float(thruster.supply)
-    limit = supply if np.isfinite(supply) else _VOLTAGE
+    supply, limit = float(thruster.supply), full_voltage(thruster)
     rows = [
         ("supply, dead zone", f"{supply:.4g}, {float(thruster.dead_zone):.4g}", "V"),
         ("gain of the linear model", f"{float(np.min(thruster.voltage_gain())):.4g}", "N/V"),
@@ -39,6 +39,9 @@ def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str
     motor = getattr(thruster, "motor", None)
     if isinstance(motor, DCMotor):
         rows += _of_motor(motor, limit)
+    else:
+        steady = ", ".join(f"{settled_thrust(thruster, volts):.4g}" for volts in (limit, -limit))
+        rows.append((f"steady thrust at +-{limit:g} V", steady, "N"))
     return tuple(rows)
 
 

@@ -16,6 +16,7 @@ from types import ModuleType
 from typing import Any
 
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.foreign import MODULE_PREFIX, python_says
 
 KINDS = (
     "vehicles",
@@ -82,7 +83,7 @@ def _from_file(name: str, folder: Path) -> Part:
     path = (folder / path_text).resolve()
     if not path.is_file():
         raise BadInput("name", "name an existing file", path_text)
-    spec = importlib.util.spec_from_file_location(f"undertow_part_{path.stem}", path)
+    spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
     if spec is None or spec.loader is None:
         raise BadInput("name", "name a Python file", path_text)
     module = importlib.util.module_from_spec(spec)
@@ -90,7 +91,7 @@ def _from_file(name: str, folder: Path) -> Part:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
-        raise BadInput("name", "name a file that Python can run", f"{path_text}: {error!r}") from error
+        raise BadInput("name", "name a file that Python can run", f"{path_text}: {python_says(error)}") from error
     part = getattr(module, attribute, None)
     if not callable(part):
         hint = did_you_mean(attribute, [n for n, v in vars(module).items() if callable(v) and n[0] != "_"])

@@ -164,6 +164,10 @@ class AbstractPlant(eqx.Module):
     def advice(self) -> tuple[str, ...]:
         """What a user should know before running this plant; each with the numbers that caused it."""
 
+    @abc.abstractmethod
+    def model(self) -> AbstractModel:
+        """What a controller is told of this plant; keyword arguments with defaults are the scenario's `model`."""
+
     def books(self, x: PyTree, u: Inputs) -> dict[str, Array]:
         """Scalars that this plant alone has and that are worth recording, by name."""
         return {}

@@ -8,6 +8,8 @@ Advice is not an error: parts that have some to give have a method `advice()`, a
 import difflib
 from collections.abc import Iterable
 
+_LONGEST = 200  # characters of what something is
+
 
 class BadInput(ValueError):
     """Something the user gave cannot be used. One line; the command line turns it into exit code 2.
@@ -45,4 +47,4 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 def _one_line(value: object) -> str:
     text = " ".join(str(value).split())
-    return text if len(text) <= 80 else text[:77] + "..."
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."

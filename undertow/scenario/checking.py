@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.analysis.finding import Finding
-from undertow.analysis.part_check import check_contract
+from undertow.analysis.part_check import check_contract, of_plant
+from undertow.analysis.plant_check import derived_of_plant
 from undertow.analysis.thruster_lint import derived_of_thruster, lint_thruster
 from undertow.analysis.vehicle_lint import Facts, derived, facts_of, lint
 from undertow.core import catalogue
+from undertow.core.contracts import AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario import parts
 from undertow.scenario.build import build
@@ -86,9 +88,18 @@ def _of_part(name: str, part: Any) -> Report:
     if isinstance(part, Vehicle):
         return _of_vehicle(facts_of(part))
     if isinstance(part, AbstractThruster):
-        return _report(lint_thruster(part), title=f"{name} (thruster)", rows=derived_of_thruster(part))
-    advice = [Finding("advice", "own", name, sentence) for sentence in getattr(part, "advice", tuple)()]
-    return _report([*check_contract(part), *advice], title=name)
+        return _of_thruster(part, f"{name} (thruster)")
+    found = check_contract(part)
+    said = () if found else getattr(part, "advice", tuple)()
+    rows = derived_of_plant(part) if isinstance(part, AbstractPlant) and not found else ()
+    own = [Finding("advice", "own", name, sentence.rstrip(".")) for sentence in said]
+    return _report([*found, *own], title=f"{name} (plant)", rows=rows)
+
+
+def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
+    findings = lint_thruster(thruster)
+    broken = any(finding.level == "error" for finding in findings)
+    return _report(findings, title=title, rows=() if broken else derived_of_thruster(thruster))
 
 
 def _of_scenario(text: Text) -> list[Report]:
@@ -101,9 +112,16 @@ def _of_scenario(text: Text) -> list[Report]:
     if isinstance(vehicle, Vehicle):
         reports.append(_of_vehicle(*_facts(text, built.resolved["plant"], vehicle)))
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
-        reports.append(_report(lint_thruster(thruster), title="thruster", rows=derived_of_thruster(thruster)))
-    for part in (loop.plant, loop.reference, loop.controller):
-        reports.append(_report(check_contract(part)))
+        reports.append(_of_thruster(thruster, "thruster"))
+    if any(report.errors for report in reports):
+        return reports  # whatever contains these parts would only stumble over them
+    reports.append(_report(check_contract(loop.plant)))
+    if not reports[-1].errors:
+        around = of_plant(loop.plant)
+        reports += [
+            _report(check_contract(part, around))
+            for part in (loop.reference, loop.disturbance, loop.sensor, loop.controller)
+        ]
     return reports
 
 
@@ -122,7 +140,10 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any]:
             function = catalogue.find("", thing)
         except BadInput as error:
             raise BadInput("THING", error.must, error.got, hint=error.hint) from error.__cause__
-        part = parts.call(function, options, _leading(function), Path())[0]
+        try:
+            part = parts.call(function, options, _leading(function), Path())[0]
+        except BadInput as error:
+            raise (error if error.name else error.at("THING")) from error.__cause__
         if not parts.is_part(part):
             raise BadInput("THING", "return a vehicle, thruster, plant or other part", f"{thing}: {part!r}")
         return thing.rpartition(":")[2], part

@@ -7,7 +7,9 @@ import jax
 import jax.numpy as jnp
 
 from undertow.core import checks
+from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
+from undertow.core.foreign import python_says
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.reading import Text, key_path
 from undertow.scenario.schema import Initial, Loop, Window
@@ -75,6 +77,8 @@ def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
     drawn = _traced(text, "disturbance", loop.draw, jax.random.PRNGKey(0))
     x, z = _traced(text, "sensor", lambda drawn: drawn.start(), drawn)
     load = _traced(text, "disturbance", lambda drawn, x: drawn.load(zero, x), drawn, x)
+    if not isinstance(load, Load):
+        raise BadInput("disturbance", "give a Load", "something else", where=text.where(("disturbance",)))
     if any(signal.shape != (axes,) for signal in load[:2]):
         got = f"of shapes {[signal.shape for signal in load[:2]]}"
         raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
@@ -90,6 +94,6 @@ def _traced(text: Text, key: str, function: Callable[..., Any], *arguments: Any)
         except BadInput:
             raise
         except Exception as error:
-            raise BadInput("", "fit the other parts", f"not: {type(error).__name__}: {error}") from error
+            raise BadInput("", "fit the other parts", f"not: {python_says(error)}") from error
 
     return placed(text, key, trace)

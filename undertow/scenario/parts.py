@@ -11,6 +11,7 @@ import numpy as np
 
 from undertow.core import catalogue, contracts
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.foreign import python_says
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
@@ -78,7 +79,7 @@ def make(
         table = _samples(options, folder)
     part, resolved = call(function, options, given, folder)
     if not isinstance(part, _CONTRACTS[kind]):
-        raise BadInput("kind", f"name a function that returns a {_title(_CONTRACTS[kind])}", f"{name}: {part!r}")
+        raise BadInput("kind", f"name a function that returns {_title(_CONTRACTS[kind])}", f"{name}: {part!r}")
     if table:
         del resolved["samples"]
     return adjust(part, changes) if changes else part, {"kind": _portable(name, folder), **resolved, **changes, **table}
@@ -148,7 +149,8 @@ def is_part(thing: Any) -> bool:
 
 
 def _title(contract: Any) -> str:
-    return " or ".join(kind.__name__ for kind in typing.get_args(contract) or (contract,))
+    names = [kind.__name__ for kind in typing.get_args(contract) or (contract,)]
+    return " or ".join(f"an {name}" if name[0] in "AEIO" else f"a {name}" for name in names)
 
 
 def _sized(shape: tuple[int, ...]) -> str:
@@ -162,7 +164,7 @@ def _made(make: Callable[[], Any]) -> Any:
     except BadInput:
         raise
     except Exception as error:
-        raise BadInput("", "be something that can be made", f"not: {type(error).__name__}: {error}") from error
+        raise BadInput("", "be something that can be made", f"not: {python_says(error)}") from error
 
 
 def inner_default(name: str, parameter: inspect.Parameter) -> Any:
