@@ -1,0 +1,1 @@
+"""Other people's software around undertow's parts; each package needs the extra of its name."""

@@ -1,0 +1,86 @@
+"""An undertow controller at the helm of MuJoCo's vehicle: the same object, measurements in, volts out."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractController, AbstractReference, Measurement
+from undertow.core.errors import BadInput
+from undertow.core.status import Status
+from undertow.interop.mujoco_engine.propellers import Propellers
+from undertow.interop.mujoco_engine.submerged import Submerged
+from undertow.thrusters.thruster import AbstractThruster
+
+
+class Flight(NamedTuple):
+    """What happened, at each sampling time of the controller; rows as in an undertow dataset."""
+
+    time: NDArray  # s, shape (K,)
+    position: NDArray  # m, rad, shape (K, 6)
+    velocity: NDArray  # m/s, rad/s, shape (K, 6)
+    target: NDArray  # m, rad, shape (K, 6)
+    voltage: NDArray  # applied, V, shape (K, N)
+    status: Status  # of the end; series end with the last sound state
+
+
+def fly(
+    body: Submerged,
+    thruster: AbstractThruster,
+    controller: AbstractController,
+    reference: AbstractReference,
+    *,
+    duration: float = 20.0,
+    dt: float = 1e-2,
+    position: ArrayLike | None = None,
+) -> Flight:
+    """Run a sampled closed loop with MuJoCo as the plant: command, move with the volts held, then adapt.
+
+    Args:
+        body: the vehicle in MuJoCo.
+        thruster: on rung `shaft` or `static`.
+        controller: any, made from the model of an undertow plant.
+        reference: what to follow.
+        duration: s, rounded to whole sampling times.
+        dt: sampling time of the controller, s; a whole number of the engine's steps.
+        position: north, east, down (m), roll, pitch, yaw (rad) at t = 0, at rest; None for zero.
+
+    Returns:
+        Flight. One that fails says so in its status; nothing is raised.
+
+    Raises:
+        BadInput: times that do not go together, or another kind of thruster.
+    """
+    checks.positive("duration", duration, "s")
+    checks.positive("dt", dt, "s")
+    timestep = body.model.opt.timestep
+    steps = round(dt / timestep)
+    if steps < 1 or abs(steps * timestep - dt) > 1e-9 * dt:
+        raise BadInput("dt", f"be a whole number of the engine's steps ({timestep:g} s)", f"{dt:g} s")
+    propellers = Propellers(thruster, body.model.nu)
+    body.place(np.zeros(6) if position is None else position, np.zeros(6))
+    command, advance, wanted = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
+    z, rows, ticks, status = None, [], round(duration / dt), Status.OK
+    for tick in range(ticks + 1):
+        t = tick * dt
+        y, r = _measured(body), wanted(jnp.asarray(t))
+        z = controller.init(y, r) if z is None else z
+        volts, _ = command(z, y, r)
+        applied = propellers.admissible(np.asarray(volts))
+        status = body.status() if np.isfinite(applied).all() else Status.NOT_FINITE
+        if status != Status.OK:
+            break
+        rows.append((t, body.position(), body.velocity(), np.asarray(r.position), applied))
+        if tick < ticks:
+            thrusts = propellers.turn(applied, dt, 2 * steps)
+            # Runge-Kutta asks at the ends and in the middle of each step.
+            body.advance(lambda now, t=t, thrusts=thrusts: thrusts[round(2 * (now - t) / timestep)], steps)
+            z = advance(z, y, r, jnp.asarray(applied), jnp.asarray(dt))
+    return Flight(*map(np.array, zip(*rows, strict=True)), status=status)
+
+
+def _measured(body: Submerged) -> Measurement:
+    return Measurement(jnp.asarray(body.position()), jnp.asarray(body.velocity()))

@@ -1,0 +1,105 @@
+"""An undertow vehicle as an MJCF model: what MuJoCo's engine can hold by itself.
+
+One free body of the vehicle's mass, centre of gravity and inertia; gravity W / m; buoyancy as the `gravcomp` of a
+point mass taken out of the body at the centre of buoyancy; a site and a motor for each thruster.
+"""
+
+import numpy as np
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.interop.mujoco_engine.frames import flip, flip_tensor
+from undertow.interop.mujoco_engine.rigid_body import RigidBody, about_centre, as_rigid_body, is_possible
+from undertow.vehicles.vehicle import Vehicle
+
+# Share of the mass that sits at the centre of buoyancy, where the engine can lift it. The whole is exact whatever it
+# is; small, so that what is left of a flat body is still a possible one.
+_LIFTED = 1e-3
+
+
+def mjcf(vehicle: Vehicle, timestep: float = 2e-3, added_mass: bool = False) -> str:
+    """MJCF text of a vehicle in water without added mass and damping.
+
+    Auto-reset is off: a state that is not finite stays visible instead of starting the motion anew.
+
+    Args:
+        vehicle: any; its axes are turned to forward, port, up.
+        timestep: of the engine's Runge-Kutta integrator, s.
+        added_mass: whether added mass is put in as a weightless second body, which takes one that a rigid body
+            could have.
+
+    Raises:
+        BadInput: the inertia, or the added mass where it is asked for, is not a rigid body's; timestep not positive.
+    """
+    checks.positive("timestep", timestep, "s")
+    mass, weight = float(vehicle.mass), float(vehicle.weight)
+    whole = about_centre(mass, np.asarray(vehicle.r_g), np.asarray(vehicle.inertia))
+    lifted = _LIFTED * mass
+    hull = whole.without(lifted, np.asarray(vehicle.r_b))
+    if not is_possible(hull.inertia):
+        must = "be that of a rigid body: no principal inertia above the sum of the others"
+        raise BadInput("inertia", must, np.linalg.eigvalsh(whole.inertia).round(6), hint="undertow check says more")
+    lift = float(vehicle.buoyancy) / (weight * _LIFTED)
+    bodies = [
+        _body("rest", hull),
+        _body("buoyancy", RigidBody(lifted, np.asarray(vehicle.r_b), np.zeros((3, 3))), lift),
+    ]
+    if added_mass:
+        bodies.append(_body("added_mass", _as_body(vehicle), 1.0))
+    poses = zip(flip(vehicle.thruster_positions), flip(vehicle.thruster_directions), strict=True)
+    sites = [
+        f'<site name="thruster{j}" pos="{_text(at)}" zaxis="{_text(axis)}" type="cylinder" size="0.04 0.04"/>'
+        for j, (at, axis) in enumerate(poses, start=1)
+    ]
+    motors = [
+        f'<motor name="thruster{j}" site="thruster{j}" gear="0 0 1 0 0 0"/>' for j in range(1, vehicle.thrusters + 1)
+    ]
+    return f"""<mujoco model="{vehicle.name}">
+  <compiler angle="radian"/>
+  <option timestep="{timestep!r}" integrator="RK4" gravity="0 0 {-weight / mass!r}">
+    <flag contact="disable" autoreset="disable"/>
+  </option>
+  <worldbody>
+    <body name="{vehicle.name}">
+      <freejoint name="hull"/>
+      {_lines(bodies)}
+      {_lines(sites)}
+    </body>
+  </worldbody>
+  <actuator>
+    {_lines(motors, 4)}
+  </actuator>
+</mujoco>
+"""
+
+
+def _as_body(vehicle: Vehicle) -> RigidBody:
+    body = as_rigid_body(vehicle.added_mass)
+    if body is None:
+        hint = "Apply it as a force instead"
+        raise BadInput("added_mass", "be one that a rigid body could have", np.diag(vehicle.added_mass), hint=hint)
+    return body
+
+
+def _body(name: str, body: RigidBody, lift: float = 0.0) -> str:
+    """Part of the vehicle, which water lifts with `lift` times its weight.
+
+    A frame of its own at its centre: an inertial frame within 30 nm of its body's would be taken for the same.
+    """
+    i = flip_tensor(body.inertia)
+    products = [i[0, 1], i[0, 2], i[1, 2]]
+    # MuJoCo turns full matrices to principal axes and wants them positive definite; a diagonal stays as it is.
+    inertia = (
+        f'fullinertia="{_text([*np.diag(i), *products])}"' if any(products) else f'diaginertia="{_text(np.diag(i))}"'
+    )
+    inertial = f'<inertial pos="0 0 0" mass="{float(body.mass)!r}" {inertia}/>'
+    return f'<body name="{name}" pos="{_text(flip(body.centre))}" gravcomp="{lift!r}">{inertial}</body>'
+
+
+def _text(numbers) -> str:
+    """Numbers in full precision."""
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def _lines(elements: list[str], indent: int = 6) -> str:
+    return f"\n{' ' * indent}".join(elements)
