@@ -1,7 +1,8 @@
 """Every Python block, and every `undertow` command, that README.md and docs/*.md show runs as it stands.
 
 Blocks of one page run in order, in one folder, with one namespace. A block that cannot run here (a set-up command,
-an output) is not marked python or bash, or stands after a line `<!-- not run -->`.
+an output) is not marked python or bash, or stands after a line `<!-- not run -->`. A block of Python or YAML whose
+first line is `# my_part.py` is that file: it is written into the folder.
 """
 
 import re
@@ -15,7 +16,10 @@ from undertow.cli.main import run
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
-BLOCK = re.compile(r"(?P<skip><!-- not run -->\s*\n)?^```(?P<language>python|bash)\n(?P<code>.*?)^```", re.S | re.M)
+BLOCK = re.compile(
+    r"(?P<skip><!-- not run -->\s*\n)?^```(?P<language>python|yaml|bash)\n(?P<code>.*?)^```", re.S | re.M
+)
+FILE = re.compile(r"# (?P<name>\w+\.(?:py|yaml))\n")
 
 # Commands with tests of their own that take minutes.
 LONG = {"reproduce"}
@@ -49,9 +53,11 @@ def test_blocks_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}
     for block in blocks(page):
-        if block.language == "python":
+        if file := FILE.match(block.code):
+            (tmp_path / file["name"]).write_text(block.code, encoding="utf-8")
+        elif block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
-        else:
+        elif block.language == "bash":
             for arguments in commands(block.code):
                 assert run(arguments) in (0, 1), f"{page.name}, line {block.line}: undertow {shlex.join(arguments)}"
 

@@ -23,7 +23,9 @@ from undertow.core.contracts import (
     Target,
 )
 from undertow.core.foreign import python_says
-from undertow.thrusters.thruster import AbstractThruster
+from undertow.instruments.estimate import estimate_of, motion_of
+from undertow.instruments.instrument import AbstractInstrument
+from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 
 _TIMES = (0.37, 1.93, 7.1)  # s; away from round numbers, where references may turn
 
@@ -110,6 +112,32 @@ def _sensor(sensor: AbstractSensor, around: Surroundings) -> Iterator[Finding]:
     yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
 
 
+def _instrument(instrument: AbstractInstrument, around: Surroundings) -> Iterator[Finding]:
+    """Tried on a body at rest, so that a delay makes no difference."""
+    report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
+    truth = Measurement(around.truth.position, jnp.zeros(6), report)
+    motion, right = motion_of(truth, jnp.zeros(3), jnp.asarray(0.01)), estimate_of(truth)
+    reading = instrument.reading(motion)
+    if jnp.ndim(reading) != 1:
+        yield error("contract", "reading", "give an array of one axis", f"of shape {jnp.shape(reading)}")
+        return
+    corrected = instrument.correct(right, reading)
+    wrong = list(alike("correct", corrected, right, "give an estimate in the form it was"))
+    if wrong:
+        yield from wrong
+        return
+    off = jnp.array([0.1, -0.2, 0.3])
+    for name in ("position", "velocity"):
+        true = getattr(right, name)
+        yield from agree("correct", getattr(corrected, name), true, f"the {name}, where the reading tells nothing new")
+        after = instrument.correct(right._replace(**{name: true + off}), reading)
+        errors = [float(jnp.linalg.norm(vector)) for vector in (off, getattr(after, name) - true)]
+        late = name == "velocity" and (after.position != right.position).any()  # a position of some time ago
+        if not late and errors[1] > (1 + 1e-9) * errors[0]:
+            got = f"from {errors[0]:.3g} to {errors[1]:.3g} off"
+            yield error("contract", "correct", f"move the {name} towards the reading", got)
+
+
 def _reference(reference: AbstractReference, around: Surroundings) -> Iterator[Finding]:
     for t in map(jnp.asarray, _TIMES):
         target, rate = jax.jvp(lambda t: tuple(reference.at(t)), (t,), (jnp.ones(()),))
@@ -125,5 +153,6 @@ _USES: dict[type, Callable[[Any, Surroundings], Iterator[Finding]]] = {
     AbstractDisturbance: _disturbance,
     AbstractReference: _reference,
     AbstractSensor: _sensor,
+    AbstractInstrument: _instrument,
     AbstractThruster: lambda thruster, around: check_thruster(thruster),
 }
