@@ -77,7 +77,7 @@ def list_parts(
 ) -> None:
     """List what there is.
 
-    Kinds: vehicles, thrusters, plants, controllers, disturbances, references, sensors.
+    Kinds: vehicles, thrusters, power, plants, controllers, disturbances, references, instruments, sensors.
     """
     from undertow.cli.list_parts import list_parts
 

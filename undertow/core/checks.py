@@ -27,7 +27,7 @@ def length(name: str, value: Any, expected: int, what: str) -> None:
     """One-dimensional, with `expected` entries."""
     shape = np.shape(value)
     if shape != (expected,):
-        got = f"{shape[0]} long" if len(shape) == 1 else f"of shape {shape}"
+        got = f"{shape[0]} long" if len(shape) == 1 else f"of shape {shape}" if shape else f"one number, {value}"
         raise BadInput(name, f"have {expected} entries ({what})", got)
 
 

@@ -15,7 +15,7 @@ class PropellerSpeed(AbstractInstrument):
 
     def reading(self, motion: Motion):
         if motion.actuator is None:
-            hint = "Take a rung with a propeller speed (shaft, electromechanical), or leave propeller_speed out"
+            hint = "Take rung: electromechanical, the only one on which it is reported, or leave propeller_speed out"
             raise BadInput("propeller_speed", "have propellers that turn", "thrusters without a speed", hint=hint)
         return motion.actuator.speed
 

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Place
+from undertow.core.errors import BadInput
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import (
     Kinematics,
@@ -143,7 +144,12 @@ class HybridVehicle(AbstractPlant):
         return int(np.linalg.matrix_rank(np.asarray(self.thruster_matrix), tol=1e-9))
 
     def model(
-        self, *, speed_sensor: bool = False, rate_term: bool = False, regularisation: float | None = None
+        self,
+        *,
+        speed_sensor: bool = False,
+        rate_term: bool = False,
+        regularisation: float | None = None,
+        vehicle: Vehicle | None = None,
     ) -> HybridModel:
         """What a controller may know of this plant.
 
@@ -151,22 +157,27 @@ class HybridVehicle(AbstractPlant):
             speed_sensor: whether phi of Eq. (15) is known from propeller-speed sensors (Example 1) or left in d.
             rate_term: whether J_dot nu is in F; the paper leaves it in d (Remark 2).
             regularisation: delta of Definition 2; None for the exact inverse.
+            vehicle: what the controller takes it for, such as another published parameter set; None for the truth.
 
         Raises:
-            BadInput: speed_sensor for thrusters that have no measurable speed, or regularisation not positive.
+            BadInput: speed_sensor for thrusters that have no measurable speed, regularisation not positive, or a
+                vehicle with another number of thrusters.
         """
+        told = self if vehicle is None else HybridVehicle(vehicle, self.thruster)
+        if told.inputs() != self.inputs():
+            raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{told.inputs()}")
         if regularisation is not None:
             checks.positive("regularisation", regularisation)
         if speed_sensor:  # thrusters without a speed to measure complain here, not in the loop
             self.thruster.speed_term(self.thruster.report(self.thruster.initial_state(self.inputs())))
         alpha = jnp.broadcast_to(self.thruster.voltage_gain(), (self.inputs(),))
         return HybridModel(
-            body=self.body,
+            body=told.body,
             thruster=self.thruster,
-            thruster_matrix=self.thruster_matrix,
-            body_gain=self.body.inverse_mass_matrix @ self.thruster_matrix * alpha,
-            allocation=jnp.linalg.pinv(self.thruster_matrix * alpha),
-            rank=self.rank(),
+            thruster_matrix=told.thruster_matrix,
+            body_gain=told.body.inverse_mass_matrix @ told.thruster_matrix * alpha,
+            allocation=jnp.linalg.pinv(told.thruster_matrix * alpha),
+            rank=told.rank(),
             regularisation=regularisation,
             speed_sensor=speed_sensor,
             rate_term=rate_term,

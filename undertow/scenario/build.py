@@ -65,7 +65,9 @@ def build(source: Text | Mapping[str, Any]) -> Built:
         return Together(tuple(member for member, _ in pairs))
 
     plant = make("plant")
-    model, resolved["model"] = placed(text, "model", lambda: parts.call(plant.model, scenario.model))
+    model, resolved["model"] = placed(
+        text, "model", lambda: parts.call(plant.model, scenario.model, folder=text.folder)
+    )
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), make("sensor"))
     if scenario.loop.kind == "continuous":

@@ -2,7 +2,7 @@
 
 import inspect
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +82,12 @@ def make(
         raise BadInput("kind", f"name a function that returns {_title(_CONTRACTS[kind])}", f"{name}: {part!r}")
     if table:
         del resolved["samples"]
-    return adjust(part, changes) if changes else part, {"kind": _portable(name, folder), **resolved, **changes, **table}
+    return adjust(part, changes, tuple(own)) if changes else part, {
+        "kind": _portable(name, folder),
+        **resolved,
+        **changes,
+        **table,
+    }
 
 
 def call(
@@ -114,8 +119,13 @@ def call(
     return _made(lambda: function(*given, **arguments)), resolved
 
 
-def adjust(part: Any, changes: Mapping[str, Any]) -> Any:
+def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -> Any:
     """Same part with some declared parameters replaced; those of parts inside it as nested mappings.
+
+    Args:
+        part: to be changed.
+        changes: new values by name.
+        options: other names that could have been meant.
 
     Raises:
         BadInput: unknown parameter, wrong type or shape, or the part's own complaint.
@@ -125,7 +135,9 @@ def adjust(part: Any, changes: Mapping[str, Any]) -> Any:
     adjustable = [n for n, f in fields.items() if "unit" in f.metadata or isinstance(values[n], eqx.Module)]
     for key, change in changes.items():
         if key not in adjustable:
-            raise BadInput(key, "be an option or parameter here", "unknown", hint=did_you_mean(key, adjustable))
+            raise BadInput(
+                key, "be an option or parameter here", "unknown", hint=did_you_mean(key, [*options, *adjustable])
+            )
         if isinstance(values[key], eqx.Module):
             if not isinstance(change, Mapping):
                 raise BadInput(key, "be a mapping of parameters", change)
