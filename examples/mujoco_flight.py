@@ -70,7 +70,7 @@ def flights(duration: float) -> tuple[ut.Run, Flight]:
     reference = ut.references.setpoint([2, 1, 1, 0, 0, 0.5], settling=8.0)
     current = ut.disturbances.current(CURRENT)
     run = ut.simulate(plant, law, reference, disturbance=current, duration=duration, dt=0.01, record=0.01)
-    body = Submerged(plant.vehicle, water=Water(np.array(CURRENT)))
+    body = Submerged(plant.vehicle, water=Water(CURRENT))
     return run, fly(body, thruster, law, reference, duration=duration, dt=0.01)
 
 
@@ -87,6 +87,7 @@ def draw(run: ut.Run, flight: Flight, figure: str) -> None:
     gap.semilogy(flight.time[1:], np.abs(flight.position - here)[1:, :3])
     gap.set(xlabel="time, s", ylabel="difference, m")
     plt.savefig(figure)
+    plt.close()
 
 
 if __name__ == "__main__":

@@ -47,10 +47,25 @@ def test_scenario(name, tmp_path):
         assert steady["saturated_fraction"] > 0.05
 
 
-def test_python_api(capsys):
-    spec = importlib.util.spec_from_file_location("python_api", EXAMPLES / "python_api.py")
+def example(name):
+    """An example in Python, as a module."""
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    assert module.main(fast=True).status == 0
+    return module
+
+
+def test_python_api(capsys):
+    assert example("python_api").main(fast=True).status == 0
     assert "tracking_rms" in capsys.readouterr().out
+
+
+def test_mujoco_flight(capsys, tmp_path):
+    """Not worse than docs/independent-physics.md says."""
+    found = example("mujoco_flight").main(fast=True, figure=str(tmp_path / "agreement.png"))
+    said = {"nu_dot": 1e-12, "position": 1e-7, "attitude": 1e-7, "voltage": 1e-5}
+    assert len(found) == 6
+    assert all(difference < said[name.split()[0]] for name, difference in found.items())
+    assert "undertow ok, MuJoCo ok" in capsys.readouterr().out
+    assert (tmp_path / "agreement.png").stat().st_size > 1e4

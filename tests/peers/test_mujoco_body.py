@@ -1,7 +1,10 @@
 """The same vehicle in MuJoCo's engine: axes, mass, thruster geometry, and accelerations at random states."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 from mujoco_states import poses, undertow_acceleration
@@ -12,10 +15,10 @@ from undertow.interop.mujoco_engine.rigid_body import as_rigid_body
 from undertow.numerics.rotations import Kinematics, rotation_from_euler
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import paper_table3
-from undertow.vehicles import bluerov2_heavy, lauv, npsauv2, odin, remus100, rexrov
+from undertow.vehicles import bluerov2, bluerov2_heavy, lauv, npsauv2, odin, remus100, rexrov
 from undertow.vehicles.body import rigid_body_mass
 
-VEHICLES = [odin, bluerov2_heavy, rexrov, npsauv2, remus100, lauv]
+VEHICLES = [odin, bluerov2, bluerov2_heavy, rexrov, npsauv2, remus100, lauv]
 FLIP = np.diag([1.0, -1, -1])
 
 
@@ -47,8 +50,6 @@ def test_states_come_back():
 
 def test_the_engine_has_the_rigid_body(vehicle):
     """Its mass matrix upright is M_RB; its weight and buoyancy are those of the vehicle."""
-    import mujoco
-
     body = Submerged(vehicle)
     body.place(np.zeros(6), np.zeros(6))
     mujoco.mj_forward(body.model, body.data)
@@ -63,8 +64,6 @@ def test_the_engine_has_the_rigid_body(vehicle):
 
 
 def test_thrusters_push_where_they_are(vehicle):
-    import mujoco
-
     body = Submerged(vehicle)
     body.place(np.zeros(6), np.zeros(6))
     turn = np.kron(np.eye(2), FLIP)
@@ -112,6 +111,18 @@ def test_what_added_mass_can_be_a_body():
             mjcf(make(), added_mass=True)
 
 
+@pytest.mark.parametrize("density", [0, 1000])
+def test_the_engines_own_water_has_no_inertia(density):
+    """Why it is not used: 100 N move 41.9 kg from rest at 100 / 41.9 m/s^2, in water as in vacuum."""
+    ellipsoid = '<geom type="ellipsoid" size="0.5 0.2 0.1" mass="41.9" fluidshape="ellipsoid"/>'
+    world = f"<worldbody><body><freejoint/>{ellipsoid}</body></worldbody>"
+    model = mujoco.MjModel.from_xml_string(f'<mujoco><option gravity="0 0 0" density="{density}"/>{world}</mujoco>')
+    data = mujoco.MjData(model)
+    data.qfrc_applied[2] = 100
+    mujoco.mj_forward(model, data)
+    assert data.qacc[2] == pytest.approx(100 / 41.9, rel=1e-12)
+
+
 def test_on_the_static_rung_undertow_is_not_newton():
     """There the paper prescribes the whole of d (Remark 2), J_dot nu with it: the body lacks exactly this term."""
     vehicle, body = rexrov(), Submerged(rexrov())
@@ -124,6 +135,11 @@ def test_on_the_static_rung_undertow_is_not_newton():
         prescribed = plant.dynamics(jnp.zeros(()), x, jnp.zeros(8), plant.no_load()).nu
         body.place(eta, nu)
         np.testing.assert_allclose(body.acceleration(np.zeros(8)), prescribed + missing, atol=1e-12)
+
+
+def test_any_name_will_do():
+    vehicle = replace(odin(), name='"A" & <B>')
+    assert Submerged(vehicle).model.names.startswith(b'"A" & <B>')
 
 
 def test_impossible_inertia_is_refused():

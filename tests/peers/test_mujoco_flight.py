@@ -37,7 +37,7 @@ def test_closed_loops_agree(parts):
     plant, thruster, law, reference = parts
     current = ut.disturbances.current(FLOW)
     run = ut.simulate(plant, law, reference, disturbance=current, duration=5.0, dt=0.01, record=0.01)
-    body = Submerged(plant.vehicle, water=Water(np.array(FLOW)))
+    body = Submerged(plant.vehicle, water=Water(FLOW))
     flight = fly(body, thruster, law, reference, duration=5.0, dt=0.01)
     assert flight.status == Status.OK
     np.testing.assert_allclose(flight.time, run.dataset.time, atol=1e-12)
@@ -93,3 +93,5 @@ def test_what_does_not_fit_is_refused(parts):
         fly(Submerged(plant.vehicle), ut.thrusters.linear_voltage(), law, reference)
     with pytest.raises(BadInput, match="`added_mass` must be one of force, body, but is ghost"):
         Submerged(plant.vehicle, added_mass="ghost")
+    with pytest.raises(BadInput, match=r"`velocity` must have 3 entries \(north, east, down\), but is 2 long"):
+        Submerged(plant.vehicle, water=Water([0.1, 0.2]))

@@ -8,7 +8,7 @@ water in the body's place (Froude and Krylov).
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from undertow.interop.mujoco_engine.frames import cross
 from undertow.vehicles.vehicle import Vehicle
@@ -17,8 +17,8 @@ from undertow.vehicles.vehicle import Vehicle
 class Water(NamedTuple):
     """How the water moves, everywhere alike; world axes north, east, down."""
 
-    velocity: NDArray = np.zeros(3)  # m/s
-    acceleration: NDArray = np.zeros(3)  # m/s^2
+    velocity: ArrayLike = (0.0, 0.0, 0.0)  # m/s
+    acceleration: ArrayLike = (0.0, 0.0, 0.0)  # m/s^2
 
 
 class Hydrodynamics:
@@ -44,7 +44,7 @@ class Hydrodynamics:
             nu: velocity over ground, m/s and rad/s.
             water: how it moves.
         """
-        flow, rising = rotation.T @ water.velocity, rotation.T @ water.acceleration
+        flow, rising = (rotation.T @ np.asarray(rate) for rate in water)
         through = nu - np.concatenate([flow, np.zeros(3)])
         flow_rate = np.concatenate([rising - cross(nu[3:], flow), np.zeros(3)])  # seen from the turning body
         # A rigid body's added mass does not see steady flow (Galileo), only its acceleration.

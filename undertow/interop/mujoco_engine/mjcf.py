@@ -4,6 +4,8 @@ One free body of the vehicle's mass, centre of gravity and inertia; gravity W / 
 point mass taken out of the body at the centre of buoyancy; a site and a motor for each thruster.
 """
 
+from xml.sax.saxutils import quoteattr
+
 import numpy as np
 
 from undertow.core import checks
@@ -54,13 +56,13 @@ def mjcf(vehicle: Vehicle, timestep: float = 2e-3, added_mass: bool = False) -> 
     motors = [
         f'<motor name="thruster{j}" site="thruster{j}" gear="0 0 1 0 0 0"/>' for j in range(1, vehicle.thrusters + 1)
     ]
-    return f"""<mujoco model="{vehicle.name}">
+    return f"""<mujoco model={quoteattr(vehicle.name)}>
   <compiler angle="radian"/>
   <option timestep="{timestep!r}" integrator="RK4" gravity="0 0 {-weight / mass!r}">
     <flag contact="disable" autoreset="disable"/>
   </option>
   <worldbody>
-    <body name="{vehicle.name}">
+    <body name="vehicle">
       <freejoint name="hull"/>
       {_lines(bodies)}
       {_lines(sites)}

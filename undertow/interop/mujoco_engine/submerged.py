@@ -37,7 +37,8 @@ class Submerged:
         water: how the water moves.
 
     Raises:
-        BadInput: the vehicle is no rigid body, its added mass no body, a wrong word, timestep not positive.
+        BadInput: the vehicle is no rigid body, its added mass no body, a wrong word, timestep not positive, water that
+            does not have three finite numbers.
     """
 
     def __init__(self, vehicle: Vehicle, timestep: float = 2e-3, added_mass: str = "force", water: Water | None = None):
@@ -47,6 +48,9 @@ class Submerged:
         self.data = mujoco.MjData(self.model)
         self._hydrodynamics = Hydrodynamics(vehicle, held)
         self._water = Water() if water is None else water
+        for name, rate in self._water._asdict().items():
+            checks.length(name, rate, 3, "north, east, down")
+            checks.finite(name, rate)
 
     def place(self, position: ArrayLike, nu: ArrayLike) -> None:
         """Put it somewhere, at time 0.
@@ -114,7 +118,10 @@ class Submerged:
             mujoco.set_mjcb_control(before)
 
     def _push(self, thrust: NDArray) -> None:
-        """Thrust through the engine's own sites; added mass and damping as generalised forces."""
+        """Thrust through the engine's own sites; added mass and damping as generalised forces.
+
+        Nothing is called here that could make the engine complain: inside a callback MuJoCo 4.0.0 then hangs.
+        """
         data, added_mass = self.data, self._hydrodynamics.added_mass
         data.ctrl[:] = thrust
         mass_matrix, levers = np.empty((6, 6)), np.empty((self.model.nu, 6))
