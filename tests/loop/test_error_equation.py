@@ -31,7 +31,7 @@ def terms(drawn, t, position, velocity, estimates):
     seen = drawn.decide(t, x, z)
     moved = loop.plant.dynamics(t, x, seen.applied, drawn.load(t, x))
     _, acceleration = jax.jvp(lambda x: loop.plant.output(t, x).velocity, (x,), (moved,))
-    sample = drawn.sample(t, x, seen)
+    sample = drawn.sample(t, x, z, seen)
     left = seen.r.acceleration - acceleration
     feedback = law.feedback[0] * sample.error + law.feedback[1] * (seen.r.velocity - sample.velocity)
     wanted = -model.drift(seen.y) - sample.estimate + feedback + seen.r.acceleration + sample.robust

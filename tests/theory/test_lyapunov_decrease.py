@@ -65,7 +65,7 @@ def watch(loop, ticks):
     nothing = jnp.full_like(first, -jnp.inf)
     (x, z), _, worst, peak = jax.lax.fori_loop(0, ticks, tick, (start, first, nothing, nothing))
     end = jnp.asarray(ticks * STEP)
-    sample = drawn.sample(end, x, drawn.decide(end, x, z))
+    sample = drawn.sample(end, x, z, drawn.decide(end, x, z))
     return worst / first, peak, sample.error, sample.estimate - sample.uncertainty
 
 

@@ -92,16 +92,16 @@ class RCAF(AbstractContinuousController):
 
     def init(self, y: Measurement, r: Target) -> RCAFState:
         axes = y.position.shape[0]
-        return RCAFState(y.position, y.velocity, jnp.zeros((axes, self.fuzzy.rules)))
+        return RCAFState(y.position, self.model.rates(y), jnp.zeros((axes, self.fuzzy.rules)))
 
     def command(self, z: RCAFState, y: Measurement, r: Target):
         """V of Eq. (23), with d_hat of Eq. (42) and u_r of Eq. (43)."""
         error, error_rate, s = self._tracking(y, r)
-        eps = self.identification.error(z.predicted_velocity, y.velocity)
+        eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
         u_r = self.robust_gain * switch(s, self.layer, self.switching)
         proportional = self.feedback[..., 0] * error + self.feedback[..., 1] * error_rate
-        wanted = -self.model.drift(y) - d_hat + proportional + r.acceleration + u_r
+        wanted = -self.model.drift(y) - d_hat + proportional + self.model.wanted(y, r)[1] + u_r
         telemetry = Telemetry(
             estimate=d_hat,
             robust=u_r,
@@ -115,7 +115,7 @@ class RCAF(AbstractContinuousController):
     def flow(self, z: RCAFState, y: Measurement, r: Target, u_applied) -> RCAFState:
         """Identification model, Eq. (32), and composite adaptive law, Eq. (44)."""
         _, _, s = self._tracking(y, r)
-        eps = self.identification.error(z.predicted_velocity, y.velocity)
+        eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
         xi = self._basis(eps, y)
         d_hat = self.fuzzy.output(z.weights, xi)
         known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)
@@ -140,8 +140,8 @@ class RCAF(AbstractContinuousController):
 
     def _tracking(self, y: Measurement, r: Target) -> tuple[PerAxis, PerAxis, PerAxis]:
         """e, e_dot of Eq. (19) and the filtered error s = E^T P b."""
-        error = self.model.difference(r.position, y.position)
-        error_rate = r.velocity - y.velocity
+        error = self.model.error(y, r)
+        error_rate = self.model.wanted(y, r)[0] - self.model.rates(y)
         p = self.lyapunov()
         return error, error_rate, p[..., 0, 1] * error + p[..., 1, 1] * error_rate
 

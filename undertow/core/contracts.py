@@ -11,6 +11,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
+from undertow.core.drive import AbstractDrive, DirectDrive
+from undertow.numerics.linear import matvec
+
 Time = Float[Array, ""]
 Outputs = Float[Array, " n"]
 Inputs = Float[Array, " m"]
@@ -91,6 +94,7 @@ class Telemetry(NamedTuple):
     predicted_position: Outputs  # x_hat
     predicted_velocity: Outputs
     weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2; no columns when nothing is learnt
+    books: dict[str, Array] | None = None  # scalars that this law alone has to tell, by name
 
 
 class AbstractModel(eqx.Module):
@@ -109,6 +113,40 @@ class AbstractModel(eqx.Module):
     @abc.abstractmethod
     def invert(self, y: Measurement, acceleration: Outputs) -> Inputs:
         """u with G u = acceleration as nearly as the plant allows: G# of Eqs. (22)-(27)."""
+
+    def drive(self) -> AbstractDrive:
+        """What stands between input and force; G is per unit of input unless a model says otherwise."""
+        return DirectDrive()
+
+    def effect(self, y: Measurement) -> Gain:
+        """Acceleration per force of the drive: x_ddot = F + effect force + d."""
+        return self.gain(y)
+
+    def spread(self, y: Measurement, acceleration: Outputs) -> Inputs:
+        """Smallest forces of the drive with effect force = acceleration, as nearly as possible."""
+        return self.invert(y, acceleration)
+
+    # The coordinates of the law. They are the outputs themselves unless a model has better ones, such as body axes.
+
+    def error(self, y: Measurement, r: Target) -> Outputs:
+        """How far the target is, m and rad."""
+        return self.difference(r.position, y.position)
+
+    def rates(self, y: Measurement) -> Outputs:
+        """Velocity, m/s and rad/s."""
+        return y.velocity
+
+    def wanted(self, y: Measurement, r: Target) -> tuple[Outputs, Outputs]:
+        """Velocity of the target and its time derivative."""
+        return r.velocity, r.acceleration
+
+    def seen(self, y: Measurement, acceleration: Outputs) -> Outputs:
+        """Time derivative of `rates` for a second derivative of the outputs."""
+        return acceleration
+
+    def own_axes(self) -> "AbstractModel":
+        """This model in the coordinates that suit the plant best; itself where there are no better ones."""
+        return self
 
     def difference(self, target: Outputs, actual: Outputs) -> Outputs:
         """target - actual, angles the short way round."""
@@ -198,6 +236,14 @@ class AbstractController(eqx.Module):
     @abc.abstractmethod
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
         """State one sampling time later."""
+
+    def known(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+        """F + G u: what the law takes for granted of the acceleration; d is all the rest."""
+        return self.model.drift(y) + matvec(self.model.gain(y), u_applied)
+
+    def columns(self) -> dict[str, tuple[str, str]]:
+        """Meaning and unit of each entry of the telemetry's `books`."""
+        return {}
 
 
 class AbstractDisturbance(eqx.Module):

@@ -20,7 +20,6 @@ from undertow.core.contracts import (
     Telemetry,
     Time,
 )
-from undertow.numerics.linear import matvec
 
 
 class Sample(NamedTuple):
@@ -112,12 +111,12 @@ class Drawn(NamedTuple):
         command, telemetry = self.loop.controller.command(z, y, r)
         return Decision(y, r, command, self.loop.plant.admissible(x, command), telemetry, heard)
 
-    def sample(self, t: Time, x: PyTree, decision: Decision) -> Sample:
+    def sample(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Sample:
         """What is written down about time t. Errors are those of the truth, not of the measurement."""
-        plant, model = self.loop.plant, self.loop.controller.model
+        plant, controller = self.loop.plant, self.loop.controller
         truth = plant.output(t, x)
         y, r, command, applied, telemetry, _ = decision
-        known = model.drift(truth) + matvec(model.gain(truth), applied)
+        acceleration = plant.acceleration(t, x, applied, self.load(t, x))
         effort = plant.effort(x, applied)
         return Sample(
             position=truth.position,
@@ -125,8 +124,8 @@ class Drawn(NamedTuple):
             measured_position=y.position,
             measured_velocity=y.velocity,
             target=r.position,
-            error=model.difference(r.position, truth.position),
-            uncertainty=plant.acceleration(t, x, applied, self.load(t, x)) - known,
+            error=controller.model.difference(r.position, truth.position),
+            uncertainty=controller.model.seen(truth, acceleration) - controller.known(z, truth, applied),
             estimate=telemetry.estimate,
             robust=telemetry.robust,
             modelling_error=telemetry.modelling_error,
@@ -138,9 +137,9 @@ class Drawn(NamedTuple):
             command=command,
             power=effort.power,
             saturated=effort.saturated,
-            books=plant.books(x, applied),
+            books=plant.books(x, applied) | (telemetry.books or {}),
         )
 
     def look(self, t: Time, x: PyTree, z: PyTree, heard: PyTree = ()) -> Sample:
         """`sample` of the decision taken at time t."""
-        return self.sample(t, x, self.decide(t, x, z, heard))
+        return self.sample(t, x, z, self.decide(t, x, z, heard))

@@ -96,7 +96,7 @@ def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     loop, t = drawn.loop, instant(k, dt)
     decision = drawn.decide(t, x, z, heard)
     if accumulators:
-        sample = drawn.sample(t, x, decision)
+        sample = drawn.sample(t, x, z, decision)
         gathered = tuple(a.update(g, t, sample) for a, g in zip(accumulators, gathered, strict=True))
     motion, h = partial(_motion, drawn, decision.applied), dt / substeps
     if substeps == 1:

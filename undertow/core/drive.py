@@ -1,0 +1,64 @@
+"""What a controller knows of what stands between its input and the force that moves the plant."""
+
+import abc
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PyTree
+
+Inputs = Float[Array, " m"]
+Forces = Float[Array, " m"]
+
+
+class AbstractDrive(eqx.Module):
+    """From input to force and back, with what the controller remembers of it (propeller speeds, for instance)."""
+
+    @abc.abstractmethod
+    def init(self) -> PyTree:
+        """State at rest."""
+
+    @abc.abstractmethod
+    def heard(self, state: PyTree, report: PyTree) -> PyTree:
+        """State with what the actuators report of themselves put into it."""
+
+    @abc.abstractmethod
+    def range(self, state: PyTree, rate: Float[Array, ""]) -> tuple[Forces, Forces]:
+        """Smallest and largest force that may be asked for without asking for more input than there is."""
+
+    @abc.abstractmethod
+    def force(self, state: PyTree, u: Inputs) -> Forces:
+        """Force that an applied input gives."""
+
+    @abc.abstractmethod
+    def command(self, state: PyTree, force: Forces, rate: Float[Array, ""]) -> Inputs:
+        """Input that brings the force to a wanted one, as fast as `rate` (1/s) where it cannot be at once."""
+
+    @abc.abstractmethod
+    def advance(self, state: PyTree, u: Inputs, dt: Float[Array, ""]) -> PyTree:
+        """State after a sampling time with an input held."""
+
+
+class DirectDrive(AbstractDrive):
+    """The force is proportional to the input, at once, within limits of the input."""
+
+    gain: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
+    low: Inputs = eqx.field(converter=jnp.asarray, default=-jnp.inf)
+    high: Inputs = eqx.field(converter=jnp.asarray, default=jnp.inf)
+
+    def init(self) -> tuple[()]:
+        return ()
+
+    def heard(self, state, report) -> tuple[()]:
+        return ()
+
+    def range(self, state, rate):
+        return self.gain * self.low, self.gain * self.high
+
+    def force(self, state, u):
+        return self.gain * u
+
+    def command(self, state, force, rate):
+        return force / self.gain
+
+    def advance(self, state, u, dt) -> tuple[()]:
+        return ()
