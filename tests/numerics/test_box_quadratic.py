@@ -1,0 +1,65 @@
+"""Box-constrained quadratics against SciPy's bounded least squares and against what an optimum must satisfy."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from undertow.numerics.box_quadratic import box_minimum, solve_symmetric
+
+RNG = np.random.default_rng(11)
+solve = jax.jit(box_minimum)
+
+
+def problem(n, tightness):
+    a = RNG.normal(size=(n + 3, n))
+    b = 3 * RNG.normal(size=n + 3)
+    low = -tightness * RNG.uniform(0.1, 1.0, n)
+    high = tightness * RNG.uniform(0.1, 1.0, n)
+    return a, b, low, high
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 9, 12])
+@pytest.mark.parametrize("tightness", [0.1, 1.0, 10.0])
+def test_agrees_with_bounded_least_squares(n, tightness):
+    for _ in range(40):
+        a, b, low, high = problem(n, tightness)
+        expected = lsq_linear(a, b, (low, high), method="bvls", tol=1e-14).x
+        np.testing.assert_allclose(solve(a.T @ a, a.T @ b, low, high), expected, rtol=1e-8, atol=1e-9)
+
+
+def test_optimality_of_ten_thousand():
+    """Inside: no slope. At a bound: the slope points outwards. That is all there is for a convex function."""
+    problems = [problem(9, 10.0 ** RNG.uniform(-2, 1)) for _ in range(10_000)]
+    a, b, low, high = (np.stack(parts) for parts in zip(*problems, strict=True))
+    h, c = np.einsum("kij,kil->kjl", a, a), np.einsum("kij,ki->kj", a, b)
+    x = np.asarray(jax.jit(jax.vmap(box_minimum))(h, c, low, high))
+    slope = np.einsum("kij,kj->ki", h, x) - c
+    assert ((x >= low) & (x <= high)).all()
+    inside = (x > low) & (x < high)
+    size = np.abs(c).max(1, keepdims=True)
+    assert (np.abs(slope / size)[inside] < 1e-9).all()
+    assert ((slope / size)[x <= low] > -1e-9).all()
+    assert ((slope / size)[x >= high] < 1e-9).all()
+
+
+def test_a_box_without_an_inside_is_its_point():
+    a, b, low, _ = problem(4, 1.0)
+    np.testing.assert_array_equal(solve(a.T @ a, a.T @ b, low, low), low)
+
+
+def test_a_variable_may_be_held():
+    a, b, low, high = problem(4, 5.0)
+    low[2] = high[2] = 0.7
+    rest = [0, 1, 3]
+    expected = lsq_linear(a[:, rest], b - 0.7 * a[:, 2], (low[rest], high[rest]), method="bvls", tol=1e-14).x
+    found = solve(a.T @ a, a.T @ b, low, high)
+    np.testing.assert_allclose(np.asarray(found)[rest], expected, rtol=1e-8, atol=1e-9)
+    assert float(found[2]) == 0.7
+
+
+def test_symmetric_systems():
+    a = RNG.normal(size=(8, 8))
+    h, b = a @ a.T + np.eye(8), RNG.normal(size=8)
+    np.testing.assert_allclose(solve_symmetric(jnp.asarray(h), jnp.asarray(b)), np.linalg.solve(h, b), rtol=1e-11)
