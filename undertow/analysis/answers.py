@@ -13,12 +13,12 @@ _TOLERANCE = 1e-6
 
 
 def shaped(name: str, value: Any, *shapes: tuple[int, ...]) -> Iterator[Finding]:
-    """An array of one of these shapes, of finite numbers."""
-    if not isinstance(value, jax.Array | np.ndarray | np.generic | float | int):
+    """An array of one of these shapes, of finite numbers unless it is only traced."""
+    if not isinstance(value, jax.Array | jax.ShapeDtypeStruct | np.ndarray | np.generic | float | int):
         yield error("contract", name, f"give an array of shape {shapes[0]}", _form(value))
     elif jnp.shape(value) not in shapes:
         yield error("contract", name, f"give arrays of shape {shapes[0]}", f"of shape {jnp.shape(value)}")
-    elif not np.all(np.isfinite(value)):
+    elif not isinstance(value, jax.ShapeDtypeStruct) and not np.all(np.isfinite(value)):
         yield error("contract", name, "give finite numbers", str(np.asarray(value)))
 
 
@@ -52,6 +52,6 @@ def agree(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
 def _form(value: Any) -> str:
     if value is None:
         return "nothing (no `return`?)"
-    if isinstance(value, jax.Array):
+    if isinstance(value, jax.Array | jax.ShapeDtypeStruct):
         return f"an array of shape {value.shape}"
     return f"of type {type(value).__name__}"

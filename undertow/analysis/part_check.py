@@ -70,11 +70,17 @@ def _controller(controller: AbstractController, around: Surroundings) -> Iterato
     n = len(controller.model.angles)
     y = Measurement(0.1 * jnp.ones(n), jnp.zeros(n))
     r = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n))
-    z = controller.init(y, r)
-    u, telemetry = controller.command(z, y, r)
+
+    @jax.jit
+    def step():
+        z = controller.init(y, r)
+        u, telemetry = controller.command(z, y, r)
+        return z, u, telemetry.estimate, controller.advance(z, y, r, u, jnp.asarray(1e-3))
+
+    z, u, estimate, after = step()
     yield from shaped("command", u, (controller.model.gain(y).shape[1],))
-    yield from shaped("command", telemetry.estimate, (n,))
-    yield from alike("advance", controller.advance(z, y, r, u, jnp.asarray(1e-3)), z, "have the form of the state")
+    yield from shaped("command", estimate, (n,))
+    yield from alike("advance", after, z, "have the form of the state")
 
 
 def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iterator[Finding]:
@@ -85,15 +91,16 @@ def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iter
     yield from alike("draw", again, path, "give the same path for the same key")
     if not all(map(np.array_equal, jax.tree.leaves(path), jax.tree.leaves(again))):
         yield error("contract", "draw", "give the same path for the same key", "another one")
+    at = jax.jit(lambda t, calm: disturbance.at(path, t, place, calm))
+    form = jax.eval_shape(at, jnp.zeros(()), calm)
+    wrong = list(is_a("at", form, Load))
+    wrong = wrong or [*shaped("at", form.acceleration, (n,)), *shaped("at", form.wrench, (n,))]
+    if wrong:
+        yield from wrong
+        return
     for t in map(jnp.asarray, _TIMES):
-        jax.eval_shape(lambda t: disturbance.at(path, t, place, calm), t)  # whether it compiles
-        load = disturbance.at(path, t, place, calm)
-        wrong = list(is_a("at", load, Load))
-        wrong = wrong or [*shaped("at", load.acceleration, (n,)), *shaped("at", load.wrench, (n,))]
-        if wrong:
-            yield from wrong
-            return
-        more = disturbance.at(path, t, place, busy)
+        load, more = at(t, calm), at(t, busy)
+        yield from (finding for value in load[:2] for finding in shaped("at", value, (n,)))
         for name in ("acceleration", "wrench"):
             gained = getattr(more, name) - getattr(load, name)
             yield from agree("at", gained, getattr(busy, name), f"what was there already: add to `calm.{name}`")
@@ -103,10 +110,9 @@ def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iter
 
 
 def _sensor(sensor: AbstractSensor, around: Surroundings) -> Iterator[Finding]:
-    path = sensor.draw(jax.random.PRNGKey(0))
-    state = sensor.init(path, around.truth)
-    jax.eval_shape(lambda t: sensor.measure(path, state, t, around.truth), jnp.zeros(()))  # whether it compiles
-    y, after = sensor.measure(path, state, jnp.asarray(_TIMES[0]), around.truth)
+    path = jax.eval_shape(sensor.draw, jax.random.PRNGKey(0))
+    state = jax.eval_shape(sensor.init, path, around.truth)
+    y, after = jax.eval_shape(sensor.measure, path, state, jnp.zeros(()), around.truth)
     yield from alike("measure", after, state, "give the state in the form of `init`")
     wrong, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
     yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]

@@ -51,28 +51,29 @@ def full_voltage(thruster: AbstractThruster) -> float:
     return supply if np.isfinite(supply) else _VOLTAGE
 
 
-def settled_thrust(thruster: AbstractThruster, voltage: float) -> float:
-    """Thrust, N, long after a voltage was applied to a thruster at rest."""
-    volts = jnp.full(1, voltage)
-    start = thruster.initial_state(1)
+def settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, float]:
+    """Thrust, N, long after a voltage, and after its opposite, was applied to thrusters at rest."""
+    volts = jnp.array([voltage, -voltage])
+    start = thruster.initial_state(2)
     flat, tree = ravel_pytree(start)
-    if not flat.size:
-        return float(thruster.thrust(start, volts)[0])
-    rate = jax.jit(lambda x: ravel_pytree(thruster.dynamics(tree(x), volts))[0])
-    end = solve_ivp(lambda t, x: np.asarray(rate(x)), (0, _LONG), np.asarray(flat), method="LSODA").y[:, -1]
-    return float(thruster.thrust(tree(jnp.asarray(end)), volts)[0])
+    if flat.size:
+        rate = jax.jit(lambda x: ravel_pytree(thruster.dynamics(tree(x), volts))[0])
+        end = solve_ivp(lambda t, x: np.asarray(rate(x)), (0, _LONG), np.asarray(flat), method="LSODA").y[:, -1]
+        start = tree(jnp.asarray(end))
+    forward, reverse = np.asarray(thruster.thrust(start, volts)).tolist()
+    return forward, reverse
 
 
 def _ways(thruster: AbstractThruster) -> Iterator[Finding]:
     """Positive voltage pushes forward, and about as much as the controller's model is told."""
     full, gain = full_voltage(thruster), float(np.min(thruster.voltage_gain()))
-    for sign, word in ((1, "positive"), (-1, "negative")):
-        thrust = settled_thrust(thruster, sign * full)
-        if not sign * thrust > 0:
-            yield error("sign", "thrust", f"be {word} at {sign * full:+.4g} V", f"{thrust:.4g} N")
+    forward, reverse = settled_thrust(thruster, full)
+    for thrust, volts, word in ((forward, full, "positive"), (-reverse, -full, "negative")):
+        if not thrust > 0:
+            got = f"{forward if volts > 0 else reverse:.4g} N"
+            yield error("sign", "thrust", f"be {word} at {volts:+.4g} V", got)
             return
-    ratio = gain * full / settled_thrust(thruster, full)
-    if gain > 0 and not 1 / _FACTOR < ratio < _FACTOR:
-        got = f"{gain:.4g} N/V where {full:.4g} V give {gain * full / ratio:.4g} N"
+    if gain > 0 and not 1 / _FACTOR < gain * full / forward < _FACTOR:
+        got = f"{gain:.4g} N/V where {full:.4g} V give {forward:.4g} N"
         should = "be about the thrust per volt: it is the gain of the model that the controller inverts"
         yield advice("gain", "voltage_gain", should, got)

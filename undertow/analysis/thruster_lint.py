@@ -40,8 +40,7 @@ def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str
     if isinstance(motor, DCMotor):
         rows += _of_motor(motor, limit)
     else:
-        steady = ", ".join(f"{settled_thrust(thruster, volts):.4g}" for volts in (limit, -limit))
-        rows.append((f"steady thrust at +-{limit:g} V", steady, "N"))
+        rows.append((f"steady thrust at +-{limit:g} V", _row(settled_thrust(thruster, limit)), "N"))
     return tuple(rows)
 
 

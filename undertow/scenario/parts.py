@@ -82,12 +82,8 @@ def make(
         raise BadInput("kind", f"name a function that returns {_title(_CONTRACTS[kind])}", f"{name}: {part!r}")
     if table:
         del resolved["samples"]
-    return adjust(part, changes, tuple(own)) if changes else part, {
-        "kind": _portable(name, folder),
-        **resolved,
-        **changes,
-        **table,
-    }
+    part = adjust(part, changes, tuple(own)) if changes else part
+    return part, {"kind": _portable(name, folder), **resolved, **changes, **table}
 
 
 def call(
