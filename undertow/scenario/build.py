@@ -8,10 +8,12 @@ from undertow.core.contracts import AbstractDisturbance
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import parts
 from undertow.scenario.fitting import check_fit, check_times, placed
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
+from undertow.scenario.stepping import step_advice
 
 
 class Built(NamedTuple):
@@ -25,7 +27,9 @@ class Built(NamedTuple):
         """What is odd about it, though it can be run."""
         (start, _), end = self.window(), self.scenario.loop.duration
         late = f"the steady window starts at {start:g} s, the run ends at {end:g} s: no steady metrics"
-        return self.closed_loop.plant.advice() + ((late,) if start >= end else ())
+        plant = self.closed_loop.plant
+        fast = step_advice(plant.thruster, self.scenario.loop) if isinstance(plant, HybridVehicle) else ()
+        return plant.advice() + fast + ((late,) if start >= end else ())
 
     def window(self) -> tuple[float, float]:
         """Start and stop of the steady metrics, s."""
@@ -55,7 +59,8 @@ def build(source: Text | Mapping[str, Any]) -> Built:
         return part
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
-        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given))
+        times = {"sampling_time": scenario.loop.dt}
+        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given, times))
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):
