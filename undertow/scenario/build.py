@@ -59,8 +59,7 @@ def build(source: Text | Mapping[str, Any]) -> Built:
         return part
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
-        times = {"sampling_time": scenario.loop.dt}
-        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given, times))
+        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given))
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):
