@@ -98,8 +98,8 @@ def test_interrupt_is_130(undertow, tmp_path, monkeypatch):
 
 
 def test_interrupt_of_compiled_code(tmp_path):
-    """A day of simulated time ends at once, and leaves nothing."""
-    write(tmp_path, SCENARIO.replace("duration: 0.1", "duration: 90000").replace("seed: 3", ""))
+    """Hours of simulated time end at once, and leave nothing."""
+    write(tmp_path, SCENARIO.replace("duration: 0.1", "duration: 9000").replace("seed: 3", ""))
     command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml", "--out", "out"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
