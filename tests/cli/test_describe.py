@@ -38,7 +38,9 @@ def test_parameters_come_with_unit_symbol_and_source(undertow):
 
 
 def test_controller_shows_its_options_and_the_defaults_of_its_class():
-    (rcaf,) = describing.describe("rcaf")
+    rcaf, sound = describing.describe("rcaf")
+    assert [option.default for one in (rcaf, sound) for option in one.options[:1]] == ["paper", "robust"]
+    assert "bandwidth" in {option.name for option in sound.options}
     options = {option.name: option for option in rcaf.options}
     assert "model" not in options
     assert options["composite"].default == 500.0 and "gamma_eps" in options["composite"].meaning

@@ -9,6 +9,7 @@ import pytest
 from undertow.core import catalogue
 from undertow.instruments import compass, depth, dvl, imu, position_fix
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.scenario.parts import presets_of
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -31,14 +32,22 @@ def required(argument):
 
 @functools.cache
 def make(kind, name):
-    """Part `name` of a kind, with its defaults."""
+    """Part `name` of a kind, or `name:preset`, with its defaults."""
+    name, _, preset = name.partition(":")
     part = catalogue.names(kind)[name]
+    if preset:
+        part = presets_of(part)[preset]
     empty = inspect.Parameter.empty
     needed = [p.name for p in inspect.signature(part).parameters.values() if p.default is empty]
     return part(**{argument: required(argument) for argument in needed})
 
 
-ALL = [(kind, name) for kind in catalogue.KINDS for name in catalogue.names(kind)]
+def variants(kind, name):
+    """The part, or each of its presets."""
+    return [f"{name}:{preset}" for preset in presets_of(catalogue.names(kind)[name])] or [name]
+
+
+ALL = [(kind, which) for kind in catalogue.KINDS for name in catalogue.names(kind) for which in variants(kind, name)]
 
 
 def pytest_generate_tests(metafunc):

@@ -59,6 +59,23 @@ def test_a_variable_may_be_held():
     assert float(found[2]) == 0.7
 
 
+@pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
+def test_derivatives_are_those_of_small_changes(mode):
+    """Away from a change of the active set, which random problems do not meet."""
+    a, b, low, high = problem(6, 1.0)
+    arguments = tuple(map(jnp.asarray, (a.T @ a, a.T @ b, low, high)))
+    for i, value in enumerate(arguments):
+        found = np.asarray(mode(box_minimum, argnums=i)(*arguments)).reshape(6, -1)
+        for k in range(0, value.size, 5):
+            nudge = np.zeros(value.size)
+            nudge[k] = 1e-6
+            apart = [
+                np.asarray(box_minimum(*arguments[:i], value + sign * nudge.reshape(value.shape), *arguments[i + 1 :]))
+                for sign in (1, -1)
+            ]
+            np.testing.assert_allclose(found[:, k], (apart[0] - apart[1]) / 2e-6, rtol=1e-5, atol=1e-7)
+
+
 def test_symmetric_systems():
     a = RNG.normal(size=(8, 8))
     h, b = a @ a.T + np.eye(8), RNG.normal(size=8)

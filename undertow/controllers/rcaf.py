@@ -1,94 +1,28 @@
-"""The paper's controller, ready to use: Table 1, its fuzzy sets, and what may be chosen differently."""
+"""The controller, ready to use: a preset of the robust composite adaptive fuzzy law, and what is chosen differently."""
 
-import math
+from typing import Any
 
-from undertow.controllers.law import FUZZY_INPUTS, RCAF
+from undertow.controllers.presets.paper import paper
+from undertow.controllers.presets.robust import robust
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel
-from undertow.core.errors import BadInput
-from undertow.fuzzy.tsk import gaussian_sets
-from undertow.identification.series_parallel import SeriesParallel
+from undertow.core.contracts import AbstractController, AbstractModel
 
-PRESETS = ("paper",)
-
-# Outermost sets of each fuzzy input. The paper leaves centres and widths blank: eps in m/s and rad/s as fixed by
-# the benchmark; for the state input, wide enough for the paper's step of 4 m and its velocities.
-_REACH = {"error": (1.0,), "state": (4.0, 2.0)}
+PRESETS = {"paper": paper, "robust": robust}
 
 
-def rcaf(
-    model: AbstractModel,
-    *,
-    preset: str = "paper",
-    feedback=(1.0, 2.0),
-    weight=((10.0, 0.0), (0.0, 10.0)),
-    adaptation=100.0,
-    composite=500.0,
-    robust_gain=10.0,
-    layer=0.5,
-    pole=150.0,
-    compensation_gain=0.1,
-    compensation_layer=0.5,
-    weights_bound=math.inf,
-    switching: str = "tanh",
-    fuzzy_input: str = "error",
-    sets: int = 5,
-    reach=None,
-    width: float | None = None,
-    method: str = "euler",
-    substeps: int = 1,
-) -> RCAF:
-    """Robust composite adaptive fuzzy controller; every default is Table 1 of the paper.
+def rcaf(model: AbstractModel, *, preset: str = "paper", **options: Any) -> AbstractController:
+    """Robust composite adaptive fuzzy controller.
 
     Args:
         model: what the controller may know, from `plant.model()`.
-        preset: `paper`.
-        feedback: K = (k1, k2), 1/s^2 and 1/s; one pair or one per axis.
-        weight: Q of Eq. (21).
-        adaptation: gamma.
-        composite: gamma_eps; 0 gives RAFC, Eq. (61).
-        robust_gain: w_bar, m/s^2 and rad/s^2.
-        layer: boundary layer of the robust term.
-        pole: alpha_F of the identification model, 1/s.
-        compensation_gain: omega_bar, m/s^2 and rad/s^2.
-        compensation_layer: boundary layer of the compensation.
-        weights_bound: theta_max, m/s^2 and rad/s^2; weights are projected into +-theta_max, and with them the
-            estimate. The paper has none.
-        switching: tanh (Remark 5) or sign (as in Eqs. (33), (43)).
-        fuzzy_input: error (the modelling error) or state (position and velocity).
-        sets: fuzzy sets per input; any number from 1.
-        reach: outermost centres, one per fuzzy input; None: 1 for the error, 4 and 2 for the state.
-        width: of the sets as a share of `reach`; None: their spacing.
-        method: how the law is discretised in the sampled loop, euler or rk4.
-        substeps: steps of `method` per sampling time.
+        preset: `paper`, every default of which is Table 1, or `robust`, the sound version for real vehicles.
+        options: of the preset; see `undertow.controllers.presets`.
 
     Raises:
-        BadInput: a value is out of its range.
+        BadInput: no such preset, or a value is out of its range.
     """
-    checks.choice("preset", preset, PRESETS)
-    checks.choice("fuzzy_input", fuzzy_input, FUZZY_INPUTS)
-    checks.choice("method", method, ("euler", "rk4"))
-    if substeps < 1:
-        raise BadInput("substeps", "be 1 or more", substeps)
-    reach = _REACH[fuzzy_input] if reach is None else reach
-    checks.length("reach", reach, len(_REACH[fuzzy_input]), f"one per input of fuzzy_input = {fuzzy_input}")
-    try:
-        identification = SeriesParallel(pole, compensation_gain, compensation_layer, switching)
-    except BadInput as error:
-        raise BadInput(error.name.replace("layer", "compensation_layer"), error.must, error.got) from None
-    return RCAF(
-        model=model,
-        fuzzy=gaussian_sets(sets, tuple(reach), width),
-        identification=identification,
-        feedback=feedback,
-        weight=weight,
-        adaptation=adaptation,
-        composite=composite,
-        robust_gain=robust_gain,
-        layer=layer,
-        weights_bound=weights_bound,
-        switching=switching,
-        fuzzy_input=fuzzy_input,
-        method=method,
-        substeps=substeps,
-    )
+    checks.choice("preset", preset, tuple(PRESETS))
+    return PRESETS[preset](model, **options)
+
+
+rcaf.presets = PRESETS  # pyright: ignore[reportFunctionMemberAccess] - a scenario and `describe` find their options here

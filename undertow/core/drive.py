@@ -34,6 +34,10 @@ class AbstractDrive(eqx.Module):
         """Input that brings the force to a wanted one, as fast as `rate` (1/s) where it cannot be at once."""
 
     @abc.abstractmethod
+    def aim(self, state: PyTree, u: Inputs, rate: Float[Array, ""]) -> Forces:
+        """Force that an input is on its way to: `command` solved."""
+
+    @abc.abstractmethod
     def advance(self, state: PyTree, u: Inputs, dt: Float[Array, ""]) -> PyTree:
         """State after a sampling time with an input held."""
 
@@ -59,6 +63,9 @@ class DirectDrive(AbstractDrive):
 
     def command(self, state, force, rate):
         return force / self.gain
+
+    def aim(self, state, u, rate):
+        return self.gain * u
 
     def advance(self, state, u, dt) -> tuple[()]:
         return ()

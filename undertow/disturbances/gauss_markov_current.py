@@ -42,8 +42,10 @@ class GaussMarkovCurrent(AbstractDisturbance):
         kept = jnp.exp(-self.step / self.correlation_time)
         fresh = jnp.sqrt(-jnp.expm1(-2 * self.step / self.correlation_time))
         noise = jax.random.normal(key, (self.samples, 3), dtype=self.mean.dtype)
-        after = lambda x, n: (kept * x + fresh * n, x)
-        return self.deviation * jax.lax.scan(after, noise[0], jnp.roll(noise, -1, axis=0))[1]
+        # Steps x -> kept x + news add up in any order, so that all of them take as long as a few.
+        news = (fresh * noise).at[0].set(noise[0])
+        after = lambda first, second: (first[0] * second[0], first[1] * second[0] + second[1])
+        return self.deviation * jax.lax.associative_scan(after, (jnp.full((self.samples, 1), kept), news))[1]
 
     def at(self, path, t, place, calm: Load) -> Load:
         index = jnp.clip(t / self.step, 0.0, self.samples - 1.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from undertow.core.contracts import AbstractPlant
+from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.status import Status
 from undertow.loop.outcome import Outcome
 
@@ -30,7 +30,7 @@ _MEANINGS = {
 }
 
 
-def to_dataset(outcome: Outcome, plant: AbstractPlant) -> xr.Dataset:
+def to_dataset(outcome: Outcome, plant: AbstractPlant, controller: AbstractController) -> xr.Dataset:
     """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `input` (numbers from 1)."""
     units = np.array(plant.output_units)
     variables = {}
@@ -40,8 +40,9 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant) -> xr.Dataset:
         rates = ", ".join(f"{u}{rate}" for u in dict.fromkeys(units))
         shown = rates if "axis" in dims else rate or plant.input_unit
         variables[name] = (dims, values, {"long_name": meaning, "units": shown})
+    columns = plant.columns() | controller.columns()
     for name, values in outcome.samples.books.items():
-        meaning, unit = plant.columns()[name]
+        meaning, unit = columns[name]
         variables[name] = (("time",), np.asarray(values), {"long_name": meaning, "units": unit})
     status = Status(int(outcome.status))
     return xr.Dataset(

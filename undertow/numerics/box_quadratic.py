@@ -26,8 +26,11 @@ class _Search(NamedTuple):
     done: Bool[Array, ""]
 
 
+@jax.custom_jvp
 def box_minimum(matrix: Float[Array, "n n"], linear: Vector, low: Vector, high: Vector) -> Vector:
     """x between low and high with the smallest x^T H x / 2 - c^T x. Nocedal and Wright (2006), section 16.5.
+
+    It may be differentiated: variables at a bound move with it, the others by the linear system that they solve.
 
     Args:
         matrix: H, symmetric, positive definite.
@@ -43,25 +46,47 @@ def box_minimum(matrix: Float[Array, "n n"], linear: Vector, low: Vector, high: 
     return jax.lax.while_loop(lambda search: ~search.done & (search.step < most), step, first).x
 
 
+@box_minimum.defjvp
+def _derivative(primals, tangents):
+    matrix, linear, low, high = primals
+    matrix_dot, linear_dot, low_dot, high_dot = tangents
+    x = box_minimum(matrix, linear, low, high)
+    free = (x > low) & (x < high)
+    held_dot = jnp.where(free, 0.0, jnp.where(x >= high, high_dot, low_dot))
+    right = linear_dot - matvec(matrix_dot, x) - matvec(matrix, held_dot)
+    inverse = _eliminated(_among(free, matrix), jnp.eye(x.shape[0]))
+    return x, jnp.where(free, matvec(inverse, jnp.where(free, right, 0.0)), held_dot)
+
+
 def solve_symmetric(matrix: Float[Array, "n n"], right: Vector) -> Vector:
-    """Solution of a symmetric positive definite system, by Gauss-Jordan elimination."""
+    """Solution of a symmetric positive definite system."""
+    return _eliminated(matrix, right[:, None])[:, 0]
+
+
+def _eliminated(matrix: Float[Array, "n n"], right: Float[Array, "n k"]) -> Float[Array, "n k"]:
+    """Solutions of symmetric positive definite systems by Gauss-Jordan elimination."""
 
     def eliminate(k, rows):
         pivot = rows[k] / rows[k, k]
         column = rows[:, k].at[k].set(0.0)
         return (rows - column[:, None] * pivot).at[k].set(pivot)
 
-    rows = jnp.concatenate([matrix, right[:, None]], axis=1)
-    return jax.lax.fori_loop(0, right.shape[0], eliminate, rows)[:, -1]
+    n = matrix.shape[0]
+    return jax.lax.fori_loop(0, n, eliminate, jnp.concatenate([matrix, right], axis=1))[:, n:]
+
+
+def _among(free: Bool[Array, " n"], matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
+    """The matrix of the free variables, in a system that leaves the others alone."""
+    return jnp.where(free[:, None] & free, matrix, jnp.eye(matrix.shape[0]))
 
 
 def _step(matrix, linear, low, high, search: _Search) -> _Search:
     """To the minimum over the free variables, or as far as the first bound; then the worst bound is let go."""
     x, free, step, _ = search
-    both = free[:, None] & free
-    reduced = jnp.where(both, matrix, jnp.eye(x.shape[0]))
     held = jnp.where(free, 0.0, x)
-    target = jnp.where(free, solve_symmetric(reduced, jnp.where(free, linear - matvec(matrix, held), 0.0)), x)
+    target = jnp.where(
+        free, solve_symmetric(_among(free, matrix), jnp.where(free, linear - matvec(matrix, held), 0.0)), x
+    )
     room = jnp.where(target < x, low - x, high - x) / jnp.where(target == x, 1.0, target - x)
     room = jnp.where(target == x, jnp.inf, room)
     reached = room.min() >= 1.0

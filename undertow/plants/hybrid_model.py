@@ -9,6 +9,7 @@ from undertow.core.contracts import AbstractModel, Measurement
 from undertow.numerics.inverses import pseudo_inverse, regularised_sharp
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import Kinematics, rotation_from_euler
+from undertow.plants.body_model import BodyModel
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.body import Body
 
@@ -55,6 +56,17 @@ class HybridModel(AbstractModel):
             return matvec(pseudo_inverse(self.gain(y)), acceleration)
         wrench = matvec(self.body.mass_matrix, _kinematics(y).to_body(acceleration))
         return matvec(self.allocation, wrench)
+
+    def own_axes(self) -> BodyModel:
+        """The same knowledge in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
+        count = self.thruster_matrix.shape[1]
+        return BodyModel(
+            body=self.body,
+            thrusters=self.thruster.drive(count, self.speed_sensor),
+            acceleration_per_thrust=self.body.inverse_mass_matrix @ self.thruster_matrix,
+            allocation=jnp.linalg.pinv(self.thruster_matrix),
+            thrust_per_volt=jnp.broadcast_to(self.thruster.voltage_gain(), (count,)),
+        )
 
 
 def _kinematics(y: Measurement) -> Kinematics:

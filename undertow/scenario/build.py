@@ -59,7 +59,8 @@ def build(source: Text | Mapping[str, Any]) -> Built:
         return part
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
-        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given))
+        times = {"sampling_time": scenario.loop.dt}
+        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given, times))
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):

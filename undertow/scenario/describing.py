@@ -54,7 +54,8 @@ def describe(name: str) -> tuple[Description, ...]:
     wanted, _, short = name.rpartition("/")
     kinds = [kind for kind in catalogue.KINDS if wanted in ("", kind)]
     known = {kind: catalogue.names(kind) for kind in kinds}
-    found = tuple(_describe(kind, short, known[kind][short]) for kind in kinds if short in known[kind])
+    named = [(kind, known[kind][short]) for kind in kinds if short in known[kind]]
+    found = tuple(one for kind, part in named for one in _presets(kind, short, part))
     if not found:
         every = {part for parts_of_kind in known.values() for part in parts_of_kind}
         raise BadInput("NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "metrics"}))
@@ -66,8 +67,21 @@ def summary(part: Any) -> str:
     return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
 
 
-def _describe(kind: str, name: str, part: Any) -> Description:
-    instance = _instance(kind, name, part)
+def _presets(kind: str, name: str, part: Any) -> tuple[Description, ...]:
+    """The part, or each of its presets."""
+    presets = parts.presets_of(part)
+    if not presets:
+        return (_describe(kind, name, part),)
+    each = []
+    for preset, function in presets.items():
+        found = _describe(kind, name, function, {"kind": name, "preset": preset})
+        chosen = Option("preset", preset, f"one of {', '.join(presets)}.")
+        each.append(found._replace(options=(chosen, *found.options)))
+    return tuple(each)
+
+
+def _describe(kind: str, name: str, part: Any, description: Any = None) -> Description:
+    instance = _instance(kind, description or name, part)
     shown: Any = instance if instance is not None else typing.get_type_hints(part).get("return")
     described = isinstance(shown, eqx.Module) or (isinstance(shown, type) and issubclass(shown, eqx.Module))
     advise = getattr(instance, "advice", tuple)
@@ -81,7 +95,7 @@ def _describe(kind: str, name: str, part: Any) -> Description:
     )
 
 
-def _instance(kind: str, name: str, part: Any) -> Any:
+def _instance(kind: str, name: Any, part: Any) -> Any:
     """The part with all its defaults; None when it cannot be made of them."""
     try:
         return parts.make(kind, name, Path())[0] if kind else part()

@@ -35,7 +35,7 @@ def label(loop: ClosedLoop, outcome: Outcome, window: tuple[float, float], attri
     """
     status, ended, rules = Status(int(outcome.status)), float(outcome.ended), _rules(loop)
     covered = status is Status.OK and window[0] < ended
-    dataset = to_dataset(outcome, loop.plant)
+    dataset = to_dataset(outcome, loop.plant, loop.controller)
     over = lambda start, stop: measure(outcome, start, stop) | closure(dataset, start, stop) | rules
     steady, whole = over(*window) if covered else None, over(0.0, ended)
     dataset.attrs |= attributes | versions()

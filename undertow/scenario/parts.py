@@ -9,7 +9,7 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
-from undertow.core import catalogue, contracts
+from undertow.core import catalogue, checks, contracts
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.foreign import python_says
 from undertow.instruments.instrument import AbstractInstrument
@@ -48,7 +48,11 @@ _VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
 
 
 def make(
-    kind: str, description: str | Mapping[str, Any], folder: Path, given: tuple[Any, ...] = ()
+    kind: str,
+    description: str | Mapping[str, Any],
+    folder: Path,
+    given: tuple[Any, ...] = (),
+    circumstances: Mapping[str, Any] | None = None,
 ) -> tuple[Any, dict[str, Any]]:
     """A part, and its description with every default filled in.
 
@@ -57,6 +61,7 @@ def make(
         description: name, or mapping of `kind` (the name) and options; a vehicle's name may be that of a YAML file.
         folder: where relative file names start.
         given: leading arguments that are not the user's.
+        circumstances: options that follow from the rest of a scenario where the user says nothing about them.
 
     Raises:
         BadInput: anything wrong with the description; key names start at the part.
@@ -71,7 +76,9 @@ def make(
         function = catalogue.find(kind, name, folder)
     except BadInput as error:
         raise BadInput("kind", error.must, error.got, hint=error.hint) from error.__cause__
+    function, preset = _preset(function, options)
     own = inspect.signature(function).parameters
+    options = {key: value for key, value in (circumstances or {}).items() if key in own} | options
     changes, table = {}, {}
     if kind in _ADJUSTABLE:
         changes = {key: options.pop(key) for key in list(options) if key not in own}
@@ -83,7 +90,12 @@ def make(
     if table:
         del resolved["samples"]
     part = adjust(part, changes, tuple(own)) if changes else part
-    return part, {"kind": _portable(name, folder), **resolved, **changes, **table}
+    return part, {"kind": _portable(name, folder), **preset, **resolved, **changes, **table}
+
+
+def presets_of(function: Callable[..., Any]) -> Mapping[str, Callable[..., Any]]:
+    """Ready-made settings that a part has, each with options of its own; none for most."""
+    return getattr(function, "presets", {})
 
 
 def call(
@@ -154,6 +166,16 @@ def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -
 def is_part(thing: Any) -> bool:
     """Whether it keeps the contract of some kind of part."""
     return isinstance(thing, tuple(_CONTRACTS.values()))
+
+
+def _preset(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Callable[..., Any], dict[str, str]]:
+    """The function of the preset that the options name, the first where they name none; and that name."""
+    presets = presets_of(function)
+    if not presets:
+        return function, {}
+    name = options.pop("preset", next(iter(presets)))
+    checks.choice("preset", name, tuple(presets))
+    return presets[name], {"preset": name}
 
 
 def _title(contract: Any) -> str:

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.motor_drive import MotorDrive
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
 
 
@@ -55,6 +56,9 @@ class ElectromechanicalThruster(AbstractThruster):
 
     def speed_term(self, report: PropellerReport) -> PerThruster:
         return self.motor.speed_term(report.speed, report.acceleration)
+
+    def drive(self, count: int, measured: bool) -> MotorDrive:
+        return MotorDrive(self.motor, self.supply, self.dead_zone, count, measured)
 
     def advice(self):
         return self.motor.advice()

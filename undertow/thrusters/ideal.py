@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.steady_drive import SteadyDrive
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
@@ -49,6 +50,13 @@ class IdealThruster(AbstractThruster):
 
     def speed_term(self, report):
         return jnp.zeros(())
+
+    def voltage_for(self, thrust: PerThruster) -> PerThruster:
+        """V, V, that gives a thrust in N."""
+        return self.motor.ideal_voltage(thrust)
+
+    def drive(self, count: int, measured: bool) -> SteadyDrive:
+        return SteadyDrive(self)
 
     def advice(self):
         return self.motor.advice()

@@ -7,6 +7,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param
+from undertow.thrusters.steady_drive import SteadyDrive
 from undertow.thrusters.thruster import AbstractThruster, PerThruster
 
 
@@ -56,6 +57,13 @@ class MemorylessThruster(AbstractThruster):
 
     def speed_term(self, report):
         raise BadInput("speed_sensor", "be false", "true", hint="This thruster has no propeller speed")
+
+    def voltage_for(self, thrust: PerThruster) -> PerThruster:
+        """V, V, that gives a thrust in N."""
+        return jnp.sign(thrust) * (jnp.abs(thrust) / self.thrust_per_volt) ** (1 / self.power)
+
+    def drive(self, count: int, measured: bool) -> SteadyDrive:
+        return SteadyDrive(self)
 
     def advice(self):
         return ()

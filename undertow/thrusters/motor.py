@@ -89,6 +89,10 @@ class DCMotor(eqx.Module):
         """Thrust, N, if the whole voltage overcame propeller torque: alpha V, with the alpha of each direction."""
         return self._gain(voltage) * voltage
 
+    def ideal_voltage(self, thrust: PerThruster) -> PerThruster:
+        """Voltage, V, for a thrust in N: `ideal_thrust` solved."""
+        return thrust / self._gain(thrust)
+
     def speed_at(self, thrust: PerThruster) -> PerThruster:
         """Propeller speed, rad/s, that gives a thrust in N: Eq. (11) solved."""
         coefficient = jnp.where(thrust < 0, self.reverse_thrust_coefficient, self.thrust_coefficient)
@@ -100,6 +104,10 @@ class DCMotor(eqx.Module):
         quadratic = self.k3 * jnp.where(voltage < 0, self.reverse_torque_coefficient, self.torque_coefficient)
         root = jnp.sqrt(self.k2**2 + 4 * quadratic * jnp.abs(voltage))
         return 2 * voltage / (self.k2 + root)
+
+    def steady_voltage(self, speed: PerThruster) -> PerThruster:
+        """Voltage, V, that keeps a speed: Eq. (13) at rest."""
+        return self.k2 * speed + self.k3 * self.torque(speed)
 
     def steady_current(self, speed: PerThruster) -> PerThruster:
         """Current, A, that keeps a speed: Eq. (8) without acceleration."""

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.motor_drive import MotorDrive
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
@@ -61,6 +62,9 @@ class ShaftThruster(AbstractThruster):
             hint="There Om_dot depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1. "
             "Use rung: electromechanical, where it is a state",
         )
+
+    def drive(self, count: int, measured: bool) -> MotorDrive:
+        return MotorDrive(self.motor, self.supply, self.dead_zone, count, measured)
 
     def advice(self):
         return self.motor.advice()

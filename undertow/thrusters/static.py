@@ -7,6 +7,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.steady_drive import SteadyDrive
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
@@ -51,6 +52,13 @@ class StaticThruster(AbstractThruster):
             "true",
             hint="There phi depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1",
         )
+
+    def voltage_for(self, thrust: PerThruster) -> PerThruster:
+        """V, V, that gives a thrust in N."""
+        return self.motor.steady_voltage(self.motor.speed_at(thrust))
+
+    def drive(self, count: int, measured: bool) -> SteadyDrive:
+        return SteadyDrive(self)
 
     def advice(self):
         return self.motor.advice()

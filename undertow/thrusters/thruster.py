@@ -7,6 +7,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.core.drive import AbstractDrive, DirectDrive
+
 PerThruster = Float[Array, " N"]
 
 
@@ -70,6 +72,15 @@ class AbstractThruster(eqx.Module):
     @abc.abstractmethod
     def speed_term(self, report: Any) -> PerThruster | Float[Array, ""]:
         """phi of Eq. (15), N, from a speed sensor."""
+
+    def drive(self, count: int, measured: bool) -> AbstractDrive:
+        """What a controller may know of `count` of them, to make them obey; T = alpha V where nothing better is known.
+
+        Args:
+            count: N.
+            measured: whether propeller speeds are reported.
+        """
+        return DirectDrive(self.voltage_gain(), -self.supply, self.supply)
 
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """C5: the modelling error as fuzzy input needs fewer rules than the state, and estimates better."""
 
-from undertow.controllers.rcaf import rcaf
+from undertow.controllers.presets.paper import paper
 from undertow.plants.double_integrator import double_integrator
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
 from undertow.studies.paper.setup import scenario
@@ -52,5 +52,5 @@ def judge(runs: Runs) -> Finding:
 
 
 def _gathering(fuzzy_input: str, sets: int) -> float:
-    law = rcaf(double_integrator(1).model(), fuzzy_input=fuzzy_input, sets=sets)
+    law = paper(double_integrator(1).model(), fuzzy_input=fuzzy_input, sets=sets)
     return float(law.fuzzy.gathering())

@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from undertow.analysis.linear import gains
-from undertow.controllers.rcaf import rcaf
+from undertow.controllers.presets.paper import paper
 from undertow.plants.double_integrator import double_integrator
 from undertow.scenario.execute import Executed
 from undertow.studies.paper.setup import RAFC, scenario
@@ -41,7 +41,7 @@ def equal_gain_scenario() -> dict[str, Any]:
 
 def equal_gain_ratio() -> float:
     """How much larger the low-frequency loop gain of RCAFC is than that of RAFC, at Table 1: about 68."""
-    g = gains(rcaf(double_integrator(1).model()))
+    g = gains(paper(double_integrator(1).model()))
     tracking_branch = g.p12 / g.stiffness
     return (tracking_branch + g.composite / g.pole) / tracking_branch
 

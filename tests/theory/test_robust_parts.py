@@ -1,0 +1,284 @@
+"""What preset `robust` is made of: estimator, allocation, reference filter, drives, body axes. Closed forms throughout."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import linprog
+
+from undertow.controllers.presets.robust import robust
+from undertow.controllers.robust.allocation import allocate, attained
+from undertow.controllers.robust.estimator import Estimator
+from undertow.controllers.robust.reference_filter import ReferenceFilter
+from undertow.core.contracts import Measurement, Target
+from undertow.core.errors import BadInput
+from undertow.fuzzy.tsk import gaussian_sets
+from undertow.numerics.integrators import rk4
+from undertow.plants import double_integrator, hybrid_vehicle
+from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage, t200
+from undertow.vehicles import bluerov2_heavy
+
+RNG = np.random.default_rng(4)
+
+
+@pytest.mark.parametrize("damping", [0.3, 1.0, 2.5])
+@pytest.mark.parametrize("dt", [1e-4, 1e-2, 1.0])
+def test_estimator_poles_are_those_of_continuous_time(damping, dt):
+    """One rule: eps and d_til obey a matrix, and its eigenvalues are exp(p T)."""
+    estimator = Estimator(gaussian_sets(1), bandwidth=20.0, damping=damping, bound=jnp.inf)
+
+    def step(state):
+        start = estimator.init(jnp.zeros(1))._replace(rates=state[:1], weights=state[1:, None])
+        after = estimator.advance(start, estimator.look(start, jnp.zeros(1)), jnp.zeros(1), jnp.zeros(1), dt)
+        return jnp.concatenate([after.rates, after.weights[:, 0]])
+
+    matrix = np.asarray(jax.jacfwd(step)(jnp.zeros(2)))
+    poles = np.roots([1.0, 2 * damping * 20.0, 400.0])
+    found = np.sort_complex(np.linalg.eigvals(matrix))
+    # Two equal poles are known to the root of what each is known to.
+    np.testing.assert_allclose(found, np.sort_complex(np.exp(poles * dt)), atol=1e-7)
+
+
+def test_one_step_moves_the_estimate_by_a_given_amount_whatever_the_sets():
+    moved = []
+    for sets in (1, 3, 7):
+        estimator = Estimator(gaussian_sets(sets), bandwidth=30.0)
+        state = estimator.init(jnp.array([0.2]))
+        seen = estimator.look(state, jnp.zeros(1))
+        after = estimator.advance(state, seen, jnp.zeros(1), jnp.zeros(1), 1e-3)
+        moved.append(float(estimator.fuzzy.output(after.weights, seen.basis)[0]))
+    expected = -0.2 * (1 - np.exp(-0.03)) ** 2 / 1e-3
+    np.testing.assert_allclose(moved, expected, rtol=1e-9)
+
+
+def test_the_estimate_stays_in_its_box():
+    estimator = Estimator(gaussian_sets(5), bandwidth=50.0, bound=3.0)
+    state = estimator.init(jnp.zeros(1))
+    for _ in range(200):  # a body that stands still under 10 m/s^2: d = -10, more than the box holds
+        seen = estimator.look(state, jnp.zeros(1))
+        state = estimator.advance(state, seen, jnp.full(1, 10.0), jnp.zeros(1), 1e-2)
+        assert abs(float(seen.uncertainty[0])) <= 3.0 * (1 + 1e-15)
+    assert float(seen.uncertainty[0]) == pytest.approx(-3.0)
+
+
+def test_letters_of_table_1_mean_the_same_estimator():
+    """Section 3.3: five sets, c = sigma/2: w_o = 142.3 rad/s and damping 0.528 at reach 1 (spacing = width)."""
+    model = double_integrator(1).model()
+    law = robust(model, pole=150.2, adaptation=100.0, composite=500.0)
+    np.testing.assert_allclose(law.estimator.bandwidth, 142.3, rtol=1e-3)
+    np.testing.assert_allclose(law.estimator.damping, 0.528, rtol=1e-3)
+    np.testing.assert_allclose(law.tracking_share, 1 / 500.0)
+
+
+def test_defaults_follow_the_sampling_time():
+    slow, fast = (robust(double_integrator(1).model(), sampling_time=dt) for dt in (1e-2, 1e-3))
+    np.testing.assert_allclose(fast.estimator.bandwidth, 10 * slow.estimator.bandwidth)
+    np.testing.assert_allclose(fast.feedback, [900.0, 60.0])
+
+
+@pytest.mark.parametrize(
+    "wrong, name",
+    [
+        ({"pole": 10.0}, "adaptation"),
+        ({"pole": 10.0, "adaptation": 1.0, "composite": 0.0}, "composite"),
+        ({"pole": 10.0, "adaptation": 1.0, "composite": 1.0, "bandwidth": 3.0}, "bandwidth"),
+        ({"feedback": (1.0, 2.0), "tracking": 1.0}, "tracking"),
+        ({"bandwidth": -1.0}, "bandwidth"),
+        ({"sampling_time": 0.0}, "sampling_time"),
+        ({"damping": 0.0}, "damping"),
+    ],
+)
+def test_settings_that_contradict_each_other(wrong, name):
+    with pytest.raises(BadInput, match=name):
+        robust(double_integrator(1).model(), **wrong)
+
+
+# Allocation.
+
+EFFECT = np.asarray(hybrid_vehicle(bluerov2_heavy(), t200()).model().own_axes().effect(None))
+FULL = np.full(8, 30.0)
+
+
+solve = jax.jit(allocate)
+
+
+def demands(size):
+    for _ in range(30):
+        yield np.linalg.pinv(EFFECT) @ (size * RNG.normal(size=6) * [1, 1, 1, 3, 3, 3])
+
+
+def test_what_fits_is_taken_as_it_is():
+    for forces in demands(0.3):
+        np.testing.assert_array_equal(solve(EFFECT, forces, -FULL, FULL, 1.0), forces)
+
+
+def test_limits_hold_and_the_share_is_the_largest_in_that_direction():
+    """Against linear programming: max s with effect f = s effect f_wanted within the limits."""
+    for forces in demands(8.0):
+        given = np.asarray(solve(EFFECT, forces, -FULL, FULL, 1e6))
+        assert (np.abs(given) <= FULL).all()
+        best = linprog(
+            np.r_[np.zeros(8), -1.0],
+            A_eq=np.c_[EFFECT, -EFFECT @ forces],
+            b_eq=np.zeros(6),
+            bounds=[(-30.0, 30.0)] * 8 + [(0.0, 1.0)],
+        )
+        share = float(attained(EFFECT, forces, given))
+        assert abs(share + best.fun) < 1e-4
+        aside = EFFECT @ given - share * EFFECT @ forces
+        assert np.linalg.norm(aside) < 1e-3 * np.linalg.norm(EFFECT @ forces)
+
+
+def test_giving_up_the_direction_gives_more():
+    for forces in demands(8.0):
+        loss = [np.linalg.norm(EFFECT @ (solve(EFFECT, forces, -FULL, FULL, w) - forces)) for w in (1e6, 1.0)]
+        # Eight forces at their limits cost 8e-6 of the square of what is wanted.
+        assert loss[1] <= loss[0] + np.sqrt(8e-6) * np.linalg.norm(EFFECT @ forces)
+
+
+def test_one_sided_limits():
+    """Two coils that can only pull: what one cannot give the other does not."""
+    effect = np.array([[-1.0, 1.0]])
+    given = allocate(effect, np.array([-2.0, 2.0]), np.array([0.1, 0.1]), np.array([5.0, 3.0]), 1.0)
+    assert float(given[0]) == 0.1 and float(given[1]) == 3.0
+
+
+# Reference filter.
+
+
+def test_a_jump_dies_out_like_three_equal_poles():
+    w, dt = 1.7, 0.05
+    model, chosen = double_integrator(1).model(), ReferenceFilter(1.7)
+    state = Target(*jnp.asarray([[0.4], [-0.5], [0.9]]))
+    generator = np.array([[0, 1, 0], [0, 0, 1], [-(w**3), -3 * w**2, -3 * w]])
+    target, x = Target(*jnp.asarray([[1.0], [0.0], [0.0]])), np.array([0.4 - 1.0, -0.5, 0.9])
+    for k in range(1, 60):
+        state = chosen.advance(state, target, model, 1.0, dt)
+        expected = expm(generator * dt * k) @ x + [1.0, 0.0, 0.0]
+        np.testing.assert_allclose(np.ravel(state), expected, atol=1e-12)
+
+
+def test_a_smooth_reference_passes_without_lag():
+    model, chosen, dt = double_integrator(1).model(), ReferenceFilter(2.0), 1e-3
+    at = lambda t: Target(*jnp.asarray([[1.0 + 2 * t + 3 * t**2], [2.0 + 6 * t], [6.0]]))
+    state = at(0.0)
+    for k in range(500):
+        state = chosen.advance(state, at(k * dt), model, 1.0, dt)
+    np.testing.assert_allclose(np.ravel(state), np.ravel(at(0.5)), atol=1e-9)
+
+
+def test_the_filter_waits_while_nothing_can_be_given():
+    model, chosen = double_integrator(1).model(), ReferenceFilter(2.0)
+    state = Target(*jnp.asarray([[0.2], [0.0], [0.0]]))
+    after = chosen.advance(state, Target(*jnp.asarray([[1.0], [0.0], [0.0]])), model, 0.0, 0.1)
+    np.testing.assert_allclose(np.ravel(after), np.ravel(state), atol=1e-15)
+
+
+# Drives.
+
+THRUSTERS = {
+    "ideal": paper_table3("ideal", supply=24.0),
+    "static": paper_table3("static", supply=24.0),
+    "shaft": t200("shaft"),
+    "electromechanical": paper_table3("electromechanical", supply=24.0),
+    "linear": linear_voltage(supply=24.0),
+    "quadratic": quadratic_voltage(supply=24.0),
+}
+
+
+@pytest.mark.parametrize("name", THRUSTERS)
+def test_a_drive_aims_where_it_was_told_to(name):
+    drive = THRUSTERS[name].drive(4, False)
+    state = jax.tree.map(lambda leaf: jnp.asarray([20.0, -30.0, 5.0, 0.5]), drive.init())
+    wanted = jnp.asarray([9.0, -7.0, 15.0, -4.0])
+    volts = drive.command(state, wanted, 40.0)
+    assert (jnp.abs(volts) > THRUSTERS[name].dead_zone).all()
+    np.testing.assert_allclose(drive.aim(state, volts, 40.0), wanted, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", THRUSTERS)
+def test_the_range_of_a_drive_is_where_the_supply_ends(name):
+    """Without inductance, which the range leaves to the current loop."""
+    thruster = THRUSTERS[name]
+    if name == "electromechanical":
+        thruster = paper_table3("shaft", supply=24.0)
+    drive = thruster.drive(4, False)
+    state = jax.tree.map(lambda leaf: jnp.asarray([20.0, -30.0, 5.0, 0.0]), drive.init())
+    if name in ("shaft", "electromechanical"):
+        resting = thruster.motor.steady_current(state.speed)
+        state = state._replace(current=resting)
+    for limit, volts in zip(drive.range(state, 10.0), (-1.0, 1.0), strict=True):
+        found = drive.command(state, limit, 10.0)
+        boost = 0.0 if name not in ("shaft", "electromechanical") else float(drive._boost(10.0))
+        assert boost == 0.0
+        np.testing.assert_allclose(found, volts * float(thruster.supply), rtol=1e-9)
+
+
+@pytest.mark.parametrize("make", [t200, paper_table3])
+def test_a_predicted_motor_turns_as_the_true_one(make):
+    """Against the electromechanical rung with steps 200 times smaller, over one second of changing voltage."""
+    thruster = make("electromechanical")
+    drive, dt, fine = thruster.drive(1, False), 5e-3, 200
+    belief, truth = drive.init(), thruster.initial_state(1)
+
+    @jax.jit
+    def both(belief, truth, volts):
+        step = lambda _, s: rk4(lambda t, y: thruster.dynamics(y, volts), 0.0, s, dt / fine)
+        return drive.advance(belief, volts, dt), jax.lax.fori_loop(0, fine, step, truth)
+
+    apart = []
+    for k in range(200):
+        belief, truth = both(belief, truth, jnp.asarray([8.0 * np.sin(0.05 * k) + 3.0]))
+        apart.append(float(jnp.abs(belief.speed - truth.speed)[0]))
+    assert max(apart) < 0.03 * float(thruster.motor.steady_speed(11.0))
+
+
+# Body axes.
+
+
+def motion(t):
+    """A smooth way through all six outputs, and its first two derivatives."""
+    eta = lambda t: jnp.stack([jnp.sin(t), 0.5 * t**2, jnp.cos(2 * t), 0.8 * jnp.sin(t), 0.9 * jnp.cos(1.3 * t), 3 * t])
+    rate = jax.jacfwd(eta)
+    return eta(t), rate(t), jax.jacfwd(rate)(t)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return hybrid_vehicle(bluerov2_heavy(), t200()).model().own_axes()
+
+
+@pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
+def test_rates_and_their_derivative(body, t):
+    eta, rate, bend = motion(t)
+    rates = lambda t: body.rates(Measurement(*motion(t)[:2]))
+    np.testing.assert_allclose(body.seen(Measurement(eta, rate), bend), jax.jacfwd(rates)(t), atol=1e-10)
+
+
+@pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
+def test_wanted_rates_and_their_derivative_seen_from_a_turning_vehicle(body, t):
+    """Both move: the target half as fast, along the same way."""
+    target = lambda t: Target(*(m * 0.5**k for k, m in enumerate(motion(0.5 * t + 1.0))))
+    wanted = lambda t: body.wanted(Measurement(*motion(t)[:2]), target(t))
+    np.testing.assert_allclose(wanted(t)[1], jax.jacfwd(lambda t: wanted(t)[0])(t), atol=1e-9)
+
+
+def test_on_target_nothing_is_wanted_but_its_own_motion(body):
+    eta, rate, bend = motion(0.7)
+    y, r = Measurement(eta, rate), Target(eta, rate, bend)
+    np.testing.assert_allclose(body.error(y, r), 0, atol=1e-15)
+    velocity, acceleration = body.wanted(y, r)
+    np.testing.assert_allclose(velocity, body.rates(y), atol=1e-12)
+    np.testing.assert_allclose(acceleration, body.seen(y, bend), atol=1e-11)
+
+
+def test_attitude_errors_go_the_short_way(body):
+    """I32: full turns do not matter, and 200 degrees to the right are 160 to the left."""
+    y = Measurement(jnp.zeros(6), jnp.zeros(6))
+    target = lambda yaw: Target(jnp.zeros(6).at[5].set(yaw), jnp.zeros(6), jnp.zeros(6))
+    for yaw in RNG.uniform(-3, 3, 20):
+        once, more = body.error(y, target(yaw)), body.error(y, target(yaw + 2 * np.pi))
+        np.testing.assert_allclose(once, more, atol=1e-12)
+        np.testing.assert_allclose(once[5], 2 * np.sin(yaw / 2), atol=1e-12)
+    assert float(body.error(y, target(np.radians(200)))[5]) < 0

@@ -1,0 +1,1 @@
+"""Ready-made settings of the law: the paper's, and the sound one."""

@@ -1,0 +1,103 @@
+"""Preset `robust`: the sound version, its gains from a few numbers that mean something."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.controllers.robust.estimator import Estimator
+from undertow.controllers.robust.law import RobustRCAF
+from undertow.controllers.robust.reference_filter import ReferenceFilter
+from undertow.controllers.robust.speeds import speeds
+from undertow.core.contracts import AbstractModel
+from undertow.core.errors import BadInput
+from undertow.fuzzy.tsk import gaussian_sets
+
+
+def robust(
+    model: AbstractModel,
+    *,
+    sampling_time: float = 1e-3,
+    bandwidth=None,
+    damping=1.0,
+    tracking_share=0.0,
+    tracking=None,
+    feedback=None,
+    weight=((10.0, 0.0), (0.0, 10.0)),
+    pole=None,
+    adaptation=None,
+    composite=None,
+    robust_gain=0.0,
+    layer=0.5,
+    weights_bound=50.0,
+    reference_frequency=None,
+    actuator_rate=None,
+    direction=1.0,
+    sets: int = 5,
+    reach=(1.0,),
+    width: float | None = None,
+) -> RobustRCAF:
+    """The sound law: body axes and quaternions where there are any, projected weights, limits respected.
+
+    Args:
+        model: what the controller may know, from `plant.model()`.
+        sampling_time: of the loop, s; a scenario gives it.
+        bandwidth: natural frequency of the estimator, rad/s; None: as fast as sampling and actuators allow.
+        damping: its damping ratio.
+        tracking_share: mu, share of the filtered tracking error in the adaptation; 0 for a pure observer.
+        tracking: natural frequency of the tracking error, critically damped, rad/s; None: a fifth of the bandwidth.
+        feedback: K = (k1, k2) instead of `tracking`, 1/s^2 and 1/s; one pair or one per axis.
+        weight: Q of Eq. (21).
+        pole: alpha_F, with `adaptation` and `composite` instead of `bandwidth`, `damping` and `tracking_share`, 1/s.
+        adaptation: gamma, likewise.
+        composite: gamma_eps, likewise.
+        robust_gain: w_bar, m/s^2 and rad/s^2.
+        layer: boundary layer of the robust term.
+        weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that can be estimated.
+        reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of
+            `tracking`, 2 at most; 0 for no filter.
+        actuator_rate: how fast motors are made to follow, 1/s; None: as fast as sampling allows.
+        direction: what departing from the wanted direction costs, where limits bind, beside losing size.
+        sets: fuzzy sets; any number from 1.
+        reach: outermost centres, m/s and rad/s.
+        width: of the sets as a share of `reach`; None: their spacing.
+
+    Raises:
+        BadInput: a value is out of its range, or both ways of giving the same thing.
+    """
+    fuzzy = gaussian_sets(sets, tuple(np.ravel(reach)), width)
+    letters = {"pole": pole, "adaptation": adaptation, "composite": composite}
+    if any(value is not None for value in letters.values()):
+        bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.gathering()), bandwidth)
+    fast = speeds(sampling_time, bandwidth, tracking, actuator_rate)
+    if feedback is None:
+        feedback = jnp.stack([fast.tracking**2, 2 * fast.tracking], -1)
+    elif tracking is not None:
+        raise BadInput("tracking", "be left out when there is `feedback`", tracking)
+    if reference_frequency is None:
+        reference_frequency = jnp.minimum(fast.tracking / 2, 2.0)
+    jumps = bool(np.any(np.asarray(reference_frequency) != 0))
+    return RobustRCAF(
+        model=model.own_axes(),
+        estimator=Estimator(fuzzy, fast.bandwidth, damping, weights_bound),
+        filter=ReferenceFilter(reference_frequency) if jumps else None,
+        feedback=feedback,
+        weight=weight,
+        tracking_share=tracking_share,
+        robust_gain=robust_gain,
+        layer=layer,
+        actuator_rate=fast.actuators,
+        direction=direction,
+    )
+
+
+def _from_letters(letters: dict, gathering: float, bandwidth):
+    """(bandwidth, damping, tracking share) of Table 1's letters: section 3.12 of the theory."""
+    for name, value in letters.items():
+        if value is None:
+            raise BadInput(name, "be given with the other two of pole, adaptation and composite")
+    if bandwidth is not None:
+        raise BadInput("bandwidth", "be left out when there are pole, adaptation and composite", bandwidth)
+    pole, adaptation, composite = (np.asarray(value, dtype=float) for value in letters.values())
+    if not (composite > 0).all():
+        raise BadInput("composite", "be positive", composite, hint="The sound law has no case gamma_eps = 0 (RAFC)")
+    natural = np.sqrt(adaptation * composite * gathering)
+    return natural, pole / (2 * natural), 1 / composite

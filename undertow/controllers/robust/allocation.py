@@ -1,0 +1,60 @@
+"""Forces within limits that give as much of a wanted acceleration as there is, in its own direction."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.numerics.box_quadratic import box_minimum
+from undertow.numerics.linear import matvec
+
+# What a force at its limit costs, where losing the wanted acceleration whole costs one.
+_USE = 1e-6
+
+
+def allocate(
+    effect: Float[Array, "n m"],
+    forces: Float[Array, " m"],
+    low: Float[Array, " m"],
+    high: Float[Array, " m"],
+    direction: Float[Array, ""],
+) -> Float[Array, " m"]:
+    """Forces within [low, high] that give as much as possible of the wanted acceleration a = effect forces.
+
+    Where the wanted forces are within limits they are taken as they are. Else a quadratic programme in the forces
+    and a scale s is solved exactly: min direction |effect f - s a|^2 / |a|^2 + (1 - s)^2 + little |f|^2. Section X10
+    of the theory. Actuators that can replace each other do so before anything is given up.
+
+    Args:
+        effect: acceleration per force.
+        forces: smallest ones that give the wanted acceleration, without regard of limits.
+        low, high: limits.
+        direction: what departing from the direction of a costs beside losing size; up to 1e6, which keeps it.
+    """
+    fits = ((forces >= low) & (forces <= high)).all()
+    solve = lambda: _programme(effect, forces, low, high, direction)
+    return jax.lax.cond(fits, lambda: forces, solve)
+
+
+def attained(effect: Float[Array, "n m"], wanted: Float[Array, " m"], given: Float[Array, " m"]) -> Float[Array, ""]:
+    """Share of the acceleration of the wanted forces that other forces give, along its direction; at most 1."""
+    demand = matvec(effect, wanted)
+    size = (demand**2).sum()
+    share = (demand * matvec(effect, given)).sum() / jnp.where(size > 0, size, 1.0)
+    return jnp.where(size > 0, jnp.clip(share, 0.0, 1.0), 1.0)
+
+
+def _programme(effect, forces, low, high, direction) -> Float[Array, " m"]:
+    unit = jnp.maximum(jnp.abs(low), jnp.abs(high))
+    unit = jnp.where(jnp.isfinite(unit) & (unit > 0), unit, 1.0)
+    wanted = matvec(effect, forces)
+    size = jnp.sqrt((wanted**2).sum())
+    size = jnp.where(size > 0, size, 1.0)
+    aside = jnp.concatenate([effect * unit, -wanted[:, None]], axis=1) / size
+    m = forces.shape[0]
+    use = jnp.full(m + 1, _USE).at[m].set(1.0)
+    matrix = direction * aside.T @ aside + jnp.diag(use)
+    linear = jnp.zeros(m + 1).at[m].set(1.0)
+    least = jnp.concatenate([jnp.broadcast_to(low, (m,)) / unit, jnp.zeros(1)])
+    most = jnp.concatenate([jnp.broadcast_to(high, (m,)) / unit, jnp.ones(1)])
+    found = box_minimum(matrix, linear, least, most)
+    return unit * found[:m]

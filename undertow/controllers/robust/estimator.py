@@ -1,0 +1,90 @@
+"""The identification model and the composite adaptive law in discrete time: stable at any sampling time."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.param import param
+from undertow.fuzzy.tsk import FuzzySystem
+
+PerAxis = Float[Array, " n"]
+
+
+class EstimatorState(NamedTuple):
+    """What is believed of the motion, and what is learnt."""
+
+    rates: PerAxis  # m/s, rad/s
+    weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2
+
+
+class Estimate(NamedTuple):
+    """d_hat and what it comes from."""
+
+    error: PerAxis  # eps, m/s, rad/s
+    basis: Float[Array, "n rules"]  # xi
+    uncertainty: PerAxis  # d_hat, m/s^2, rad/s^2
+
+
+class Estimator(eqx.Module):
+    """Eqs. (31), (32), (42), (44) with poles at exp(p T), p^2 + 2 zeta w_o p + w_o^2 = 0. Section X7 of the theory.
+
+    Per axis, with alpha = 2 zeta w_o and gamma gamma_eps |xi|^2 = w_o^2 this is the paper's pair of equations, sampled
+    exactly as long as the basis does not change; the weights are stepped by what moves d_hat by a given amount,
+    whatever |xi|^2 is, and kept in their box.
+
+    Raises:
+        BadInput: bandwidth, damping or bound not positive.
+    """
+
+    fuzzy: FuzzySystem
+    bandwidth: Float[Array, "..."] = param("rad/s", "natural frequency of the estimator", symbol="w_o")
+    damping: Float[Array, "..."] = param("", "its damping ratio", symbol="zeta", default=1.0)
+    bound: Float[Array, "..."] = param("m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=50.0)
+
+    def __check_init__(self):
+        checks.positive("bandwidth", self.bandwidth, "rad/s")
+        checks.positive("damping", self.damping)
+        checks.positive("bound", self.bound, finite=False)
+
+    def init(self, rates: PerAxis) -> EstimatorState:
+        """Nothing learnt."""
+        return EstimatorState(rates, jnp.zeros((rates.shape[0], self.fuzzy.rules)))
+
+    def look(self, state: EstimatorState, rates: PerAxis) -> Estimate:
+        """Modelling error and estimate at measured rates."""
+        error = state.rates - rates
+        basis = self.fuzzy.basis(error[:, None])
+        return Estimate(error, basis, self.fuzzy.output(state.weights, basis))
+
+    def gains(self, dt: Float[Array, ""]) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+        """Correction of the rates (1) and of d_hat (1/s) per modelling error."""
+        decay = jnp.exp(-self.damping * self.bandwidth * dt)
+        both = 2 * decay * _cosine_of_root((self.bandwidth * dt) ** 2 * (1 - self.damping**2))  # sum of the poles
+        return 2 - both, (1 + decay**2 - both) / dt
+
+    def advance(self, state: EstimatorState, seen: Estimate, known: PerAxis, tracking: PerAxis, dt) -> EstimatorState:
+        """State one sampling time later.
+
+        Args:
+            state: now.
+            seen: `look` of now.
+            known: F + G u of what was applied, m/s^2 and rad/s^2.
+            tracking: mu s, the share of the filtered tracking error, m/s and rad/s; zero for a pure observer.
+            dt: sampling time, s.
+        """
+        of_rates, of_estimate = self.gains(dt)
+        moved = of_estimate * (seen.error + tracking)
+        weights = state.weights - (moved / (seen.basis**2).sum(-1))[:, None] * seen.basis
+        box = jnp.broadcast_to(self.bound, moved.shape)[:, None]
+        rates = state.rates + dt * (known + seen.uncertainty) - of_rates * seen.error
+        return EstimatorState(rates, jnp.clip(weights, -box, box))
+
+
+def _cosine_of_root(x: Float[Array, "..."]) -> Float[Array, "..."]:
+    """cos(sqrt(x)), which is smooth through 0 and cosh(sqrt(-x)) beyond."""
+    small = jnp.abs(x) < 1e-6
+    root = jnp.sqrt(jnp.where(small, 1.0, jnp.abs(x)))
+    return jnp.where(small, 1 - x / 2 + x**2 / 24, jnp.where(x > 0, jnp.cos(root), jnp.cosh(root)))

@@ -1,0 +1,147 @@
+"""The sound law: Eqs. (18)-(44) with what makes them hold on a real vehicle. Sections 3.12, 6 and 7 of the theory."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.controllers.robust.allocation import allocate, attained
+from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
+from undertow.controllers.robust.reference_filter import ReferenceFilter
+from undertow.core import checks
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.param import param
+from undertow.numerics.linear import matvec
+from undertow.numerics.lyapunov import companion_lyapunov
+
+PerAxis = Float[Array, " n"]
+
+# A smaller share than this of what is wanted says that limits bind, not that numbers are rounded.
+_WHOLE = 0.999
+
+
+class RobustState(NamedTuple):
+    """State z of the law."""
+
+    estimator: EstimatorState
+    drive: Any  # what is believed of the actuators
+    reference: Target  # filtered
+
+
+class Plan(NamedTuple):
+    """All that is decided at one instant."""
+
+    drive: Any
+    seen: Estimate
+    tracking: PerAxis  # s
+    robust: PerAxis  # u_r
+    forces: Float[Array, " m"]  # that would give what is wanted
+
+
+class RobustRCAF(AbstractController):
+    """The paper's structure, in the model's own axes, fed with what was applied, within the actuators' limits.
+
+    Gains are one number for all axes or one per axis. With `tracking_share` 0 the estimator is a pure observer: it
+    depends on neither the controller nor its limits.
+
+    Raises:
+        BadInput: a gain of the wrong sign, feedback not Hurwitz or weight not positive definite.
+    """
+
+    model: AbstractModel
+    estimator: Estimator
+    filter: ReferenceFilter | None
+    feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
+    weight: Float[Array, "*n 2 2"] = param("", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)))
+    tracking_share: Float[Array, "..."] = param(
+        "", "share of the filtered tracking error in the adaptation, 1 / gamma_eps", symbol="mu", default=0.0
+    )
+    robust_gain: Float[Array, "..."] = param(
+        "m/s^2, rad/s^2", "amplitude of the robust term", symbol="w_bar", default=0.0
+    )
+    layer: Float[Array, "..."] = param("unit of s", "boundary layer of the robust term", symbol="phi", default=0.5)
+    actuator_rate: Float[Array, ""] = param(
+        "1/s", "how fast actuators are made to follow", symbol="lambda", default=100.0
+    )
+
+    direction: Float[Array, ""] = param(
+        "", "what departing from the wanted direction costs, where limits bind, beside losing size", default=1.0
+    )
+
+    def __check_init__(self):
+        for name in ("tracking_share", "robust_gain"):
+            checks.not_negative(name, getattr(self, name))
+        for name in ("layer", "actuator_rate", "direction"):
+            checks.positive(name, getattr(self, name))
+        axes = len(self.model.angles)
+        for part, names in (
+            (self, ("tracking_share", "robust_gain", "layer")),
+            (self.estimator, ("bandwidth", "damping", "bound")),
+        ):
+            for name in names:
+                checks.per_axis(name, getattr(part, name), axes)
+        checks.per_axis("feedback", self.feedback, axes, (2,))
+        checks.per_axis("weight", self.weight, axes, (2, 2))
+        checks.hurwitz("feedback", self.feedback)
+        checks.positive_definite("weight", self.weight)
+
+    def init(self, y: Measurement, r: Target) -> RobustState:
+        at_rest = Target(y.position, jnp.zeros_like(y.position), jnp.zeros_like(y.position))
+        return RobustState(self.estimator.init(self.model.rates(y)), self.model.drive().init(), at_rest)
+
+    def command(self, z: RobustState, y: Measurement, r: Target):
+        plan = self._plan(z, y, r)
+        drive, effect = self.model.drive(), self.model.effect(y)
+        forces = allocate(effect, plan.forces, *drive.range(plan.drive, self.actuator_rate), self.direction)
+        u = drive.command(plan.drive, forces, self.actuator_rate)
+        telemetry = Telemetry(
+            estimate=plan.seen.uncertainty,
+            robust=plan.robust,
+            modelling_error=plan.seen.error,
+            predicted_position=y.position,
+            predicted_velocity=z.estimator.rates,
+            weights=z.estimator.weights,
+            books={"attained_share": attained(effect, plan.forces, forces)},
+        )
+        return u, telemetry
+
+    def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
+        plan, drive = self._plan(z, y, r), self.model.drive()
+        # While limits bind, the reference waits, and the tracking error says nothing about d.
+        going = drive.aim(plan.drive, u_applied, self.actuator_rate)
+        share = attained(self.model.effect(y), plan.forces, going)
+        tracking = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.tracking)
+        known = self._known(plan.drive, y, u_applied)
+        reference = r if self.filter is None else self.filter.advance(z.reference, r, self.model, share, dt)
+        return RobustState(
+            estimator=self.estimator.advance(z.estimator, plan.seen, known, tracking, dt),
+            drive=drive.advance(plan.drive, u_applied, dt),
+            reference=reference,
+        )
+
+    def known(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:
+        return self._known(self.model.drive().heard(z.drive, y.actuator), y, u_applied)
+
+    def columns(self):
+        return {"attained_share": ("share of the wanted acceleration that the actuators can give", "1")}
+
+    def lyapunov(self) -> Float[Array, "*n 2 2"]:
+        """P of Eq. (21)."""
+        return companion_lyapunov(self.feedback, self.weight)
+
+    def _known(self, drive: Any, y: Measurement, u_applied) -> PerAxis:
+        return self.model.drift(y) + matvec(self.model.effect(y), self.model.drive().force(drive, u_applied))
+
+    def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
+        model = self.model
+        drive = model.drive().heard(z.drive, y.actuator)
+        target = r if self.filter is None else z.reference
+        rates, (velocity, acceleration) = model.rates(y), model.wanted(y, target)
+        error, error_rate = model.error(y, target), velocity - rates
+        p = self.lyapunov()
+        s = p[..., 0, 1] * error + p[..., 1, 1] * error_rate
+        u_r = self.robust_gain * jnp.tanh(s / self.layer)
+        seen = self.estimator.look(z.estimator, rates)
+        proportional = self.feedback[..., 0] * error + self.feedback[..., 1] * error_rate
+        demand = acceleration + proportional + u_r - seen.uncertainty - model.drift(y)
+        return Plan(drive, seen, s, u_r, model.spread(y, demand))

@@ -1,0 +1,50 @@
+"""Thrusters without a state of their own: the voltage for a thrust is the inverse of a curve."""
+
+from typing import Protocol
+
+import jax.numpy as jnp
+
+from undertow.core.drive import AbstractDrive
+from undertow.thrusters.thruster import PerThruster
+
+
+class Invertible(Protocol):
+    """A thruster whose thrust depends on the voltage alone."""
+
+    supply: PerThruster
+
+    def thrust(self, state, voltage: PerThruster) -> PerThruster:
+        """T, N."""
+        ...
+
+    def voltage_for(self, thrust: PerThruster) -> PerThruster:
+        """V, V."""
+        ...
+
+
+class SteadyDrive(AbstractDrive):
+    """Thrust at once, by the curve that the thruster itself has."""
+
+    thruster: Invertible
+
+    def init(self) -> tuple[()]:
+        return ()
+
+    def heard(self, state, report) -> tuple[()]:
+        return ()
+
+    def range(self, state, rate) -> tuple[PerThruster, PerThruster]:
+        top = jnp.asarray(self.thruster.supply)
+        return self.thruster.thrust((), -top), self.thruster.thrust((), top)
+
+    def force(self, state, u) -> PerThruster:
+        return self.thruster.thrust((), u)
+
+    def command(self, state, force, rate) -> PerThruster:
+        return self.thruster.voltage_for(force)
+
+    def aim(self, state, u, rate) -> PerThruster:
+        return self.thruster.thrust((), u)
+
+    def advance(self, state, u, dt) -> tuple[()]:
+        return ()
