@@ -147,32 +147,51 @@ def test_one_sided_limits():
 # Reference filter.
 
 
+def followed(chosen, at, start, dt, ticks, share=1.0):
+    """Filtered reference at every tick."""
+    model, state, found = double_integrator(1).model(), chosen.init(jnp.asarray([start])), []
+    for k in range(ticks):
+        found.append(np.ravel(chosen.smoothed(state, at(k * dt), model)))
+        state = chosen.advance(state, at(k * dt), model, share, dt)
+    return np.array(found)
+
+
+def polynomial(*coefficients):
+    """A reference a + b t + c t^2 + ..., with its derivatives."""
+    p = np.polynomial.Polynomial(coefficients)
+    return lambda t: Target(*(jnp.asarray([float(p.deriv(k)(t))]) if k else jnp.asarray([p(t)]) for k in range(3)))
+
+
 def test_a_jump_dies_out_like_three_equal_poles():
     w, dt = 1.7, 0.05
-    model, chosen = double_integrator(1).model(), ReferenceFilter(1.7)
-    state = Target(*jnp.asarray([[0.4], [-0.5], [0.9]]))
     generator = np.array([[0, 1, 0], [0, 0, 1], [-(w**3), -3 * w**2, -3 * w]])
-    target, x = Target(*jnp.asarray([[1.0], [0.0], [0.0]])), np.array([0.4 - 1.0, -0.5, 0.9])
-    for k in range(1, 60):
-        state = chosen.advance(state, target, model, 1.0, dt)
-        expected = expm(generator * dt * k) @ x + [1.0, 0.0, 0.0]
-        np.testing.assert_allclose(np.ravel(state), expected, atol=1e-12)
+    found = followed(ReferenceFilter(w), polynomial(1.0), 0.4, dt, 60)
+    expected = [expm(generator * dt * k) @ [-0.6, 0, 0] + [1.0, 0, 0] for k in range(60)]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
-def test_a_smooth_reference_passes_without_lag():
-    model, chosen, dt = double_integrator(1).model(), ReferenceFilter(2.0), 1e-3
-    at = lambda t: Target(*jnp.asarray([[1.0 + 2 * t + 3 * t**2], [2.0 + 6 * t], [6.0]]))
-    state = at(0.0)
-    for k in range(500):
-        state = chosen.advance(state, at(k * dt), model, 1.0, dt)
-    np.testing.assert_allclose(np.ravel(state), np.ravel(at(0.5)), atol=1e-9)
+def test_a_smooth_reference_passes_as_it_is():
+    """A cubic from rest: all that is known of it at a tick leads to the next without error."""
+    at = polynomial(0.3, 0.0, 1.0, 2.0)
+    found = followed(ReferenceFilter(2.0), at, 0.3, 0.02, 100)
+    np.testing.assert_allclose(found, [np.ravel(at(0.02 * k)) for k in range(100)], atol=1e-11)
+
+
+def test_what_is_left_of_a_sinusoid_falls_with_the_square_of_the_sampling_time():
+    """Once the start from rest has died out."""
+    sine = lambda t: Target(*jnp.asarray([[np.sin(3 * t)], [3 * np.cos(3 * t)], [-9 * np.sin(3 * t)]]))
+    left = []
+    for dt in (0.02, 0.01):
+        found = followed(ReferenceFilter(4.0), sine, 0.0, dt, round(8.0 / dt))
+        late = [np.ravel(sine(dt * k)) for k in range(len(found))]
+        left.append(np.abs(found - late)[len(found) // 2 :, 0].max())
+    assert left[0] < 2e-3
+    assert 3.5 < left[0] / left[1] < 4.5
 
 
 def test_the_filter_waits_while_nothing_can_be_given():
-    model, chosen = double_integrator(1).model(), ReferenceFilter(2.0)
-    state = Target(*jnp.asarray([[0.2], [0.0], [0.0]]))
-    after = chosen.advance(state, Target(*jnp.asarray([[1.0], [0.0], [0.0]])), model, 0.0, 0.1)
-    np.testing.assert_allclose(np.ravel(after), np.ravel(state), atol=1e-15)
+    found = followed(ReferenceFilter(2.0), polynomial(1.0), 0.2, 0.1, 5, share=0.0)
+    np.testing.assert_allclose(found, np.tile([0.2, 0.0, 0.0], (5, 1)), atol=1e-15)
 
 
 # Drives.

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from undertow.core.drive import AbstractDrive, DirectDrive
+from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 
 Time = Float[Array, ""]
@@ -143,6 +144,10 @@ class AbstractModel(eqx.Module):
     def seen(self, y: Measurement, acceleration: Outputs) -> Outputs:
         """Time derivative of `rates` for a second derivative of the outputs."""
         return acceleration
+
+    def bears(self) -> tuple[Status, ...]:
+        """Conditions of the plant under which a run goes on, because these coordinates are not touched by them."""
+        return ()
 
     def own_axes(self) -> "AbstractModel":
         """This model in the coordinates that suit the plant best; itself where there are no better ones."""

@@ -27,7 +27,7 @@ def solve(loop, key, start, times, jumps, rtol, atol) -> Outcome:
         return ravel_pytree(flow(t, unravel(flat), drawn))[0]
 
     def is_unsound(t, y, args, **_):
-        return health(args.loop.plant, *unravel(y)) != int(Status.OK)
+        return health(args.loop, *unravel(y)) != int(Status.OK)
 
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(flat_flow),
@@ -44,7 +44,7 @@ def solve(loop, key, start, times, jumps, rtol, atol) -> Outcome:
         throw=False,
     )
     (states, final), (_, ended) = cast(tuple[Any, Any], solution.ys), cast(tuple[Any, Any], solution.ts)
-    code = health(loop.plant, *unravel(final[0]))
+    code = health(loop, *unravel(final[0]))
     out_of_steps = (solution.result != diffrax.RESULTS.successful) & (code == int(Status.OK))
     status = jnp.where(out_of_steps, int(Status.STEPS_EXHAUSTED), code)
     last = jnp.maximum(jnp.isfinite(states).all(axis=1).sum() - 1, 0)  # what was never saved is infinite

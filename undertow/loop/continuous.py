@@ -87,7 +87,7 @@ def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, in
         state, status, ended = carry
         t = instant(k, dt)
         x, z = rk4_compact(lambda s, state: flow(s, state, drawn), t, state, dt)
-        return keep_sound(loop.plant, state, (x, controller.project(z)), status, ended, t + dt)
+        return keep_sound(loop, state, (x, controller.project(z)), status, ended, t + dt)
 
     carry = (drawn.start(*start), jnp.asarray(int(Status.OK)), jnp.zeros(()))
     (final, status, ended), (time, samples) = record(drawn, tick, carry, dt, ticks, every)

@@ -6,9 +6,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PyTree
 
-from undertow.core.contracts import AbstractPlant
 from undertow.core.status import Status
-from undertow.loop.closed_loop import Sample
+from undertow.loop.closed_loop import ClosedLoop, Sample
 
 
 class Outcome(NamedTuple):
@@ -22,8 +21,11 @@ class Outcome(NamedTuple):
     ended: Float[Array, ""]  # s; when it failed, else the duration
 
 
-def health(plant: AbstractPlant, x: PyTree, z: PyTree) -> Array:
-    """Status code of an instant."""
+def health(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
+    """Status code of an instant; what the controller's model can bear is no failure."""
     leaves = [jnp.isfinite(leaf).all() for leaf in jax.tree.leaves((x, z))]
     finite = jnp.stack(leaves).all()
-    return jnp.where(finite, plant.health(x), int(Status.NOT_FINITE))
+    code = loop.plant.health(x)
+    for borne in loop.controller.model.bears():
+        code = jnp.where(code == int(borne), int(Status.OK), code)
+    return jnp.where(finite, code, int(Status.NOT_FINITE))

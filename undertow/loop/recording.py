@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core.status import Status
-from undertow.loop.closed_loop import Drawn, Sample
+from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
 from undertow.loop.outcome import health
 
 
@@ -35,13 +35,15 @@ def record(
     return jax.lax.scan(block, carry, jnp.arange(0, ticks + 1, every))
 
 
-def keep_sound(plant, old: Any, new: Any, status: Int[Array, ""], ended: Float[Array, ""], t: Float[Array, ""]):
+def keep_sound(
+    loop: ClosedLoop, old: Any, new: Any, status: Int[Array, ""], ended: Float[Array, ""], t: Float[Array, ""]
+):
     """States (x, z, ...) after a tick that ends at t: the new ones, or for ever the old ones once something is wrong.
 
     Returns:
         States, status and time of the end.
     """
-    code = health(plant, *new[:2])
+    code = health(loop, *new[:2])
     failing = (status == int(Status.OK)) & (code != int(Status.OK))
     status, ended = jnp.where(failing, code, status), jnp.where(failing, t, ended)
     sound = status == int(Status.OK)

@@ -104,7 +104,7 @@ def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     else:
         new_x = jax.lax.fori_loop(0, substeps, lambda i, x: step(motion, t + instant(i, h), x, h), x)
     new_z = loop.controller.advance(z, decision.y, decision.r, decision.applied, dt)
-    state, status, ended = keep_sound(loop.plant, (x, z, heard), (new_x, new_z, decision.heard), status, ended, t + dt)
+    state, status, ended = keep_sound(loop, (x, z, heard), (new_x, new_z, decision.heard), status, ended, t + dt)
     return state, gathered, status, ended
 
 

@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractModel, Measurement, Target
 from undertow.core.drive import AbstractDrive
+from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import (
     Kinematics,
@@ -35,6 +36,9 @@ class BodyModel(AbstractModel):
 
     def drive(self) -> AbstractDrive:
         return self.thrusters
+
+    def bears(self) -> tuple[Status, ...]:
+        return (Status.PITCH_SINGULAR,)
 
     def error(self, y: Measurement, r: Target) -> Vector6:
         """Position error in body axes (m), attitude error as a rotation vector (rad), the short way round."""

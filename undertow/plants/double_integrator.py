@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.drive import DirectDrive
 from undertow.core.param import param
 from undertow.core.status import Status
 
@@ -23,7 +24,11 @@ class AxisState(NamedTuple):
 class DoubleIntegratorModel(AbstractModel):
     """F = 0, G = I."""
 
+    actuator: DirectDrive
     angles: tuple[bool, ...] = eqx.field(static=True)
+
+    def drive(self) -> DirectDrive:
+        return self.actuator
 
     def drift(self, y: Measurement):
         return jnp.zeros_like(y.position)
@@ -77,7 +82,9 @@ class DoubleIntegrator(AbstractPlant):
 
     def model(self) -> DoubleIntegratorModel:
         """The exact model."""
-        return DoubleIntegratorModel(angles=(False,) * self.inputs())
+        return DoubleIntegratorModel(
+            actuator=DirectDrive(low=-self.limit, high=self.limit), angles=(False,) * self.inputs()
+        )
 
 
 def double_integrator(axes: int = 1, limit: float = float(jnp.inf)) -> DoubleIntegrator:

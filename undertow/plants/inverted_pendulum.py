@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.drive import DirectDrive
 from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.plants.nominal import as_told
@@ -70,7 +71,11 @@ class InvertedPendulumModel(AbstractModel):
     """F = f, G = b of the cart and pole that the controller was told of."""
 
     cart_pole: CartPole
+    actuator: DirectDrive
     angles: tuple[bool, ...] = eqx.field(static=True, default=(True,))
+
+    def drive(self) -> DirectDrive:
+        return self.actuator
 
     def drift(self, y: Measurement):
         return self.cart_pole.drift(y.position, y.velocity)
@@ -136,7 +141,7 @@ class InvertedPendulum(AbstractPlant):
             half_length: half the length of the pole, m.
         """
         told = as_told(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
-        return InvertedPendulumModel(cart_pole=told)
+        return InvertedPendulumModel(cart_pole=told, actuator=DirectDrive(low=-self.limit, high=self.limit))
 
 
 def inverted_pendulum(

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.drive import DirectDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.status import Status
@@ -58,7 +59,11 @@ class LinearModel(AbstractModel):
 
     system: LinearSystem
     allocation: Float[Array, "m n"]  # G+; constant, so nothing is factorised in the loop
+    actuator: DirectDrive
     angles: tuple[bool, ...] = eqx.field(static=True)
+
+    def drive(self) -> DirectDrive:
+        return self.actuator
 
     def drift(self, y: Measurement):
         return self.system.drift(y.position, y.velocity)
@@ -128,7 +133,12 @@ class LinearPlant(AbstractPlant):
         told = as_told(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
         if told.gain.shape != self.system.gain.shape:
             raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{told.gain.shape}")
-        return LinearModel(system=told, allocation=pseudo_inverse(told.gain), angles=(False,) * len(self.outputs))
+        return LinearModel(
+            system=told,
+            allocation=pseudo_inverse(told.gain),
+            actuator=DirectDrive(low=-self.limit, high=self.limit),
+            angles=(False,) * len(self.outputs),
+        )
 
 
 def linear_plant(

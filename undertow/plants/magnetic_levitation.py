@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.drive import DirectDrive
 from undertow.core.status import Status
 from undertow.plants.levitation_rig import RIGS, LevitationRig, PerCoil
 from undertow.plants.nominal import as_told
@@ -27,7 +28,11 @@ class MagneticLevitationModel(AbstractModel):
     """F = g, G = the pull of each coil per squared current: the rig once its currents are where they should be."""
 
     rig: LevitationRig
+    actuator: DirectDrive
     angles: tuple[bool, ...] = eqx.field(static=True, default=(False,))
+
+    def drive(self) -> DirectDrive:
+        return self.actuator
 
     def drift(self, y: Measurement):
         return jnp.broadcast_to(self.rig.gravity, (1,))
@@ -119,7 +124,9 @@ class MagneticLevitation(AbstractPlant):
             inductance_reach: gap over which it falls e times, m.
         """
         changed = {"inductance": inductance, "inductance_reach": inductance_reach}
-        return MagneticLevitationModel(rig=as_told(self.rig, mass=mass, force_factor=force_factor, **changed))
+        told = as_told(self.rig, mass=mass, force_factor=force_factor, **changed)
+        limits = DirectDrive(low=self.rig.smallest_current**2, high=self.rig.largest_current**2)
+        return MagneticLevitationModel(rig=told, actuator=limits)
 
 
 def magnetic_levitation(rig: str = "balko_rosinova", rung: str = "coil") -> MagneticLevitation:

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.drive import DirectDrive
 from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
@@ -28,7 +29,11 @@ class TwoLinkArmModel(AbstractModel):
     """F = -M^-1 (C q_dot + g), G = M^-1 of the links that the controller was told of."""
 
     links: Links
+    actuator: DirectDrive
     angles: tuple[bool, ...] = eqx.field(static=True, default=(True, True))
+
+    def drive(self) -> DirectDrive:
+        return self.actuator
 
     def drift(self, y: Measurement):
         return self.links.drift(y.position, y.velocity)
@@ -93,7 +98,7 @@ class TwoLinkArm(AbstractPlant):
             outer_offset: by how far that centre lags behind the link, rad.
         """
         told = as_told(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
-        return TwoLinkArmModel(links=told)
+        return TwoLinkArmModel(links=told, actuator=DirectDrive(low=-self.limit, high=self.limit))
 
 
 def two_link_arm(

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
-from undertow.controllers.robust.reference_filter import ReferenceFilter
+from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
 from undertow.core.param import param
@@ -25,7 +25,7 @@ class RobustState(NamedTuple):
 
     estimator: EstimatorState
     drive: Any  # what is believed of the actuators
-    reference: Target  # filtered
+    filter: FilterState | None
 
 
 class Plan(NamedTuple):
@@ -86,8 +86,8 @@ class RobustRCAF(AbstractController):
         checks.positive_definite("weight", self.weight)
 
     def init(self, y: Measurement, r: Target) -> RobustState:
-        at_rest = Target(y.position, jnp.zeros_like(y.position), jnp.zeros_like(y.position))
-        return RobustState(self.estimator.init(self.model.rates(y)), self.model.drive().init(), at_rest)
+        smoothing = None if self.filter is None else self.filter.init(y.position)
+        return RobustState(self.estimator.init(self.model.rates(y)), self.model.drive().init(), smoothing)
 
     def command(self, z: RobustState, y: Measurement, r: Target):
         plan = self._plan(z, y, r)
@@ -112,11 +112,10 @@ class RobustRCAF(AbstractController):
         share = attained(self.model.effect(y), plan.forces, going)
         tracking = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.tracking)
         known = self._known(plan.drive, y, u_applied)
-        reference = r if self.filter is None else self.filter.advance(z.reference, r, self.model, share, dt)
         return RobustState(
             estimator=self.estimator.advance(z.estimator, plan.seen, known, tracking, dt),
             drive=drive.advance(plan.drive, u_applied, dt),
-            reference=reference,
+            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model, share, dt),
         )
 
     def known(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:
@@ -135,7 +134,7 @@ class RobustRCAF(AbstractController):
     def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
         model = self.model
         drive = model.drive().heard(z.drive, y.actuator)
-        target = r if self.filter is None else z.reference
+        target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
         rates, (velocity, acceleration) = model.rates(y), model.wanted(y, target)
         error, error_rate = model.error(y, target), velocity - rates
         p = self.lyapunov()

@@ -1,16 +1,29 @@
 """A reference that may jump, made smooth: three equal poles, no lag behind what is smooth already."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel, Target
+from undertow.core.contracts import AbstractModel, Outputs, Target
 from undertow.core.param import param
 
 
+class FilterState(NamedTuple):
+    """What is left of earlier jumps, and what the reference should be by now if it has not jumped again."""
+
+    offset: Target
+    expected: Target  # its acceleration is the last one that was seen
+    elapsed: Float[Array, ""]  # s, since then
+
+
 class ReferenceFilter(eqx.Module):
-    """The difference to the reference dies out like (p + w)^3 = 0, in closed form, at whatever sampling time.
+    """Jumps of position and velocity die out like (p + w)^3 = 0, in closed form, at whatever sampling time.
+
+    What is a jump is told from the derivatives that come with a reference: a smooth one departs from what they lead
+    to by the third power of the sampling time, and passes as it is. Jumps of the acceleration pass, too.
 
     Raises:
         BadInput: frequency not positive.
@@ -21,29 +34,47 @@ class ReferenceFilter(eqx.Module):
     def __check_init__(self):
         checks.positive("frequency", self.frequency, "rad/s")
 
-    def advance(self, state: Target, r: Target, model: AbstractModel, share, dt) -> Target:
-        """Filtered reference one sampling time later.
+    def init(self, position: Outputs) -> FilterState:
+        """At rest at a position: the first reference is a jump from there."""
+        still = jnp.zeros_like(position)
+        return FilterState(Target(still, still, still), Target(position, still, still), jnp.zeros(()))
+
+    def smoothed(self, state: FilterState, r: Target, model: AbstractModel) -> Target:
+        """The reference with what is left of its jumps."""
+        offset = self._offset(state, r, model)
+        return Target(*(own + left for own, left in zip(r, offset, strict=True)))
+
+    def advance(self, state: FilterState, r: Target, model: AbstractModel, share, dt) -> FilterState:
+        """State one sampling time later.
 
         Args:
-            state: filtered reference now.
-            r: reference now; its acceleration is held.
+            state: now.
+            r: reference now.
             model: knows which outputs are angles.
             share: of the wanted acceleration that the actuators give; with less than 1 the filter waits.
             dt: sampling time, s.
         """
+        away, rate, bend = self._offset(state, r, model)
         w, t = self.frequency, share * dt
-        away = model.difference(state.position, r.position)
-        rate = state.velocity - r.velocity
-        bend = state.acceleration - r.acceleration
         # exp(A t) = exp(-w t) (1 + N t + N^2 t^2 / 2) with N = A + w nilpotent.
-        first = rate + w * away
-        second = bend + 2 * w * rate + w**2 * away
+        first, second = rate + w * away, bend + 2 * w * rate + w**2 * away
+        third = -(w**3) * away - 3 * w**2 * rate - 2 * w * bend
         decay = jnp.exp(-w * t)
-        position = decay * (away + t * first + t**2 / 2 * second)
-        velocity = decay * (rate + t * (bend + w * rate) - w * t**2 / 2 * second)
-        acceleration = decay * (bend + t * (-(w**3) * away - 3 * w**2 * rate - 2 * w * bend) + w**2 * t**2 / 2 * second)
-        return Target(
-            position=r.position + dt * r.velocity + dt**2 / 2 * r.acceleration + position,
-            velocity=r.velocity + dt * r.acceleration + velocity,
-            acceleration=r.acceleration + acceleration,
+        offset = Target(
+            position=decay * (away + t * first + t**2 / 2 * second),
+            velocity=decay * (rate + t * (bend + w * rate) - w * t**2 / 2 * second),
+            acceleration=decay * (bend + t * third + w**2 * t**2 / 2 * second),
         )
+        expected = Target(
+            position=r.position + dt * r.velocity + dt**2 / 2 * r.acceleration,
+            velocity=r.velocity + dt * r.acceleration,
+            acceleration=r.acceleration,
+        )
+        return FilterState(offset, expected, dt)
+
+    def _offset(self, state: FilterState, r: Target, model: AbstractModel) -> Target:
+        """What is left of earlier jumps, and the one that has just been seen; the acceleration rose evenly."""
+        risen = r.acceleration - state.expected.acceleration
+        jump = model.difference(r.position, state.expected.position) - state.elapsed**2 / 6 * risen
+        kick = r.velocity - state.expected.velocity - state.elapsed / 2 * risen
+        return Target(state.offset.position - jump, state.offset.velocity - kick, state.offset.acceleration)
