@@ -9,6 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.contracts import AbstractModel, Measurement, Target, Telemetry
@@ -82,13 +83,9 @@ class RCAF(AbstractContinuousController):
         if self.fuzzy.inputs != 1 + FUZZY_INPUTS.index(self.fuzzy_input):
             raise BadInput("fuzzy", f"have the inputs of `{self.fuzzy_input}`", f"of {self.fuzzy.inputs} input(s)")
         axes = len(self.model.angles)
-        for part, names in ((self, _PER_AXIS), (self.identification, _PER_AXIS_IDENTIFICATION)):
-            for name in names:
-                checks.per_axis(name, getattr(part, name), axes)
-        checks.per_axis("feedback", self.feedback, axes, (2,))
-        checks.per_axis("weight", self.weight, axes, (2, 2))
-        checks.hurwitz("feedback", self.feedback)
-        checks.positive_definite("weight", self.weight)
+        for name in _PER_AXIS_IDENTIFICATION:
+            checks.per_axis(name, getattr(self.identification, name), axes)
+        check_gains(self.feedback, self.weight, {name: getattr(self, name) for name in _PER_AXIS}, axes)
 
     def init(self, y: Measurement, r: Target) -> RCAFState:
         axes = y.position.shape[0]
@@ -96,12 +93,11 @@ class RCAF(AbstractContinuousController):
 
     def command(self, z: RCAFState, y: Measurement, r: Target):
         """V of Eq. (23), with d_hat of Eq. (42) and u_r of Eq. (43)."""
-        error, error_rate, s = self._tracking(y, r)
+        off = self._tracking(y, r)
         eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
-        u_r = self.robust_gain * switch(s, self.layer, self.switching)
-        proportional = self.feedback[..., 0] * error + self.feedback[..., 1] * error_rate
-        wanted = -self.model.drift(y) - d_hat + proportional + self.model.wanted(y, r)[1] + u_r
+        u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
+        wanted = -self.model.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
         telemetry = Telemetry(
             estimate=d_hat,
             robust=u_r,
@@ -114,7 +110,7 @@ class RCAF(AbstractContinuousController):
 
     def flow(self, z: RCAFState, y: Measurement, r: Target, u_applied) -> RCAFState:
         """Identification model, Eq. (32), and composite adaptive law, Eq. (44)."""
-        _, _, s = self._tracking(y, r)
+        s = self._tracking(y, r).filtered
         eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
         xi = self._basis(eps, y)
         d_hat = self.fuzzy.output(z.weights, xi)
@@ -138,12 +134,8 @@ class RCAF(AbstractContinuousController):
         """theta_max, shaped to stand beside theta."""
         return self.weights_bound[..., None]
 
-    def _tracking(self, y: Measurement, r: Target) -> tuple[PerAxis, PerAxis, PerAxis]:
-        """e, e_dot of Eq. (19) and the filtered error s = E^T P b."""
-        error = self.model.error(y, r)
-        error_rate = self.model.wanted(y, r)[0] - self.model.rates(y)
-        p = self.lyapunov()
-        return error, error_rate, p[..., 0, 1] * error + p[..., 1, 1] * error_rate
+    def _tracking(self, y: Measurement, r: Target) -> Tracking:
+        return tracking(self.model, self.lyapunov(), y, r)
 
     def _basis(self, eps: PerAxis, y: Measurement) -> Float[Array, "n rules"]:
         """xi of the chosen input: eps (the paper's), or (x_i, x_i_dot) (what Table 2 compares it with)."""

@@ -5,7 +5,6 @@ import jax.numpy as jnp
 from undertow.instruments.estimate import Estimate, Motion
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.sampling import Sampling
-from undertow.numerics.rotations import euler_from_rotation, rotation_from_quaternion
 
 
 class Compass(AbstractInstrument):
@@ -15,9 +14,8 @@ class Compass(AbstractInstrument):
         return motion.angles[2:]
 
     def correct(self, estimate: Estimate, reading) -> Estimate:
-        angles = euler_from_rotation(rotation_from_quaternion(estimate.attitude))
         now = reading + self.sampling.delay * estimate.rates[2]
-        return estimate.turned(jnp.concatenate([angles[:2], now]), self.blend)
+        return estimate.turned(jnp.concatenate([estimate.angles()[:2], now]), self.blend)
 
 
 def compass(

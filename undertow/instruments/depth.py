@@ -1,22 +1,20 @@
 """Depth from pressure."""
 
-import jax.numpy as jnp
-
 from undertow.instruments.estimate import Estimate, Motion
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.sampling import Sampling
+
+_DOWN = slice(2, 3)
 
 
 class Depth(AbstractInstrument):
     """Down, m. The sensor is at the body origin, and waves do not press on it."""
 
     def reading(self, motion: Motion):
-        return motion.position[2:]
+        return motion.position[_DOWN]
 
     def correct(self, estimate: Estimate, reading) -> Estimate:
-        then = estimate.position[2] - self.sampling.delay * estimate.velocity[2]
-        error = jnp.zeros(3).at[2].set(reading[0] - then)
-        return estimate.moved(error, self.blend, self.sampling.period)
+        return estimate.fixed(_DOWN, reading, self.sampling, self.blend)
 
 
 def depth(

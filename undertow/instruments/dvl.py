@@ -4,7 +4,6 @@ from undertow.instruments.estimate import Estimate, Motion
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.sampling import Sampling
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import rotation_from_quaternion
 
 
 class DVL(AbstractInstrument):
@@ -16,7 +15,7 @@ class DVL(AbstractInstrument):
     def correct(self, estimate: Estimate, reading) -> Estimate:
         """What it was then, by the acceleration since, is compared."""
         then = estimate.velocity - self.sampling.delay * estimate.acceleration
-        error = matvec(rotation_from_quaternion(estimate.attitude), reading) - then
+        error = matvec(estimate.rotation(), reading) - then
         return estimate._replace(velocity=estimate.velocity + self.blend * error)
 
 

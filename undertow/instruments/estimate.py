@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import Measurement
+from undertow.instruments.sampling import Sampling
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import (
     Kinematics,
@@ -46,7 +47,7 @@ class Estimate(NamedTuple):
 
     def measurement(self) -> Measurement:
         """Outputs of the plant and their rates, as a controller wants them."""
-        rotation = rotation_from_quaternion(self.attitude)
+        rotation = self.rotation()
         nu = jnp.concatenate([matvec(rotation.T, self.velocity), self.rates])
         position = jnp.concatenate([self.position, euler_from_rotation(rotation)])
         return Measurement(position, Kinematics(rotation).to_world(nu), self.actuator)
@@ -66,6 +67,19 @@ class Estimate(NamedTuple):
         aligned = jnp.where((there * self.attitude).sum() < 0, -there, there)
         between = (1 - share) * self.attitude + share * aligned
         return self._replace(attitude=between / jnp.sqrt((between * between).sum()))
+
+    def angles(self) -> Vector3:
+        """Euler angles, rad."""
+        return euler_from_rotation(self.rotation())
+
+    def rotation(self) -> Matrix3:
+        """Body -> world."""
+        return rotation_from_quaternion(self.attitude)
+
+    def fixed(self, axes: slice, reading: Float[Array, " k"], sampling: Sampling, share) -> "Estimate":
+        """`moved` on some axes by a position that was read `sampling.delay` ago."""
+        then = self.position[axes] - sampling.delay * self.velocity[axes]
+        return self.moved(jnp.zeros(3).at[axes].set(reading - then), share, sampling.period)
 
     def moved(self, error: Vector3, share, period) -> "Estimate":
         """Position and velocity corrected by an error of position (m): an alpha-beta filter.

@@ -7,7 +7,6 @@ from undertow.instruments.estimate import GRAVITY, Estimate, Motion
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.sampling import Sampling
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import euler_from_rotation, rotation_from_quaternion
 
 
 class IMU(AbstractInstrument):
@@ -17,12 +16,11 @@ class IMU(AbstractInstrument):
         return jnp.concatenate([motion.angles[:2], motion.rates, motion.specific_force])
 
     def foretell(self, estimate: Estimate, reading) -> Estimate:
-        rotation = rotation_from_quaternion(estimate.attitude)
-        return estimate._replace(rates=reading[2:5], acceleration=matvec(rotation, reading[5:]) + GRAVITY)
+        acceleration = matvec(estimate.rotation(), reading[5:]) + GRAVITY
+        return estimate._replace(rates=reading[2:5], acceleration=acceleration)
 
     def correct(self, estimate: Estimate, reading) -> Estimate:
-        yaw = euler_from_rotation(rotation_from_quaternion(estimate.attitude))[2:]
-        return estimate.turned(jnp.concatenate([reading[:2], yaw]), self.blend)
+        return estimate.turned(jnp.concatenate([reading[:2], estimate.angles()[2:]]), self.blend)
 
 
 def imu(

@@ -1,22 +1,20 @@
 """Position fixes: acoustic positioning (USBL, LBL), or a satellite receiver at the surface."""
 
-import jax.numpy as jnp
-
 from undertow.instruments.estimate import Estimate, Motion
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.sampling import Sampling
+
+_LEVEL = slice(0, 2)
 
 
 class PositionFix(AbstractInstrument):
     """North and east, m."""
 
     def reading(self, motion: Motion):
-        return motion.position[:2]
+        return motion.position[_LEVEL]
 
     def correct(self, estimate: Estimate, reading) -> Estimate:
-        then = estimate.position[:2] - self.sampling.delay * estimate.velocity[:2]
-        error = jnp.concatenate([reading - then, jnp.zeros(1)])
-        return estimate.moved(error, self.blend, self.sampling.period)
+        return estimate.fixed(_LEVEL, reading, self.sampling, self.blend)
 
 
 def position_fix(

@@ -178,6 +178,11 @@ class Kinematics:
         )
 
 
+def kinematics_from_euler(angles: Vector3) -> Kinematics:
+    """J of Eq. (1) at (roll, pitch, yaw)."""
+    return Kinematics(rotation_from_euler(angles))
+
+
 def jacobian(angles: Vector3) -> Float[Array, "6 6"]:
     """J of Eq. (1) as a matrix, from (roll, pitch, yaw)."""
     zero = jnp.zeros((3, 3))

@@ -9,9 +9,9 @@ from undertow.core.drive import AbstractDrive
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import (
-    Kinematics,
     attitude_error,
     cross,
+    kinematics_from_euler,
     quaternion_from_euler,
     rotation_from_quaternion,
 )
@@ -48,11 +48,11 @@ class BodyModel(AbstractModel):
 
     def rates(self, y: Measurement) -> Vector6:
         """nu."""
-        return _kinematics(y.position).to_body(y.velocity)
+        return kinematics_from_euler(y.position[3:]).to_body(y.velocity)
 
     def wanted(self, y: Measurement, r: Target) -> tuple[Vector6, Vector6]:
         """nu of the target as the vehicle sees it in its own axes, and its time derivative."""
-        own, other = _kinematics(y.position), _kinematics(r.position)
+        own, other = kinematics_from_euler(y.position[3:]), kinematics_from_euler(r.position[3:])
         rates, nu = own.to_body(y.velocity)[3:], other.to_body(r.velocity)
         turning = other.to_body(r.acceleration - other.rate_term(nu))[3:]
         between = own.rotation.T @ other.rotation
@@ -63,11 +63,11 @@ class BodyModel(AbstractModel):
 
     def seen(self, y: Measurement, acceleration: Vector6) -> Vector6:
         """nu_dot of an acceleration of the outputs."""
-        kinematics = _kinematics(y.position)
+        kinematics = kinematics_from_euler(y.position[3:])
         return kinematics.to_body(acceleration - kinematics.rate_term(kinematics.to_body(y.velocity)))
 
     def drift(self, y: Measurement) -> Vector6:
-        kinematics = _kinematics(y.position)
+        kinematics = kinematics_from_euler(y.position[3:])
         return self.body.free_acceleration(kinematics.to_body(y.velocity), kinematics.rotation[2])
 
     def effect(self, y: Measurement) -> Float[Array, "6 N"]:
@@ -81,7 +81,3 @@ class BodyModel(AbstractModel):
 
     def invert(self, y: Measurement, acceleration: Vector6) -> Float[Array, " N"]:
         return self.spread(y, acceleration) / self.thrust_per_volt
-
-
-def _kinematics(position: Vector6) -> Kinematics:
-    return Kinematics(rotation_from_quaternion(quaternion_from_euler(position[3:])))

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from undertow.core.contracts import AbstractModel, Measurement
 from undertow.numerics.inverses import pseudo_inverse, regularised_sharp
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import Kinematics, rotation_from_euler
+from undertow.numerics.rotations import kinematics_from_euler
 from undertow.plants.body_model import BodyModel
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.body import Body
@@ -30,7 +30,7 @@ class HybridModel(AbstractModel):
 
     def drift(self, y: Measurement) -> Float[Array, "6"]:
         """F of Eq. (17): J M^-1 (-C nu - D nu - g), with J M^-1 B phi if speeds are measured."""
-        kinematics = _kinematics(y)
+        kinematics = kinematics_from_euler(y.position[3:])
         nu = kinematics.to_body(y.velocity)
         own = self.body.free_acceleration(nu, kinematics.rotation[2])
         if self.speed_sensor:
@@ -42,7 +42,7 @@ class HybridModel(AbstractModel):
 
     def gain(self, y: Measurement) -> Float[Array, "6 N"]:
         """G = J M^-1 B alpha of Eq. (17); equal to M_J^-1 J^-T B alpha."""
-        return jax.vmap(_kinematics(y).to_world, in_axes=1, out_axes=1)(self.body_gain)
+        return jax.vmap(kinematics_from_euler(y.position[3:]).to_world, in_axes=1, out_axes=1)(self.body_gain)
 
     def invert(self, y: Measurement, acceleration: Float[Array, "6"]) -> Float[Array, " N"]:
         """V = G# acceleration, Eq. (23).
@@ -54,7 +54,7 @@ class HybridModel(AbstractModel):
             return matvec(regularised_sharp(self.gain(y), self.regularisation), acceleration)
         if self.rank < 6:
             return matvec(pseudo_inverse(self.gain(y)), acceleration)
-        wrench = matvec(self.body.mass_matrix, _kinematics(y).to_body(acceleration))
+        wrench = matvec(self.body.mass_matrix, kinematics_from_euler(y.position[3:]).to_body(acceleration))
         return matvec(self.allocation, wrench)
 
     def own_axes(self) -> BodyModel:
@@ -67,7 +67,3 @@ class HybridModel(AbstractModel):
             allocation=jnp.linalg.pinv(self.thruster_matrix),
             thrust_per_volt=jnp.broadcast_to(self.thruster.voltage_gain(), (count,)),
         )
-
-
-def _kinematics(y: Measurement) -> Kinematics:
-    return Kinematics(rotation_from_euler(y.position[3:]))

@@ -9,7 +9,8 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param, sources_field
-from undertow.thrusters.thruster import AbstractThruster, PerThruster
+from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.thruster import PerThruster
 
 
 class AxialFlowState(NamedTuple):
@@ -20,7 +21,7 @@ class AxialFlowState(NamedTuple):
     ambient: PerThruster
 
 
-class AxialFlowThruster(AbstractThruster):
+class AxialFlowThruster(AbstractMotorlessThruster):
     """Propeller speed n, axial flow v and ambient flow v_a: the form of Healey et al. 1995, with linear terms.
 
         T = c_T n|n| - c_Tv v|n| ,  Q = c_Q n|n| - c_Qv v|n|
@@ -87,18 +88,6 @@ class AxialFlowThruster(AbstractThruster):
 
     def current(self, state, voltage) -> PerThruster:
         return self.current_per_torque * self.torque(state)
-
-    def powers(self, state, voltage) -> None:
-        return None
-
-    def stored(self, state) -> PerThruster:
-        return jnp.zeros(())
-
-    def report(self, state) -> None:
-        return None
-
-    def voltage_gain(self):
-        return self.linear_gain
 
     def speed_term(self, report):
         hint = "A speed sensor does not see the axial flow, which takes a third of the thrust at full speed"

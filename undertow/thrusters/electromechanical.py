@@ -58,7 +58,7 @@ class ElectromechanicalThruster(AbstractThruster):
         return self.motor.speed_term(report.speed, report.acceleration)
 
     def drive(self, count: int, measured: bool) -> MotorDrive:
-        return MotorDrive(self.motor, self.supply, self.dead_zone, count, measured)
+        return MotorDrive(self, count, measured)
 
     def advice(self):
         return self.motor.advice()

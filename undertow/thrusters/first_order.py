@@ -10,7 +10,8 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.thrusters.thruster import AbstractThruster, PerThruster
+from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.thruster import PerThruster
 
 
 class LaggedThrust(NamedTuple):
@@ -19,7 +20,7 @@ class LaggedThrust(NamedTuple):
     thrust: PerThruster
 
 
-class FirstOrderThruster(AbstractThruster):
+class FirstOrderThruster(AbstractMotorlessThruster):
     """tau T_dot + T = c |V|^(p-1) V, less by a share in reverse; no motor behind it.
 
     Raises:
@@ -60,18 +61,6 @@ class FirstOrderThruster(AbstractThruster):
     def current(self, state, voltage) -> PerThruster:
         """That of the steady state: it leads the thrust, so that no power comes back from a thruster being reversed."""
         return self.current_per_thrust * self.steady_thrust(voltage)
-
-    def powers(self, state, voltage) -> None:
-        return None
-
-    def stored(self, state) -> PerThruster:
-        return jnp.zeros(())
-
-    def report(self, state) -> None:
-        return None
-
-    def voltage_gain(self):
-        return self.linear_gain
 
     def speed_term(self, report):
         hint = "This thruster has no propeller speed. Describe its motor (DCMotor), or leave its lag to the estimator"

@@ -7,11 +7,12 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param
+from undertow.thrusters.motorless import AbstractMotorlessThruster
 from undertow.thrusters.steady_drive import SteadyDrive
-from undertow.thrusters.thruster import AbstractThruster, PerThruster
+from undertow.thrusters.thruster import PerThruster
 
 
-class MemorylessThruster(AbstractThruster):
+class MemorylessThruster(AbstractMotorlessThruster):
     """Thrust c |V|^(p-1) V with no motor behind it; current proportional to thrust.
 
     Raises:
@@ -42,18 +43,6 @@ class MemorylessThruster(AbstractThruster):
 
     def current(self, state, voltage) -> PerThruster:
         return self.current_per_thrust * self.thrust(state, voltage)
-
-    def powers(self, state, voltage) -> None:
-        return None
-
-    def stored(self, state) -> PerThruster:
-        return jnp.zeros(())
-
-    def report(self, state) -> None:
-        return None
-
-    def voltage_gain(self):
-        return self.linear_gain
 
     def speed_term(self, report):
         raise BadInput("speed_sensor", "be false", "true", hint="This thruster has no propeller speed")

@@ -1,10 +1,9 @@
 """Speed control of motors by computed voltage: what makes a thruster obey a thrust."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
 
 from undertow.core.drive import AbstractDrive
 from undertow.numerics.integrators import rk4
@@ -22,6 +21,17 @@ class MotorState(NamedTuple):
     current: PerThruster  # A
 
 
+class WithMotor(Protocol):
+    """A thruster with a motor behind it."""
+
+    motor: DCMotor
+    supply: PerThruster
+
+    def terminal(self, voltage: PerThruster) -> PerThruster:
+        """Voltage that turns the motor."""
+        ...
+
+
 class MotorDrive(AbstractDrive):
     """The current for a wanted torque, Eq. (8), and the voltage for that current, Eq. (9). Section X9 of the theory.
 
@@ -29,9 +39,7 @@ class MotorDrive(AbstractDrive):
     that were applied; currents are predicted.
     """
 
-    motor: DCMotor
-    supply: Float[Array, ""]  # V
-    dead_zone: Float[Array, ""]  # V
+    thruster: WithMotor
     count: int = eqx.field(static=True)
     measured: bool = eqx.field(static=True)
 
@@ -43,43 +51,42 @@ class MotorDrive(AbstractDrive):
 
     def range(self, state: MotorState, rate) -> tuple[PerThruster, PerThruster]:
         """Thrusts at the speeds towards which -supply and supply turn the motor within 1 / rate, N."""
-        motor = self.motor
+        motor = self.thruster.motor
         resisted = motor.steady_voltage(state.speed)
-        limited = jnp.isfinite(self.supply)
-        volts = jnp.where(limited, self.supply, 0.0)  # so that what is unlimited has gradients, too
+        limited = jnp.isfinite(self.thruster.supply)
+        volts = jnp.where(limited, self.thruster.supply, 0.0)  # so that what is unlimited has gradients, too
         low, high = (state.speed + (side * volts - resisted) / (motor.k1 * rate) for side in (-1, 1))
         return jnp.where(limited, motor.thrust(low), -jnp.inf), jnp.where(limited, motor.thrust(high), jnp.inf)
 
     def force(self, state: MotorState, u) -> PerThruster:
-        return self.motor.thrust(state.speed)
+        return self.thruster.motor.thrust(state.speed)
 
     def command(self, state: MotorState, force, rate) -> PerThruster:
-        motor = self.motor
+        motor = self.thruster.motor
         pull = motor.rotor_inertia * rate * (motor.speed_at(force) - state.speed)
         wanted = motor.steady_current(state.speed) + pull / motor.torque_constant
         held = motor.resistance * wanted + motor.back_emf_constant * state.speed
         return held + self._boost(rate) * (wanted - state.current)
 
     def aim(self, state: MotorState, u, rate) -> PerThruster:
-        motor, boost = self.motor, self._boost(rate)
-        free = self._terminal(u) - motor.back_emf_constant * state.speed + boost * state.current
+        motor, boost = self.thruster.motor, self._boost(rate)
+        free = self.thruster.terminal(u) - motor.back_emf_constant * state.speed + boost * state.current
         pull = (free / (motor.resistance + boost) - motor.steady_current(state.speed)) * motor.torque_constant
         return motor.thrust(state.speed + pull / (motor.rotor_inertia * rate))
 
     def advance(self, state: MotorState, u, dt) -> MotorState:
         """The current exactly for a held back-EMF, however fast the winding; the speed under its mean."""
-        motor = self.motor
-        settled = (self._terminal(u) - motor.back_emf_constant * state.speed) / motor.resistance
+        motor = self.thruster.motor
+        settled = (self.thruster.terminal(u) - motor.back_emf_constant * state.speed) / motor.resistance
         fading = motor.resistance * dt / jnp.maximum(motor.inductance, 1e-12)
         mean = settled + (state.current - settled) * -jnp.expm1(-fading) / fading
-        friction = lambda speed: motor.friction * speed + motor.torque(speed)
-        turning = lambda t, speed: (motor.torque_constant * mean - friction(speed)) / motor.rotor_inertia
+        pull = lambda speed: motor.torque_constant * (mean - motor.steady_current(speed))
+        turning = lambda t, speed: pull(speed) / motor.rotor_inertia
         speed = rk4(turning, jnp.zeros(()), state.speed, dt)
         return MotorState(speed, settled + (state.current - settled) * jnp.exp(-fading))
 
     def _boost(self, rate) -> PerThruster:
         """By itself the current comes at R / L; where that is too slow, more voltage makes it faster, ohm."""
-        return jnp.maximum(self.motor.inductance * _CURRENT_FASTER * rate - self.motor.resistance, 0.0)
-
-    def _terminal(self, u) -> PerThruster:
-        return jnp.where(jnp.abs(u) > self.dead_zone, u, 0.0)
+        return jnp.maximum(
+            self.thruster.motor.inductance * _CURRENT_FASTER * rate - self.thruster.motor.resistance, 0.0
+        )

@@ -32,8 +32,7 @@ class ShaftThruster(AbstractThruster):
 
     def dynamics(self, state, voltage) -> ShaftState:
         motor = self.motor
-        resisted = motor.k2 * state.speed + motor.k3 * motor.torque(state.speed)
-        return ShaftState((self.terminal(voltage) - resisted) / motor.k1)
+        return ShaftState((self.terminal(voltage) - motor.steady_voltage(state.speed)) / motor.k1)
 
     def thrust(self, state, voltage) -> PerThruster:
         return self.motor.thrust(state.speed)
@@ -64,7 +63,7 @@ class ShaftThruster(AbstractThruster):
         )
 
     def drive(self, count: int, measured: bool) -> MotorDrive:
-        return MotorDrive(self.motor, self.supply, self.dead_zone, count, measured)
+        return MotorDrive(self, count, measured)
 
     def advice(self):
         return self.motor.advice()

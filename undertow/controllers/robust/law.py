@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
+from undertow.controllers.tracking_error import check_gains, tracking
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
 from undertow.core.param import param
@@ -33,7 +34,7 @@ class Plan(NamedTuple):
 
     drive: Any
     seen: Estimate
-    tracking: PerAxis  # s
+    filtered: PerAxis  # s, the filtered tracking error
     robust: PerAxis  # u_r
     forces: Float[Array, " m"]  # that would give what is wanted
 
@@ -73,17 +74,9 @@ class RobustRCAF(AbstractController):
             checks.not_negative(name, getattr(self, name))
         for name in ("layer", "actuator_rate", "direction"):
             checks.positive(name, getattr(self, name))
-        axes = len(self.model.angles)
-        for part, names in (
-            (self, ("tracking_share", "robust_gain", "layer")),
-            (self.estimator, ("bandwidth", "damping", "bound")),
-        ):
-            for name in names:
-                checks.per_axis(name, getattr(part, name), axes)
-        checks.per_axis("feedback", self.feedback, axes, (2,))
-        checks.per_axis("weight", self.weight, axes, (2, 2))
-        checks.hurwitz("feedback", self.feedback)
-        checks.positive_definite("weight", self.weight)
+        own = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
+        estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound")}
+        check_gains(self.feedback, self.weight, own | estimators, len(self.model.angles))
 
     def init(self, y: Measurement, r: Target) -> RobustState:
         smoothing = None if self.filter is None else self.filter.init(y.position)
@@ -110,10 +103,10 @@ class RobustRCAF(AbstractController):
         # While limits bind, the reference waits, and the tracking error says nothing about d.
         going = drive.aim(plan.drive, u_applied, self.actuator_rate)
         share = attained(self.model.effect(y), plan.forces, going)
-        tracking = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.tracking)
+        learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.filtered)
         known = self._known(plan.drive, y, u_applied)
         return RobustState(
-            estimator=self.estimator.advance(z.estimator, plan.seen, known, tracking, dt),
+            estimator=self.estimator.advance(z.estimator, plan.seen, known, learnt, dt),
             drive=drive.advance(plan.drive, u_applied, dt),
             filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model, share, dt),
         )
@@ -135,12 +128,8 @@ class RobustRCAF(AbstractController):
         model = self.model
         drive = model.drive().heard(z.drive, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
-        rates, (velocity, acceleration) = model.rates(y), model.wanted(y, target)
-        error, error_rate = model.error(y, target), velocity - rates
-        p = self.lyapunov()
-        s = p[..., 0, 1] * error + p[..., 1, 1] * error_rate
-        u_r = self.robust_gain * jnp.tanh(s / self.layer)
-        seen = self.estimator.look(z.estimator, rates)
-        proportional = self.feedback[..., 0] * error + self.feedback[..., 1] * error_rate
-        demand = acceleration + proportional + u_r - seen.uncertainty - model.drift(y)
-        return Plan(drive, seen, s, u_r, model.spread(y, demand))
+        off = tracking(model, self.lyapunov(), y, target)
+        u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
+        seen = self.estimator.look(z.estimator, model.rates(y))
+        demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - model.drift(y)
+        return Plan(drive, seen, off.filtered, u_r, model.spread(y, demand))

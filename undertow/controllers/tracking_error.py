@@ -1,0 +1,46 @@
+"""How far the plant is from its target, in the coordinates of the model: what every law here feeds back."""
+
+from typing import Any, NamedTuple
+
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractModel, Measurement, Target
+
+PerAxis = Float[Array, " n"]
+Feedback = Float[Array, "*n 2"]
+Matrices = Float[Array, "*n 2 2"]
+
+
+class Tracking(NamedTuple):
+    """E of Eq. (19), and what follows from it."""
+
+    error: PerAxis  # e, m, rad
+    rate: PerAxis  # m/s, rad/s
+    filtered: PerAxis  # s = E^T P b
+    acceleration: PerAxis  # of the target, m/s^2, rad/s^2
+
+    def feedback(self, gains: Feedback) -> PerAxis:
+        """K^T E, m/s^2 and rad/s^2."""
+        return gains[..., 0] * self.error + gains[..., 1] * self.rate
+
+
+def tracking(model: AbstractModel, lyapunov: Matrices, y: Measurement, r: Target) -> Tracking:
+    """Errors of a measurement against a target, with P of Eq. (21)."""
+    velocity, acceleration = model.wanted(y, r)
+    error, rate = model.error(y, r), velocity - model.rates(y)
+    return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
+
+
+def check_gains(feedback: Feedback, weight: Matrices, per_axis: dict[str, Any], axes: int) -> None:
+    """Whether K, Q and other gains fit the axes, and K and Q what Eq. (21) asks of them.
+
+    Raises:
+        BadInput: one of them does not.
+    """
+    for name, value in per_axis.items():
+        checks.per_axis(name, value, axes)
+    checks.per_axis("feedback", feedback, axes, (2,))
+    checks.per_axis("weight", weight, axes, (2, 2))
+    checks.hurwitz("feedback", feedback)
+    checks.positive_definite("weight", weight)
