@@ -59,7 +59,7 @@ def _apart(run: xr.Dataset) -> list[Block]:
         apart = signals.difference(run, "told less true", f"measured_{signal}", signal, style.SOLID)
         turns = np.array(["rad" in unit and not rate for unit in run["axis"].attrs["unit_of_each"].split(", ")])
         wrapped = np.where(turns, (apart.values + np.pi) % (2 * np.pi) - np.pi, apart.values)
-        quantities = signals.per_axis(run, f"${symbol}$", rate)
+        quantities = signals.per_axis(run, f"error of ${symbol}$", rate)
         blocks.append(_block(run, [apart._replace(values=wrapped)], quantities, 0.0)._replace(titled=not rate))
     return blocks
 
