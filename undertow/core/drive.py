@@ -41,6 +41,10 @@ class AbstractDrive(eqx.Module):
     def advance(self, state: PyTree, u: Inputs, dt: Float[Array, ""]) -> PyTree:
         """State after a sampling time with an input held."""
 
+    def steady(self) -> "AbstractDrive":
+        """The same actuators taken for ones that follow at once."""
+        return self
+
 
 class DirectDrive(AbstractDrive):
     """The force is proportional to the input, at once, within limits of the input."""

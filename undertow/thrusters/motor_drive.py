@@ -8,6 +8,8 @@ import jax.numpy as jnp
 from undertow.core.drive import AbstractDrive
 from undertow.numerics.integrators import rk4
 from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.static import StaticThruster
+from undertow.thrusters.steady_drive import SteadyDrive
 from undertow.thrusters.thruster import PerThruster
 
 # How much faster the current is made to follow than the speed that it drives.
@@ -26,6 +28,7 @@ class WithMotor(Protocol):
 
     motor: DCMotor
     supply: PerThruster
+    dead_zone: PerThruster
 
     def terminal(self, voltage: PerThruster) -> PerThruster:
         """Voltage that turns the motor."""
@@ -84,6 +87,10 @@ class MotorDrive(AbstractDrive):
         turning = lambda t, speed: pull(speed) / motor.rotor_inertia
         speed = rk4(turning, jnp.zeros(()), state.speed, dt)
         return MotorState(speed, settled + (state.current - settled) * jnp.exp(-fading))
+
+    def steady(self) -> SteadyDrive:
+        thruster = self.thruster
+        return SteadyDrive(StaticThruster(thruster.motor, thruster.supply, thruster.dead_zone))
 
     def _boost(self, rate) -> PerThruster:
         """By itself the current comes at R / L; where that is too slow, more voltage makes it faster, ohm."""

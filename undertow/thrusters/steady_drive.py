@@ -35,7 +35,10 @@ class SteadyDrive(AbstractDrive):
 
     def range(self, state, rate) -> tuple[PerThruster, PerThruster]:
         top = jnp.asarray(self.thruster.supply)
-        return self.thruster.thrust((), -top), self.thruster.thrust((), top)
+        limited = jnp.isfinite(top)
+        volts = jnp.where(limited, top, 0.0)  # the curve of a motor is inf / inf at infinite voltage
+        low, high = self.thruster.thrust((), -volts), self.thruster.thrust((), volts)
+        return jnp.where(limited, low, -jnp.inf), jnp.where(limited, high, jnp.inf)
 
     def force(self, state, u) -> PerThruster:
         return self.thruster.thrust((), u)

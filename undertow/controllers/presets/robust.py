@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.law import RobustRCAF
@@ -74,7 +75,7 @@ def robust(
         raise BadInput("tracking", "be left out when there is `feedback`", tracking)
     if reference_frequency is None:
         reference_frequency = jnp.minimum(fast.tracking / 2, 2.0)
-    jumps = bool(np.any(np.asarray(reference_frequency) != 0))
+    jumps = isinstance(reference_frequency, Tracer) or bool(np.any(np.asarray(reference_frequency) != 0))
     return RobustRCAF(
         model=model.own_axes(),
         estimator=Estimator(fuzzy, fast.bandwidth, damping, weights_bound),

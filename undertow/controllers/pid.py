@@ -1,0 +1,185 @@
+"""PID control as a marine engineer would set it up: the baseline that other laws have to beat."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+from undertow.controllers.robust.allocation import allocate, attained
+from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
+from undertow.core import checks
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.drive import AbstractDrive
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.numerics.linear import matvec
+
+PerAxis = Float[Array, " n"]
+
+MOTORS = ("steady", "computed")
+
+
+class PIDState(NamedTuple):
+    """State z of the law."""
+
+    integral: PerAxis  # what the integral asks for, m/s^2, rad/s^2
+    drive: Any  # what is believed of the actuators
+    filter: FilterState | None
+
+
+class Plan(NamedTuple):
+    """All that is decided at one instant."""
+
+    drive: Any
+    error: PerAxis  # m, rad
+    forces: Float[Array, " m"]  # that would give what is wanted
+
+
+class PID(AbstractController):
+    """a = a_d + k_p e + k_d e_dot + integral of k_i e, in the model's own axes; forces within limits; no windup.
+
+    Raises:
+        BadInput: a gain of the wrong sign, or an integral too strong for a stable loop: k_i < k_p k_d (Routh).
+    """
+
+    model: AbstractModel
+    filter: ReferenceFilter | None
+    proportional: Float[Array, "..."] = param("1/s^2", "acceleration per error", symbol="k_p")
+    integral: Float[Array, "..."] = param("1/s^3", "its rate per error", symbol="k_i")
+    derivative: Float[Array, "..."] = param("1/s", "acceleration per error of the rates", symbol="k_d")
+    actuator_rate: Float[Array, ""] = param("1/s", "how fast actuators are made to follow", symbol="lambda")
+    direction: Float[Array, ""] = param("", "what departing from the wanted direction costs beside losing size")
+    feedforward: bool = eqx.field(static=True, default=True)
+    motor: str = eqx.field(static=True, default="steady")
+
+    def __check_init__(self):
+        checks.choice("motor", self.motor, MOTORS)
+        checks.not_negative("integral", self.integral, "1/s^3")
+        for name in ("proportional", "derivative", "actuator_rate", "direction"):
+            checks.positive(name, getattr(self, name))
+        for name in ("proportional", "integral", "derivative"):
+            checks.per_axis(name, getattr(self, name), len(self.model.angles))
+        most = self.proportional * self.derivative
+        if not isinstance(most, Tracer) and np.any(np.asarray(self.integral >= most)):
+            worst = np.asarray(self.integral / most).max()
+            raise BadInput("integral", "be less than proportional times derivative", f"{worst:g} times that")
+
+    def init(self, y: Measurement, r: Target) -> PIDState:
+        smoothing = None if self.filter is None else self.filter.init(y.position)
+        return PIDState(jnp.zeros_like(y.position), self._drive().init(), smoothing)
+
+    def command(self, z: PIDState, y: Measurement, r: Target):
+        plan, drive, effect = self._plan(z, y, r), self._drive(), self.model.effect(y)
+        forces = allocate(effect, plan.forces, *drive.range(plan.drive, self.actuator_rate), self.direction)
+        none = jnp.zeros_like(y.position)
+        telemetry = Telemetry(
+            estimate=-z.integral,
+            robust=none,
+            modelling_error=none,
+            predicted_position=y.position,
+            predicted_velocity=self.model.rates(y),
+            weights=jnp.zeros((y.position.shape[0], 0)),
+            books={"attained_share": attained(effect, plan.forces, forces)},
+        )
+        return drive.command(plan.drive, forces, self.actuator_rate), telemetry
+
+    def advance(self, z: PIDState, y: Measurement, r: Target, u_applied, dt) -> PIDState:
+        """What limits take away is taken from the integral, too: back-calculation, Astrom and Murray (2008), 10.4.
+
+        Its time constant is the geometric mean of those of integral and derivative.
+        """
+        plan, drive, effect = self._plan(z, y, r), self._drive(), self.model.effect(y)
+        heading = lambda u: drive.aim(plan.drive, u, self.actuator_rate)
+        asked, going = heading(drive.command(plan.drive, plan.forces, self.actuator_rate)), heading(u_applied)
+        back = jnp.sqrt(self.integral / self.derivative) * matvec(effect, going - asked)
+        share = attained(effect, asked, going)
+        return PIDState(
+            integral=z.integral + dt * (self.integral * plan.error + back),
+            drive=drive.advance(plan.drive, u_applied, dt),
+            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model, share, dt),
+        )
+
+    def known(self, z: PIDState, y: Measurement, u_applied) -> PerAxis:
+        drive = self._drive()
+        given = drive.force(drive.heard(z.drive, y.actuator), u_applied)
+        return self._drift(y) + matvec(self.model.effect(y), given)
+
+    def columns(self):
+        return {"attained_share": ("share of the wanted acceleration that the actuators can give", "1")}
+
+    def _drive(self) -> AbstractDrive:
+        drive = self.model.drive()
+        return drive.steady() if self.motor == "steady" else drive
+
+    def _drift(self, y: Measurement) -> PerAxis:
+        return self.model.drift(y) if self.feedforward else jnp.zeros_like(y.position)
+
+    def _plan(self, z: PIDState, y: Measurement, r: Target) -> Plan:
+        model = self.model
+        target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
+        velocity, acceleration = model.wanted(y, target)
+        error, rate = model.error(y, target), velocity - model.rates(y)
+        demand = acceleration + self.proportional * error + self.derivative * rate + z.integral - self._drift(y)
+        return Plan(self._drive().heard(z.drive, y.actuator), error, model.spread(y, demand))
+
+
+def pid(
+    model: AbstractModel,
+    *,
+    sampling_time: float = 1e-3,
+    frequency=1.0,
+    damping=1.0,
+    integral_share=0.1,
+    gains=None,
+    feedforward: bool = True,
+    motor: str = "steady",
+    reference_frequency=None,
+    actuator_rate=None,
+    direction=1.0,
+) -> PID:
+    """PID with acceleration as its output: pole placement, Fossen (2021), ch. 15. Body axes and quaternions.
+
+    Args:
+        model: what the controller may know, from `plant.model()`.
+        sampling_time: of the loop, s; a scenario gives it.
+        frequency: natural frequency w of the closed loop without its integral, rad/s; one number or one per axis.
+        damping: its damping ratio.
+        integral_share: k_i = share w k_p with k_p = w^2; a tenth is Fossen's. 0 for PD.
+        gains: (k_p, k_i, k_d) instead of these three, 1/s^2, 1/s^3 and 1/s; one triple or one per axis.
+        feedforward: whether weight, buoyancy, drag and whatever else the model knows are compensated.
+        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is made up for.
+        reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of the natural
+            frequency, 2 at most; 0 for no filter.
+        actuator_rate: with motor = computed, how fast it is made to follow, 1/s; None: 0.15 per sampling time.
+        direction: what departing from the wanted direction costs, where limits bind, beside losing size.
+
+    Raises:
+        BadInput: a value is out of its range.
+    """
+    checks.positive("sampling_time", sampling_time, "s")
+    if gains is None:
+        for name, value in (("frequency", frequency), ("damping", damping)):
+            checks.positive(name, value)
+        checks.not_negative("integral_share", integral_share)
+        w = jnp.asarray(frequency, dtype=float)
+        proportional, integral, derivative = w**2, integral_share * w**3, 2 * damping * w
+    else:
+        checks.per_axis("gains", gains, len(model.angles), (3,))
+        proportional, integral, derivative = jnp.moveaxis(jnp.asarray(gains, dtype=float), -1, 0)
+    if reference_frequency is None:
+        reference_frequency = jnp.minimum(jnp.sqrt(proportional) / 2, 2.0)
+    unfiltered = not isinstance(reference_frequency, Tracer) and not np.any(np.asarray(reference_frequency))
+    return PID(
+        model=model.own_axes(),
+        filter=None if unfiltered else ReferenceFilter(reference_frequency),
+        proportional=proportional,
+        integral=integral,
+        derivative=derivative,
+        actuator_rate=0.15 / sampling_time if actuator_rate is None else actuator_rate,
+        direction=direction,
+        feedforward=feedforward,
+        motor=motor,
+    )
