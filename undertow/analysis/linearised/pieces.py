@@ -1,0 +1,135 @@
+"""A closed loop taken apart and differentiated exactly: plant, law and what is recorded, at one instant.
+
+Limits, dead zones, pulses of speed controllers and the sensor are left out: what is linearised is the loop inside its
+limits, measured without error. The law hears the input `u` that it believes to be applied, and the plant gets the same.
+"""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, PyTree
+
+from undertow.core.continuous import AbstractContinuousController
+from undertow.core.contracts import Target
+from undertow.loop.closed_loop import ClosedLoop
+
+# Arguments of `Parts.values`, in this order; and what it gives.
+INPUTS = ("plant", "law", "u", "load", "noise")
+SIGNALS = ("error", "estimate", "uncertainty", "modelling_error", "robust")
+
+
+class Local(NamedTuple):
+    """Values and derivatives of everything at one instant, by name."""
+
+    values: dict[str, np.ndarray]
+    slopes: dict[str, dict[str, np.ndarray]]  # of what -> with respect to what
+
+
+class Parts(NamedTuple):
+    """A closed loop whose states are vectors.
+
+    Attributes:
+        loop: the five roles.
+        target: constant reference.
+        plant_state, law_state: vectors back into the states of plant and law.
+        sizes: length of each of `INPUTS`.
+    """
+
+    loop: ClosedLoop
+    target: Target
+    plant_state: Any
+    law_state: Any
+    sizes: tuple[int, ...]
+
+    def differentiate(self, at: dict[str, Any], dt: float) -> Local:
+        """Values and slopes where the states, the input, the load and the noise are as given, arrays by name.
+
+        Args:
+            at: vectors for `INPUTS`: states of plant and law; u; load, an acceleration of the outputs (m/s^2,
+                rad/s^2); noise on position and velocity (m, rad, m/s, rad/s). What is missing is zero.
+            dt: sampling time of the law, s.
+        """
+        point = [
+            np.asarray(at.get(name, np.zeros(size)), dtype=float) for name, size in zip(INPUTS, self.sizes, strict=True)
+        ]
+        values, slopes = _evaluated(self, tuple(map(jnp.asarray, point)), jnp.asarray(dt, dtype=float))
+        ends = np.cumsum([0, *self.sizes])
+        columns = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(INPUTS)}
+        return Local(
+            {name: np.asarray(value) for name, value in values.items()},
+            {
+                name: {by: np.asarray(slope)[:, column] for by, column in columns.items()}
+                for name, slope in slopes.items()
+            },
+        )
+
+    def states(self, at: dict[str, Any]) -> tuple[PyTree, PyTree]:
+        """States of plant and law of a point."""
+        return self.plant_state(jnp.asarray(at["plant"])), self.law_state(jnp.asarray(at["law"]))
+
+
+def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.ndarray]]:
+    """A closed loop about a constant reference, and its states at rest there as vectors (`plant` and `law`).
+
+    Args:
+        loop: the five roles.
+        position: reference, m and rad.
+    """
+    loop = _without_dead_zones(loop)
+    position = jnp.asarray(position, dtype=float)
+    still = jnp.zeros_like(position)
+    target = Target(position, still, still)
+    x = loop.plant.initial_state(position, still)
+    z = loop.controller.init(loop.plant.output(jnp.zeros(()), x), target)
+    flat_x, plant_state = ravel_pytree(x)
+    flat_z, law_state = ravel_pytree(z)
+    axes, inputs = position.shape[0], loop.plant.inputs()
+    sizes = (flat_x.size, flat_z.size, inputs, axes, 2 * axes)
+    return Parts(loop, target, plant_state, law_state, sizes), {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
+
+
+def _without_dead_zones(loop: ClosedLoop) -> ClosedLoop:
+    """Same loop with thrusters that turn at any voltage: inside a dead zone nothing has a slope."""
+    named = lambda path: getattr(path[-1], "name", "") == "dead_zone"
+    return jax.tree_util.tree_map_with_path(lambda path, leaf: jnp.zeros_like(leaf) if named(path) else leaf, loop)
+
+
+@eqx.filter_jit
+def _evaluated(parts: Parts, point: tuple[Array, ...], dt: Array):
+    whole, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
+
+    def both(vector):
+        values = _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt)
+        return values, values
+
+    slopes, values = jax.jacfwd(both, has_aux=True)(whole)
+    return values, slopes
+
+
+def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array]:
+    """What follows from states, input, load and noise."""
+    (plant, law), zero = (parts.loop.plant, parts.loop.controller), jnp.zeros(())
+    x, z, r = parts.plant_state(flat_x), parts.law_state(flat_z), parts.target
+    calm = plant.no_load()
+    pushed = calm._replace(acceleration=calm.acceleration + load)
+    truth, axes = plant.output(zero, x), load.shape[0]
+    y = truth._replace(position=truth.position + noise[:axes], velocity=truth.velocity + noise[axes:])
+    command, telemetry = law.command(z, y, r)
+    values = {
+        "plant": ravel_pytree(plant.dynamics(zero, x, u, pushed))[0],
+        "law": ravel_pytree(law.advance(z, y, r, u, dt))[0],
+        "u": command,
+        "position": truth.position,
+        "error": law.model.difference(r.position, truth.position),
+        "estimate": telemetry.estimate,
+        "robust": telemetry.robust,
+        "modelling_error": telemetry.modelling_error,
+        "uncertainty": law.model.seen(truth, plant.acceleration(zero, x, u, pushed)) - law.known(z, truth, u),
+    }
+    if isinstance(law, AbstractContinuousController):
+        values["flow"] = ravel_pytree(law.flow(z, y, r, u))[0]
+    return values
