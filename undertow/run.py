@@ -25,7 +25,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.scenario import execute
 from undertow.scenario.fitting import check_fit, check_times
-from undertow.scenario.labelling import label
+from undertow.scenario.labelling import certificate_of, label
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.schema import Initial, Loop, Window, complaint
 from undertow.sensors.perfect import perfect
@@ -50,6 +50,11 @@ class Run:
     metrics: dict[str, dict[str, Any] | None]
     status: Status
     outcome: Outcome
+
+    @property
+    def certificate(self) -> dict[str, Any] | None:
+        """Lyapunov function in numbers, and for how long each hypothesis of the proof held; None without a proof."""
+        return certificate_of(self.dataset)
 
     def plot(self) -> "dict[str, Figure]":
         """Figures of the run, by name."""
@@ -139,7 +144,8 @@ def simulate(
         raise BadInput(name, error.must, error.got, hint=error.hint) from error.__cause__
     outcome = execute.run_loop(closed_loop, settings, start, seed)
     attributes = {"title": "a closed loop run by undertow", "seed": seed}
-    return _run(outcome, *label(closed_loop, outcome, window.of_run(settings.duration), attributes))
+    steady = window.of_run(settings.duration)
+    return _run(outcome, *label(closed_loop, outcome, steady, settings.dt, attributes))
 
 
 def simulate_scenario(scenario: str | Path | Mapping[str, Any]) -> Run:

@@ -9,13 +9,13 @@ from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import next_free, results_folder
 from undertow.cli.stages import Stages
-from undertow.cli.tables import metrics_table, wide_console
+from undertow.cli.tables import certificate_table, metrics_table, wide_console
 from undertow.core.status import Status
 from undertow.report.figures import run_figures
 from undertow.report.figures import save as save_figure
 from undertow.scenario.build import build
 from undertow.scenario.execute import Executed, execute, save
-from undertow.scenario.labelling import metrics_text
+from undertow.scenario.labelling import certificate_of, metrics_text
 from undertow.scenario.reading import dump, read
 from undertow.scenario.repetition import Repetition, compare
 
@@ -33,6 +33,9 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool) -> int:
             _write(executed, staging)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
     console.print(metrics_table(executed.steady, executed.whole, executed.built.window()))
+    certificate = certificate_of(executed.dataset)
+    if certificate is not None:
+        console.print(certificate_table(certificate, executed.built.window()))
     console.print(f"Status: {executed.status.word}. Results: {folder}", highlight=False, soft_wrap=True)
     codes = [_judge_ending(executed)] + ([_judge(repetition, console)] if repetition else [])
     return max(codes)

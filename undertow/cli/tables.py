@@ -21,10 +21,57 @@ def metrics_table(steady: dict[str, Any] | None, whole: dict[str, Any], window: 
     return table
 
 
+def certificate_table(certificate: dict[str, Any], window: tuple[float, float]) -> Table:
+    """For which share of the time each hypothesis of the stability proof held, and when it first did not."""
+    table = Table(title="Certificate: hypotheses of the stability proof", title_justify="left", title_style="bold")
+    table.add_column("hypothesis")
+    table.add_column(f"{window[0]:g} to {window[1]:g} s", justify="right")
+    table.add_column("whole run", justify="right")
+    table.add_column("first fails at", justify="right")
+    for one in certificate["hypotheses"]:
+        if one["whole"] is None:
+            table.add_row(one["sentence"], "-", "-", one["unknown"])
+            continue
+        first = "never" if one["first_failure"] is None else f"{one['first_failure']:.4g} s"
+        table.add_row(one["sentence"], _share(one["steady"]), _share(one["whole"]), first)
+    table.caption, table.caption_justify = "\n".join(_consequences(certificate)), "left"
+    return table
+
+
+def _consequences(certificate: dict[str, Any]) -> list[str]:
+    """What the proof is about, in numbers."""
+    rising = certificate["rising"]
+    said = [
+        f"{certificate['function']}: {_number(certificate['start'])} at the start, {_number(certificate['end'])} at "
+        f"the end; rises at {_share(rising['whole'])} of the steps, {_share(rising['steady'])} of the steady ones."
+    ]
+    if certificate.get("decay") is not None:
+        said.append(
+            f"Mean 1/2 E^T Q E of the steady window: {_number(certificate['decay'])}; tanh for sign (Remark 5) allows "
+            f"{_number(certificate['residual'])} to stay."
+        )
+    if "estimation_within" in certificate:
+        kept = certificate["estimation_within"]
+        said.append(
+            f"|d_hat - d| within what the largest recorded |d_dot| allows (up to "
+            f"{_number(max(certificate['estimation_bound']))}): {_share(kept['steady'])} of the steady window."
+        )
+    return said
+
+
 def wide_console() -> Console:
     """Console on stdout; in a pipe lines are long enough for every table."""
     console = Console(soft_wrap=False)
     return console if console.is_terminal else Console(width=160)
+
+
+def _share(value: float | None) -> str:
+    """In percent, 100 and 0 only where they are exact."""
+    if value is None:
+        return "-"
+    if 0 < value < 1:
+        return f"{min(max(100 * value, 0.1), 99.9):.1f} %"
+    return f"{100 * value:.0f} %"
 
 
 def _number(value: float) -> str:

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.books import COLUMNS, share_at_bound, share_given, tracking_books
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
@@ -98,6 +99,7 @@ class RCAF(AbstractContinuousController):
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
         u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
         wanted = -self.model.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
+        u = self.model.invert(y, wanted)
         telemetry = Telemetry(
             estimate=d_hat,
             robust=u_r,
@@ -105,8 +107,13 @@ class RCAF(AbstractContinuousController):
             predicted_position=z.predicted_position,
             predicted_velocity=z.predicted_velocity,
             weights=z.weights,
+            books=tracking_books(off, self.lyapunov(), self.weight)
+            | {
+                "weights_at_bound": share_at_bound(z.weights, self.weights_bound),
+                "attained_share": share_given(wanted, matvec(self.model.gain(y), u)),
+            },
         )
-        return self.model.invert(y, wanted), telemetry
+        return u, telemetry
 
     def flow(self, z: RCAFState, y: Measurement, r: Target, u_applied) -> RCAFState:
         """Identification model, Eq. (32), and composite adaptive law, Eq. (44)."""
@@ -125,6 +132,9 @@ class RCAF(AbstractContinuousController):
     def project(self, z: RCAFState) -> RCAFState:
         """Weights back inside their box: |d_hat| stays below `weights_bound`, and no weight drifts away."""
         return z._replace(weights=jnp.clip(z.weights, -self._box(), self._box()))
+
+    def columns(self):
+        return COLUMNS
 
     def lyapunov(self) -> Float[Array, "*n 2 2"]:
         """P of Eq. (21)."""

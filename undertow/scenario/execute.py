@@ -50,7 +50,8 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
         "scenario_hash": text_hash(text),
         "seed": scenario.seed,
     }
-    return Executed(built, outcome, *label(built.closed_loop, outcome, built.window(), attributes))
+    finished = label(built.closed_loop, outcome, built.window(), scenario.loop.dt, attributes)
+    return Executed(built, outcome, *finished)
 
 
 def run_loop(loop: ClosedLoop, settings: Loop, start: Initial, seed: int) -> Outcome:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+from undertow.analysis.certificate import certify
 from undertow.analysis.metrics import measure
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
@@ -24,13 +25,16 @@ class Labelled(NamedTuple):
     dataset: xr.Dataset
 
 
-def label(loop: ClosedLoop, outcome: Outcome, window: tuple[float, float], attributes: dict[str, Any]) -> Labelled:
+def label(
+    loop: ClosedLoop, outcome: Outcome, window: tuple[float, float], dt: float, attributes: dict[str, Any]
+) -> Labelled:
     """Measure a run and write down what it was.
 
     Args:
         loop: what was run.
         outcome: how it went.
         window: start and stop of the steady metrics, s.
+        dt: sampling time, s.
         attributes: of the dataset, beside status, metrics, versions and content hash.
     """
     status, ended, rules = Status(int(outcome.status)), float(outcome.ended), _rules(loop)
@@ -38,6 +42,10 @@ def label(loop: ClosedLoop, outcome: Outcome, window: tuple[float, float], attri
     dataset = to_dataset(outcome, loop.plant, loop.controller)
     over = lambda start, stop: measure(outcome, start, stop) | closure(dataset, start, stop) | rules
     steady, whole = over(*window) if covered else None, over(0.0, ended)
+    certified = certify(dataset, loop.controller, window, dt)
+    if certified is not None:
+        dataset = dataset.assign(certified.signals)
+        dataset.attrs["certificate"] = to_json(certified.summary)
     dataset.attrs |= attributes | versions()
     dataset.attrs |= {"metrics": to_json({"steady": steady, "whole": whole}), "content_hash": content_hash(dataset)}
     return Labelled(status, steady, whole, dataset)
@@ -46,7 +54,13 @@ def label(loop: ClosedLoop, outcome: Outcome, window: tuple[float, float], attri
 def metrics_text(dataset: xr.Dataset) -> str:
     """Contents of metrics.json for a run."""
     ending = {"status": dataset.attrs["status"], "ended": dataset.attrs["ended"]}
-    return to_json(ending | json.loads(dataset.attrs["metrics"]), indent=2) + "\n"
+    found = ending | json.loads(dataset.attrs["metrics"]) | {"certificate": certificate_of(dataset)}
+    return to_json(found, indent=2) + "\n"
+
+
+def certificate_of(dataset: xr.Dataset) -> dict[str, Any] | None:
+    """Certificate of a run as it stands in its attributes; None for a law without one, and in older files."""
+    return json.loads(dataset.attrs["certificate"]) if "certificate" in dataset.attrs else None
 
 
 def to_json(value: Any, indent: int | None = None) -> str:

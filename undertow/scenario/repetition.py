@@ -19,7 +19,7 @@ class Repetition(NamedTuple):
 def compare(path: Path, repeated: xr.Dataset) -> Repetition:
     """Compare a run with the result file at `path`, whose scenario it followed."""
     with xr.open_dataset(path, engine="netcdf4") as earlier:
-        before, actual = dict(earlier.attrs), content_hash(earlier)
+        before, actual, held = dict(earlier.attrs), content_hash(earlier), set(map(str, earlier.variables))
     stated = str(before.get("content_hash"))
     if actual != stated:
         return Repetition(
@@ -27,7 +27,13 @@ def compare(path: Path, repeated: xr.Dataset) -> Repetition:
         )
     if stated == repeated.attrs["content_hash"]:
         return Repetition(True, True, f"{path.name} was repeated bit for bit (content hash {stated[:12]})")
+    added = sorted({str(name) for name in repeated.variables} - held)
+    if added and stated == content_hash(repeated.drop_vars(added)):
+        sentence = f"{path.name} was repeated bit for bit in all that it holds; new since then: {', '.join(added)}"
+        return Repetition(True, True, sentence)
     differing = _differences(before, repeated.attrs)
+    if added:
+        differing = ", ".join(filter(None, [differing, f"one that did not record {', '.join(added)}"]))
     if differing:
         return Repetition(False, True, f"{path.name} was not repeated bit for bit; other versions: {differing}")
     hint = " Did its part file change?" if ".py:" in str(before.get("scenario")) else ""

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.books import share_given
 from undertow.numerics.box_quadratic import box_minimum
 from undertow.numerics.linear import matvec
 
@@ -37,10 +38,7 @@ def allocate(
 
 def attained(effect: Float[Array, "n m"], wanted: Float[Array, " m"], given: Float[Array, " m"]) -> Float[Array, ""]:
     """Share of the acceleration of the wanted forces that other forces give, along its direction; at most 1."""
-    demand = matvec(effect, wanted)
-    size = (demand**2).sum()
-    share = (demand * matvec(effect, given)).sum() / jnp.where(size > 0, size, 1.0)
-    return jnp.where(size > 0, jnp.clip(share, 0.0, 1.0), 1.0)
+    return share_given(matvec(effect, wanted), matvec(effect, given))
 
 
 def _programme(effect, forces, low, high, direction) -> Float[Array, " m"]:

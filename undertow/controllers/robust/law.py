@@ -5,10 +5,11 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.books import COLUMNS, share_at_bound, tracking_books
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
-from undertow.controllers.tracking_error import check_gains, tracking
+from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
 from undertow.core.param import param
@@ -34,7 +35,7 @@ class Plan(NamedTuple):
 
     drive: Any
     seen: Estimate
-    filtered: PerAxis  # s, the filtered tracking error
+    off: Tracking  # from the target, smoothed if there is a filter
     robust: PerAxis  # u_r
     forces: Float[Array, " m"]  # that would give what is wanted
 
@@ -94,7 +95,11 @@ class RobustRCAF(AbstractController):
             predicted_position=y.position,
             predicted_velocity=z.estimator.rates,
             weights=z.estimator.weights,
-            books={"attained_share": attained(effect, plan.forces, forces)},
+            books=tracking_books(plan.off, self.lyapunov(), self.weight)
+            | {
+                "weights_at_bound": share_at_bound(z.estimator.weights, self.estimator.bound),
+                "attained_share": attained(effect, plan.forces, forces),
+            },
         )
         return u, telemetry
 
@@ -103,7 +108,7 @@ class RobustRCAF(AbstractController):
         # While limits bind, the reference waits, and the tracking error says nothing about d.
         going = drive.aim(plan.drive, u_applied, self.actuator_rate)
         share = attained(self.model.effect(y), plan.forces, going)
-        learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.filtered)
+        learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
         known = self._known(plan.drive, y, u_applied)
         return RobustState(
             estimator=self.estimator.advance(z.estimator, plan.seen, known, learnt, dt),
@@ -115,7 +120,7 @@ class RobustRCAF(AbstractController):
         return self._known(self.model.drive().heard(z.drive, y.actuator), y, u_applied)
 
     def columns(self):
-        return {"attained_share": ("share of the wanted acceleration that the actuators can give", "1")}
+        return COLUMNS
 
     def lyapunov(self) -> Float[Array, "*n 2 2"]:
         """P of Eq. (21)."""
@@ -132,4 +137,4 @@ class RobustRCAF(AbstractController):
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
         seen = self.estimator.look(z.estimator, model.rates(y))
         demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - model.drift(y)
-        return Plan(drive, seen, off.filtered, u_r, model.spread(y, demand))
+        return Plan(drive, seen, off, u_r, model.spread(y, demand))

@@ -5,6 +5,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from undertow.report.figures import signals, style
+from undertow.report.figures.certificate import certificate
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
 from undertow.report.figures.uncertainty import settled
@@ -14,7 +15,10 @@ _RUNAWAY = 1e2
 
 
 def run_figures(run: xr.Dataset) -> dict[str, Figure]:
-    """Tracking, error, estimate and effort of one run, by these names; with a sensor that errs, `measurement` too."""
+    """Tracking, error, estimate and effort of one run, by these names.
+
+    With a law that has one, `certificate` too; with a sensor that errs, `measurement`.
+    """
     outputs, columns = signals.axis_names(run), _columns(run.sizes["axis"])
     inputs = [f"input {number}" for number in run["input"].values]
     wanted = signals.curve(run, "wanted $x_d$", "target", style.TRUTH)
@@ -47,6 +51,8 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
             _columns(run.sizes["input"]),
         ),
     }
+    if "lyapunov" in run:
+        figures["certificate"] = certificate(run, _titled(run, "Certificate"))
     if (run["measured_position"] == run["position"]).all() and (run["measured_velocity"] == run["velocity"]).all():
         return figures
     return figures | {"measurement": small_multiples(_titled(run, "Measurement error"), outputs, _apart(run), columns)}

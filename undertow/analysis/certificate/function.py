@@ -1,0 +1,76 @@
+"""The Lyapunov function of the law that ran, from what was recorded: Eq. (46), and section X4 of the theory.
+
+theta* = d(t) 1: the basis sums to one, so these weights are exact at every instant (U6 of the theory). While d moves
+they move, and the function may rise.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from undertow.controllers.law import RCAF
+from undertow.controllers.robust.estimator import Estimator
+from undertow.controllers.robust.law import RobustRCAF
+
+PerRecord = np.ndarray  # (time,)
+
+
+class Lyapunov(NamedTuple):
+    """V along a run, m^2/s^2 and rad^2/s^2, summed over axes."""
+
+    meaning: str
+    value: PerRecord
+    estimation: PerRecord  # what eps and theta contribute; the rest is the tracking error's
+
+
+def of_paper(law: RCAF, run: xr.Dataset) -> Lyapunov:
+    """V_f = 1/2 E^T P E + gamma_eps/2 eps^2 + |theta - theta*|^2 / (2 gamma), Eq. (46). No gamma, no third part."""
+    adaptation = np.broadcast_to(law.adaptation, run.sizes["axis"])
+    per_weight = np.divide(1.0, adaptation, out=np.zeros(adaptation.shape), where=adaptation > 0)
+    own = np.asarray(law.composite) * run["modelling_error"].values ** 2 + per_weight * _departure(run)
+    estimation = own.sum(-1) / 2
+    return Lyapunov("V_f of Eq. (46)", run["lyapunov_tracking"].values + estimation, estimation)
+
+
+def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
+    """The estimator's own function, V_eps, and V_f = 1/2 E^T P E + gamma_eps V_eps where mu = 1 / gamma_eps > 0.
+
+    V_eps is eps^2/2 + |theta - theta*|^2 / (2 gamma gamma_eps) of section X4 in discrete time: see `gramian`.
+    """
+    matrix = gramian(law.estimator, dt, run.sizes["axis"])
+    d_til = run["estimate"].values - run["uncertainty"].values
+    eps, rho = run["modelling_error"].values, float(law.estimator.fuzzy.gathering())
+    per_axis = matrix[:, 0, 0] * eps**2 + 2 * matrix[:, 0, 1] * eps * d_til + matrix[:, 1, 1] * rho * _departure(run)
+    share = np.broadcast_to(law.tracking_share, eps.shape[1:])
+    if not (share > 0).all():
+        value = per_axis.sum(-1)
+        return Lyapunov("V_eps of the estimator alone (mu = 0)", value, value)
+    estimation = (per_axis / share).sum(-1)
+    return Lyapunov("V_f of Eq. (46), gamma_eps = 1/mu", run["lyapunov_tracking"].values + estimation, estimation)
+
+
+def transition(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
+    """Matrix of (eps, d_hat - d) from one tick to the next, per axis, for constant d and basis: poles at exp(p T)."""
+    of_rates, of_estimate = (np.broadcast_to(gain, axes) for gain in estimator.gains(np.asarray(dt)))
+    one = np.ones(axes)
+    return np.stack([np.stack([1 - of_rates, dt * one], -1), np.stack([-of_estimate, one], -1)], -2)
+
+
+def gramian(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
+    """W per axis with l_1 sum of eps^2 over this and all later ticks = x^T W x, x = (eps, d_hat - d), l_1 = 1 - A_11.
+
+    So x^T W x falls by exactly l_1 eps^2 per tick, at any sampling time. For short ones W comes to
+    diag(1, 1 / (gamma gamma_eps |xi|^2)) / 2.
+    """
+    step = transition(estimator, dt, axes)
+    start = np.zeros((2, 2))
+    start[0, 0] = 1.0
+    kept = np.einsum("nji,nlk->nikjl", step, step).reshape(axes, 4, 4)  # vec(A^T W A) = kept vec(W)
+    fall = (1 - step[:, 0, 0])[:, None] * start.ravel()
+    return np.linalg.solve(np.eye(4) - kept, fall[..., None]).reshape(axes, 2, 2)
+
+
+def _departure(run: xr.Dataset) -> np.ndarray:
+    """|theta - d 1|^2, (time, axis)."""
+    return ((run["weights"].values - run["uncertainty"].values[..., None]) ** 2).sum(-1)

@@ -1,0 +1,79 @@
+"""What the proof of the theorem asks for, held against a recorded run: Eqs. (33), (38), (41), (43), U6 and U7."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import numpy as np
+import xarray as xr
+
+from undertow.analysis.certificate.set_point import minimax_weight
+from undertow.controllers.law import RCAF
+from undertow.controllers.robust.law import RobustRCAF
+from undertow.core.contracts import AbstractModel, Measurement
+
+# Smaller departures are rounding: shares, or m/s^2 and rad/s^2.
+_ROUNDING = 1e-9
+
+
+class Hypothesis(NamedTuple):
+    """One thing that the proof takes for granted; per record whether it held, None where no record tells."""
+
+    name: str
+    sentence: str
+    held: np.ndarray | None  # (time,)
+    unknown: str = ""  # why no record tells
+
+
+def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterator[Hypothesis]:
+    """What both laws need; `bound` is theta_max of each axis, (n,)."""
+    d = run["uncertainty"].values
+    told = [(run[f"measured_{name}"] == run[name]).values.all(-1) for name in ("position", "velocity")]
+    yield Hypothesis("limits", "no input is at its limit", (run["saturated"].values == 0).all(-1))
+    full = run["attained_share"].values >= 1 - _ROUNDING
+    yield Hypothesis("demand", "the command gives the whole wanted acceleration (sigma = 0)", full)
+    unknown = "G depends on what actuators report"
+    yield Hypothesis("rank", "G has full rank: every axis can be accelerated", _full_rank(law.model, run), unknown)
+    yield Hypothesis("measurement", "the measurement is the truth", told[0] & told[1])
+    yield Hypothesis("weights", "no weight is at its bound (projection idle)", run["weights_at_bound"].values == 0)
+    yield Hypothesis("box", "|d| is inside the box of the weights", (np.abs(d) <= bound).all(-1))
+    yield Hypothesis("constant", "d is constant: theta* = d does not move", _constant(d))
+
+
+def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
+    """The two amplitudes: omega is what no constant theta* explains, at best half the range of d."""
+    omega = np.abs(minimax_weight(run) - run["uncertainty"].values)
+    whole = (run["saturated"].values == 0).all(-1) & (run["attained_share"].values >= 1 - _ROUNDING)
+    sentence = "w_bar >= |omega + sigma|, Eq. (43), with sigma = 0 (else it is not recorded)"
+    yield Hypothesis("robust_gain", sentence, whole & (omega <= np.asarray(law.robust_gain)).all(-1))
+    amplitude = np.asarray(law.identification.compensation_gain)
+    yield Hypothesis("compensation_gain", "omega_bar >= |omega|, Eq. (33)", (omega <= amplitude).all(-1))
+
+
+def of_robust() -> Iterator[Hypothesis]:
+    """What bounds the estimation error where d moves."""
+    yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records")
+
+
+def _constant(d: np.ndarray) -> np.ndarray:
+    """Whether d is at each record what it was at the one before."""
+    still = (np.abs(np.diff(d, axis=0)) <= _ROUNDING * np.maximum(np.abs(d).max(axis=0), 1.0)).all(-1)
+    return np.concatenate([still[:1], still]) if len(still) else np.ones(len(d), bool)
+
+
+def _full_rank(model: AbstractModel, run: xr.Dataset) -> np.ndarray | None:
+    """Whether G had as many independent columns as there are axes, where the controller believed to be."""
+    try:
+        gains = _gains(model, run["measured_position"].values, run["measured_velocity"].values)
+    except (AttributeError, TypeError):  # of a model that asks what the actuators report
+        return None
+    gains = np.asarray(gains)
+    if (gains == gains[0]).all():
+        gains = gains[:1]
+    return np.broadcast_to(np.linalg.matrix_rank(gains) == gains.shape[1], run.sizes["time"])
+
+
+@eqx.filter_jit
+def _gains(model: AbstractModel, position, velocity):
+    return jax.vmap(lambda x, v: model.gain(Measurement(x, v)))(position, velocity)

@@ -1,0 +1,134 @@
+"""Certificate of a run: its Lyapunov function, how fast it moves, the weights, and when limits or projection acted."""
+
+import json
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, NullLocator
+
+from undertow.report.figures import style
+from undertow.report.figures.limits import fit_linear, fit_log
+
+# Narrower than the others, so that it is read without scrolling where a page is narrow.
+_WIDTH, _LEFT, _RIGHT, _TOP, _TALL, _GAP, _FOOT = 7.2, 0.66, 0.14, 0.66, 1.5, 0.42, 0.45
+
+# Colour, opacity, and the height as shares of a panel: one as a background, one as a strip along the bottom.
+_SPANS = {
+    "input at a limit": ("#e07b00", 0.22, 1.0),
+    "weight at its bound (projection)": ("#009e73", 0.7, 0.07),
+}
+
+# Decades of dV/dt that are shown on either side of zero.
+_DECADES = 4
+
+
+def certificate(run: xr.Dataset, title: str) -> Figure:
+    """V and its parts, dV/dt, the largest weight with its bound. Spans are shaded where something was at a limit."""
+    lived = run.isel(time=run["time"].values <= run.attrs.get("ended", np.inf))
+    time, seen = lived["time"].values, lambda name: lived[name].values
+    figure = style.blank(_WIDTH, _TOP + 3 * _TALL + 2 * _GAP + _FOOT)
+    _head(figure, title)
+    panels = [
+        style.place(figure, _LEFT, _TOP + row * (_TALL + _GAP), _WIDTH - _LEFT - _RIGHT, _TALL) for row in range(3)
+    ]
+    value, rate = seen("lyapunov"), seen("lyapunov_rate")
+    parts = [
+        ("V", value, style.SOLID),
+        ("tracking part", seen("lyapunov_tracking"), style.DASHED),
+        ("estimation part", seen("lyapunov_estimation"), style.TRUTH),
+    ]
+    if np.array_equal(value, seen("lyapunov_estimation")):  # then tracking stands beside V, and is no part of it
+        parts = [("V of the estimator", value, style.SOLID), ("tracking, beside it", *parts[1][1:])]
+    _draw(panels[0], time, parts)
+    fit_log(panels[0], [(name, time, values) for name, values, _ in parts], 0.0)
+    style.label(panels[0], "", "V, m$^2$/s$^2$", "Lyapunov function")
+    _draw(panels[1], time, [("dV/dt", rate, style.SOLID)], key=False)
+    _fit_rate(panels[1], rate)
+    style.label(panels[1], "", "dV/dt, m$^2$/s$^3$", "its rate: above zero it rises")
+    weights = [("largest |$\\theta$|", seen("weights_peak"), style.SOLID)]
+    bound = _bound(run)
+    if np.isfinite(bound):
+        weights.append(("bound", np.full(len(time), bound), style.TRUTH))
+    _draw(panels[2], time, weights)
+    fit_linear(panels[2], [(name, time, values) for name, values, _ in weights], 0.0)
+    style.label(panels[2], "time, s", "|$\\theta$|, m/s$^2$", "weights")
+    acting = dict(zip(_SPANS, (seen("saturated").max(-1) > 0, seen("weights_at_bound") > 0), strict=True))
+    for panel in panels:
+        for name, now in acting.items():
+            _shade(panel, time, now, name)
+        if len(time) > 1:
+            panel.set_xlim(time[0], time[-1])
+    return figure
+
+
+def _head(figure: Figure, title: str) -> None:
+    style.head(figure, title, {})
+    patches = [
+        Patch(facecolor=colour, alpha=alpha, linewidth=0, label=name) for name, (colour, alpha, _) in _SPANS.items()
+    ]
+    figure.legend(
+        handles=patches,
+        loc="upper right",
+        bbox_to_anchor=(0.995, 1.0),
+        ncols=len(patches),
+        fontsize=style.TEXT,
+        frameon=False,
+    )
+
+
+def _draw(panel: Axes, time: np.ndarray, curves, key: bool = True) -> None:
+    for name, values, look in curves:
+        shown = np.where(np.isfinite(values), values, np.nan)
+        panel.plot(
+            time, shown, color=look.colour, linestyle=look.dashes, linewidth=look.width, zorder=look.order, label=name
+        )
+    if key:
+        panel.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            ncols=len(curves),
+            fontsize=style.SMALL,
+            frameon=False,
+            borderaxespad=0.0,
+            handlelength=2.6,
+        )
+
+
+def _fit_rate(panel: Axes, rate: np.ndarray) -> None:
+    """Both signs over decades, linear about zero."""
+    panel.axhline(0.0, color=style.INK, linewidth=0.8)
+    sizes = np.abs(rate[np.isfinite(rate)])
+    if not sizes.any():
+        return
+    top = 10.0 ** np.floor(np.log10(sizes.max()))
+    panel.set_yscale("symlog", linthresh=top / 10**_DECADES, linscale=0.5)
+    panel.yaxis.set_major_locator(FixedLocator([-top, -top / 100, 0.0, top / 100, top]))
+    panel.yaxis.set_minor_locator(NullLocator())
+
+
+def _shade(panel: Axes, time: np.ndarray, now: np.ndarray, name: str) -> None:
+    """Spans over all records at which something acted, each as long as until the next record."""
+    if not now.any():
+        return
+    colour, alpha, height = _SPANS[name]
+    until = np.append(time[1:], time[-1])
+    panel.fill_between(
+        np.ravel(np.column_stack([time, until])),
+        0.0,
+        height,
+        where=np.repeat(now, 2),
+        transform=panel.get_xaxis_transform(),
+        facecolor=colour,
+        alpha=alpha,
+        linewidth=0,
+        zorder=0,
+    )
+
+
+def _bound(run: xr.Dataset) -> float:
+    """Largest theta_max of any axis; infinite where there is none."""
+    bounds = json.loads(run.attrs["certificate"])["weights_bound"]
+    return max(np.inf if bound is None else bound for bound in bounds)
