@@ -54,7 +54,7 @@ def certify(
         elif isinstance(controller, RobustRCAF):
             bound = np.broadcast_to(controller.estimator.bound, axes)
             function, numbers = of_robust(controller, run, dt), _robust_numbers(controller, lived, window, dt)
-            asked = [*hypotheses.of_any(controller, bound, lived), *hypotheses.of_robust()]
+            asked = [*hypotheses.of_any(controller, bound, lived), *hypotheses.of_robust(controller, lived)]
         else:
             return None
         rate = _rate(function.value, run["time"].values)
@@ -113,7 +113,7 @@ def _robust_numbers(law: RobustRCAF, run: xr.Dataset, window: tuple[float, float
     """Estimation error allowed by the largest |d_dot| from record to record, and how often it was kept."""
     rate = bounds.fastest(run)
     allowed = bounds.estimation_error(law.estimator, dt, rate)
-    kept = (np.abs(run["estimate"].values - run["uncertainty"].values) <= allowed).all(-1)
+    kept = (np.abs(run["estimate"].values - run["uncertainty"].values) <= allowed + hypotheses.ROUNDING).all(-1)
     return {
         "uncertainty_rate": rate.tolist(),
         "estimation_bound": allowed.tolist(),

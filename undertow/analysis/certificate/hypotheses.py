@@ -14,7 +14,10 @@ from undertow.controllers.robust.law import RobustRCAF
 from undertow.core.contracts import AbstractModel, Measurement
 
 # Smaller departures are rounding: shares, or m/s^2 and rad/s^2.
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
+
+# |xi(eps)|^2 divides the steps of the robust law's weights; its function takes it for |xi(0)|^2.
+_SAME_BASIS = 0.01
 
 
 class Hypothesis(NamedTuple):
@@ -31,7 +34,7 @@ def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterat
     d = run["uncertainty"].values
     told = [(run[f"measured_{name}"] == run[name]).values.all(-1) for name in ("position", "velocity")]
     yield Hypothesis("limits", "no input is at its limit", (run["saturated"].values == 0).all(-1))
-    full = run["attained_share"].values >= 1 - _ROUNDING
+    full = run["attained_share"].values >= 1 - ROUNDING
     yield Hypothesis("demand", "the command gives the whole wanted acceleration (sigma = 0)", full)
     unknown = "G depends on what actuators report"
     yield Hypothesis("rank", "G has full rank: every axis can be accelerated", _full_rank(law.model, run), unknown)
@@ -44,21 +47,25 @@ def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterat
 def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """The two amplitudes: omega is what no constant theta* explains, at best half the range of d."""
     omega = np.abs(minimax_weight(run) - run["uncertainty"].values)
-    whole = (run["saturated"].values == 0).all(-1) & (run["attained_share"].values >= 1 - _ROUNDING)
+    whole = (run["saturated"].values == 0).all(-1) & (run["attained_share"].values >= 1 - ROUNDING)
     sentence = "w_bar >= |omega + sigma|, Eq. (43), with sigma = 0 (else it is not recorded)"
     yield Hypothesis("robust_gain", sentence, whole & (omega <= np.asarray(law.robust_gain)).all(-1))
     amplitude = np.asarray(law.identification.compensation_gain)
     yield Hypothesis("compensation_gain", "omega_bar >= |omega|, Eq. (33)", (omega <= amplitude).all(-1))
 
 
-def of_robust() -> Iterator[Hypothesis]:
-    """What bounds the estimation error where d moves."""
+def of_robust(law: RobustRCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
+    """What the discrete function asks of the basis, and what bounds the estimation error where d moves."""
+    fuzzy, eps = law.estimator.fuzzy, run["modelling_error"].values
+    rho = (np.asarray(fuzzy.basis(eps.reshape(-1, 1))) ** 2).sum(-1).reshape(eps.shape)
+    still = (np.abs(rho / float(fuzzy.gathering()) - 1) <= _SAME_BASIS).all(-1)
+    yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", still)
     yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records")
 
 
 def _constant(d: np.ndarray) -> np.ndarray:
     """Whether d is at each record what it was at the one before."""
-    still = (np.abs(np.diff(d, axis=0)) <= _ROUNDING * np.maximum(np.abs(d).max(axis=0), 1.0)).all(-1)
+    still = (np.abs(np.diff(d, axis=0)) <= ROUNDING * np.maximum(np.abs(d).max(axis=0), 1.0)).all(-1)
     return np.concatenate([still[:1], still]) if len(still) else np.ones(len(d), bool)
 
 
