@@ -51,6 +51,17 @@ def scenario(
     } | changes
 
 
+# The paper's law as fast as a T200 allows: the gains of examples/bluerov2_heavy.yaml.
+HAND_TUNED: dict[str, Any] = {
+    "feedback": [[4, 7], [4, 7], [4, 7], [20, 13], [20, 13], [20, 13]],
+    "pole": [4, 4, 4, 3, 3, 3],
+    "adaptation": [0.15, 0.15, 0.15, 0.05, 0.05, 0.05],
+    "composite": [150, 150, 150, 200, 200, 200],
+    "robust_gain": 0.1,
+    "compensation_gain": 0,
+    "weights_bound": 40,
+}
+
 # Six independent axes x_ddot = u + d: what rung `ideal` amounts to for a law whose model is exact.
 SIX_AXES = {
     "plant": {"kind": "double_integrator", "axes": 6},

@@ -1,0 +1,51 @@
+"""The textbook's linear extended-state observer with state feedback (ADRC, or a PI observer): no fuzzy sets."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.param import param
+from undertow.numerics.linear import matvec
+
+
+class ObserverState(NamedTuple):
+    """What is believed: velocity (m/s, rad/s) and disturbance (m/s^2, rad/s^2)."""
+
+    rates: Float[Array, " n"]
+    estimate: Float[Array, " n"]
+
+
+class LinearObserver(AbstractController):
+    """v_hat_dot = F + G u + d_hat - pole eps, d_hat_dot = -stiffness eps, by Euler's method as the paper's law is."""
+
+    model: AbstractModel
+    pole: Float[Array, ""] = param("1/s", "correction of the velocity, beta_1")
+    stiffness: Float[Array, ""] = param("1/s^2", "correction of d_hat, beta_2")
+    feedback: Float[Array, "2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
+
+    def init(self, y: Measurement, r: Target) -> ObserverState:
+        rates = self.model.rates(y)
+        return ObserverState(rates, jnp.zeros_like(rates))
+
+    def command(self, z: ObserverState, y: Measurement, r: Target):
+        model = self.model
+        velocity, acceleration = model.wanted(y, r)
+        demand = acceleration + self.feedback[0] * model.error(y, r) + self.feedback[1] * (velocity - model.rates(y))
+        telemetry = Telemetry(
+            estimate=z.estimate,
+            robust=jnp.zeros_like(demand),
+            modelling_error=z.rates - model.rates(y),
+            predicted_position=y.position,
+            predicted_velocity=z.rates,
+            weights=z.estimate[:, None],
+        )
+        return model.invert(y, demand - z.estimate - model.drift(y)), telemetry
+
+    def advance(self, z: ObserverState, y: Measurement, r: Target, u_applied, dt) -> ObserverState:
+        eps = z.rates - self.model.rates(y)
+        known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)
+        return ObserverState(
+            z.rates + dt * (known + z.estimate - self.pole * eps), z.estimate - dt * self.stiffness * eps
+        )
