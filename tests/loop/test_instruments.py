@@ -210,15 +210,20 @@ def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
     np.testing.assert_allclose(before_correction, expected, rtol=1e-6)
 
 
-def test_propeller_speed_and_its_rate():
-    """A propeller that speeds up steadily: speed as read, rate from two readings."""
+@pytest.mark.parametrize("rate", [jnp.zeros(2), None], ids=["with its rate", "alone"])
+def test_propeller_speed_and_its_rate(rate):
+    """A propeller that speeds up steadily: speed as read, rate from two readings where thrusters report one."""
 
     def motion(t):
-        return Measurement(jnp.zeros(6), jnp.zeros(6), PropellerReport(jnp.array([3.0, -2.0]) * t, jnp.zeros(2)))
+        return Measurement(jnp.zeros(6), jnp.zeros(6), PropellerReport(jnp.array([3.0, -2.0]) * t, rate))
 
     parts = [imu(**QUIET_IMU), propeller_speed(noise=0)]
     told, truth = observe(navigation(parts), motion, 100, 0.01, jax.random.PRNGKey(0))
     np.testing.assert_allclose(told.actuator.speed, truth.actuator.speed, atol=1e-12)
+    if rate is None:
+        assert told.actuator.acceleration is None
+    else:
+        np.testing.assert_allclose(told.actuator.acceleration[2:], np.array([[3.0, -2.0]] * 98), rtol=1e-9)
 
 
 def test_the_same_key_gives_the_same_bits():

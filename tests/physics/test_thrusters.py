@@ -148,11 +148,22 @@ def test_dead_zone_of_real_thrusters(make, rung):
     assert outside[0] < 0 < outside[1]
 
 
-@pytest.mark.parametrize("thruster", [t200("static"), t200("shaft"), linear_voltage(), first_order(), axial_flow()])
-def test_a_speed_sensor_is_refused_where_it_tells_too_little(thruster):
+@pytest.mark.parametrize("thruster", [t200("static"), linear_voltage(), first_order(), axial_flow()])
+def test_a_speed_sensor_is_refused_where_there_is_no_speed(thruster):
     assert thruster.report(thruster.initial_state(2)) is None
     with pytest.raises(BadInput, match="`speed_sensor` must be false"):
         thruster.speed_term(None)
+
+
+def test_a_speed_without_its_rate_is_not_enough_for_the_speed_term():
+    """Eq. (15) wants Om_dot, which without inductance depends on the voltage that Eq. (23) asks for."""
+    thruster = t200("shaft")
+    state = thruster.initial_state(2)._replace(speed=np.array([3.0, -5.0]))
+    report = thruster.report(state)
+    np.testing.assert_array_equal(report.speed, [3.0, -5.0])
+    assert report.acceleration is None
+    with pytest.raises(BadInput, match="`speed_sensor` must be false on rung `shaft`"):
+        thruster.speed_term(report)
 
 
 # ------------------------------------------------------------------------------------------ order of integration

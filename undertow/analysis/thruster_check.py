@@ -38,7 +38,7 @@ def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
     ]
     for name, values in (("powers", powers), ("report", report)):
         if isinstance(values, Powers | PropellerReport):
-            wrong += [finding for value in values for finding in shaped(name, value, each)]
+            wrong += [finding for value in values if value is not None for finding in shaped(name, value, each)]
     if wrong:
         yield from wrong
         return

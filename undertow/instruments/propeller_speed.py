@@ -15,15 +15,17 @@ class PropellerSpeed(AbstractInstrument):
 
     def reading(self, motion: Motion):
         if motion.actuator is None:
-            hint = "Take rung: electromechanical, the only one on which it is reported, or leave propeller_speed out"
+            hint = "Take rung: shaft or electromechanical, on which it is reported, or leave propeller_speed out"
             raise BadInput("propeller_speed", "have propellers that turn", "thrusters without a speed", hint=hint)
         return motion.actuator.speed
 
     def correct(self, estimate: Estimate, reading) -> Estimate:
         before = estimate.actuator.speed
         speed = before + self.blend * (reading - before)
-        acceleration = (speed - before) / self.sampling.period
-        return estimate._replace(actuator=estimate.actuator._replace(speed=speed, acceleration=acceleration))
+        told = estimate.actuator._replace(speed=speed)
+        if told.acceleration is not None:
+            told = told._replace(acceleration=(speed - before) / self.sampling.period)
+        return estimate._replace(actuator=told)
 
 
 def propeller_speed(

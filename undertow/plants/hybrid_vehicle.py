@@ -168,8 +168,9 @@ class HybridVehicle(AbstractPlant):
             raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{told.inputs()}")
         if regularisation is not None:
             checks.positive("regularisation", regularisation)
-        if speed_sensor:  # thrusters without a speed to measure complain here, not in the loop
-            self.thruster.speed_term(self.thruster.report(self.thruster.initial_state(self.inputs())))
+        still = self.thruster.report(self.thruster.initial_state(self.inputs()))
+        if speed_sensor and still is None:  # thrusters without a speed to measure complain here, not in the loop
+            self.thruster.speed_term(still)
         alpha = jnp.broadcast_to(self.thruster.voltage_gain(), (self.inputs(),))
         return HybridModel(
             body=told.body,

@@ -10,7 +10,7 @@ from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.motor_drive import MotorDrive
-from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
+from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
 
 
 class ShaftState(NamedTuple):
@@ -47,8 +47,9 @@ class ShaftThruster(AbstractThruster):
     def stored(self, state) -> PerThruster:
         return self.motor.rotor_energy(state.speed)
 
-    def report(self, state) -> None:
-        return None
+    def report(self, state) -> PropellerReport:
+        """Speed alone: its rate follows from the voltage that the answer to this is used to find."""
+        return PropellerReport(state.speed, None)
 
     def voltage_gain(self):
         return self.motor.voltage_gain
@@ -59,7 +60,7 @@ class ShaftThruster(AbstractThruster):
             "be false on rung `shaft`",
             "true",
             hint="There Om_dot depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1. "
-            "Use rung: electromechanical, where it is a state",
+            "Use preset: robust, which needs the speed only, or rung: electromechanical, where Om_dot follows from states",
         )
 
     def drive(self, count: int, measured: bool) -> MotorDrive:

@@ -13,10 +13,10 @@ PerThruster = Float[Array, " N"]
 
 
 class PropellerReport(NamedTuple):
-    """What a propeller-speed sensor tells: speed (rad/s) and its rate (rad/s^2)."""
+    """What a propeller-speed sensor tells: speed (rad/s) and its rate (rad/s^2; None where states do not give it)."""
 
     speed: PerThruster
-    acceleration: PerThruster
+    acceleration: PerThruster | None
 
 
 class Powers(NamedTuple):

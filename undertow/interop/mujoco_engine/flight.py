@@ -13,7 +13,7 @@ from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.interop.mujoco_engine.propellers import Propellers
 from undertow.interop.mujoco_engine.submerged import Submerged
-from undertow.thrusters.thruster import AbstractThruster
+from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 
 
 class Flight(NamedTuple):
@@ -66,7 +66,7 @@ def fly(
     z, rows, ticks, status = None, [], round(duration / dt), Status.OK
     for tick in range(ticks + 1):
         t = tick * dt
-        y, r = _measured(body), wanted(jnp.asarray(t))
+        y, r = _measured(body, propellers), wanted(jnp.asarray(t))
         z = controller.init(y, r) if z is None else z
         volts, _ = command(z, y, r)
         applied = propellers.admissible(np.asarray(volts))
@@ -82,5 +82,6 @@ def fly(
     return Flight(*map(np.array, zip(*rows, strict=True)), status=status)
 
 
-def _measured(body: Submerged) -> Measurement:
-    return Measurement(jnp.asarray(body.position()), jnp.asarray(body.velocity()))
+def _measured(body: Submerged, propellers: Propellers) -> Measurement:
+    turning = PropellerReport(jnp.asarray(propellers.speed), None)
+    return Measurement(jnp.asarray(body.position()), jnp.asarray(body.velocity()), turning)
