@@ -71,6 +71,30 @@ def simulate(
     return simulate(scenario, out, overwrite)
 
 
+@app.command()
+def tune(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME-tuned, or the next.")
+    ] = None,
+    method: Annotated[
+        str, typer.Option(metavar="METHOD", help="gradient, or search: without slopes, for what is not smooth.")
+    ] = "gradient",
+    budget: Annotated[float, typer.Option(metavar="SECONDS", help="Time to take, all told.")] = 240.0,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with a tuning that was interrupted.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")] = False,
+) -> int:
+    """Find the gains of a controller.
+
+    Runs the loop with many gains on a training set of seeds, sizes of the disturbance and published parameter sets;
+    judges the best on other runs, and never gives gains without a certificate of stability. Writes tuned.yaml, which
+    `undertow simulate` takes, tuning.json and figures/. The section `tune` of the scenario says more.
+    """
+    from undertow.cli.tune import tune_scenario
+
+    return tune_scenario(scenario, out, method, budget, resume, overwrite)
+
+
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,

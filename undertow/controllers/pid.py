@@ -164,8 +164,8 @@ def pid(
         for name, value in (("frequency", frequency), ("damping", damping)):
             checks.positive(name, value)
         checks.not_negative("integral_share", integral_share)
-        w = jnp.asarray(frequency, dtype=float)
-        proportional, integral, derivative = w**2, integral_share * w**3, 2 * damping * w
+        w, zeta, share = (jnp.asarray(value, dtype=float) for value in (frequency, damping, integral_share))
+        proportional, integral, derivative = w**2, share * w**3, 2 * zeta * w
     else:
         checks.per_axis("gains", gains, len(model.angles), (3,))
         proportional, integral, derivative = jnp.moveaxis(jnp.asarray(gains, dtype=float), -1, 0)

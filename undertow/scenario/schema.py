@@ -76,6 +76,45 @@ class Window(_Strict):
         return start, duration if self.stop is None else self.stop
 
 
+class Tries(_Strict):
+    """Runs that gains are tried on: every parameter set with every seed."""
+
+    seeds: int = Field(2, ge=1, le=1000, description="number of seeds")
+    sizes: Numbers = Field([0.6, 1.2], description="of the disturbance, in turn with the seeds; 1 as it is")
+    sets: list[str] | None = Field(None, description="true parameter sets of the vehicle; every second unless given")
+
+
+class Weights(_Strict):
+    """What a run costs, without unit: errors by their scales, inputs as a share of their limit."""
+
+    tracking: float = Field(1.0, ge=0, description="of the rms of the error")
+    effort: float = Field(0.1, ge=0, description="of the rms of the input")
+    variation: float = Field(0.05, ge=0, description="of the total variation of the input per second")
+    failure: float = Field(100.0, ge=0, description="of the share of the time that a failed run did not last")
+
+
+class Tune(_Strict):
+    """What `undertow tune` does with this scenario; other commands do not look at it."""
+
+    parameters: dict[str, Numbers] = Field(
+        default_factory=dict, description="options of the controller: [low, high]; its main gains unless given"
+    )
+    per: Literal["group", "axis", "all"] = Field(
+        "group", description="gains for translation and rotation of a vehicle, for each axis, or one for all"
+    )
+    duration: float | None = Field(None, gt=0, le=1e5, description="s, of every run; 20 or less unless given")
+    start: float | None = Field(None, ge=0, description="s, from when on it counts; the second half unless given")
+    position_scale: float = Field(0.05, gt=0, description="error that costs one, m")
+    angle_scale: float = Field(0.05, gt=0, description="error that costs one, rad")
+    iterations: int = Field(100, ge=1, le=100_000, description="at most")
+    train: Tries = Field(default_factory=Tries, description="runs that the gains are found on")
+    held_out: Tries = Field(
+        default_factory=lambda: Tries.model_validate({"seeds": 4}),
+        description="other runs that they are judged by; 4 seeds unless given",
+    )
+    weights: Weights = Field(default_factory=Weights, description="of the cost")
+
+
 class Scenario(_Strict):
     """One closed loop, start to finish."""
 
@@ -91,6 +130,7 @@ class Scenario(_Strict):
     loop: Loop = Field(default_factory=Loop, description="how it is run")
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")
     steady: Window = Field(default_factory=Window, description="window of the steady metrics")
+    tune: Tune = Field(default_factory=Tune, description="what `undertow tune` does with it")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="of everything random")
     precision: Literal["float64", "float32"] = Field("float64", description="of all arithmetic")
 
@@ -176,6 +216,7 @@ def _type_name(annotation: Any) -> str:
         Numbers: "list of numbers",
         Numbers | None: "list of numbers",
         float | None: "number",
+        list[str] | None: "list of names",
         typing.get_args(OneOrMore)[0]: "part or list of parts",
     }
     return words.get(annotation, "mapping")

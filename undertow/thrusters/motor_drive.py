@@ -90,7 +90,7 @@ class MotorDrive(AbstractDrive):
 
     def steady(self) -> SteadyDrive:
         thruster = self.thruster
-        return SteadyDrive(StaticThruster(thruster.motor, thruster.supply, thruster.dead_zone))
+        return SteadyDrive(StaticThruster(motor=thruster.motor, supply=thruster.supply, dead_zone=thruster.dead_zone))
 
     def _boost(self, rate) -> PerThruster:
         """By itself the current comes at R / L; where that is too slow, more voltage makes it faster, ohm."""

@@ -1,0 +1,138 @@
+"""`undertow tune`: gains found by running the loop, certified, and judged on runs that they were not found on."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from undertow.cli.exit_codes import DONE
+from undertow.cli.interruptible import interruptible
+from undertow.cli.results_folder import next_free, results_folder
+from undertow.cli.tables import wide_console
+from undertow.core import checks
+from undertow.report.figures import save as save_figure
+from undertow.report.figures.tuning import tuning_figure
+from undertow.scenario.labelling import to_json
+from undertow.scenario.reading import read
+from undertow.studies.tuning.answer import as_data, as_scenario
+from undertow.studies.tuning.objective import Step
+from undertow.studies.tuning.tune import METHODS, Tuned, tune
+
+_WRITTEN = ("tuned.yaml", "tuning.json", "figures")
+_JOURNAL = "tuning.jsonl"
+
+
+def tune_scenario(scenario: Path, out: Path | None, method: str, budget: float, resume: bool, overwrite: bool) -> int:
+    """Exit code of a tuning whose results went to `out`, or to a folder under runs/ that was free."""
+    checks.choice("--method", method, METHODS)
+    checks.positive("--budget", budget, "s")
+    console = wide_console()
+    text = read(scenario)
+    folder = _folder(scenario, resume) if out is None else out
+    with results_folder(folder, _WRITTEN, "tuning.json", overwrite) as staging, _kept(folder, resume) as journal:
+        with _live(console, budget) as (say, watch):
+            run = lambda: tune(text, journal, method=method, budget=budget, resume=resume, say=say, watch=watch)
+            found = interruptible(run)
+        _write(found, staging)
+    journal.unlink()
+    console.print(_table(found))
+    for line in _sentences(found):
+        console.print(line, highlight=False, soft_wrap=True)
+    console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
+    return DONE
+
+
+def _folder(scenario: Path, resume: bool) -> Path:
+    """Where a new tuning goes; where the last unfinished one is."""
+    first = Path("runs") / f"{scenario.stem}-tuned"
+    if not resume:
+        return next_free(first)
+    begun = [path.parent for path in Path("runs").glob(f"{first.name}*/{_JOURNAL}")]
+    return max(begun, key=lambda path: (path / _JOURNAL).stat().st_mtime, default=first)
+
+
+@contextlib.contextmanager
+def _kept(folder: Path, resume: bool) -> Iterator[Path]:
+    """The journal, which stays when a tuning is interrupted, and only then."""
+    existed = folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    journal = folder / _JOURNAL
+    before = journal.exists()
+    try:
+        yield journal
+    except KeyboardInterrupt:
+        typer.echo(f"Interrupted. `undertow tune ... --out {folder} --resume` goes on.", err=True)
+        raise
+    except BaseException:
+        if not before:
+            journal.unlink(missing_ok=True)
+            if not existed:
+                with contextlib.suppress(OSError):
+                    folder.rmdir()
+        raise
+
+
+@contextlib.contextmanager
+def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], None], Callable[[Step, int], None]]]:
+    """What is being done, the best cost so far, and how much of the budget is left."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[left]}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
+        task = live.add_task("reading", total=budget, left="")
+
+        def say(stage: str) -> None:
+            live.update(task, description=stage)
+            if not console.is_terminal:
+                console.print(stage, markup=False, highlight=False)
+
+        def watch(best: Step, evaluations: int) -> None:
+            left = max(0.0, budget - best.elapsed)
+            line = f"{evaluations} runs of gains, best cost {best.cost:.4g}, spectral radius {best.radius:.5f}"
+            live.update(task, description=line, completed=best.elapsed, left=f"{left:.0f} s left at most")
+            if not console.is_terminal:
+                console.print(line, markup=False, highlight=False)
+
+        yield say, watch
+
+
+def _write(found: Tuned, folder: Path) -> None:
+    (folder / "tuned.yaml").write_text(as_scenario(found), encoding="utf-8")
+    (folder / "tuning.json").write_text(to_json(as_data(found), indent=2) + "\n", encoding="utf-8")
+    (folder / "figures").mkdir()
+    save_figure(tuning_figure(as_data(found)), folder / "figures", "tuning")
+
+
+def _table(found: Tuned) -> Table:
+    table = Table(title="Cost, mean over runs", title_justify="left", title_style="bold")
+    for column in ("gains", "training", "held out", "tracking", "effort", "variation", "lost", "spectral radius"):
+        table.add_column(column, justify="left" if column == "gains" else "right")
+    for one in found.judged:
+        parts = [f"{float(part.mean()):.4g}" for part in one.held_out]
+        table.add_row(
+            one.name, f"{one.train_cost:.4g}", f"{one.held_out_cost:.4g}", *parts, f"{one.certificate.worst:.5f}"
+        )
+    return table
+
+
+def _sentences(found: Tuned) -> list[str]:
+    given, _, tuned = found.judged
+    options = ", ".join(f"{name} {_short(value)}" for name, value in (tuned.options or {}).items())
+    ending = "ended by itself" if found.finished else "ended by its budget"
+    return [
+        f"Tuned: {options}",
+        f"Held-out cost {given.held_out_cost / tuned.held_out_cost:.3g} times smaller than with the given gains; "
+        f"{found.evaluations} gains tried, {found.refused} refused for want of a certificate; "
+        f"{found.elapsed:.0f} s, {ending}.",
+    ]
+
+
+def _short(value: Any) -> str:
+    """Gains of axes that share them, once."""
+    if not isinstance(value, list):
+        return f"{value:g}"
+    rows = [_short(entry) if isinstance(entry, list) else f"{entry:g}" for entry in value]
+    return rows[0] if len(set(rows)) == 1 else f"({', '.join(rows)})"

@@ -1,0 +1,70 @@
+"""Stability of tuned gains, by the spectrum of the exactly linearised loop: on every true plant of the training."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.linearised import margins
+from undertow.analysis.linearised.rest import rest
+from undertow.analysis.linearised.surroundings import surroundings
+from undertow.core.contracts import AbstractController
+from undertow.studies.tuning.evaluation import Bench
+from undertow.studies.tuning.trials import Trials
+
+# Shares of the run's loads, by size, at which the loop is linearised: motors answer otherwise at every speed.
+_SHARES = (0.1, 0.5, 0.9)
+
+
+class Certificate(NamedTuple):
+    """Spectral radii of the closed loop from tick to tick, one per operating point."""
+
+    radii: tuple[float, ...]
+
+    @property
+    def worst(self) -> float:
+        """The largest; the loop is stable at every operating point if it is below 1."""
+        return max(self.radii)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every radius is below 1."""
+        return bool(self.worst < 1)
+
+
+class Certifier:
+    """Law -> certificate.
+
+    Args:
+        bench: the loop; the reference rests where it is at the middle of the runs.
+        trials: the true plants are those that appear there, each once.
+        first: law with which the operating points are looked for.
+    """
+
+    def __init__(self, bench: Bench, trials: Trials, first: AbstractController):
+        self._bench = bench
+        self._position = np.asarray(bench.loop.reference.at(jnp.asarray(bench.duration / 2)).position)
+        once = [trials.truths.index(name) for name in dict.fromkeys(trials.truths)]
+        self._plants = [_plant(trials, i) for i in once]
+        pairs = zip(self._plants, once, strict=True)
+        self._loads = [self._operating_loads(plant, trials.keys[i], first) for plant, i in pairs]
+
+    def __call__(self, law: AbstractController) -> Certificate:
+        """Certificate of a law."""
+        dt = self._bench.settings.dt
+        radii: list[float] = []
+        for plant, loads in zip(self._plants, self._loads, strict=True):
+            radii += margins.certify(self._bench.with_parts(plant, law), dt, self._position, loads)
+        return Certificate(tuple(radius if np.isfinite(radius) else float("inf") for radius in radii))
+
+    def _operating_loads(self, plant: Any, key: Any, law: AbstractController) -> np.ndarray:
+        loop, dt = self._bench.with_parts(plant, law), self._bench.settings.dt
+        at = rest(loop, dt, self._position, np.zeros_like(self._position))
+        around = surroundings(loop, at, key, round(self._bench.duration / dt), dt)
+        return around.operating_loads(_SHARES)
+
+
+def _plant(trials: Trials, number: int) -> Any:
+    return jax.tree.map(lambda leaf: leaf[number] if eqx.is_array(leaf) else leaf, trials.plants)

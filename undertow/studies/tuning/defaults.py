@@ -1,0 +1,91 @@
+"""What is tuned when nothing is said: the numbers that matter of each law, and where to begin."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from undertow.core.contracts import AbstractController
+
+Range = tuple[float, float]
+
+
+class Law(NamedTuple):
+    """How one law is tuned."""
+
+    ranges: Callable[[float], Mapping[str, Range]]  # of the sampling time, s
+    now: Mapping[str, Callable[[Any], Any]]  # value of an option in a law that has been made
+    instead: Mapping[str, tuple[str, ...]]  # option -> others that say the same and must be left out
+
+
+# One number for all axes.
+SHARED = ("actuator_rate", "direction")
+
+
+def _robust(dt: float) -> Mapping[str, Range]:
+    return {
+        "bandwidth": (0.3, 0.5 / dt),
+        "damping": (0.5, 3.0),
+        "tracking": (0.1, 0.25 / dt),
+        "actuator_rate": (1.0, 0.5 / dt),
+    }
+
+
+def _paper(dt: float) -> Mapping[str, Range]:
+    return {
+        "feedback[0]": (0.05, 100.0),
+        "feedback[1]": (0.2, 40.0),
+        "pole": (0.5, min(150.0, 0.8 / dt)),
+        "adaptation": (1e-3, 100.0),
+        "composite": (5.0, 1000.0),
+        "robust_gain": (1e-3, 10.0),
+    }
+
+
+def _pid(dt: float) -> Mapping[str, Range]:
+    return {"frequency": (0.1, 0.25 / dt), "damping": (0.3, 4.0), "integral_share": (0.01, 1.0)}
+
+
+_LAWS = {
+    ("rcaf", "robust"): Law(
+        ranges=_robust,
+        now={
+            "bandwidth": lambda law: law.estimator.bandwidth,
+            "damping": lambda law: law.estimator.damping,
+            "tracking": lambda law: jnp.sqrt(law.feedback[..., 0]),
+            "actuator_rate": lambda law: law.actuator_rate,
+        },
+        instead={"tracking": ("feedback",), "bandwidth": ("pole", "adaptation", "composite")},
+    ),
+    ("rcaf", "paper"): Law(
+        ranges=_paper,
+        now={
+            "feedback[0]": lambda law: law.feedback[..., 0],
+            "feedback[1]": lambda law: law.feedback[..., 1],
+            "pole": lambda law: law.identification.pole,
+            "adaptation": lambda law: law.adaptation,
+            "composite": lambda law: law.composite,
+            "robust_gain": lambda law: law.robust_gain,
+        },
+        instead={},
+    ),
+    ("pid", None): Law(
+        ranges=_pid,
+        now={
+            "frequency": lambda law: jnp.sqrt(law.proportional),
+            "damping": lambda law: law.derivative / (2 * jnp.sqrt(law.proportional)),
+            "integral_share": lambda law: law.integral / law.proportional**1.5,
+        },
+        instead={"frequency": ("gains",)},
+    ),
+}
+
+
+def law_of(kind: str, preset: str | None) -> Law:
+    """How a controller is tuned; nothing is known of one that is not ours."""
+    return _LAWS.get((kind, preset), Law(lambda dt: {}, {}, {}))
+
+
+def now(known: Law, law: AbstractController, option: str, given: Any) -> Any:
+    """What an option is in a law: as the law has it, else as it was given; None where neither says."""
+    return known.now[option](law) if option in known.now else given

@@ -1,0 +1,120 @@
+"""What is tuned: options of a controller, each between two bounds, on a logarithmic scale."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core.errors import BadInput
+
+Point = Float[Array, " k"]  # of the tuning: 0 at the lower bound of a dial, 1 at the upper
+
+_NAME = re.compile(r"(\w+)(?:\[(\d+)\])?")
+_WIDTHS = {"feedback": 2, "gains": 3}  # options of which an axis has several, and how many
+
+
+class Dial(NamedTuple):
+    """One number to be found, shared by a group of axes."""
+
+    option: str
+    entry: int | None  # of an option that has several numbers per axis, such as `feedback[0]`
+    axes: tuple[int, ...]  # () for an option that all axes share
+    low: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        """As in a scenario, with the axes that it is for."""
+        entry = "" if self.entry is None else f"[{self.entry}]"
+        return f"{self.option}{entry}" + (f" of axes {', '.join(str(a + 1) for a in self.axes)}" if self.axes else "")
+
+    def value(self, share: Any) -> Any:
+        """low at 0, high at 1, equal ratios for equal steps."""
+        return self.low * (self.high / self.low) ** share
+
+    def share(self, value: float) -> float:
+        """Where a value stands between the bounds; beyond them it is taken to the nearer one."""
+        inside = min(max(value, self.low), self.high)
+        return float(np.log(inside / self.low) / np.log(self.high / self.low))
+
+
+def dials(
+    ranges: Mapping[str, Sequence[float]], groups: Sequence[tuple[int, ...]], shared: Sequence[str] = ()
+) -> list[Dial]:
+    """A dial per option and group of axes; one for an option that all axes share.
+
+    Args:
+        ranges: low and high by option; `feedback[0]` for the first of several numbers per axis.
+        groups: axes that have their gains in common.
+        shared: options that are one number for all axes, whatever the groups.
+
+    Raises:
+        BadInput: not two bounds, not positive, or the wrong way round.
+    """
+    found = []
+    for name, bounds in ranges.items():
+        option, entry = _parsed(name)
+        low, high = _bounds(name, bounds)
+        for axes in [()] if option in shared else groups:
+            found.append(Dial(option, entry, axes, low, high))
+    return found
+
+
+def options(chosen: Sequence[Dial], point: Point, axes: int) -> dict[str, Array]:
+    """Options at a point; may be traced.
+
+    Args:
+        chosen: the dials, in the order of the point's entries.
+        point: shape (k,).
+        axes: n.
+    """
+    found: dict[str, Any] = {}
+    for share, dial in zip(point, chosen, strict=True):
+        value = dial.value(share)
+        if not dial.axes:
+            found[dial.option] = value
+            continue
+        shape = (axes,) if dial.entry is None else (axes, _WIDTHS[dial.option])
+        held = found.get(dial.option, jnp.zeros(shape))
+        place = (np.array(dial.axes),) if dial.entry is None else (np.array(dial.axes), dial.entry)
+        found[dial.option] = held.at[place].set(value)
+    return found
+
+
+def whole(chosen: Sequence[Dial], key: str = "tune.parameters") -> None:
+    """Whether every option is covered: all of several numbers per axis, or none.
+
+    Raises:
+        BadInput: some of them are missing.
+    """
+    for option, width in _WIDTHS.items():
+        entries = {dial.entry for dial in chosen if dial.option == option}
+        missing = [f"{option}[{i}]" for i in range(width) if i not in entries] if entries else []
+        if missing:
+            raise BadInput(key, f"name {', '.join(missing)}, too", f"without, beside {option}[{min(entries)}]")
+
+
+def _parsed(name: str) -> tuple[str, int | None]:
+    match = _NAME.fullmatch(name)
+    option, entry = match.groups() if match else (name, None)
+    width = _WIDTHS.get(option, 0)
+    if width == 0 and entry is not None:
+        raise BadInput(f"tune.parameters.{name}", f"be `{option}`, which is one number per axis")
+    if width and (entry is None or int(entry) >= width):
+        raise BadInput(f"tune.parameters.{name}", f"be one of {', '.join(f'{option}[{i}]' for i in range(width))}")
+    return option, None if entry is None else int(entry)
+
+
+def _bounds(name: str, bounds: Sequence[float]) -> tuple[float, float]:
+    key = f"tune.parameters.{name}"
+    if len(bounds) != 2:
+        raise BadInput(key, "be [low, high]", list(bounds))
+    low, high = bounds
+    if not 0 < low:
+        raise BadInput(key, "have a positive lower bound, for a logarithmic scale", low)
+    if not low < high:
+        raise BadInput(key, "be [low, high] with low < high", list(bounds))
+    return float(low), float(high)

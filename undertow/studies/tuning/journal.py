@@ -1,0 +1,95 @@
+"""Everything that was computed, on disk as soon as it is known: what an interrupted tuning goes on from.
+
+The methods are functions of what they are answered, so a tuning is resumed by asking again: the answers come from the
+journal as far as it goes. The result is the same as without the interruption, bit for bit.
+"""
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from undertow.core.errors import BadInput
+
+
+class OutOfTime(Exception):
+    """The budget does not allow for another question."""
+
+
+class Journal:
+    """Questions and answers, in order.
+
+    Args:
+        path: of the file, one answer per line; the first says what was tuned.
+        about: what is tuned; an earlier journal must be about the same.
+        budget: s, of all sessions together.
+        resume: whether to go on from what is there.
+        started: `time.perf_counter()` of the beginning, so that preparations count.
+
+    Raises:
+        BadInput: nothing to resume, or something else; an unfinished tuning in the way.
+    """
+
+    def __init__(self, path: Path, about: str, budget: float, resume: bool, started: float | None = None):
+        self._path, self._budget = path, budget
+        self._started = time.perf_counter() if started is None else started
+        self._known = _read(path, about, resume)
+        self._asked, self._spent = 0, self._known[-1]["elapsed"] if self._known else 0.0
+        self._longest: dict[str, float] = {}
+        if not self._known:
+            path.write_text(json.dumps({"about": about}) + "\n", encoding="utf-8")
+
+    @property
+    def elapsed(self) -> float:
+        """Time spent, of all sessions, s."""
+        if self._asked < len(self._known):
+            return self._known[self._asked]["elapsed"]
+        return self._spent + time.perf_counter() - self._started
+
+    def ask(self, what: str, at: np.ndarray, compute: Callable[[], Any], last: bool = False) -> Any:
+        """The answer, from the journal or computed and written down.
+
+        Args:
+            what: kind of question.
+            at: its arguments.
+            compute: gives the answer, as JSON holds it.
+            last: whether it must be answered even if time is up.
+
+        Raises:
+            OutOfTime: it would take longer than there is.
+        """
+        place = np.asarray(at, dtype=float).tolist()
+        if self._asked < len(self._known):
+            found = self._known[self._asked]
+            if (found["what"], found["at"]) != (what, place):
+                raise BadInput("--resume", "meet the same steps as before", f"other ones from {what} on")
+            self._asked += 1
+            return found["answer"]
+        begun = self.elapsed
+        if not last and begun + self._longest.get(what, 0.0) > self._budget:
+            raise OutOfTime
+        answer = compute()
+        self._longest[what] = self.elapsed - begun if what in self._longest else 0.0  # the first one is compiled
+        line = {"what": what, "at": place, "answer": answer, "elapsed": self.elapsed}
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
+        return answer
+
+
+def _read(path: Path, about: str, resume: bool) -> list[dict[str, Any]]:
+    if not path.exists():
+        if resume:
+            raise BadInput("--resume", "find an unfinished tuning", f"nothing in {path.parent}")
+        return []
+    if not resume:
+        hint = "Add --resume to go on with it, or choose another folder"
+        raise BadInput("--out", "be a folder without an unfinished tuning", str(path.parent), hint=hint)
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    entries = [json.loads(line) for line in lines if line.endswith("\n")]  # the last one may be torn
+    if not entries or entries[0].get("about") != about:
+        raise BadInput("--resume", "go on with the same scenario and method", "another one")
+    path.write_text("".join(line for line in lines if line.endswith("\n")), encoding="utf-8")
+    return entries[1:]

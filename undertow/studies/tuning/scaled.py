@@ -1,0 +1,36 @@
+"""A disturbance made larger or smaller as a whole."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import AbstractDisturbance, Factors, Load, Payload, Water
+from undertow.core.param import param
+
+
+class Scaled(AbstractDisturbance):
+    """`size` times a disturbance: loads and water in proportion, factors on the body as powers."""
+
+    inner: AbstractDisturbance
+    size: Float[Array, ""] = param("", "1 leaves the disturbance as it is")
+
+    def draw(self, key):
+        return self.inner.draw(key)
+
+    def at(self, path, t, place, calm: Load) -> Load:
+        whole, size = self.inner.at(path, t, place, calm), self.size
+        water, factors = whole.water, whole.factors
+        return Load(
+            acceleration=calm.acceleration + size * (whole.acceleration - calm.acceleration),
+            wrench=calm.wrench + size * (whole.wrench - calm.wrench),
+            water=water and Water(size * water.velocity, size * water.acceleration),
+            factors=factors and Factors(*(factor**size for factor in factors)),
+            payloads=tuple(Payload(size * each.mass, size * each.weight, each.point) for each in whole.payloads),
+        )
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return self.inner.jumps(duration)
+
+
+def scaled(inner: AbstractDisturbance, size) -> Scaled:
+    """A disturbance times a size, which may be traced."""
+    return Scaled(inner, jnp.asarray(size, dtype=float))
