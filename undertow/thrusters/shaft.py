@@ -60,7 +60,7 @@ class ShaftThruster(AbstractThruster):
             "be false on rung `shaft`",
             "true",
             hint="There Om_dot depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1. "
-            "Use preset: robust, which needs the speed only, or rung: electromechanical, where Om_dot follows from states",
+            "Use preset: robust, which needs the speed only, or rung: electromechanical, where states give Om_dot",
         )
 
     def drive(self, count: int, measured: bool) -> MotorDrive:
