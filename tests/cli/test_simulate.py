@@ -34,6 +34,11 @@ def test_files_of_a_run(ran, tmp_path):
         assert dataset.attrs["content_hash"] == content_hash(dataset)
         assert dataset.attrs["seed"] == 3
         assert {"version_jax", "machine", "scenario_hash", "metrics"} <= set(dataset.attrs)
+    certificate = metrics["certificate"]
+    limits = next(one for one in certificate["hypotheses"] if one["name"] == "limits")
+    assert limits["whole"] == limits["steady"] == 1.0 and limits["first_failure"] is None
+    assert "no input is at its limit" in ran.out and "V_f of Eq. (46): " in ran.out
+    assert (folder / "figures" / "certificate.svg").is_file()
     assert "tracking_rms" in ran.out and "Status: ok. Results: runs/s" in ran.out
     assert ran.err.startswith("Advice: torque constant / back-EMF constant is 117")
 
@@ -65,6 +70,32 @@ def test_changed_numbers_are_noticed(ran, undertow, tmp_path):
     assert said.code == 1
     line = "Error: changed.nc was changed after it was written: its numbers do not match its hash"
     assert said.err.splitlines()[-1] == line
+
+
+RECENT = ["lyapunov", "lyapunov_decay", "lyapunov_rate"]
+
+
+def as_before(tmp_path, change=lambda dataset: None):
+    """A result file of a version that did not record everything."""
+    with xr.open_dataset(tmp_path / "runs/s/run.nc") as dataset:
+        copy = dataset.load().drop_vars(RECENT)
+    change(copy)
+    copy.attrs["content_hash"] = content_hash(copy)
+    copy.to_netcdf(tmp_path / "before.nc", engine="netcdf4")
+
+
+def test_what_an_older_file_holds_is_repeated(ran, undertow, tmp_path):
+    as_before(tmp_path)
+    said = undertow("simulate", "before.nc", "--out", "again")
+    assert said.code == 0
+    assert f"before.nc was repeated bit for bit in all that it holds; new since then: {', '.join(RECENT)}." in said.out
+
+
+def test_an_older_file_that_differs_is_explained(ran, undertow, tmp_path):
+    as_before(tmp_path, lambda dataset: dataset["position"].values.__setitem__((3, 2), 1.0))
+    said = undertow("simulate", "before.nc", "--out", "again")
+    assert said.code == 0
+    assert f"before.nc was not repeated bit for bit; other versions: one without {', '.join(RECENT)}" in said.out
 
 
 def other_numbers(dataset):

@@ -33,7 +33,7 @@ def compare(path: Path, repeated: xr.Dataset) -> Repetition:
         return Repetition(True, True, sentence)
     differing = _differences(before, repeated.attrs)
     if added:
-        differing = ", ".join(filter(None, [differing, f"one that did not record {', '.join(added)}"]))
+        differing = ", ".join(filter(None, [differing, f"one without {', '.join(added)}"]))
     if differing:
         return Repetition(False, True, f"{path.name} was not repeated bit for bit; other versions: {differing}")
     hint = " Did its part file change?" if ".py:" in str(before.get("scenario")) else ""
