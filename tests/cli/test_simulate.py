@@ -72,32 +72,6 @@ def test_changed_numbers_are_noticed(ran, undertow, tmp_path):
     assert said.err.splitlines()[-1] == line
 
 
-RECENT = ["lyapunov", "lyapunov_decay", "lyapunov_rate"]
-
-
-def as_before(tmp_path, change=lambda dataset: None):
-    """A result file of a version that did not record everything."""
-    with xr.open_dataset(tmp_path / "runs/s/run.nc") as dataset:
-        copy = dataset.load().drop_vars(RECENT)
-    change(copy)
-    copy.attrs["content_hash"] = content_hash(copy)
-    copy.to_netcdf(tmp_path / "before.nc", engine="netcdf4")
-
-
-def test_what_an_older_file_holds_is_repeated(ran, undertow, tmp_path):
-    as_before(tmp_path)
-    said = undertow("simulate", "before.nc", "--out", "again")
-    assert said.code == 0
-    assert f"before.nc was repeated bit for bit in all that it holds; new since then: {', '.join(RECENT)}." in said.out
-
-
-def test_an_older_file_that_differs_is_explained(ran, undertow, tmp_path):
-    as_before(tmp_path, lambda dataset: dataset["position"].values.__setitem__((3, 2), 1.0))
-    said = undertow("simulate", "before.nc", "--out", "again")
-    assert said.code == 0
-    assert f"before.nc was not repeated bit for bit; other versions: one without {', '.join(RECENT)}" in said.out
-
-
 def other_numbers(dataset):
     dataset["position"].values[3, 2] = 1.0
     dataset.attrs["content_hash"] = content_hash(dataset)

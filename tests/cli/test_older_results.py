@@ -1,0 +1,47 @@
+"""Result files of a version that recorded fewer signals: repeated in all that they hold, or told why not."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from undertow.scenario.provenance import content_hash
+from undertow.scenario.repetition import compare
+
+
+def labelled(**columns):
+    run = xr.Dataset({name: ("time", values) for name, values in columns.items()}, coords={"time": [0.0, 1.0]})
+    return run.assign_attrs(content_hash=content_hash(run), scenario="", version_undertow="0.1.0")
+
+
+NOW = labelled(position=np.array([1.0, 2.0]), lyapunov=np.array([4.0, 3.0]), lyapunov_rate=np.array([np.nan, -1.0]))
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(run):
+        run.to_netcdf(tmp_path / "before.nc", engine="netcdf4")
+        return tmp_path / "before.nc"
+
+    return write
+
+
+def test_what_an_older_file_holds_is_repeated(written):
+    found = compare(written(labelled(position=np.array([1.0, 2.0]))), NOW)
+    assert found.equal
+    said = "before.nc was repeated bit for bit in all that it holds; new since then: lyapunov, lyapunov_rate"
+    assert found.sentence == said
+
+
+def test_an_older_file_that_differs_is_explained(written):
+    found = compare(written(labelled(position=np.array([1.0, 2.5]))), NOW)
+    assert not found.equal and found.explained
+    said = "before.nc was not repeated bit for bit; other versions: one without lyapunov, lyapunov_rate"
+    assert found.sentence == said
+
+
+def test_missing_rates_do_not_hide_a_difference(written):
+    """NaN at the first record: equal files are equal, others are not."""
+    assert compare(written(NOW), NOW).equal
+    other = labelled(position=np.array([1.0, 2.0]), lyapunov=np.array([4.0, 3.0]), lyapunov_rate=np.array([np.nan, -2]))
+    found = compare(written(other), NOW)
+    assert not found.equal and not found.explained
