@@ -170,15 +170,21 @@ def largest_sampling_time(law: RCAF, rule: str = "euler", axis: int = 0) -> floa
     return first_crossing(unstable, np.geomspace(1e-6, 1e2, 2001))
 
 
-def first_crossing(beyond: Callable[[float], bool], grid: np.ndarray) -> float:
-    """Where `beyond` first turns true along a rising grid, to rounding; 0 if from the start, infinite if nowhere."""
+def first_crossing(beyond: Callable[[float], bool], grid: np.ndarray, halvings: int = 60) -> float:
+    """Where `beyond` first turns true along a rising grid; 0 if from the start, infinite if nowhere.
+
+    Args:
+        beyond: of a value.
+        grid: rising.
+        halvings: of the step of the grid in which it turns; 60 come down to rounding.
+    """
     first = next((i for i, point in enumerate(grid) if beyond(point)), None)
     if first is None:
         return float("inf")
     if first == 0:
         return 0.0
     low, high = grid[first - 1], grid[first]
-    for _ in range(60):
+    for _ in range(halvings):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if beyond(middle) else (middle, high)
     return float(high)

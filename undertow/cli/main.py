@@ -95,6 +95,26 @@ def tune(
     return tune_scenario(scenario, out, method, budget, resume, overwrite)
 
 
+@app.command()
+def analyze(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the page. Default: runs/NAME-prediction, or the next free one."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier prediction in DIR.")] = False,
+) -> int:
+    """Predict a closed loop before it is run.
+
+    Linearises the whole loop exactly where it rests: poles over the operating range, how much sampling time, delay,
+    lag and noise it bears, error against frequency, what the actuators can hold. Writes prediction.html, prediction.json
+    and figures/.
+    """
+    from undertow.cli.analyze import analyze
+
+    return analyze(scenario, out, overwrite)
+
+
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,

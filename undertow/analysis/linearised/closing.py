@@ -63,7 +63,8 @@ def close_sampled(at: Rest, dt: float, delay: float = 0.0, lag: float = 0.0, gai
 
     u, u_noise = of_state("u"), slopes["u"]["noise"]
     matrix = np.zeros((states, states))
-    entries = {name: np.zeros((states, size)) for name, size in zip(ENTRIES, (load.shape[1], u_noise.shape[1], inputs))}
+    sizes = {"load": load.shape[1], "noise": u_noise.shape[1], "input": inputs}
+    entries = {name: np.zeros((states, size)) for name, size in sizes.items()}
     matrix[x, x], entries["load"][x] = step, loaded
     entries["input"][x] = early + late
     matrix[z] = of_state("law") + slopes["law"]["u"] @ u

@@ -9,13 +9,14 @@ from scipy.linalg import solve_discrete_lyapunov
 from undertow.analysis.linear import first_crossing
 from undertow.analysis.linearised.closing import LinearLoop, close_continuous, close_sampled
 from undertow.analysis.linearised.rest import Rest, rest
-from undertow.analysis.linearised.visible import visible
+from undertow.analysis.linearised.visible import multipliers, visible
 from undertow.loop.closed_loop import ClosedLoop
 
 # What control can reach, and what shows it: freedoms that no input moves are not the law's to stabilise.
 _REACHED_BY, _SHOWN_BY = ("input", "noise"), ("error", "u")
 
-_POINTS = 41  # of a search, before it is bisected
+_POINTS, _HALVINGS = 25, 12  # of a search: to a ten-thousandth of the value
+_FADING = 1 - 1e-9  # so that what rounding leaves of modes that nothing excites fades away
 _STABLE = 1 + 1e-9  # a spectral radius of one, and rounding
 
 
@@ -26,14 +27,14 @@ def closed(at: Rest, dt: float, kind: str = "sampled", **between: float) -> Line
 
 def poles(loop: LinearLoop) -> np.ndarray:
     """Poles that control can move, as rates in 1/s (logarithms over dt), the slowest first."""
-    values = np.linalg.eigvals(visible(loop, _REACHED_BY, _SHOWN_BY).matrix).astype(complex)
+    values = multipliers(loop, _REACHED_BY, _SHOWN_BY).astype(complex)
     rates = np.log(np.where(values == 0, 1e-300, values)) / loop.dt
     return rates[np.argsort(-rates.real, kind="stable")]
 
 
 def spectral_radius(loop: LinearLoop) -> float:
     """Largest absolute value of the poles that control can move, from tick to tick; below 1 it is stable."""
-    return float(np.abs(np.linalg.eigvals(visible(loop, _REACHED_BY, _SHOWN_BY).matrix)).max(initial=0.0))
+    return float(np.abs(multipliers(loop, _REACHED_BY, _SHOWN_BY)).max(initial=0.0))
 
 
 def largest_delay(at: Rest, dt: float, most: float) -> float:
@@ -47,21 +48,20 @@ def largest_lag(at: Rest, dt: float, most: float) -> float:
 
 
 def gain_range(at: Rest, dt: float, most: float = 100.0) -> tuple[float, float]:
-    """Factors on what the input does, below and above which the sampled loop is unstable; 1 / most and most at most."""
+    """Factors on what the input does, below and above which the sampled loop is unstable: 0 and infinite where none
+    from 1 / most to most is; 1 and 1 where it is unstable as it is."""
     above = _largest(lambda gain: close_sampled(at, dt, gain=gain), 1.0, most)
     below = _largest(lambda inverse: close_sampled(at, dt, gain=1 / inverse), 1.0, most)
-    return 1 / below if np.isfinite(below) else 0.0, above
+    return 1 / max(below, 1.0), max(above, 1.0)
 
 
-def largest_sampling_time(loop_at: Callable[[float], Rest], dt: float, most: float) -> float:
+def largest_sampling_time(at: Rest, dt: float, most: float) -> float:
     """Sampling time, s, at which the loop with these gains becomes unstable; infinite beyond `most`.
 
-    Args:
-        loop_at: the loop at rest with its slopes taken for a sampling time.
-        dt: present sampling time, s; the search starts well below it.
-        most: s.
+    Where a loop rests does not depend on its sampling time. The search starts well below dt, the present one.
     """
-    return _largest(lambda step: close_sampled(loop_at(step), step), dt / 20, most)
+    resampled = lambda step: at._replace(local=at.parts.differentiate(at.at, step))
+    return _largest(lambda step: close_sampled(resampled(step), step), dt / 20, most)
 
 
 def noise_gain(loop: LinearLoop, signal: str, deviations: np.ndarray) -> np.ndarray:
@@ -77,9 +77,9 @@ def noise_gain(loop: LinearLoop, signal: str, deviations: np.ndarray) -> np.ndar
     small = visible(loop, ("noise",), (signal,))
     entry = small.entries["noise"] * deviations
     direct = loop.direct[signal].get("noise", 0.0) * deviations
-    if np.abs(np.linalg.eigvals(small.matrix)).max(initial=0.0) >= 1:
+    if np.abs(multipliers(loop, ("noise",), (signal,))).max(initial=0.0) >= 1:
         return np.full(len(loop.signals[signal]), np.inf)
-    covariance = solve_discrete_lyapunov(small.matrix, entry @ entry.T)
+    covariance = solve_discrete_lyapunov(_FADING * small.matrix, entry @ entry.T)
     shown = small.signals[signal]
     return np.sqrt(np.einsum("ij,jk,ik->i", shown, covariance, shown) + (np.atleast_2d(direct) ** 2).sum(axis=1))
 
@@ -107,4 +107,4 @@ def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = 
 
 def _largest(closed_at: Callable[[float], LinearLoop], least: float, most: float) -> float:
     beyond = lambda value: spectral_radius(closed_at(value)) > _STABLE
-    return first_crossing(beyond, np.geomspace(least, most, _POINTS))
+    return first_crossing(beyond, np.geomspace(least, most, _POINTS), _HALVINGS)

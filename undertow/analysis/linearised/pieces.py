@@ -103,7 +103,7 @@ def _evaluated(parts: Parts, point: tuple[Array, ...], dt: Array):
     whole, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
 
     def both(vector):
-        values = _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt)
+        values = _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt=dt)
         return values, values
 
     slopes, values = jax.jacfwd(both, has_aux=True)(whole)

@@ -55,7 +55,9 @@ def rest(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Rest:
     at["u"] = np.asarray(_holding_input(model, y, jnp.asarray(at["load"])))
     first = parts.differentiate(at, dt)
     acting = _acting(first)
-    # The plant first, so that actuators turn; then the law for that plant; then both together.
+    # The plant first, so that actuators turn (with the input held, else the shortest way to rest is to switch them
+    # off); then the law for that plant; then both together.
+    at = _newton(parts, at, dt, acting, ("plant",))
     at = _newton(parts, at, dt, acting, ("plant", "u"))
     at = _newton(parts, at, dt, acting, ("law",))
     at = _newton(parts, at, dt, acting, ("plant", "law", "u"))
@@ -92,7 +94,7 @@ def _residual(local: Local, at: dict, dt: float, acting: np.ndarray, unknown: tu
     identity = {name: np.eye(len(at[name])) for name in ("law", "u")}
     blank = lambda name, by: 0 if name != by else identity[name]
     residual, rows = [], []
-    if "plant" in unknown:
+    if "plant" in unknown:  # at rest
         residual.append(values["plant"][acting])
         rows.append([slopes["plant"][by][acting] for by in unknown])
     if "law" in unknown:

@@ -1,0 +1,84 @@
+"""The metrics of a run, foretold: the linearised loop driven by what acts along the reference."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.linearised.closing import LinearLoop
+from undertow.analysis.linearised.rest import Rest
+from undertow.analysis.linearised.surroundings import Surroundings
+from undertow.analysis.linearised.visible import visible
+
+_ENTRIES = ("load", "noise")
+_SIGNALS = ("error", "estimate", "uncertainty", "modelling_error", "robust", "u")
+
+
+class Comparison(NamedTuple):
+    """One metric, foretold and found."""
+
+    name: str
+    predicted: float
+    measured: float
+
+    @property
+    def departure(self) -> float:
+        """Of the measured from the predicted, as a share of the predicted."""
+        return abs(self.measured - self.predicted) / self.predicted if self.predicted else float("inf")
+
+
+def forecast(
+    at: Rest, loop: LinearLoop, around: Surroundings, window: tuple[float, float], every: int = 1
+) -> dict[str, float]:
+    """Metrics over a window (s), by the names of results files.
+
+    Args:
+        at: the loop at rest under the mean load of the window.
+        loop: the same, closed.
+        around: what acts; the linearised loop starts at rest at its first instant.
+        window: start and stop, s.
+        every: ticks per record; metrics are those of the records, as in a run.
+    """
+    small = visible(loop, _ENTRIES, _SIGNALS)
+    entry = np.hstack([small.entries[name] for name in _ENTRIES])
+    driven = np.hstack([around.load - at.at["load"], around.noise])
+    states = np.asarray(_driven(*map(jnp.asarray, (small.matrix, entry, driven))))
+    hair = loop.dt / 2
+    recorded = np.arange(len(around.time)) % every == 0
+    inside = recorded & (around.time >= window[0] - hair) & (around.time <= window[1] + hair)
+    signals = {}
+    for name in _SIGNALS:
+        direct = np.hstack([_direct(loop, name, way) for way in _ENTRIES])
+        departure = states @ small.signals[name].T + driven @ direct.T
+        signals[name] = (at.local.values[name] + departure)[inside]
+    rms = lambda values: float(np.sqrt((values**2).mean()))
+    return {
+        "tracking_rms": rms(signals["error"]),
+        "tracking_max": float(np.abs(signals["error"]).max()),
+        "estimation_rms": rms(signals["estimate"] - signals["uncertainty"]),
+        "uncertainty_rms": rms(signals["uncertainty"]),
+        "model_rms": rms(signals["modelling_error"]),
+        "robust_rms": rms(signals["robust"]),
+        "voltage_rms": rms(signals["u"]),
+        "voltage_peak": float(np.abs(signals["u"]).max()),
+    }
+
+
+def compare(predicted: dict[str, float], measured: dict) -> list[Comparison]:
+    """Predicted metrics beside the measured ones of the same names."""
+    return [Comparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
+
+
+def _direct(loop: LinearLoop, signal: str, entry: str) -> np.ndarray:
+    return loop.direct[signal].get(entry, np.zeros((len(loop.signals[signal]), loop.entries[entry].shape[1])))
+
+
+@jax.jit
+def _driven(matrix, entry, driven):
+    """States at each tick, from rest."""
+
+    def step(state, w):
+        return matrix @ state + entry @ w, state
+
+    return jax.lax.scan(step, jnp.zeros(len(matrix)), driven)[1]

@@ -1,0 +1,99 @@
+"""Figures of `undertow analyze`: poles, errors against frequency, and what the actuators can give."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from undertow.report.figures import style
+from undertow.studies.prediction import Prediction
+
+_MARKS = ("o", "s", "^")
+_COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#7a5c00")
+_DASHES = ("-", (0, (4, 1.6)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (2, 1)), (0, (8, 2)))
+
+
+def prediction_figures(prediction: Prediction) -> dict[str, Figure]:
+    """By name: poles, frequency, actuators (where inputs have limits)."""
+    figures = {"poles": _poles(prediction), "frequency": _frequency(prediction)}
+    if np.isfinite(prediction.reach.high).any():
+        figures["actuators"] = _actuators(prediction)
+    return figures
+
+
+def _poles(prediction: Prediction) -> Figure:
+    figure = style.blank(9.6, 4.2)
+    style.head(figure, "Poles of the whole loop over its operating range", {})
+    panel = style.place(figure, 0.75, 0.55, 8.6, 3.1)
+    for point, mark, colour in zip(prediction.points, _MARKS, _COLOURS, strict=False):
+        poles: Any = point.poles
+        panel.plot(
+            poles.real,
+            poles.imag,
+            mark,
+            color=colour,
+            markerfacecolor="none",
+            markersize=5.5,
+            label=f"load larger than {point.share:.0%} of all",
+        )
+    panel.set_xscale("symlog", linthresh=1.0, linscale=0.5)
+    panel.set_yscale("symlog", linthresh=1.0, linscale=0.5)
+    right = max(1.0, *(float(np.real(point.poles).max(initial=0.0)) for point in prediction.points))
+    panel.set_xlim(right=1.3 * right)
+    panel.axvspan(0, 1.3 * right, color="#fbe3df", zorder=0)
+    panel.annotate(
+        "unstable",
+        (1.0, 1.0),
+        xycoords="axes fraction",
+        xytext=(-3, -3),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=style.SMALL,
+    )
+    panel.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
+    style.label(panel, "real part, 1/s", "imaginary part, rad/s")
+    return figure
+
+
+def _frequency(prediction: Prediction) -> Figure:
+    figure = style.blank(9.6, 3.7)
+    style.head(figure, "Answer to a disturbance, by its frequency", {})
+    error = _log(figure, 0.75)
+    missed = _log(figure, 5.55)
+    names = prediction.ground.built.closed_loop.plant.outputs
+    for i, name in enumerate(names):
+        look = {"color": _COLOURS[i % 6], "linestyle": _DASHES[i % 6], "linewidth": 1.2, "label": name}
+        error.plot(prediction.frequency, np.maximum(prediction.error[:, i], 1e-12), **look)
+        missed.plot(prediction.frequency, np.maximum(prediction.estimation[:, i], 1e-12), **look)
+    missed.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
+    error.legend(fontsize=style.SMALL, frameon=False, ncols=2, loc="lower center")
+    style.label(error, "frequency of d, rad/s", "|e| / |d|, s$^2$", "tracking error")
+    style.label(
+        missed, "frequency of d, rad/s", r"$|\hat{d} - d| \,/\, |d|$", "estimation error; above 1 worse than none"
+    )
+    return figure
+
+
+def _actuators(prediction: Prediction) -> Figure:
+    reach = prediction.reach
+    figure = style.blank(9.6, 2.9)
+    style.head(figure, "Largest force asked of each actuator, and what it can hold", {})
+    panel = style.place(figure, 0.75, 0.55, 8.6, 1.85)
+    number = np.arange(1, len(reach.demand) + 1)
+    panel.bar(number, reach.demand, width=0.5, color=style.SOLID.colour, label="asked for, at most")
+    for side, dashes, what in ((reach.high, "-", "forward limit"), (-reach.low, (0, (4, 1.6)), "reverse limit")):
+        panel.hlines(side, number - 0.38, number + 0.38, color=style.INK, linestyle=dashes, linewidth=1.4, label=what)
+    panel.set_xticks(number)
+    panel.set_ylim(0, 1.25 * max(reach.demand.max(), np.max(reach.high[np.isfinite(reach.high)])))
+    panel.legend(fontsize=style.SMALL, frameon=False, ncols=3, loc="upper center")
+    style.label(panel, "actuator", "force")
+    return figure
+
+
+def _log(figure: Figure, left: float) -> Axes:
+    panel = style.place(figure, left, 0.62, 3.8, 2.5)
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    return panel

@@ -1,0 +1,60 @@
+"""The page of `undertow analyze`: what will happen, before anything is run."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from undertow.report.figures.prediction import prediction_figures
+from undertow.report.figures.writing import save
+from undertow.report.formats import prose
+from undertow.report.page import bullets, document, figure, section, table, tag
+from undertow.report.prediction_tables import Rows, tables
+from undertow.studies.prediction import Prediction
+
+_CAPTIONS = {
+    "poles": "Poles that control can move, of the sampled loop as rates, motors and coupling included; both axes are "
+    "linear near zero and logarithmic beyond.",
+    "frequency": "Gains from a disturbance on one axis to the error on the same axis, under the mean load.",
+    "actuators": "Forces that the loads along the reference demand of each actuator, as if there were no limits.",
+}
+
+
+def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path) -> Path:
+    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    drawn = []
+    for name, one in prediction_figures(prediction).items():
+        vector, _ = save(one, folder / "figures", name)
+        said = _CAPTIONS[name]
+        drawn.append(figure(vector.read_text(encoding="utf-8"), name, said, said))
+    title = prediction.ground.built.scenario.description or "a closed loop"
+    doubts = [tag("h2", "Advice"), bullets([prose(sentence) for sentence in advice])] if advice else []
+    page = document(
+        f"Prediction: {title}",
+        tag("h1", "Before anything is run"),
+        tag("p", prose(title), class_="lead"),
+        *doubts,
+        *(_section(number, rows) for number, rows in enumerate(tables(prediction))),
+        section("drawn", "Figures", *drawn),
+        tag("p", prose(LEFT_OUT), class_="small"),
+    )
+    path = folder / "prediction.html"
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+LEFT_OUT = (
+    "Linearised about rest: limits, dead zones, pulses of speed controllers and large motions are left out, and a "
+    "moving reference counts as one at rest under the loads that moving brings. `undertow simulate` says what departs "
+    "by more than 10 %."
+)
+
+
+def _section(number: int, rows: Rows):
+    cells = [[prose(cell) for cell in row] for row in rows.rows]
+    head = [prose(cell) for cell in rows.head]
+    return section(
+        f"table-{number}", rows.title, tag("p", prose(rows.sentence)), table(head, cells, wide=len(rows.head) > 3)
+    )
