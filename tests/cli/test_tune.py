@@ -1,0 +1,82 @@
+"""`undertow tune`: result files, resuming, bad input."""
+
+import json
+
+import pytest
+from ruamel.yaml import YAML
+
+SCENARIO = """\
+plant: {kind: double_integrator, axes: 1, limit: 20}
+controller: {kind: pid, frequency: 2}
+reference: {kind: setpoint, position: [0]}
+disturbance: {kind: sinusoid, amplitude: 1}
+loop: {duration: 4, dt: 0.02, record: 0.1}
+tune: {parameters: {frequency: [0.5, 8]}, iterations: 3, train: {seeds: 1}, held_out: {seeds: 2}}
+"""
+
+
+def test_result_can_be_flown(undertow, tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    said = undertow("tune", "s.yaml", "--out", "out", "--budget", "600")
+    assert said.code == 0, said
+    assert "Held-out cost" in said.out
+    found = json.loads((tmp_path / "out" / "tuning.json").read_text())
+    costs = [step["cost"] for step in found["history"]]
+    assert costs == sorted(costs, reverse=True) and all(step["radius"] < 1 for step in found["history"])
+    given, tuned = found["gains"]["given"], found["gains"]["tuned"]
+    assert tuned["held_out_cost"] < given["held_out_cost"] and max(tuned["spectral_radii"]) < 1
+    assert len(tuned["held_out"]["tracking"]) == 2
+    text = (tmp_path / "out" / "tuned.yaml").read_text()
+    assert text.startswith("# Gains found by `undertow tune`") and "spectral radius" in text
+    assert YAML(typ="safe").load(text)["controller"]["frequency"] == tuned["options"]["frequency"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["figures", "tuned.yaml", "tuning.json"]
+    assert undertow("simulate", "out/tuned.yaml", "--out", "flown").code == 0
+    again = undertow("tune", "s.yaml", "--out", "out")
+    assert again.code == 2 and "earlier result" in again.err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "{frequency: [0.5, 8]}",
+            "{frequncy: [0.5, 8]}",
+            "`tune.parameters.frequncy` must be an option of the controller, but is unknown (s.yaml, line 6). "
+            "Did you mean `frequency`?",
+        ),
+        (
+            "[0.5, 8]",
+            "[8, 0.5]",
+            "`tune.parameters.frequency` must be [low, high] with low < high, but is [8.0, 0.5] (s.yaml, line 6)",
+        ),
+        (
+            "seeds: 1",
+            "sets: [wu2018]",
+            "`tune.train.sets` must be left out: there is but one parameter set, but is ['wu2018'] (s.yaml, line 6)",
+        ),
+        (
+            "iterations: 3",
+            "itertions: 3",
+            "`tune.itertions` must be a key of the scenario, but is unknown (s.yaml, line 6). Did you mean `iterations`?",
+        ),
+        (
+            "iterations: 3",
+            "start: 5",
+            "`tune.start` must be earlier than the end of a run (4 s), but is 5 s (s.yaml, line 6)",
+        ),
+    ],
+)
+def test_mistake_is_one_exact_line(refused, tmp_path, old, new, said):
+    assert old in SCENARIO
+    (tmp_path / "s.yaml").write_text(SCENARIO.replace(old, new, 1))
+    assert refused("tune", "s.yaml", "--out", "out") == said
+
+
+def test_wrong_options(refused, tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    assert refused("tune", "s.yaml", "--method", "luck") == "`--method` must be one of gradient, search, but is luck"
+    assert refused("tune", "s.yaml", "--budget", "0") == "`--budget` must be positive, but is 0 s"
+    assert (
+        refused("tune", "s.yaml", "--out", "out", "--resume")
+        == "`--resume` must find an unfinished tuning, but is nothing in out"
+    )

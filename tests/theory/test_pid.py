@@ -1,0 +1,115 @@
+"""The PID baseline: pole placement, what its integral learns, limits, motors, other plants."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from undertow.controllers import pid
+from undertow.core.contracts import Measurement, Target
+from undertow.core.errors import BadInput
+from undertow.disturbances import none, sinusoid
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants import double_integrator, hybrid_vehicle, inverted_pendulum, magnetic_levitation
+from undertow.references import setpoint
+from undertow.sensors import perfect
+from undertow.thrusters import t200
+from undertow.vehicles import bluerov2_heavy
+
+
+def run(plant, law, position, disturbance=None, duration=20.0, dt=1e-2, **start):
+    loop = ClosedLoop(plant, law, setpoint(position), disturbance or none(), perfect())
+    return sampled.simulate(loop, duration=duration, dt=dt, record_every=1, **start)
+
+
+def test_error_follows_the_placed_poles():
+    """e, e_dot and the integral under x_ddot = u + d: the matrix exponential, to the order of the sampling time."""
+    law = pid(double_integrator(1).model(), frequency=2.0, damping=0.7, integral_share=0.2, reference_frequency=0.0)
+    found = run(double_integrator(1), law, [0.0], duration=5.0, dt=1e-3, position=[0.3])
+    k_p, k_i, k_d = 4.0, 1.6, 2.8
+    matrix = np.array([[0, 1, 0], [-k_p, -k_d, -1], [k_i, 0, 0]])
+    for k in (500, 1500, 4000):
+        expected = (expm(matrix * found.time[k]) @ [-0.3, 0.0, 0.0])[0]
+        np.testing.assert_allclose(found.samples.error[k, 0], expected, atol=5e-4)
+
+
+def test_integral_is_the_estimate_of_a_constant_load():
+    law = pid(double_integrator(2).model(), frequency=3.0)
+    found = run(double_integrator(2), law, [0.0, 0.0], sinusoid(0.0, 1.0, offset=[1.5, -0.5]), duration=60.0)
+    np.testing.assert_allclose(found.samples.estimate[-1], [1.5, -0.5], rtol=1e-6)
+    np.testing.assert_allclose(found.samples.error[-1], 0.0, atol=1e-6)
+
+
+def test_gains_may_be_given():
+    model = double_integrator(1).model()
+    placed, given = pid(model, frequency=2.0, damping=0.5), pid(model, gains=[4.0, 0.8, 2.0])
+    for name in ("proportional", "integral", "derivative"):
+        np.testing.assert_allclose(getattr(placed, name), getattr(given, name))
+
+
+def test_limits_do_not_wind_up():
+    """A step of 5 m and a load of 1 m/s^2 with 1.5 m/s^2 at hand. Negative control: told that all was applied."""
+    plant = double_integrator(1, limit=1.5)
+    law = pid(plant.model(), sampling_time=1e-2, frequency=2.0, integral_share=0.3, reference_frequency=0.0)
+    found = run(plant, law, [5.0], sinusoid(0.0, 1.0, offset=-1.0), duration=60.0)
+    overshoot = -float(found.samples.error.min())
+    np.testing.assert_allclose(found.samples.error[-1], 0.0, atol=1e-4)
+
+    x, v, z, dt = 0.0, 0.0, None, 1e-2
+    target, furthest = Target(jnp.array([5.0]), jnp.zeros(1), jnp.zeros(1)), 0.0
+    for _ in range(2000):
+        y = Measurement(jnp.array([x]), jnp.array([v]))
+        z = law.init(y, target) if z is None else z
+        u, _ = law.command(z, y, target)
+        wanted = law.proportional * (5.0 - x) - law.derivative * v + z.integral
+        z = law.advance(z, y, target, wanted, dt)
+        v, x = v + dt * (float(np.clip(u[0], -1.5, 1.5)) - 1.0), x + dt * v
+        furthest = max(furthest, x - 5.0)
+    assert overshoot < 0.5 * furthest, (overshoot, furthest)
+
+
+def test_steady_curve_holds_a_force_and_limits_of_an_endless_supply_are_endless():
+    plant = hybrid_vehicle(bluerov2_heavy(), t200(dead_zone=0.0))
+    drive = plant.model().own_axes().drive().steady()
+    forces = jnp.linspace(-20.0, 20.0, 8)
+    np.testing.assert_allclose(drive.force((), drive.command((), forces, 1.0)), forces, rtol=1e-12)
+    endless = hybrid_vehicle(bluerov2_heavy(), t200(supply=np.inf)).model().own_axes().drive().steady()
+    np.testing.assert_array_equal(np.stack(endless.range((), 1.0)), [[-np.inf], [np.inf]] * np.ones(1))
+
+
+@pytest.mark.parametrize("motor", ["steady", "computed"])
+def test_vehicle_comes_to_its_place(motor):
+    plant = hybrid_vehicle(bluerov2_heavy(), t200(), ledger=False)
+    law = pid(plant.model(), sampling_time=0.02, frequency=1.0, motor=motor)
+    found = run(plant, law, [1.0, -1.0, 0.5, 0.0, 0.0, 2.0], duration=40.0, dt=0.02)
+    assert int(found.status) == 0
+    np.testing.assert_allclose(found.samples.error[-1], 0.0, atol=0.02)
+
+
+@pytest.mark.parametrize("feedforward", [True, False])
+def test_other_plants(feedforward):
+    pendulum = inverted_pendulum()
+    law = pid(pendulum.model(), frequency=8.0, feedforward=feedforward)
+    found = run(pendulum, law, [0.1], duration=8.0)
+    assert int(found.status) == 0 and abs(float(found.samples.error[-1, 0])) < 5e-3
+    ball = magnetic_levitation()
+    law = pid(ball.model(), frequency=30.0, feedforward=feedforward)
+    found = run(ball, law, [0.010], duration=5.0, dt=1e-3, position=[0.010])
+    assert int(found.status) == 0 and abs(float(found.samples.error[-1, 0])) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        ({"frequency": -1.0}, "frequency"),
+        ({"damping": 0.1, "integral_share": 0.5}, "integral"),
+        ({"gains": [1.0, 3.0, 2.0]}, "integral"),
+        ({"gains": [1.0, 2.0]}, "gains"),
+        ({"motor": "magic"}, "motor"),
+        ({"sampling_time": 0.0}, "sampling_time"),
+    ],
+)
+def test_settings_that_cannot_be(wrong, name):
+    with pytest.raises(BadInput, match=f"`{name}`"):
+        pid(double_integrator(1).model(), **wrong)

@@ -1,0 +1,119 @@
+"""Both methods on costs whose minimum is known; certificates and journals."""
+
+import json
+
+import numpy as np
+import pytest
+
+from undertow.core.errors import BadInput
+from undertow.studies.tuning.certifying import Certificate
+from undertow.studies.tuning.descent import descend
+from undertow.studies.tuning.journal import Journal, OutOfTime
+from undertow.studies.tuning.objective import Objective
+from undertow.studies.tuning.searching import search
+
+RNG = np.random.default_rng(4)
+ROOT = RNG.normal(size=(3, 3))
+MATRIX = ROOT @ ROOT.T + 0.1 * np.eye(3)
+CENTRE = np.array([0.3, 0.6, 0.55])
+START = np.array([0.9, 0.1, 0.9])
+
+
+class Bowl:
+    """(x - c)^T A (x - c) + 1."""
+
+    def __init__(self, centre=CENTRE):
+        self.centre, self.asked = centre, 0
+
+    def costs(self, points):
+        self.asked += 1
+        off = points - self.centre
+        return 1 + np.einsum("pi,ij,pj->p", off, MATRIX, off)
+
+    def slope(self, point):
+        self.asked += 1
+        return 2 * MATRIX @ (point - self.centre)
+
+
+def stable(point):
+    return Certificate((0.9, 0.5))
+
+
+def objective(tmp_path, bowl, certify=stable, resume=False, budget=1e9):
+    return Objective(bowl, certify, Journal(tmp_path / "j", "bowl", budget, resume), lambda best, evaluations: None)
+
+
+def tune(asked, method, iterations=60):
+    asked.costs(START[None])
+    if method == "gradient":
+        descend(asked, START, asked.best.cost, iterations)
+    else:
+        search(asked, START, iterations, seed=1)
+    return asked.best
+
+
+@pytest.mark.parametrize("method", ["gradient", "search"])
+def test_minimum_of_a_quadratic(tmp_path, method):
+    best = tune(objective(tmp_path, Bowl()), method)
+    np.testing.assert_allclose(best.point, CENTRE, atol=2e-2)
+    assert best.cost < 1 + 1e-3
+
+
+@pytest.mark.parametrize("method", ["gradient", "search"])
+def test_minimum_at_a_bound(tmp_path, method):
+    """Outside the box in one direction: against a grid."""
+    bowl = Bowl(np.array([-0.3, 0.5, 0.5]))
+    free = MATRIX[1:, 1:]
+    rest = bowl.centre[1:] - np.linalg.solve(free, MATRIX[1:, 0]) * 0.3
+    assert ((rest > 0) & (rest < 1)).all()
+    best = tune(objective(tmp_path, bowl), method)
+    np.testing.assert_allclose(best.point, [0.0, *rest], atol=2e-2)
+
+
+@pytest.mark.parametrize("method", ["gradient", "search"])
+def test_nothing_is_accepted_without_certificate(tmp_path, method):
+    """Unstable below x_1 = 0.5, where the minimum lies."""
+    fenced = lambda point: Certificate((0.9 if point[0] >= 0.5 else 1.01,))
+    asked = objective(tmp_path, Bowl(), fenced)
+    best = tune(asked, method)
+    assert asked.refused > 0
+    assert all(step.point[0] >= 0.5 and step.radius < 1 for step in asked.steps)
+    assert best.cost < asked.steps[0].cost
+
+
+@pytest.mark.parametrize("method", ["gradient", "search"])
+@pytest.mark.parametrize("lines", [1, 5, 8])
+def test_resumed_is_the_same_as_uninterrupted(tmp_path, method, lines):
+    """The journal as a kill leaves it: cut off after some lines, and in the middle of the next."""
+    bowl = Bowl()
+    whole = objective(tmp_path, bowl)
+    tune(whole, method, iterations=6)
+    written = (tmp_path / "j").read_text().splitlines(keepends=True)
+    assert len(written) > lines + 1
+    (tmp_path / "j").write_text("".join(written[:lines]) + written[lines][:7])
+    again = Bowl()
+    resumed = objective(tmp_path, again, resume=True)
+    tune(resumed, method, iterations=6)
+    assert [step._replace(elapsed=0.0) for step in resumed.steps] == [
+        step._replace(elapsed=0.0) for step in whole.steps
+    ]
+    assert 0 < again.asked <= bowl.asked
+    unlike = lambda text: [{**json.loads(line), "elapsed": 0} for line in text.splitlines()]
+    assert unlike((tmp_path / "j").read_text()) == unlike("".join(written))
+
+
+def test_budget_ends_it(tmp_path):
+    asked = objective(tmp_path, Bowl(), budget=0.0)
+    with pytest.raises(OutOfTime):
+        for _ in range(3):
+            asked.costs(START[None])
+
+
+def test_journal_of_something_else(tmp_path):
+    with pytest.raises(BadInput, match="unfinished tuning"):
+        Journal(tmp_path / "j", "one", 1.0, resume=True)
+    Journal(tmp_path / "j", "one", 1.0, resume=False)
+    with pytest.raises(BadInput, match="resume"):
+        Journal(tmp_path / "j", "one", 1.0, resume=False)
+    with pytest.raises(BadInput, match="another one"):
+        Journal(tmp_path / "j", "two", 1.0, resume=True)

@@ -1,0 +1,151 @@
+"""What is tuned, on what, and its slope."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.core.contracts import Load, Place
+from undertow.core.errors import BadInput
+from undertow.disturbances import current, sinusoid, wrench
+from undertow.disturbances.adding import Together
+from undertow.scenario.reading import from_data
+from undertow.studies.tuning.certifying import Certifier
+from undertow.studies.tuning.descent import descend
+from undertow.studies.tuning.dials import dials, options
+from undertow.studies.tuning.evaluation import Evaluation
+from undertow.studies.tuning.journal import Journal
+from undertow.studies.tuning.objective import Objective
+from undertow.studies.tuning.problem import problem
+from undertow.studies.tuning.scaled import scaled
+from undertow.studies.tuning.searching import search
+
+AXIS = {
+    "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},
+    "controller": {"kind": "pid", "frequency": 3.0},
+    "reference": {"kind": "setpoint", "position": [0.0]},
+    "disturbance": {"kind": "sinusoid", "amplitude": 1.0, "frequency": 1.0},
+    "sensor": {"kind": "white_noise", "velocity": 0.01},
+    "loop": {"duration": 6.0, "dt": 0.02, "record": 0.1},
+    "tune": {"parameters": {"frequency": [0.5, 12], "damping": [0.4, 2]}, "train": {"seeds": 2}},
+}
+
+
+@pytest.fixture(scope="module")
+def axis():
+    """The problem, and its programs."""
+    found = problem(from_data(AXIS))
+    make = lambda point: found.law(found.options(point))
+    return found, Evaluation(found.bench, make, make(found.start), found.train)
+
+
+def test_slope_equals_finite_differences(axis):
+    _, evaluation = axis
+    point, step = np.array([0.5, 0.4]), 1e-5
+    moved = np.concatenate([point + step * np.eye(2), point - step * np.eye(2)])
+    ahead, behind = np.split(evaluation.costs(moved), 2)
+    np.testing.assert_allclose(evaluation.slope(point), (ahead - behind) / (2 * step), rtol=1e-5)
+
+
+def test_both_methods_come_to_the_same_gains(axis, tmp_path):
+    found, evaluation = axis
+    certifier = Certifier(found.bench, found.train, evaluation.law(found.start))
+    best = []
+    for method in ("gradient", "search"):
+        journal = Journal(tmp_path / method, method, 1e9, False)
+        asked = Objective(evaluation, lambda point: certifier(evaluation.law(point)), journal, lambda *_: None)
+        start = found.start
+        asked.costs(start[None])
+        if method == "gradient":
+            descend(asked, start, asked.best.cost, 30)
+        else:
+            search(asked, start, 25, seed=0)
+        best.append(asked.best)
+    assert abs(best[0].cost - best[1].cost) < 0.02 * best[0].cost
+    assert best[0].cost < 0.5 * asked.steps[0].cost
+
+
+def test_the_same_number_whatever_the_batch(axis):
+    """Batches are filled up and cut: 7 laws on 3 held-out runs."""
+    found, evaluation = axis
+    laws = [evaluation.law(np.array([0.1 * i, 0.5])) for i in range(7)]
+    together = evaluation.total(evaluation.shares(laws, found.held_out.part(np.array([0, 1, 3]))))
+    alone = evaluation.total(evaluation.shares(laws[4:5], found.held_out.part(np.array([3]))))
+    assert together.shape == (7, 3)
+    np.testing.assert_allclose(together[4, 2], alone[0, 0], rtol=1e-12)
+
+
+def test_seeds_are_held_out(axis):
+    found, _ = axis
+    keys = {tuple(np.asarray(key)) for trials in (found.train, found.held_out) for key in trials.keys}
+    assert len(keys) == len(found.train) + len(found.held_out) == 6
+
+
+def test_start_is_what_was_given(axis):
+    found, _ = axis
+    np.testing.assert_allclose(found.options(found.start)["frequency"], [3.0])
+    assert found.rounded(found.start) == {"frequency": [3.0], "damping": [1.0]}
+
+
+def test_parameter_sets_take_turns():
+    sea = {"plant": {"vehicle": "bluerov2_heavy", "thruster": "t200"}, "controller": {"kind": "pid"}}
+    still = {
+        "reference": {"kind": "setpoint", "position": [0.0] * 6},
+        "loop": {"dt": 0.05, "duration": 2.0, "record": 0.1},
+    }
+    found = problem(from_data(sea | still))
+    assert found.train.truths == ("vonbenzon2022", "ng2024", "px4") * 2
+    assert found.held_out.truths == ("vonbenzon2022", "wu2018", "gazebo_box_drag") * 4
+    masses = np.asarray(found.train.plants.body.mass_matrix)[:3, 0, 0]
+    np.testing.assert_allclose(masses, [13.5 + 6.36, 11.5 + 10.77, 13.4 + 1.272])
+    assert [dial.axes for dial in found.dials[:2]] == [(0, 1, 2), (3, 4, 5)]
+    np.testing.assert_allclose(found.bench.sums.input_scale, 16.0)
+
+
+def test_dials_and_options():
+    chosen = dials(
+        {"tracking": (1.0, 100.0), "feedback[0]": (1, 2), "feedback[1]": (3, 4), "rate": (5, 6)},
+        [(0, 2), (1,)],
+        ["rate"],
+    )
+    at = options(chosen, jnp.array([0.5, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0]), 3)
+    np.testing.assert_allclose(at["tracking"], [10.0, 1.0, 10.0])
+    np.testing.assert_allclose(at["feedback"], [[1, 4], [2, 3], [1, 4]])
+    np.testing.assert_allclose(at["rate"], 6.0)
+    for dial in chosen:
+        np.testing.assert_allclose(dial.share(dial.value(0.3)), 0.3)
+        assert dial.share(1e9) == 1.0 and dial.share(1e-9) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("ranges", "said"),
+    [
+        ({"a": (2.0, 1.0)}, "`tune.parameters.a` must be [low, high] with low < high, but is [2.0, 1.0]"),
+        (
+            {"a": (0.0, 1.0)},
+            "`tune.parameters.a` must have a positive lower bound, for a logarithmic scale, but is 0.0",
+        ),
+        ({"a": (1.0,)}, "`tune.parameters.a` must be [low, high], but is [1.0]"),
+        ({"a[0]": (1, 2)}, "`tune.parameters.a[0]` must be `a`, which is one number per axis"),
+        ({"feedback": (1, 2)}, "`tune.parameters.feedback` must be one of feedback[0], feedback[1]"),
+    ],
+)
+def test_ranges_that_cannot_be(ranges, said):
+    with pytest.raises(BadInput) as error:
+        dials(ranges, [(0,)])
+    assert str(error.value) == said
+
+
+def test_one_ode_is_not_what_a_vehicle_runs():
+    with pytest.raises(BadInput, match="`loop.kind` must be sampled, for gains to be used on a vehicle"):
+        problem(from_data(AXIS | {"controller": {"kind": "rcaf"}, "loop": {"kind": "continuous", "duration": 1.0}}))
+
+
+def test_disturbance_of_another_size():
+    inner = Together((sinusoid(2.0, 1.0), wrench([1.0] * 6), current([0.3, 0.1, 0.0])))
+    place, calm = Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)), Load(jnp.ones(6), jnp.zeros(6))
+    half = scaled(inner, 0.5)
+    one, two = (each.at(each.draw(jax.random.PRNGKey(0)), 0.7, place, calm) for each in (inner, half))
+    np.testing.assert_allclose(two.acceleration - 1, 0.5 * (one.acceleration - 1))
+    np.testing.assert_allclose(two.wrench, 0.5 * one.wrench)
+    np.testing.assert_allclose(two.water.velocity, [0.15, 0.05, 0.0])
