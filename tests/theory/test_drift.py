@@ -1,7 +1,5 @@
 """I25, section 3.8: weights drift under noise and ripple at a predicted rate, until the loop breaks; a box stops them."""
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,7 +9,6 @@ from undertow.controllers.rcaf import rcaf
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.fuzzy.memberships import memberships
 from undertow.fuzzy.tsk import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -24,8 +21,8 @@ DT = 1e-3
 # Noise (m/s), distance of the sets, and as printed: c_dot (1/s^2) measured, time of divergence (s).
 TABLE = [
     (1e-2, 0.1, 222.0, 7.5),
-    (1e-2, 0.2, 55.0, 21.0),
-    (1e-2, 0.5, 8.7, 120.0),
+    pytest.param(1e-2, 0.2, 55.0, 21.0, marks=pytest.mark.slow),
+    pytest.param(1e-2, 0.5, 8.7, 120.0, marks=pytest.mark.slow),
     pytest.param(1e-2, 1.0, 2.16, 470.0, marks=pytest.mark.slow),
     pytest.param(1e-3, 0.1, 2.16, 470.0, marks=pytest.mark.slow),
 ]
@@ -79,7 +76,7 @@ def test_an_hour_at_a_millimetre_per_second():
 @pytest.mark.parametrize("choices", [{"weights_bound": 20.0}, {"weights_bound": 6.0}, {"sets": 1}])
 def test_cures(choices):
     """Box projection bounds c, one set has none: both outlive the unprotected law many times over."""
-    law, _, gain, weights, outcome = noisy(60.0, 1e-2, 0.1, **choices)
+    law, _, gain, weights, outcome = noisy(15.0, 1e-2, 0.1, **choices)
     assert int(outcome.status) == int(Status.OK)
     bound = drift.gain_bound(law)
     assert gain.max() <= bound * (1 + 1e-12)
@@ -95,7 +92,7 @@ def test_certificate_separates_what_stays_calm_from_what_does_not():
     """A box within the certificate and one beyond: c keeps to both, the estimator only to the first."""
     for share, calm in ((0.7, True), (1.3, False)):
         theta_max = share * 1860.0 * 0.1 / 0.848
-        law, _, gain, _, outcome = noisy(60.0, 1e-2, 0.1, weights_bound=theta_max)
+        law, _, gain, _, outcome = noisy(15.0, 1e-2, 0.1, weights_bound=theta_max)
         assert drift.is_certified(law, DT) == calm
         assert gain.max() <= drift.gain_bound(law) * (1 + 1e-12)
         late = float(np.sqrt((np.asarray(outcome.samples.modelling_error)[-1000:] ** 2).mean()))
@@ -126,11 +123,13 @@ def after_ripple(law, amplitude, frequency, duration):
 
 
 def test_slope_of_the_basis():
-    """Against automatic differentiation, and the closed forms of section 3.2 for three sets."""
+    """Against differences, and the closed forms of section 3.2 for three sets."""
     for count, width in ((3, None), (5, None), (7, 0.2), (1, None)):
         sets = gaussian_sets(count, (0.7,), width)
-        slope = jax.jacfwd(lambda x, sets=sets: memberships(x, sets.centres[0], sets.widths[0]))(jnp.zeros(()))
-        np.testing.assert_allclose(drift.basis_slope(sets), slope, atol=1e-12)
+        centres, widths = np.asarray(sets.centres[0]), np.asarray(sets.widths[0])
+        gaussians = lambda x, c=centres, w=widths: np.exp(-(((x - c) / w) ** 2))
+        basis = lambda x, g=gaussians: g(x) / g(x).sum()
+        np.testing.assert_allclose(drift.basis_slope(sets), (basis(1e-5) - basis(-1e-5)) / 2e-5, atol=1e-8)
     r, squares = np.exp(-1.0), (drift.basis_slope(gaussian_sets(3)) ** 2).sum()
     assert squares == pytest.approx(8 * r**2 / (1 + 2 * r) ** 2) and squares == pytest.approx(0.3594, abs=5e-5)
 

@@ -144,6 +144,7 @@ def row(rung="electromechanical", supply=np.inf, speed_sensor=False, inner=None,
     return int(run.status), float(run.ended), found, law
 
 
+@pytest.mark.slow
 def test_ideal_thrusters(rows):
     status, _, found, law = rows["ideal"]
     assert status == int(Status.OK)
@@ -153,6 +154,7 @@ def test_ideal_thrusters(rows):
     assert found["V"] == pytest.approx(needed, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_table_1_on_its_own_motor(rows):
     for name, seconds in (("motor", 3.0), ("speed sensor", 1.5)):
         status, ended, _, _ = rows[name]
@@ -164,6 +166,7 @@ def test_table_1_on_its_own_motor(rows):
         assert found["e"] == pytest.approx(error, rel=0.3)
 
 
+@pytest.mark.slow
 def test_rafc_needs_no_less_than_all_the_voltage(rows):
     status, _, found, _ = rows["rafc"]
     assert status == int(Status.OK) and found["e"] == pytest.approx(1.8e-3, rel=0.1)
@@ -171,6 +174,7 @@ def test_rafc_needs_no_less_than_all_the_voltage(rows):
     assert status != int(Status.OK) or found["e"] > 10.0, "wound up"
 
 
+@pytest.mark.slow
 def test_what_does_work_on_that_motor(rows):
     status, _, found, _ = rows["inner loop, 24 V"]
     assert status == int(Status.OK) and found["e"] < 1e-4 and found["variation"] < 5.0

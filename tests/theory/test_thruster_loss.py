@@ -149,7 +149,8 @@ def amplitudes(law, effect):
     return np.abs(np.linalg.solve(q * np.eye(24) - matrix, entry @ LOAD)[:6])
 
 
-@pytest.mark.parametrize("preset", ["paper", pytest.param("robust", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("preset", ["paper", "robust"])
 def test_after_any_single_loss_the_error_is_what_the_linear_loop_predicts(preset):
     """ODIN held in place under a swell; each thruster lost whole or by half, in mid-flight.
 

@@ -43,14 +43,14 @@ class FedCommanded(AbstractController):
         return self.law.advance(z, y, r, commanded, dt)
 
 
-def step(name, limit, load=1.0, duration=40.0):
+def step(name, limit, load=1.0):
     """Error, estimate and s of the step at every tick, on one axis, and the law."""
     plant = double_integrator(1, limit)
     choices = {"rafc": {"sets": 3, "composite": 0.0}, "robust": {"preset": "robust"}}.get(name, {"sets": 3})
     law = rcaf(plant.model(), **choices)
     fed = FedCommanded(law.model, law) if name == "commanded" else law
     loop = ClosedLoop(plant, fed, setpoint([2.0]), sinusoid(0.0, 1.0, offset=load), perfect())
-    samples = sampled.simulate(loop, duration=duration, dt=1e-3, record_every=1).samples
+    samples = sampled.simulate(loop, duration=40.0, dt=1e-3, record_every=1).samples
     error, velocity = np.asarray(samples.error)[:, 0], np.asarray(samples.velocity)[:, 0]
     return error, np.asarray(samples.estimate)[:, 0], 5 * (error - velocity), law
 
@@ -79,7 +79,7 @@ def test_estimate_is_bounded_whatever_the_limit():
     """|d_hat| <= (1 + overshoot) |d| + (L1 gain from s) max |s|: with the applied input only s and d reach it."""
     for limit in LIMITS:
         for load in (0.0, 1.0, -4.0):
-            _, estimate, s, law = step("applied", limit, load, duration=10.0)
+            _, estimate, s, law = step("applied", limit, load)
             bound = bound_of(law, load, np.abs(s).max())
             assert np.abs(estimate).max() <= bound
             if load == 0.0 and limit == np.inf:
@@ -88,7 +88,7 @@ def test_estimate_is_bounded_whatever_the_limit():
 
 def test_static_bias_is_no_bound():
     """Negative control: |d| + 0.31 max |s| and 10 % more is exceeded without any limit: the estimator overshoots."""
-    _, estimate, s, _ = step("applied", np.inf, load=0.0, duration=1.0)
+    _, estimate, s, _ = step("applied", np.inf, load=0.0)
     assert np.abs(estimate).max() > 1.1 * 0.31 * np.abs(s).max()
 
 
