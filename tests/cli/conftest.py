@@ -13,11 +13,14 @@ class Said(NamedTuple):
 
 @pytest.fixture
 def undertow(tmp_path, monkeypatch, capsys):
-    """Run the command line in an empty folder, in this process."""
+    """Run the command line in an empty folder, in this process; runs without a prediction unless it is asked for."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("UNDERTOW_TRACEBACK", raising=False)
 
     def call(*arguments: str) -> Said:
+        if "simulate" in arguments and "--prediction" not in arguments:
+            command = arguments.index("simulate") + 1
+            arguments = (*arguments[:command], "--no-prediction", *arguments[command:])
         code = run(arguments)
         captured = capsys.readouterr()
         return Said(code, captured.out, captured.err)

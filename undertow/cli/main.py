@@ -60,6 +60,10 @@ def simulate(
         bool,
         typer.Option("--overwrite", help="Replace an earlier result in DIR. Without it, DIR must not hold one."),
     ] = False,
+    prediction: Annotated[
+        bool,
+        typer.Option("--prediction/--no-prediction", help="Whether to foretell the steady metrics beside the run."),
+    ] = True,
 ) -> int:
     """Run one closed loop.
 
@@ -68,7 +72,7 @@ def simulate(
     """
     from undertow.cli.simulate import simulate
 
-    return simulate(scenario, out, overwrite)
+    return simulate(scenario, out, overwrite, prediction)
 
 
 @app.command()
@@ -107,8 +111,8 @@ def analyze(
     """Predict a closed loop before it is run.
 
     Linearises the whole loop exactly where it rests: poles over the operating range, how much sampling time, delay,
-    lag and noise it bears, error against frequency, what the actuators can hold. Writes prediction.html, prediction.json
-    and figures/.
+    lag and noise it bears, error against frequency, what the actuators can hold. Writes prediction.html,
+    prediction.json and figures/.
     """
     from undertow.cli.analyze import analyze
 

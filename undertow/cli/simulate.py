@@ -6,6 +6,7 @@ import typer
 from rich.console import Console
 
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
+from undertow.cli.foresight import Foresight, beside, in_results, judgement
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import next_free, results_folder
 from undertow.cli.stages import Stages
@@ -22,17 +23,20 @@ from undertow.scenario.repetition import Repetition, compare
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
 
-def simulate(scenario: Path, out: Path | None, overwrite: bool) -> int:
+def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool) -> int:
     """Exit code of a run whose results went to `out`, or to a folder under runs/ that was free."""
     console = wide_console()
     stages = Stages(console)
     folder = next_free(Path("runs") / scenario.stem) if out is None else out
     with results_folder(folder, _WRITTEN, "run.nc", overwrite) as staging:
-        executed = _run(scenario, stages)
+        executed, foresight = _run(scenario, stages, prediction)
         with stages("figures and files"):
-            _write(executed, staging)
+            _write(executed, foresight, staging)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window()))
+    foretold = foresight.metrics if foresight else None
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), foretold))
+    if foresight:
+        console.print(f"{judgement(foresight, executed)}.", highlight=False, soft_wrap=True)
     certificate = certificate_of(executed.dataset)
     if certificate is not None:
         console.print(certificate_table(certificate, executed.built.window()))
@@ -41,20 +45,20 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool) -> int:
     return max(codes)
 
 
-def _run(path: Path, stages: Stages) -> Executed:
+def _run(path: Path, stages: Stages, prediction: bool) -> tuple[Executed, Foresight | None]:
     with stages("reading"):
         text = read(path)
     with stages("building"):
         built = build(text)
     for sentence in built.advice():
         typer.echo(f"Advice: {sentence}", err=True)
-    with stages("compiling and running"):
-        return interruptible(lambda: execute(built))
+    with stages("compiling, running and predicting" if prediction else "compiling and running"):
+        return interruptible(lambda: beside(lambda: execute(built), built, prediction))
 
 
-def _write(executed: Executed, folder: Path) -> None:
+def _write(executed: Executed, foresight: Foresight | None, folder: Path) -> None:
     save(executed.dataset, folder / "run.nc")
-    (folder / "metrics.json").write_text(metrics_text(executed.dataset), encoding="utf-8")
+    (folder / "metrics.json").write_text(metrics_text(executed.dataset, in_results(foresight)), encoding="utf-8")
     (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
     (folder / "figures").mkdir()
     for name, figure in run_figures(executed.dataset).items():

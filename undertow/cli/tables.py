@@ -8,16 +8,24 @@ from rich.table import Table
 from undertow.analysis.meanings import MEANINGS
 
 
-def metrics_table(steady: dict[str, Any] | None, whole: dict[str, Any], window: tuple[float, float]) -> Table:
-    """Metrics of the steady window beside those of the whole run."""
+def metrics_table(
+    steady: dict[str, Any] | None,
+    whole: dict[str, Any],
+    window: tuple[float, float],
+    predicted: dict[str, float] | None = None,
+) -> Table:
+    """Metrics of the steady window beside those foretold for it and those of the whole run."""
     table = Table(title="Metrics", title_justify="left", title_style="bold")
     table.add_column("metric")
+    if predicted:
+        table.add_column("predicted", justify="right")
     table.add_column(f"{window[0]:g} to {window[1]:g} s", justify="right")
     table.add_column("whole run", justify="right")
     table.add_column("unit")
     for name, (_, unit) in MEANINGS.items():
         if name in whole:
-            table.add_row(name, _number(steady[name]) if steady else "-", _number(whole[name]), unit)
+            foretold = [_number(predicted[name]) if name in predicted else ""] if predicted else []
+            table.add_row(name, *foretold, _number(steady[name]) if steady else "-", _number(whole[name]), unit)
     return table
 
 

@@ -51,10 +51,11 @@ def label(
     return Labelled(status, steady, whole, dataset)
 
 
-def metrics_text(dataset: xr.Dataset) -> str:
-    """Contents of metrics.json for a run."""
+def metrics_text(dataset: xr.Dataset, further: dict[str, Any] | None = None) -> str:
+    """Contents of metrics.json for a run, and whatever else is known about it."""
     ending = {"status": dataset.attrs["status"], "ended": dataset.attrs["ended"]}
-    found = ending | json.loads(dataset.attrs["metrics"]) | {"certificate": certificate_of(dataset)}
+    metrics = json.loads(dataset.attrs["metrics"]) | (further or {})
+    found = ending | metrics | {"certificate": certificate_of(dataset)}
     return to_json(found, indent=2) + "\n"
 
 

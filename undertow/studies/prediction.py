@@ -5,11 +5,12 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jax.flatten_util import ravel_pytree
 
 from undertow.analysis.linearised import margins
 from undertow.analysis.linearised.closed_forms import ClosedForm, closed_form_poles, drift_bound, estimator, ramp_error
 from undertow.analysis.linearised.closing import LinearLoop
-from undertow.analysis.linearised.forecast import forecast
+from undertow.analysis.linearised.forecast import forecast, from_start
 from undertow.analysis.linearised.reach import Reach, reach
 from undertow.analysis.linearised.rest import Rest, rest
 from undertow.analysis.linearised.surroundings import Surroundings, surroundings
@@ -102,8 +103,8 @@ def foretold(known: Ground) -> tuple[dict[str, float] | None, str]:
     start, stop = known.built.window()
     settings = known.built.scenario.loop
     every = max(1, round(settings.record / settings.dt))
-    metrics = forecast(known.mean, known.linear, known.around, (start, stop), every)
-    return metrics, ""
+    begun = from_start(known.linear, known.mean, *_start(known))
+    return forecast(known.mean, begun, known.around, (start, stop), every), ""
 
 
 def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
@@ -145,6 +146,14 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
         metrics=metrics,
         why_not=why_not,
     )
+
+
+def _start(known: Ground) -> list[np.ndarray]:
+    """States of plant and law at t = 0 as vectors."""
+    loop, initial = known.built.closed_loop, known.built.scenario.initial
+    outputs = loop.outputs_at_start(initial.position, initial.velocity)
+    drawn = loop.draw(jax.random.PRNGKey(known.built.scenario.seed))
+    return [np.asarray(ravel_pytree(state)[0]) for state in drawn.start(*outputs)]
 
 
 def _point(known: Ground, share: float, load: np.ndarray) -> Point:

@@ -12,6 +12,7 @@ from undertow.analysis.linearised.surroundings import Surroundings
 from undertow.analysis.linearised.visible import visible
 
 _ENTRIES = ("load", "noise")
+_START = "start"  # a column: where the states are at first
 _SIGNALS = ("error", "estimate", "uncertainty", "modelling_error", "robust", "u")
 
 
@@ -35,15 +36,15 @@ def forecast(
 
     Args:
         at: the loop at rest under the mean load of the window.
-        loop: the same, closed.
-        around: what acts; the linearised loop starts at rest at its first instant.
+        loop: the same, closed, with a start; see `from_start`.
+        around: what acts.
         window: start and stop, s.
         every: ticks per record; metrics are those of the records, as in a run.
     """
-    small = visible(loop, _ENTRIES, _SIGNALS)
+    small = visible(loop, (*_ENTRIES, _START), _SIGNALS)
     entry = np.hstack([small.entries[name] for name in _ENTRIES])
     driven = np.hstack([around.load - at.at["load"], around.noise])
-    states = np.asarray(_driven(*map(jnp.asarray, (small.matrix, entry, driven))))
+    states = np.asarray(_driven(*map(jnp.asarray, (small.entries[_START][:, 0], small.matrix, entry, driven))))
     hair = loop.dt / 2
     recorded = np.arange(len(around.time)) % every == 0
     inside = recorded & (around.time >= window[0] - hair) & (around.time <= window[1] + hair)
@@ -65,6 +66,12 @@ def forecast(
     }
 
 
+def from_start(loop: LinearLoop, at: Rest, plant: np.ndarray, law: np.ndarray) -> LinearLoop:
+    """The loop with states of plant and law at the first instant, as vectors of `Parts`."""
+    away = np.concatenate([(plant - at.at["plant"])[at.acting], law - at.at["law"]])
+    return loop._replace(entries=loop.entries | {_START: away[:, None]})
+
+
 def compare(predicted: dict[str, float], measured: dict) -> list[Comparison]:
     """Predicted metrics beside the measured ones of the same names."""
     return [Comparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
@@ -75,10 +82,10 @@ def _direct(loop: LinearLoop, signal: str, entry: str) -> np.ndarray:
 
 
 @jax.jit
-def _driven(matrix, entry, driven):
-    """States at each tick, from rest."""
+def _driven(start, matrix, entry, driven):
+    """States at each tick."""
 
     def step(state, w):
         return matrix @ state + entry @ w, state
 
-    return jax.lax.scan(step, jnp.zeros(len(matrix)), driven)[1]
+    return jax.lax.scan(step, start, driven)[1]
