@@ -119,7 +119,7 @@ def _table(found: Tuned) -> Table:
 
 
 def _sentences(found: Tuned) -> list[str]:
-    given, _, tuned = found.judged
+    given, *_, tuned = found.judged
     options = ", ".join(f"{name} {_short(value)}" for name, value in (tuned.options or {}).items())
     ending = "ended by itself" if found.finished else "ended by its budget"
     return [

@@ -1,7 +1,7 @@
 """`undertow tune` without its command line: from a scenario to gains that are certified, and how good they are."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,7 +32,7 @@ class Judged(NamedTuple):
     """One choice of gains on both sets of trials."""
 
     name: str
-    options: dict[str, Any] | None  # None for the gains as given
+    options: Mapping[str, Any] | None  # None for the gains as given
     train: Shares  # arrays, one entry per trial
     held_out: Shares
     train_cost: float
@@ -45,7 +45,7 @@ class Tuned(NamedTuple):
 
     problem: Problem
     method: str
-    judged: tuple[Judged, ...]  # given, start, tuned
+    judged: tuple[Judged, ...]  # given, ..., start, tuned
     steps: list[Step]
     evaluations: int
     refused: int  # points that would have been better, but were not certified
@@ -65,6 +65,7 @@ def tune(
     method: str = "gradient",
     budget: float = 240.0,
     resume: bool = False,
+    beside: Mapping[str, Mapping[str, Any]] | None = None,
     say: Callable[[str], None] = lambda stage: None,
     watch: Watch = lambda best, evaluations: None,
 ) -> Tuned:
@@ -76,6 +77,7 @@ def tune(
         method: gradient, downhill by forward differentiation, or search, differential evolution.
         budget: s, all told; what is begun is finished.
         resume: whether to go on from the journal.
+        beside: other choices of options, by name, to be judged like the given and the tuned ones.
         say: told the stage.
         watch: told the best so far after every batch.
 
@@ -114,7 +116,7 @@ def tune(
         finished = False
     say("judging")
     best = objective.best or start
-    chosen: list[tuple[str, dict[str, Any] | None]] = [("given", None)]
+    chosen: list[tuple[str, Mapping[str, Any] | None]] = [("given", None), *(beside or {}).items()]
     chosen += [(name, wanted.rounded(np.array(step.point))) for name, step in (("start", start), ("tuned", best))]
     judged = _judged(wanted, evaluation, certifier, chosen)
     if not judged[-1].certificate.holds:
@@ -125,7 +127,7 @@ def tune(
 
 
 def _judged(
-    wanted: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, dict[str, Any] | None]]
+    wanted: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, Mapping[str, Any] | None]]
 ) -> tuple[Judged, ...]:
     """All choices on both sets of trials; the given gains exactly as they were given."""
     own = wanted.built.closed_loop.controller

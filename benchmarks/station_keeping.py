@@ -1,0 +1,162 @@
+"""Station keeping of BlueROV2 Heavy at sea: preset `robust` against a PID tuned with the same budget.
+
+T200s at 16 V, 100 Hz, JONSWAP Hs 0.5 m at 3 m depth, current 0.5 m/s, the vehicle's own instruments. The controllers
+are told of one published parameter set; every one of them is the truth in turn.
+
+    python benchmarks/station_keeping.py [--seeds 100] [--budget 240] [--laws pid,robust]
+"""
+
+import argparse
+import copy
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import undertow  # noqa: F401  (double precision)
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.sampled import AbstractAccumulator
+from undertow.scenario.build import build
+from undertow.scenario.reading import from_data
+from undertow.scenario.schema import Tries
+from undertow.studies.tuning.trials import trials
+from undertow.studies.tuning.tune import tune
+
+SETS = ["vonbenzon2022", "wu2018", "ng2024", "gazebo_box_drag", "px4"]
+DURATION, START = 60.0, 30.0  # s
+SEA = {
+    "plant": {
+        "vehicle": {"kind": "bluerov2_heavy", "parameters": SETS[0]},
+        "thruster": {"kind": "t200", "supply": 16.0},
+        "ledger": False,
+    },
+    "model": {"rate_term": True},
+    "reference": {"kind": "setpoint", "position": [0.0] * 6},
+    "disturbance": [{"kind": "current", "velocity": [0.4, 0.3, 0.0]}, {"kind": "waves", "height": 0.5, "depth": 3.0}],
+    "sensor": {"kind": "navigation"},
+    "loop": {"dt": 0.01, "duration": DURATION, "record": 0.05},
+    "tune": {
+        "duration": 20.0,
+        "start": 8.0,
+        "train": {"sets": SETS, "seeds": 1, "sizes": [1.0]},
+        "held_out": {"sets": SETS, "seeds": 1, "sizes": [1.0]},
+        "weights": {"tracking": 1.0, "effort": 0.0, "variation": 0.01},
+    },
+}
+LAWS = {
+    "pid": {"kind": "pid"},
+    "pid_computed": {"kind": "pid", "motor": "computed"},
+    "robust": {"kind": "rcaf", "preset": "robust"},
+}
+FIRST_SEED = 10_000  # none of the tuning's
+
+
+class Sums(NamedTuple):
+    samples: jax.Array
+    error: jax.Array
+    navigation: jax.Array
+    variation: jax.Array
+    last: jax.Array
+
+
+class Station(AbstractAccumulator):
+    """Squares of the error and of what the instruments get wrong; total variation of the voltage."""
+
+    def init(self, sample):
+        zero = jnp.zeros_like(sample.error)
+        return Sums(jnp.zeros(()), zero, zero, jnp.zeros(()), sample.voltage)
+
+    def update(self, state, t, sample):
+        inside = jnp.where(t >= START, 1.0, 0.0)
+        return Sums(
+            state.samples + inside,
+            state.error + inside * sample.error**2,
+            state.navigation + inside * (sample.measured_position - sample.position) ** 2,
+            state.variation + inside * jnp.abs(sample.voltage - state.last).mean(),
+            sample.voltage,
+        )
+
+
+def fly(scenario, seeds):
+    """Per run: error and navigation error of each axis (rms), voltage variation, whether it lasted; and its truth."""
+    text = from_data(scenario)
+    built = build(text)
+    wanted = Tries.model_validate({"seeds": seeds, "sizes": [1.0], "sets": SETS})
+    loop, several = built.closed_loop, trials(text, built, wanted, (), "train", FIRST_SEED)
+
+    def run(plant, key):
+        whole = ClosedLoop(plant, loop.controller, loop.reference, loop.disturbance, loop.sensor)
+        found = sampled.simulate(whole, duration=DURATION, dt=0.01, key=key, record_every=0, accumulators=(Station(),))
+        sums = found.accumulated[0]
+        rms = lambda squares: jnp.sqrt(squares / sums.samples)
+        return rms(sums.error), rms(sums.navigation), sums.variation / (DURATION - START), found.status == 0
+
+    together = None
+    chunk = 5 * len(SETS)
+    pieces = []
+    rest = eqx.filter(several.plants, eqx.is_array, inverse=True)
+    batch = jax.jit(jax.vmap(lambda plant, key: run(eqx.combine(plant, rest), key)))
+    for i in range(0, len(several), chunk):
+        part = several.part(np.arange(i, min(i + chunk, len(several))))
+        arguments = (eqx.filter(part.plants, eqx.is_array), part.keys)
+        if together is None:
+            together = batch.lower(*arguments).compile(compiler_options={"xla_backend_optimization_level": "1"})
+        pieces.append(jax.tree.map(np.asarray, together(*arguments)))
+    return [np.concatenate(each) for each in zip(*pieces, strict=True)], np.array(several.truths)
+
+
+def tuned(name, budget):
+    """The scenario with tuned gains."""
+    scenario = {**copy.deepcopy(SEA), "controller": LAWS[name]}
+    with tempfile.TemporaryDirectory() as folder:
+        found = tune(from_data(scenario), Path(folder) / "journal", budget=budget)
+    best = found.judged[-1]
+    print(
+        f"{name}: tuned in {found.elapsed:.0f} s, {found.evaluations} gains, training cost {best.train_cost:.4g}, "
+        f"held out {best.held_out_cost:.4g}, spectral radius {best.certificate.worst:.5f}\n  {best.options}",
+        flush=True,
+    )
+    return found.scenario
+
+
+def report(title, flown):
+    (error, navigation, variation, lasted), truths = flown
+    print(f"\n{title}: {lasted.mean():.1%} of {len(lasted)} runs lasted; medians [5 %, 95 %] of rms over seeds")
+    print(f"  {'truth':<18}{'position, cm':>22}{'attitude, mrad':>24}{'navigation, cm':>16}{'V/s':>8}")
+    rms = lambda squares: np.sqrt((squares**2).mean(axis=-1))
+    cut = lambda values: (
+        f"{np.median(values):7.2f} [{np.quantile(values, 0.05):5.2f}, {np.quantile(values, 0.95):5.2f}]"
+    )
+    for name in [*SETS, "all"]:
+        of = (truths == name) | (name == "all")
+        place, turned = 100 * rms(error[of][:, :3]), 1000 * rms(error[of][:, 3:])
+        own = np.median(100 * rms(navigation[of][:, :3]))
+        print(f"  {name:<18}{cut(place):>22}{cut(turned):>24}{own:>16.2f}{np.median(variation[of]):>8.1f}")
+    return rms(error[:, :3])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--budget", type=float, default=240.0)
+    parser.add_argument("--laws", default="pid,robust")
+    options = parser.parse_args()
+    place = {}
+    for name in options.laws.split(","):
+        begun = time.perf_counter()
+        scenario = tuned(name, options.budget)
+        place[name] = report(name, fly(scenario, options.seeds))
+        print(f"  ({time.perf_counter() - begun:.0f} s)", flush=True)
+    first, *others = place
+    for name in others:
+        print(f"\n{first} / {name}: position rms {np.sqrt((place[first] ** 2).mean() / (place[name] ** 2).mean()):.2f}")
+
+
+if __name__ == "__main__":
+    main()

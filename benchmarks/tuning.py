@@ -1,0 +1,78 @@
+"""`undertow tune` against Table 1 and against gains found by hand, on three vehicles at sea: cost on held-out runs.
+
+python benchmarks/tuning.py [--budget 240] [--vehicles bluerov2_heavy,odin,rexrov]
+"""
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import undertow  # noqa: F401  (double precision)
+from undertow.scenario.reading import from_data
+from undertow.studies.tuning.tune import tune
+
+# As in examples/bluerov2_heavy.yaml: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors that lag by 0.1 s.
+BY_HAND = {
+    "feedback": [[4.0, 7.0]] * 3 + [[20.0, 13.0]] * 3,
+    "pole": [4.0] * 3 + [3.0] * 3,
+    "adaptation": [0.15] * 3 + [0.05] * 3,
+    "composite": [150.0] * 3 + [200.0] * 3,
+    "robust_gain": 0.1,
+    "compensation_gain": 0.0,
+    "weights_bound": 40.0,
+}
+TABLE_1 = {
+    "feedback": [1.0, 2.0],
+    "pole": 150.0,
+    "adaptation": 100.0,
+    "composite": 500.0,
+    "robust_gain": 10.0,
+    "compensation_gain": 0.1,
+}
+THRUSTERS = {
+    "bluerov2_heavy": {"kind": "t200", "supply": 16.0},
+    "odin": {"kind": "paper_table3", "rung": "shaft", "supply": 24.0},
+    "rexrov": {"kind": "first_order", "thrust_per_volt": 60.0, "time_constant": 0.05, "supply": 24.0},
+}
+
+
+def scenario(vehicle):
+    return {
+        "plant": {"vehicle": vehicle, "thruster": THRUSTERS[vehicle], "ledger": False},
+        "model": {"rate_term": True},
+        "controller": {"kind": "rcaf", "preset": "paper", **BY_HAND},
+        "reference": {"kind": "setpoint", "position": [2.0, 1.0, 1.0, 0.0, 0.0, 0.5], "settling": 15.0},
+        "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0.0]}, {"kind": "waves", "height": 0.5}],
+        "sensor": {"kind": "navigation"},
+        "loop": {"dt": 0.02, "duration": 60.0, "record": 0.1},
+        "tune": {"duration": 16.0},
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--budget", type=float, default=240.0)
+    parser.add_argument("--vehicles", default=",".join(THRUSTERS))
+    options = parser.parse_args()
+    for vehicle in options.vehicles.split(","):
+        begun, busy = time.perf_counter(), time.process_time()
+        with tempfile.TemporaryDirectory() as folder:
+            text = from_data(scenario(vehicle))
+            found = tune(text, Path(folder) / "journal", budget=options.budget, beside={"table 1": TABLE_1})
+        wall, processor = time.perf_counter() - begun, time.process_time() - busy
+        print(f"\n{vehicle}: {found.evaluations} gains in {wall:.0f} s, {processor:.0f} s of processor time")
+        best = found.judged[-1]
+        for one in found.judged:
+            name = {"given": "by hand"}.get(one.name, one.name)
+            print(
+                f"  {name:<10} held-out cost {one.held_out_cost:8.4g} = {one.held_out_cost / best.held_out_cost:7.3g} "
+                f"x tuned; training {one.train_cost:8.4g}; lost {one.held_out.lost.mean():.0%}; "
+                f"spectral radius {one.certificate.worst:.5f}",
+                flush=True,
+            )
+        print(f"  {best.options}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
