@@ -81,6 +81,7 @@ def test_steady_curve_holds_a_force_and_limits_of_an_endless_supply_are_endless(
     assert (np.asarray(low) == -np.inf).all() and (np.asarray(high) == np.inf).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motor", ["steady", "computed"])
 def test_vehicle_comes_to_its_place(motor):
     """Without a dead zone: inside one, a vehicle that needs no thrust wanders about its place."""
