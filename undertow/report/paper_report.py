@@ -12,11 +12,12 @@ from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
 from undertow.report.paper_background import ASSUMED, INTRODUCTION, LEFT_OPEN
 from undertow.report.paper_captions import captions
+from undertow.report.sound_section import CAPTIONS, FIGURES, TITLE, sound_section
 
 _TITLE = "The paper, reproduced and audited"
 
 # Figures that stand in a section of their own; all others stand in the first.
-_ELSEWHERE = ("ladder", "sweep")
+_ELSEWHERE = ("ladder", "sweep", *FIGURES)
 
 
 def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path) -> Path:
@@ -34,7 +35,7 @@ def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], fold
         OSError: the folder cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    said = captions(dict(results))
+    said = captions(dict(results)) | CAPTIONS
     drawn = {}
     for name, one in figures.items():
         vector, _ = save(one, folder / "figures", name)
@@ -51,6 +52,7 @@ def _content(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html
         "table2": ("Table 2 in numbers", _table2(results)),
         "ladder": ("The ladder: how much of the thruster is real", _ladder(results, drawn)),
         "audit": ("Audit of the claims", _audit(claims, drawn)),
+        "sound": (TITLE, sound_section(results.get("sound") or {}, drawn)),
         "open": ("What the paper leaves open, and misprints", _left_open()),
         "provenance": ("Provenance", _provenance(results)),
     }

@@ -1,10 +1,13 @@
 """From what `undertow reproduce` found out to its figures and its page."""
 
 from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 
 from undertow.report.figures import ladder_figure, paper_figures, sweep_figure
+from undertow.report.figures.ablations import ablations_figure
+from undertow.report.figures.sound_ladder import sound_ladder_figure
 from undertow.report.paper_report import write_report
 from undertow.studies.paper.reproduce import Reproduction
 
@@ -22,7 +25,18 @@ def draw(found: Reproduction) -> dict[str, Figure]:
     """Every figure of the report, by name."""
     numbers = {claim["id"]: claim["numbers"] for claim in found.results["claims"]}
     ladder = found.results["ladder"]
-    return paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
+    figures = paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
         "ladder": ladder_figure(ladder, {rung: found.datasets(rung) for rung in ladder}),
         "sweep": sweep_figure(numbers["C6"]["sweep"]),
+    }
+    sound = found.results.get("sound")
+    return figures | _of_last_chapter(found, sound) if sound else figures
+
+
+def _of_last_chapter(found: Reproduction, sound: dict[str, Any]) -> dict[str, Figure]:
+    rows = sound["ladder"]
+    datasets = {(row["place"], row["law"]): found.runs[Path(row["scenario"]).stem].dataset for row in rows}
+    return {
+        "sound_ladder": sound_ladder_figure(rows, datasets),
+        "ablations": ablations_figure(sound["ablations"]),
     }

@@ -8,6 +8,7 @@ from undertow.studies.ablations.on_axes import gathering, loop
 
 QUESTION = "How many fuzzy sets, and how wide?"
 PREDICTION = "The same once gamma |xi|^2 is the same."
+LONG = True
 METRICS = ("estimation_rms", "tracking_rms", "weights_peak")
 
 _COUNTS, _QUICK = (1, 3, 5, 15), (1, 5)

@@ -8,6 +8,7 @@ from undertow.studies.ablations.on_axes import loop
 
 QUESTION = "Amplitude and boundary layer of the robust term; sign or tanh?"
 PREDICTION = "Only the slope w_bar/phi counts, as a PD gain; sign chatters at half the sampling rate."
+LONG = True
 METRICS = ("tracking_rms", "voltage_rms", "voltage_variation")
 
 _PAIRS = ((10.0, 0.5), (20.0, 1.0), (2.0, 0.5), (10.0, 2.5))

@@ -10,6 +10,7 @@ from undertow.studies.ablations.rough_sensor import RoughSensor
 
 QUESTION = "How slow may the controller be, and how late its measurement?"
 PREDICTION = "Table 1 is lost below 141 Hz and beyond 4.75 ms of delay; `robust` at every rate."
+LONG = True
 METRICS = ("tracking_rms", "estimation_rms", "weights_peak")
 LEFT_OUT = "jitter: the loop has one sampling time"
 

@@ -11,6 +11,7 @@ from undertow.studies.ablations.rough_sensor import RoughSensor
 
 QUESTION = "How well must the velocity be measured?"
 PREDICTION = "Table 1 multiplies noise by 110 into the input and cannot use a 5 Hz DVL; the fewer rad/s, the better."
+LONG = True
 METRICS = ("tracking_rms", "voltage_rms", "voltage_variation", "weights_peak")
 LEFT_OUT = "drift to divergence, which takes longer: see A18 and A21"
 

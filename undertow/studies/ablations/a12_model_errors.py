@@ -7,6 +7,7 @@ from undertow.studies.ablations.on_odin import loop
 
 QUESTION = "How wrong may the model be?"
 PREDICTION = "Very: every true gain of the right sign is stable in continuous time."
+LONG = True
 METRICS = ("tracking_rms", "estimation_rms", "uncertainty_rms")
 LEFT_OUT = "shift of the centre of gravity, single entries of B"
 

@@ -5,6 +5,7 @@ from undertow.studies.ablations.on_heavy import SCHEDULE, hand_tuned, loop
 
 QUESTION = "J_dot nu in the model, or left in d (Remark 2)?"
 PREDICTION = "Left in d it is up to 2.8 m/s^2 at 1 m/s: it must be in the model."
+LONG = True
 METRICS = ("tracking_rms", "uncertainty_rms", "estimation_rms")
 
 _REFERENCES = {

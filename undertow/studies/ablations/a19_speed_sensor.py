@@ -9,6 +9,7 @@ QUESTION = "Do propeller-speed sensors help?"
 PREDICTION = (
     "As printed the variant with sensors is ill-posed and unstable; an inner loop of computed voltage uses them."
 )
+LONG = True
 METRICS = ("tracking_rms", "voltage_rms", "voltage_variation")
 
 _MOTOR = {"rung": "electromechanical", "supply": 24.0}

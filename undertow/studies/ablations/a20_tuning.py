@@ -10,8 +10,9 @@ from undertow.studies.ablations.tuning import COST, tuned
 
 QUESTION = "What does a search find with motor, limits and noise in?"
 PREDICTION = "An estimator of 20 to 50 rad/s and hardly a robust term, instead of 142 rad/s and 10 m/s^2."
+LONG = True
 METRICS = ("tracking_rms", "voltage_rms", "voltage_variation")
-LEFT_OUT = f"other costs than {COST}; 12 trials on 6 seeds per law"
+LEFT_OUT = f"other costs than {COST}; 12 trials on 4 other seeds per law"
 
 _SEA = {"rung": "electromechanical", "supply": 24.0, "noise": 2e-3}
 _BANDWIDTHS = (15.0, 30.0, 60.0, 120.0)  # rad/s

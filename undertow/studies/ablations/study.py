@@ -1,8 +1,7 @@
-"""Running the ablations, and what stands of them in results.json."""
+"""The ablations one by one, and what stands of them in results.json."""
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any
 
@@ -12,8 +11,6 @@ from undertow.studies.ablations.summary import Summary, summary
 
 SEEDS, QUICK_SEEDS = 30, 8
 
-Progress = Callable[[str, float], None]
-
 
 def modules() -> list[ModuleType]:
     """One per ablation, in order."""
@@ -21,21 +18,9 @@ def modules() -> list[ModuleType]:
     return [importlib.import_module(f"{ablations.__name__}.{name}") for name in names if _is_ablation(name)]
 
 
-def study(quick: bool, progress: Progress, chosen: Sequence[ModuleType] | None = None) -> list[dict[str, Any]]:
-    """Every ablation: question, prediction, variants with medians and intervals, answer.
-
-    Args:
-        quick: fewer seeds, and without the variants that take longest.
-        progress: told a message and the share done.
-        chosen: some of `modules()`; None for all.
-    """
-    wanted = modules() if chosen is None else list(chosen)
-    found = []
-    for place, module in enumerate(wanted):
-        name = identity(module)
-        progress(f"ablation {name}", place / len(wanted))
-        found.append(one(module, quick))
-    return found
+def is_long(module: ModuleType) -> bool:
+    """Whether it takes too long for a quick look."""
+    return getattr(module, "LONG", False)
 
 
 def one(module: ModuleType, quick: bool) -> dict[str, Any]:

@@ -20,7 +20,7 @@ class ThrusterLoss(AbstractDisturbance):
 
     def draw(self, key) -> Float[Array, " N"]:
         """Share that is left of each."""
-        place = jax.random.permutation(key, self.thrusters)
+        place = jax.random.permutation(key, self.thrusters).astype(self.left.dtype)
         return jnp.where(place < self.number, self.left, 1.0)
 
     def at(self, path, t, place, calm: Load) -> Load:

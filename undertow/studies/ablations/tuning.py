@@ -15,7 +15,7 @@ ERROR, VARIATION = 1e-3, 1e3
 
 COST = f"tracking rms / {1e3 * ERROR:g} mm + variation of the input / {VARIATION:g} per s"
 
-_SEEDS = 6
+_SEEDS = 4
 
 
 class Tuned(NamedTuple):

@@ -13,11 +13,12 @@ from undertow.studies.paper import claims, examples
 from undertow.studies.paper.experiments import run_all
 from undertow.studies.paper.setup import CONTROLLERS
 from undertow.studies.paper.thruster_response import ThrusterResponse, thruster_response
+from undertow.studies.sound.chapter import chapter
 
 Progress = Callable[[str, float], None]
 
-# Share of the work that running takes; the rest is judging and drawing.
-_RUNNING = 0.85
+# Share of the work that the paper's runs take, and with the last chapter; the rest is drawing.
+_PAPER, _RUNNING = 0.25, 0.9
 
 
 class Reproduction(NamedTuple):
@@ -32,17 +33,18 @@ class Reproduction(NamedTuple):
         return {name: self.runs[f"{rung}_{name}"].dataset for name in CONTROLLERS}
 
 
-def reproduce(folder: Path, quick: bool, progress: Progress) -> Reproduction:
+def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True) -> Reproduction:
     """Run the paper and audit it; writes `runs/`, `scenarios/` and `results.json` into a folder.
 
     Args:
         folder: an existing, empty folder.
         quick: fewer points in the sweeps; the same accuracy.
         progress: told a message and the share done.
+        sound: whether to run the last chapter, the sound version beside the paper's.
     """
     wanted = examples.scenarios() | claims.scenarios(quick)
-    runs = run_all(wanted, folder, lambda message, share: progress(message, _RUNNING * share))
-    progress("judging the claims", _RUNNING)
+    runs = run_all(wanted, folder, lambda message, share: progress(message, _PAPER * share))
+    progress("judging the claims", _PAPER)
     results = {
         "provenance": {"quick": quick, "scenarios": sorted(wanted), **versions()},
         "example1": examples.example(runs, 1),
@@ -51,5 +53,8 @@ def reproduce(folder: Path, quick: bool, progress: Progress) -> Reproduction:
         "ladder": examples.ladder(runs),
         "claims": claims.audit(runs),
     }
+    if sound:
+        last = chapter(folder, quick, lambda message, share: progress(message, _PAPER + (_RUNNING - _PAPER) * share))
+        results["sound"], runs = last.results, runs | last.runs
     (folder / "results.json").write_text(to_json(results, indent=1) + "\n", encoding="utf-8")
     return Reproduction(results, runs, thruster_response())
