@@ -102,8 +102,8 @@ def fly(scenario, seeds):
     pieces = []
     rest = eqx.filter(several.plants, eqx.is_array, inverse=True)
     batch = jax.jit(jax.vmap(lambda plant, key: run(eqx.combine(plant, rest), key)))
-    for i in range(0, len(several), chunk):
-        part = several.part(np.arange(i, min(i + chunk, len(several))))
+    for i in range(0, several.number, chunk):
+        part = several.part(np.arange(i, min(i + chunk, several.number)))
         arguments = (eqx.filter(part.plants, eqx.is_array), part.keys)
         if together is None:
             together = batch.lower(*arguments).compile(compiler_options={"xla_backend_optimization_level": "1"})

@@ -15,9 +15,15 @@ tune: {parameters: {frequency: [0.5, 8]}, iterations: 3, train: {seeds: 1}, held
 """
 
 
-def test_result_can_be_flown(undertow, tmp_path):
+def test_interrupted_and_resumed_its_result_can_be_flown(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    said = undertow("tune", "s.yaml", "--out", "out", "--budget", "600")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("undertow.studies.tuning.tune.descend", interrupted)
+        said = undertow("tune", "s.yaml", "--out", "out")
+    assert said.code == 130 and "--resume" in said.err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["tuning.jsonl"]
+    assert undertow("tune", "s.yaml", "--out", "out").code == 2
+    said = undertow("tune", "s.yaml", "--out", "out", "--budget", "600", "--resume")
     assert said.code == 0, said
     assert "Held-out cost" in said.out
     found = json.loads((tmp_path / "out" / "tuning.json").read_text())
@@ -33,6 +39,10 @@ def test_result_can_be_flown(undertow, tmp_path):
     assert undertow("simulate", "out/tuned.yaml", "--out", "flown").code == 0
     again = undertow("tune", "s.yaml", "--out", "out")
     assert again.code == 2 and "earlier result" in again.err
+
+
+def interrupted(*arguments):
+    raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize(

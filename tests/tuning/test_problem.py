@@ -78,7 +78,7 @@ def test_the_same_number_whatever_the_batch(axis):
 def test_seeds_are_held_out(axis):
     found, _ = axis
     keys = {tuple(np.asarray(key)) for trials in (found.train, found.held_out) for key in trials.keys}
-    assert len(keys) == len(found.train) + len(found.held_out) == 6
+    assert len(keys) == found.train.number + found.held_out.number == 6
 
 
 def test_start_is_what_was_given(axis):
@@ -137,8 +137,9 @@ def test_ranges_that_cannot_be(ranges, said):
 
 
 def test_one_ode_is_not_what_a_vehicle_runs():
-    with pytest.raises(BadInput, match="`loop.kind` must be sampled, for gains to be used on a vehicle"):
-        problem(from_data(AXIS | {"controller": {"kind": "rcaf"}, "loop": {"kind": "continuous", "duration": 1.0}}))
+    ode = {"controller": {"kind": "rcaf"}, "sensor": "perfect", "loop": {"kind": "continuous", "duration": 1.0}}
+    with pytest.raises(BadInput, match=r"^`loop.kind` must be sampled, for gains to be used on a vehicle"):
+        problem(from_data(AXIS | ode))
 
 
 def test_disturbance_of_another_size():

@@ -100,15 +100,15 @@ class Evaluation:
     def shares(self, laws: Sequence[AbstractController], trials: Trials) -> Shares:
         """Parts of the cost, arrays (laws, trials): in batches of one shape, on both cores."""
         numbers = [self._numbers(law) for law in laws]
-        height, width = len(numbers), len(self._training)
+        height, width = len(numbers), self._training.number
         rows = [(numbers + numbers[:1] * AT_ONCE)[i : i + AT_ONCE] for i in range(0, height, AT_ONCE)]
-        columns = [[min(i + j, len(trials) - 1) for j in range(width)] for i in range(0, len(trials), width)]
+        columns = [[min(i + j, trials.number - 1) for j in range(width)] for i in range(0, trials.number, width)]
         batches = [(_stacked(row), trials.part(np.array(column))) for row in rows for column in columns]
         done = list(self._pool.map(lambda batch: self._batch(*batch), batches))
         lines = [done[i : i + len(columns)] for i in range(0, len(done), len(columns))]
         blocks = [jax.tree.map(lambda *pieces: np.concatenate(pieces, axis=1), *line) for line in lines]
         whole = jax.tree.map(lambda *pieces: np.concatenate(pieces, axis=0), *blocks)
-        return jax.tree.map(lambda part: part[:height, : len(trials)], whole)
+        return jax.tree.map(lambda part: part[:height, : trials.number], whole)
 
     def total(self, parts: Shares) -> np.ndarray:
         """Cost of every run."""

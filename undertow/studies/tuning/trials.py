@@ -29,7 +29,9 @@ class Trials(NamedTuple):
     sizes: Float[Array, " trials"]
     truths: tuple[str, ...]  # name of the true parameter set of each; "" where there is but one
 
-    def __len__(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+    @property
+    def number(self) -> int:
+        """How many."""
         return len(self.truths)
 
     def part(self, chosen: Any) -> "Trials":
