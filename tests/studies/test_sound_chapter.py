@@ -76,7 +76,7 @@ def test_conclusions_say_what_the_numbers_say():
     ]
     motor, again = found["loses"]
     assert "ends after 1.5 s" in motor and "0.0003" in motor
-    assert "up to 1.2 off and 4 s later back to 2e-05; Table 1: 0.4" in again
+    assert "up to 1.2 off, and after 7.5 s back to 2e-05; Table 1 up to 1.2, then 0.4." in again
 
 
 def test_a_win_that_is_none_is_not_told():

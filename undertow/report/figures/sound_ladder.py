@@ -24,7 +24,7 @@ _SHOWN = ("electromechanical", "24V_03", "overload", "sea")
 _TITLES = {
     "electromechanical": "whole motor, no limit",
     "24V_03": "24 V, U1 x 0.3",
-    "overload": "24 V, too much for 3 s",
+    "overload": "24 V, too much for 1.5 s",
     "sea": "BlueROV2 Heavy at sea",
 }
 
@@ -93,7 +93,7 @@ def _dots(panel: Axes, places: Sequence[str], rows: Rows) -> None:
 
 def _wrapped(words: str) -> str:
     """On two lines where it is long."""
-    if len(words) < 46:
+    if len(words) < 50:
         return words
-    middle = words.rfind(" ", 0, 44)
+    middle = words.rfind(" ", 0, 48)
     return f"{words[:middle]}\n{words[middle + 1 :]}"

@@ -25,14 +25,13 @@ _SUPPLIES = {
     "24V": ("whole motor, 24 V, U1: beyond the motors", 24.0, 1.0),
 }
 
-# Suite U1 at 0.3 of its size, and from 10 s to 13 s a push that 24 V cannot hold: t, then m/s^2 and rad/s^2.
-_PUSH = [6.0, 6.0, -6.0, 3.0, 3.0, 3.0]
+# Suite U1 at 0.3 of its size, and for 1.5 s a push that 24 V cannot hold: t, then m/s^2 and rad/s^2.
+_PUSHED, _LET_GO, _JUDGED = 8.0, 9.5, 17.0  # s
+_PUSH, _REST = [4.0, 4.0, -4.0, 2.0, 2.0, 2.0], [0.0] * 6
+_SAMPLES = [(0.0, _REST), (_PUSHED, _REST), (_PUSHED + 0.01, _PUSH), (_LET_GO, _PUSH), (_LET_GO + 0.01, _REST)]
 _OVERLOAD = [
     {"kind": "u1", "scale": 0.3},
-    {
-        "kind": "table",
-        "samples": [[0.0, *[0.0] * 6], [10.0, *[0.0] * 6], [10.01, *_PUSH], [13.0, *_PUSH], [13.01, *[0.0] * 6]],
-    },
+    {"kind": "table", "samples": [[t, *size] for t, size in _SAMPLES]},
 ]
 
 # All of it with one number per axis, so that the two sets of gains are one program.
@@ -68,9 +67,9 @@ def places(quick: bool) -> dict[str, Place]:
     for name, (words, volts, scale) in _SUPPLIES.items():
         found[name] = Place(words, _laws(words, WHOLE, {"kind": "u1", "scale": scale}, volts, quick))
     if not quick:
-        words = "whole motor, 24 V, U1 x 0.3 and 3 s of too much"
+        words = "whole motor, 24 V, U1 x 0.3, 1.5 s of too much"
         two = {key: one for key, one in _laws(words, WHOLE, _OVERLOAD, 24.0).items() if key in ("rcafc", "robust")}
-        two = {key: (name, one | {"steady": {"start": 17.0}}) for key, (name, one) in two.items()}
+        two = {key: (name, one | {"steady": {"start": _JUDGED}}) for key, (name, one) in two.items()}
         found["overload"] = Place(words, two)
         words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own instruments"
         found["sea"] = Place(words, {key: (name, _at_sea(name, law)) for key, (name, law) in _AT_SEA.items()})
@@ -149,7 +148,7 @@ def _row(run: Executed) -> dict[str, Any]:
         "status": run.status.word,
         "diverged_at": None if run.status is Status.OK else float(run.outcome.ended),
         "steady": run.steady,
-        "largest_after": _largest_after(run, 10.0),
+        "largest_after": _largest_after(run, _PUSHED),
     }
 
 
