@@ -59,6 +59,14 @@ def test_minimum_of_a_quadratic(tmp_path, method):
     assert best.cost < 1 + 1e-3
 
 
+def test_slope_that_lies(tmp_path):
+    """Uphill: it looks around instead, and comes nearly as low."""
+    bowl = Bowl()
+    bowl.slope = lambda point: -2 * MATRIX @ (point - CENTRE)
+    best = tune(objective(tmp_path, bowl), "gradient")
+    assert best.cost - 1 < 0.1 * (Bowl().costs(START[None])[0] - 1)
+
+
 @pytest.mark.parametrize("method", ["gradient", "search"])
 def test_minimum_at_a_bound(tmp_path, method):
     """Outside the box in one direction: against a grid."""

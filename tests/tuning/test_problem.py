@@ -5,20 +5,28 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.controllers import pid
 from undertow.core.contracts import Load, Place
 from undertow.core.errors import BadInput
 from undertow.disturbances import current, sinusoid, wrench
 from undertow.disturbances.adding import Together
+from undertow.instruments import depth, dvl, imu
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants import hybrid_vehicle
+from undertow.references import setpoint
 from undertow.scenario.reading import from_data
+from undertow.sensors import navigation
 from undertow.studies.tuning.certifying import Certifier
 from undertow.studies.tuning.descent import descend
 from undertow.studies.tuning.dials import dials, options
-from undertow.studies.tuning.evaluation import Evaluation
+from undertow.studies.tuning.evaluation import Evaluation, without_steps
 from undertow.studies.tuning.journal import Journal
 from undertow.studies.tuning.objective import Objective
 from undertow.studies.tuning.problem import problem
 from undertow.studies.tuning.scaled import scaled
 from undertow.studies.tuning.searching import search
+from undertow.thrusters import t200
+from undertow.vehicles import bluerov2_heavy
 
 AXIS = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},
@@ -100,6 +108,21 @@ def test_parameter_sets_take_turns():
     np.testing.assert_allclose(masses, [13.5 + 6.36, 11.5 + 10.77, 13.4 + 1.272])
     assert [dial.axes for dial in found.dials[:2]] == [(0, 1, 2), (3, 4, 5)]
     np.testing.assert_allclose(found.bench.sums.input_scale, 16.0)
+
+
+def test_slopes_are_taken_without_steps():
+    """Rounded readings have no slope: nothing is rounded, nothing else changes."""
+    sensor = navigation([imu(), dvl(), depth()])
+    plant = hybrid_vehicle(bluerov2_heavy(), t200())
+    loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0] * 6), sinusoid(), sensor)
+    smooth = without_steps(loop)
+    assert float(smooth.plant.thruster.dead_zone) == 0.0 and float(loop.plant.thruster.dead_zone) == 1.2
+    pairs = zip(loop.sensor.instruments, smooth.sensor.instruments, strict=True)
+    assert [(float(a.sampling.resolution), float(b.sampling.resolution)) for a, b in pairs] == [(0.0, 0.0)] + [
+        (1e-3, 0.0)
+    ] * 2
+    changed = jax.tree.map(lambda a, b: bool((a != b).any()), loop, smooth)
+    assert sum(jax.tree.leaves(changed)) == 4  # the dead zone also stands in the law's own model
 
 
 def test_dials_and_options():

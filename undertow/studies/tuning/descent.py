@@ -10,13 +10,15 @@ _LARGEST = 0.5  # and in any other
 _FLAT = 1e-9  # slope
 _LITTLE = 1e-4  # relative gain of a step that is not worth another one
 _PATIENCE = 3
+_NARROWER, _NEAREST = 0.5, 0.01  # how far it looks around: half as far after every failure, down to the nearest
 
 
 def descend(objective: Objective, start: np.ndarray, cost: float, iterations: int) -> None:
     """From a certified point to a local minimum of the cost in [0, 1]^k; the objective keeps the best.
 
     Nocedal and Wright (2006), ch. 6, with variables at a bound held there while the slope pushes outward. Instead of
-    a line search one by one, all lengths are run at once and the best certified one is taken.
+    a line search one by one, all lengths are run at once and the best certified one is taken. Where none is better,
+    points all around are tried, nearer and nearer.
 
     Args:
         objective: what is asked.
@@ -24,20 +26,28 @@ def descend(objective: Objective, start: np.ndarray, cost: float, iterations: in
         cost: there.
         iterations: at most.
     """
-    x, inverse, slope, idle = start, None, objective.slope(start), 0
+    x, inverse, slope, idle, stuck, reach = start, None, objective.slope(start), 0, False, _FIRST
+    chance = np.random.default_rng(0)
     for _ in range(iterations):
         free = ~(((x <= 0) & (slope > 0)) | ((x >= 1) & (slope < 0)))
         if np.abs(slope[free]).max(initial=0.0) < _FLAT:
             return
-        direction = _direction(slope, free, inverse)
-        points = np.clip(x + _LENGTHS[:, None] * direction, 0.0, 1.0)
+        if stuck:
+            ways = reach * chance.uniform(-1.0, 1.0, (len(_LENGTHS), len(x)))
+        else:
+            ways = _LENGTHS[:, None] * _direction(slope, free, inverse)
+        points = np.clip(x + ways, 0.0, 1.0)
         costs = objective.costs(points)
         best = int(np.argmin(costs))
         if not costs[best] < cost:
-            if inverse is None:
+            reach *= _NARROWER if stuck else 1.0
+            if reach < _NEAREST:
                 return
-            inverse = None  # what was learnt of the curvature misleads: once more along the slope itself
+            # First what was learnt of the curvature is forgotten; where the slope itself misleads, as limits and the
+            # certificate make it, points all around are tried.
+            inverse, stuck = None, inverse is None
             continue
+        stuck = False
         idle = idle + 1 if cost - costs[best] < _LITTLE * abs(cost) else 0
         moved, x, cost, before = points[best] - x, points[best], float(costs[best]), slope
         if idle >= _PATIENCE:

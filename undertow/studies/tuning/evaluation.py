@@ -23,6 +23,7 @@ from undertow.studies.tuning.trials import Trials
 _COMPILER = {"xla_backend_optimization_level": "1"}
 
 AT_ONCE = 6  # gains per batch
+_STEPS = ("resolution", "dead_zone")  # parameters that make steps of what is smooth
 _WORKERS = 2
 
 
@@ -50,9 +51,12 @@ class Bench(NamedTuple):
         loop = self.loop
         return ClosedLoop(plant, law, loop.reference, scaled(loop.disturbance, size), loop.sensor)
 
-    def run(self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""]) -> Shares:
-        """One closed loop."""
+    def run(
+        self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""], smooth: bool = False
+    ) -> Shares:
+        """One closed loop; smooth for a slope that means something."""
         loop = self.with_parts(plant, law, size)
+        loop = without_steps(loop) if smooth else loop
         outcome = sampled.simulate(
             loop,
             duration=self.duration,
@@ -66,6 +70,15 @@ class Bench(NamedTuple):
             substeps=self.settings.substeps,
         )
         return shares(outcome.accumulated[0], outcome.ended, self.duration)
+
+
+def without_steps(loop: ClosedLoop) -> ClosedLoop:
+    """Same loop without rounded readings and dead zones.
+
+    The slope of a rounded number is zero: differentiated as they are, instruments would look as if they were cut off.
+    """
+    named = lambda path: getattr(path[-1], "name", "") in _STEPS
+    return jax.tree_util.tree_map_with_path(lambda path, leaf: jnp.zeros_like(leaf) if named(path) else leaf, loop)
 
 
 class Evaluation:
@@ -123,13 +136,13 @@ class Evaluation:
 
     def _slopes(self, point, plants, keys, sizes):
         """Shape (k, trials)."""
-        costs = lambda at: self._over_trials(self._numbers_at(at), plants, keys, sizes).cost(self._bench.weights)
+        costs = lambda at: self._over_trials(self._numbers_at(at), plants, keys, sizes, True).cost(self._bench.weights)
         along = lambda direction: jax.jvp(costs, (point,), (direction,))[1]
         return jax.vmap(along)(jnp.eye(point.shape[0]))
 
-    def _over_trials(self, law, plants, keys, sizes) -> Shares:
+    def _over_trials(self, law, plants, keys, sizes, smooth: bool = False) -> Shares:
         whole = eqx.combine(law, self._law_rest)
-        one = lambda plant, key, size: self._bench.run(whole, eqx.combine(plant, self._plant_rest), key, size)
+        one = lambda plant, key, size: self._bench.run(whole, eqx.combine(plant, self._plant_rest), key, size, smooth)
         return jax.vmap(one)(plants, keys, sizes)
 
     def _many(self, laws, plants, keys, sizes) -> Shares:
