@@ -291,3 +291,10 @@ class AbstractSensor(eqx.Module):
     @abc.abstractmethod
     def measure(self, path: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
         """Measurement at time t, and the state after it."""
+
+    def velocity_noise(self, dt: float) -> Array:
+        """What a law is told of it: standard deviation of white noise, new at every tick of dt (s), on velocities.
+
+        One number or one per output, m/s and rad/s; zero where nothing is known.
+        """
+        return jnp.zeros(())

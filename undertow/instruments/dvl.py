@@ -1,5 +1,7 @@
 """Doppler velocity log: velocity over the ground, in body axes."""
 
+import jax.numpy as jnp
+
 from undertow.instruments.estimate import Estimate, Motion
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.sampling import Sampling
@@ -11,6 +13,9 @@ class DVL(AbstractInstrument):
 
     def reading(self, motion: Motion):
         return matvec(motion.rotation.T, motion.velocity)
+
+    def velocity_noise(self):
+        return jnp.full(6, jnp.inf).at[:3].set(self.sampling.noise)
 
     def correct(self, estimate: Estimate, reading) -> Estimate:
         """What it was then, by the acceleration since, is compared."""

@@ -15,6 +15,9 @@ class IMU(AbstractInstrument):
     def reading(self, motion: Motion):
         return jnp.concatenate([motion.angles[:2], motion.rates, motion.specific_force])
 
+    def velocity_noise(self):
+        return jnp.full(6, jnp.inf).at[3:].set(self.sampling.noise[2:5])
+
     def foretell(self, estimate: Estimate, reading) -> Estimate:
         acceleration = matvec(estimate.rotation(), reading[5:]) + GRAVITY
         return estimate._replace(rates=reading[2:5], acceleration=acceleration)

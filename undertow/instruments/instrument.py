@@ -3,6 +3,7 @@
 import abc
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -30,6 +31,10 @@ class AbstractInstrument(eqx.Module):
     @abc.abstractmethod
     def reading(self, motion: Motion) -> Reading:
         """What it would read without any error."""
+
+    def velocity_noise(self) -> Float[Array, "6"]:
+        """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for what it does not read."""
+        return jnp.full(6, jnp.inf)
 
     def foretell(self, estimate: Estimate, reading: Reading) -> Estimate:
         """Estimate with what this reading says about the time since the last one; before the prediction."""

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from undertow.core import runtime
 from undertow.core.contracts import AbstractDisturbance
 from undertow.disturbances.adding import Together
@@ -54,13 +56,14 @@ def build(source: Text | Mapping[str, Any]) -> Built:
     start, stop = scenario.steady.of_run(scenario.loop.duration)
     resolved["steady"] = {"start": start, "stop": stop}
 
+    circumstances: dict[str, Any] = {"sampling_time": scenario.loop.dt}
+
     def make(key: str, given: tuple = ()) -> Any:
         part, resolved[key] = one(key, key, getattr(scenario, key), given)
         return part
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
-        times = {"sampling_time": scenario.loop.dt}
-        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given, times))
+        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given, circumstances))
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):
@@ -73,8 +76,11 @@ def build(source: Text | Mapping[str, Any]) -> Built:
     model, resolved["model"] = placed(
         text, "model", lambda: parts.call(plant.model, scenario.model, folder=text.folder)
     )
+    sensor = make("sensor")
+    circumstances["velocity_noise"] = np.asarray(sensor.velocity_noise(scenario.loop.dt)).tolist()
     controller = make("controller", (model,))
-    loop = ClosedLoop(plant, controller, make("reference"), disturbance(), make("sensor"))
+    loop = ClosedLoop(plant, controller, make("reference"), disturbance(), sensor)
+    resolved["sensor"] = resolved.pop("sensor")  # in the order of the scenario
     if scenario.loop.kind == "continuous":
         placed(text, "loop", lambda: continuous.check(loop))
     check_times(text, scenario.loop, scenario.steady)

@@ -15,6 +15,9 @@ from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.propeller_speed import PropellerSpeed
 from undertow.instruments.sampling import Spoken
 
+# (m/s)^2 s; less counts as none.
+_NOISELESS = 1e-20
+
 
 class NavigationState(NamedTuple):
     """What it remembers."""
@@ -50,6 +53,12 @@ class Navigation(AbstractSensor):
 
     def draw(self, key):
         return jax.random.split(key, len(self.instruments))
+
+    def velocity_noise(self, dt):
+        """That of all readings of a second, as if they came evenly at every tick; the filters' memory is left out."""
+        told = [one.velocity_noise() ** 2 * one.sampling.period for one in self.instruments]
+        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in told)
+        return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
 
     def init(self, path, truth: Measurement) -> NavigationState:
         if truth.position.shape != (6,):

@@ -29,6 +29,9 @@ class WhiteNoise(AbstractSensor):
     def draw(self, key):
         return key
 
+    def velocity_noise(self, dt):
+        return self.velocity
+
     def init(self, path, truth) -> tuple[()]:
         return ()
 

@@ -7,6 +7,7 @@ from jax.core import Tracer
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.law import RobustRCAF
 from undertow.controllers.robust.reference_filter import ReferenceFilter
+from undertow.controllers.robust.sets import widened
 from undertow.controllers.robust.speeds import speeds
 from undertow.core.contracts import AbstractModel
 from undertow.core.errors import BadInput
@@ -17,6 +18,9 @@ def robust(
     model: AbstractModel,
     *,
     sampling_time: float = 1e-3,
+    velocity_noise=0.0,
+    load_rate=1.0,
+    delay: float = 0.0,
     bandwidth=None,
     damping=1.0,
     tracking_share=0.0,
@@ -33,7 +37,7 @@ def robust(
     actuator_rate=None,
     direction=1.0,
     sets: int = 5,
-    reach=(1.0,),
+    reach=None,
     width: float | None = None,
 ) -> RobustRCAF:
     """The sound law: body axes and quaternions where there are any, projected weights, limits respected.
@@ -41,7 +45,11 @@ def robust(
     Args:
         model: what the controller may know, from `plant.model()`.
         sampling_time: of the loop, s; a scenario gives it.
-        bandwidth: natural frequency of the estimator, rad/s; None: as fast as sampling and actuators allow.
+        velocity_noise: standard deviation of the measured velocities at each tick, m/s and rad/s; one number or one
+            per axis; a scenario's sensor gives it.
+        load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s); counts where there is noise only.
+        delay: of measurement and input together that nothing makes up for, s.
+        bandwidth: natural frequency of the estimator, rad/s; None: as fast as sampling, noise and delay allow.
         damping: its damping ratio.
         tracking_share: mu, share of the filtered tracking error in the adaptation; 0 for a pure observer.
         tracking: natural frequency of the tracking error, critically damped, rad/s; None: a fifth of the bandwidth.
@@ -55,20 +63,24 @@ def robust(
         weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that can be estimated.
         reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of
             `tracking`, 2 at most; 0 for no filter.
-        actuator_rate: how fast motors are made to follow, 1/s; None: as fast as sampling allows.
+        actuator_rate: how fast motors are made to follow, 1/s; None: as fast as sampling allows, at most three times
+            the bandwidth.
         direction: what departing from the wanted direction costs, where limits bind, beside losing size.
         sets: fuzzy sets; any number from 1.
-        reach: outermost centres, m/s and rad/s.
+        reach: outermost centres, m/s and rad/s; None: so far that weights anywhere in their box add at most a tenth
+            to the damping of the estimator.
         width: of the sets as a share of `reach`; None: their spacing.
 
     Raises:
         BadInput: a value is out of its range, or both ways of giving the same thing.
     """
-    fuzzy = gaussian_sets(sets, tuple(np.ravel(reach)), width)
+    fuzzy = gaussian_sets(sets, tuple(np.ravel(1.0 if reach is None else reach)), width)
     letters = {"pole": pole, "adaptation": adaptation, "composite": composite}
     if any(value is not None for value in letters.values()):
         bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.gathering()), bandwidth)
-    fast = speeds(sampling_time, bandwidth, tracking, actuator_rate)
+    fast = speeds(sampling_time, bandwidth, tracking, actuator_rate, velocity_noise, load_rate, delay)
+    if reach is None:
+        fuzzy = widened(fuzzy, fast.bandwidth, damping, weights_bound)
     if feedback is None:
         feedback = jnp.stack([fast.tracking**2, 2 * fast.tracking], -1)
     elif tracking is not None:

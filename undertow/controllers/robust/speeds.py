@@ -11,6 +11,12 @@ from undertow.core import checks
 # the second asks a current loop three times as fast for more than it can do.
 _ESTIMATOR, _ACTUATORS = 0.35, 0.15
 
+# A delay that nobody knows of eats the estimator's margin from about one radian on; a third of that is left to it.
+_DELAYED = 0.35
+
+# Motors need not be faster than this many times what the estimator asks of them; more only passes on noise.
+_NEEDED = 3.0
+
 # The tracking error is made slower than the estimator that has to have found the load.
 _TRACKING = 0.2
 
@@ -23,26 +29,50 @@ class Speeds(NamedTuple):
     tracking: Float[Array, "..."]
 
 
-def speeds(sampling_time: float, bandwidth=None, tracking=None, actuators=None) -> Speeds:
-    """What is not given is as fast as the loop inside it allows.
+def speeds(
+    sampling_time: float,
+    bandwidth=None,
+    tracking=None,
+    actuators=None,
+    velocity_noise=0.0,
+    load_rate=1.0,
+    delay: float = 0.0,
+) -> Speeds:
+    """What is not given is as fast as the loop inside it, noise and delay allow.
 
     Args:
         sampling_time: s.
         bandwidth: of the estimator, rad/s.
         tracking: natural frequency of the tracking error, rad/s.
         actuators: rate at which motors follow, 1/s.
+        velocity_noise: standard deviation of the measured velocities at each tick, m/s and rad/s.
+        load_rate: how fast loads wander, m/s^2 per sqrt(s) and rad/s^2 per sqrt(s).
+        delay: of measurement and input together that nothing makes up for, s.
 
     Raises:
-        BadInput: a value that is not positive.
+        BadInput: a value that is not positive, or negative.
     """
     checks.positive("sampling_time", sampling_time, "s")
-    if actuators is None:
-        actuators = _ACTUATORS / sampling_time
-    checks.positive("actuator_rate", actuators, "1/s")
+    checks.not_negative("velocity_noise", velocity_noise, "m/s, rad/s")
+    checks.positive("load_rate", load_rate)
+    checks.not_negative("delay", delay, "s")
     if bandwidth is None:
-        bandwidth = jnp.minimum(_ESTIMATOR / sampling_time, actuators)
+        sampled = min(_ESTIMATOR, _ACTUATORS) / sampling_time if actuators is None else _ESTIMATOR / sampling_time
+        bandwidth = jnp.minimum(sampled, kalman(sampling_time, velocity_noise, load_rate))
+        bandwidth = jnp.minimum(bandwidth, _DELAYED / delay if delay else jnp.inf)
+        bandwidth = bandwidth if actuators is None else jnp.minimum(bandwidth, actuators)
     checks.positive("bandwidth", bandwidth, "rad/s")
+    if actuators is None:
+        actuators = jnp.minimum(_ACTUATORS / sampling_time, _NEEDED * jnp.max(jnp.asarray(bandwidth, dtype=float)))
+    checks.positive("actuator_rate", actuators, "1/s")
     if tracking is None:
         tracking = _TRACKING * jnp.asarray(bandwidth, dtype=float)
     checks.positive("tracking", tracking, "rad/s")
     return Speeds(*(jnp.asarray(value, dtype=float) for value in (actuators, bandwidth, tracking)))
+
+
+def kalman(sampling_time: float, velocity_noise, load_rate) -> Float[Array, "..."]:
+    """(q^2 / (sigma^2 T))^(1/4), rad/s: the steady Kalman filter of v_dot = u + d, d a random walk. Section 3.1."""
+    density = jnp.asarray(velocity_noise, dtype=float) ** 2 * sampling_time
+    ratio = jnp.asarray(load_rate, dtype=float) ** 2 / jnp.where(density > 0, density, 1.0)
+    return jnp.where(density > 0, ratio**0.25, jnp.inf)
