@@ -74,14 +74,14 @@ def test_conclusions_say_what_the_numbers_say():
     assert found["same"] == [
         "Accuracy. A textbook linear observer of the same bandwidth has 1.020 times the error of RCAFC (A3)."
     ]
-    motor, again = found["loses"]
+    (motor,), (again,) = found["loses"], found["neither"]
     assert "ends after 1.5 s" in motor and "0.0003" in motor
     assert "up to 1.2 off, and after 7.5 s back to 2e-05; Table 1 up to 1.2, then 0.4." in again
 
 
 def test_a_win_that_is_none_is_not_told():
     even = [ablation("A10", dict.fromkeys(LIMITED, 1e-5))]
-    assert conclusions([], even) == {"wins": [], "same": [], "loses": []}
+    assert conclusions([], even) == {"wins": [], "same": [], "loses": [], "neither": []}
 
 
 @pytest.mark.parametrize("quick", [True, False])

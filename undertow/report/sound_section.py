@@ -26,6 +26,7 @@ _LISTS = {
     "wins": "Where the paper's idea wins",
     "same": "Where a plain linear observer is as good",
     "loses": "Where it loses",
+    "neither": "Where the sound version is no better, or costs something",
 }
 
 
