@@ -96,7 +96,8 @@ class Evaluation:
     ):
         self._bench, self._training = bench, trials
         self._pool, self._lock = concurrent.futures.ThreadPoolExecutor(_WORKERS), threading.Lock()
-        self._programs: dict[str, Any] = {}
+        self._compilers = concurrent.futures.ThreadPoolExecutor(_WORKERS)
+        self._programs: dict[str, concurrent.futures.Future[Any]] = {}
         self._plant_rest = eqx.filter(trials.plants, eqx.is_array, inverse=True)
         self._law_numbers, self._law_rest = eqx.partition(like, eqx.is_array)
         self._numbers_at = lambda point: eqx.filter(make(point), eqx.is_array)
@@ -129,10 +130,17 @@ class Evaluation:
 
     def slope(self, point: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         """Gradient of the mean cost over the training, forward through every run; runs without one count as flat."""
-        trials = self._training
-        arguments = (jnp.asarray(point), eqx.filter(trials.plants, eqx.is_array), trials.keys, trials.sizes)
+        arguments = self._of_slope(point)
         each = np.asarray(self._compiled("slope", self._slopes, *arguments)(*arguments))
         return np.where(np.isfinite(each), each, 0.0).mean(axis=1)
+
+    def foresee_slope(self, point: Float[np.ndarray, " k"]) -> None:
+        """Begin to compile what `slope` needs, beside whatever else is done."""
+        self._compiling("slope", self._slopes, *self._of_slope(point))
+
+    def _of_slope(self, point: Float[np.ndarray, " k"]) -> tuple[Any, ...]:
+        trials = self._training
+        return jnp.asarray(point), eqx.filter(trials.plants, eqx.is_array), trials.keys, trials.sizes
 
     def _slopes(self, point, plants, keys, sizes):
         """Shape (k, trials)."""
@@ -158,9 +166,13 @@ class Evaluation:
         return jax.tree.map(spread, eqx.filter(law, eqx.is_array), self._law_numbers)
 
     def _compiled(self, name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+        return self._compiling(name, function, *arguments).result()
+
+    def _compiling(self, name: str, function: Callable[..., Any], *arguments: Any) -> concurrent.futures.Future[Any]:
+        compiled = lambda: jax.jit(function).lower(*arguments).compile(compiler_options=_COMPILER)
         with self._lock:
             if name not in self._programs:
-                self._programs[name] = jax.jit(function).lower(*arguments).compile(compiler_options=_COMPILER)
+                self._programs[name] = self._compilers.submit(compiled)
             return self._programs[name]
 
 

@@ -94,6 +94,8 @@ def tune(
     make = lambda point: wanted.law(wanted.options(point))
     first = make(wanted.start)
     evaluation = Evaluation(wanted.bench, make, first, wanted.train)
+    if method == "gradient":
+        evaluation.foresee_slope(wanted.start)
     certifier = Certifier(wanted.bench, wanted.train, first)
     objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
     say("compiling, and looking for a beginning")
