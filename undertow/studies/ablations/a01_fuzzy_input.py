@@ -8,6 +8,7 @@ from undertow.studies.ablations.on_axes import gathering, loop
 
 QUESTION = "Modelling error or state as fuzzy input?"
 PREDICTION = "At equal gamma the state is worse by the ratio of |xi|^2; at equal gamma |xi|^2 they are the same."
+LONG = True
 METRICS = ("estimation_rms", "tracking_rms")
 LEFT_OUT = "loads that repeat with position, which only the state could learn"
 

@@ -9,6 +9,7 @@ from undertow.studies.ablations.on_axes import loop
 
 QUESTION = "Which sizes and frequencies of disturbance does it cope with?"
 PREDICTION = "Below 50 rad/s the estimate helps, above 103 rad/s it adds error, whatever the size."
+LONG = True
 METRICS = ("share", "tracking_rms")
 LEFT_OUT = "chirps (Fig. 7 has one)"
 

@@ -38,6 +38,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
         )
         for limit in _LIMITS
         for name, law in _LAWS.items()
+        if not (quick and name == "robust")
     ]
     laws = {} if quick else {name: _LAWS[name] for name in ("RCAFC", "RAFC", "robust")}
     vehicle = [

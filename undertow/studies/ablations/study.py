@@ -19,7 +19,7 @@ def modules() -> list[ModuleType]:
 
 
 def is_long(module: ModuleType) -> bool:
-    """Whether it takes too long for a quick look."""
+    """Whether a quick look leaves it out: it takes long, or a claim of the audit tells as much."""
     return getattr(module, "LONG", False)
 
 
