@@ -95,6 +95,8 @@ def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray
 def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = "sampled") -> list[float]:
     """Spectral radius of the closed loop at rest under each of some constant loads; below 1 each is stable.
 
+    Loads that no input holds are left out; where none is held, the radius is infinite.
+
     Args:
         loop: the five roles.
         dt: sampling time, s.
@@ -102,7 +104,8 @@ def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = 
         loads: accelerations of the outputs, m/s^2 and rad/s^2, one per row.
         kind: sampled or continuous.
     """
-    return [spectral_radius(closed(rest(loop, dt, position, load), dt, kind)) for load in np.atleast_2d(loads)]
+    found = [at for load in np.atleast_2d(loads) if (at := rest(loop, dt, position, load)).found]
+    return [spectral_radius(closed(at, dt, kind)) for at in found] or [float("inf")]
 
 
 def _largest(closed_at: Callable[[float], LinearLoop], least: float, most: float) -> float:

@@ -1,5 +1,6 @@
 """Where a closed loop rests under a constant load: found by Newton's method, whether the loop is stable or not."""
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -10,7 +11,10 @@ from undertow.analysis.linearised.pieces import Local, Parts, take_apart
 from undertow.core.contracts import AbstractModel, Measurement
 from undertow.loop.closed_loop import ClosedLoop
 
-_STEPS = 40
+_STEPS = 30
+_LENGTHS = (1.0, 0.5, 0.25, 0.1)  # of a step
+_FIRST_SHARE, _SMALLEST_SHARE = 0.25, 0.02  # of a load that is put on little by little
+_WORSE = 100.0  # times the residual before: further than this nothing is looked for
 _AT_REST = 1e-8  # of what moves, in SI units
 _SETTLING = 400  # sampling times that an actuator is given to come to a force
 
@@ -48,21 +52,47 @@ def rest(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Rest:
         load: acceleration of the outputs, m/s^2 and rad/s^2.
     """
     parts, start = take_apart(loop, position)
-    model = loop.controller.model.own_axes()
-    at = start | {"load": np.asarray(load, dtype=float)}
-    x = parts.plant_state(jnp.asarray(at["plant"]))
-    y = loop.plant.output(jnp.zeros(()), x)
-    at["u"] = np.asarray(_holding_input(model, y, jnp.asarray(at["load"])))
-    first = parts.differentiate(at, dt)
-    acting = _acting(first)
+    load = np.asarray(load, dtype=float)
+    acting = _acting(parts.differentiate(start, dt))
+    found = _from_afar(parts, start, load, dt, acting)
+    # Where that fails, the load is put on little by little, from a share that can be held.
+    share, step = 0.0, _FIRST_SHARE
+    held = found if found.found else _from_afar(parts, start, share * load, dt, acting)
+    while not found.found and held.found and step > _SMALLEST_SHARE:
+        further = _onward(held, min(1.0, share + step) * load, dt)
+        if further.found:
+            share, held = min(1.0, share + step), further
+            found = held if share == 1.0 else found
+        else:
+            step /= 2
+    return found
+
+
+def _from_afar(parts: Parts, start: dict, load: np.ndarray, dt: float, acting: np.ndarray) -> Rest:
+    """Rest under a load, from actuators that stand still."""
+    loop = parts.loop
+    y = loop.plant.output(jnp.zeros(()), parts.plant_state(jnp.asarray(start["plant"])))
+    held = np.asarray(_holding_input(loop.controller.model.own_axes(), y, jnp.asarray(load)))
+    at = start | {"load": load, "u": held}
+    solve = partial(_newton, parts, dt=dt, acting=acting)
     # The plant first, so that actuators turn (with the input held, else the shortest way to rest is to switch them
-    # off); then the law for that plant; then both together.
-    at = _newton(parts, at, dt, acting, ("plant",))
-    at = _newton(parts, at, dt, acting, ("plant", "u"))
-    at = _newton(parts, at, dt, acting, ("law",))
-    at = _newton(parts, at, dt, acting, ("plant", "law", "u"))
+    # off); then what the law learns and believes at that plant; then both together.
+    at = solve(at, unknown=("plant",), still=("plant", "outputs"))
+    at = solve(at, unknown=("plant", "u"), still=("plant", "outputs"))
+    at = solve(at, unknown=("law",), still=("law",))
+    return _together(parts, at, dt, acting)
+
+
+def _onward(held: Rest, load: np.ndarray, dt: float) -> Rest:
+    """Rest under a load, from rest under another."""
+    return _together(held.parts, held.at | {"load": load}, dt, held.acting)
+
+
+def _together(parts: Parts, at: dict, dt: float, acting: np.ndarray) -> Rest:
+    unknown, still = ("plant", "law", "u"), ("plant", "law", "command")
+    at = _newton(parts, at, unknown, still, dt, acting)
     local = parts.differentiate(at, dt)
-    remaining = _residual(local, at, dt, acting, ("plant", "law", "u"))[0]
+    remaining = _residual(local, at, dt, acting, unknown, still)[0]
     return Rest(parts, at, local, float(np.abs(remaining).max(initial=0.0)), acting)
 
 
@@ -88,43 +118,51 @@ def _acting(local: Local) -> np.ndarray:
         acts = now
 
 
-def _residual(local: Local, at: dict, dt: float, acting: np.ndarray, unknown: tuple[str, ...]):
+def _residual(local: Local, at: dict, dt: float, acting: np.ndarray, unknown: tuple[str, ...], still: tuple[str, ...]):
     """What must vanish, and its slopes with respect to the unknown."""
     values, slopes = local.values, local.slopes
-    identity = {name: np.eye(len(at[name])) for name in ("law", "u")}
-    blank = lambda name, by: 0 if name != by else identity[name]
-    residual, rows = [], []
-    if "plant" in unknown:  # at rest
-        residual.append(values["plant"][acting])
-        rows.append([slopes["plant"][by][acting] for by in unknown])
-    if "law" in unknown:
-        residual.append((values["law"] - at["law"]) / dt)
-        rows.append([(slopes["law"][by] - blank("law", by)) / dt for by in unknown])
-        residual.append(values["u"] - at["u"])
-        rows.append([slopes["u"][by] - blank("u", by) for by in unknown])
-    else:
-        residual.append(values["error"])
-        rows.append([slopes["error"][by] for by in unknown])
-    return np.concatenate(residual), np.block(rows)
+    own = lambda name, by: np.eye(len(at[name])) if name == by else 0
+    equations = {
+        "plant": lambda: (values["plant"][acting], [slopes["plant"][by][acting] for by in unknown]),
+        "outputs": lambda: (values["error"], [slopes["error"][by] for by in unknown]),
+        "law": lambda: (
+            (values["law"] - at["law"]) / dt,
+            [(slopes["law"][by] - own("law", by)) / dt for by in unknown],
+        ),
+        "command": lambda: (values["u"] - at["u"], [slopes["u"][by] - own("u", by) for by in unknown]),
+    }
+    residuals, rows = zip(*(equations[name]() for name in still), strict=True)
+    return np.concatenate(residuals), np.block(list(rows))
 
 
-def _newton(parts: Parts, at: dict, dt: float, acting: np.ndarray, unknown: tuple[str, ...]) -> dict:
-    """Smallest steps that solve the linearised equations, until nothing moves or steps do not help any more."""
-    local = parts.differentiate(at, dt)
-    best, kept = np.inf, at
+def _newton(
+    parts: Parts, at: dict, unknown: tuple[str, ...], still: tuple[str, ...], dt: float, acting: np.ndarray
+) -> dict:
+    """Smallest steps that solve the linearised equations, shortened while they make it worse."""
+
+    def look(at: dict):
+        local = parts.differentiate(at, dt)
+        residual, jacobian = _residual(local, at, dt, acting, unknown, still)
+        sound = np.isfinite(residual).all() and np.isfinite(jacobian).all()
+        return residual, jacobian, float(np.abs(residual).max(initial=0.0)) if sound else np.inf
+
+    residual, jacobian, size = look(at)
+    ends = np.cumsum([len(at[name]) for name in unknown])[:-1]
     for _ in range(_STEPS):
-        residual, jacobian = _residual(local, at, dt, acting, unknown)
-        size = np.abs(residual).max(initial=0.0)
-        if not np.isfinite(jacobian).all() or not np.isfinite(size):
-            break
-        if size < best:
-            best, kept = size, at
-        if size < _AT_REST:
+        if not _AT_REST < size < np.inf:
             break
         scale = np.abs(jacobian).max(axis=1, keepdims=True)
         scale[scale == 0] = 1.0
-        step = -np.linalg.lstsq(jacobian / scale, residual / scale[:, 0], rcond=1e-11)[0]
-        ends = np.cumsum([len(at[name]) for name in unknown])[:-1]
-        at = at | {name: at[name] + part for name, part in zip(unknown, np.split(step, ends), strict=True)}
-        local = parts.differentiate(at, dt)
-    return kept
+        step = np.split(-np.linalg.lstsq(jacobian / scale, residual / scale[:, 0], rcond=1e-11)[0], ends)
+        for length in _LENGTHS:
+            trial = at | {name: at[name] + length * part for name, part in zip(unknown, step, strict=True)}
+            found = look(trial)
+            if found[2] < size:
+                break
+        else:  # whatever the length: far from rest a larger residual may still be the way
+            trial = at | {name: at[name] + part for name, part in zip(unknown, step, strict=True)}
+            found = look(trial)
+            if not found[2] < _WORSE * size:
+                break
+        at, (residual, jacobian, size) = trial, found
+    return at
