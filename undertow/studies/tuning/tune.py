@@ -128,6 +128,23 @@ def tune(
     )
 
 
+def judge(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Judged, ...]:
+    """How the gains of a scenario, and other choices of its options by name, do in the runs that `tune` would take.
+
+    Scenarios that differ in their controller only meet the same runs.
+
+    Raises:
+        BadInput: anything wrong with the scenario.
+    """
+    wanted = problem(text)
+    make = lambda point: wanted.law(wanted.options(point))
+    first = make(wanted.start)
+    evaluation = Evaluation(wanted.bench, make, first, wanted.train)
+    return _judged(
+        wanted, evaluation, Certifier(wanted.bench, wanted.train, first), [("given", None), *choices.items()]
+    )
+
+
 def _judged(
     wanted: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, Mapping[str, Any] | None]]
 ) -> tuple[Judged, ...]:
