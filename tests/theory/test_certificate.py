@@ -132,7 +132,7 @@ def test_discrete_function_comes_to_the_continuous_one():
 
 def test_rises_only_where_the_basis_moves():
     """Negative control: a slow estimator errs beyond its fuzzy sets, and its function rises there only."""
-    run = flown(constant(CONSTANTS), {"preset": "robust", "bandwidth": 5.0}, axes=4)
+    run = flown(constant(CONSTANTS), {"preset": "robust", "bandwidth": 5.0, "reach": (1.0,)}, axes=4)
     rho = (np.asarray(gaussian_sets(5).basis(run.dataset["modelling_error"].values.reshape(-1, 1))) ** 2).sum(-1)
     moved = (np.abs(rho / float(gaussian_sets(5).gathering()) - 1) > 0.01).reshape(-1, 4).any(-1)
     up = rising(run)

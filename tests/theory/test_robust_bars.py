@@ -9,7 +9,7 @@ import pytest
 
 from undertow.controllers import rcaf
 from undertow.core.contracts import AbstractReference, Target
-from undertow.disturbances import none, sinusoid, u1
+from undertow.disturbances import none, sinusoid, table, u1
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.rotations import rotation_from_euler, wrap_angle
@@ -60,6 +60,21 @@ def test_the_estimator_depends_on_neither_controller_nor_limits():
     first, second = run(2.0, [0.0, 0.0], math.inf), run(8.0, [3.0, -1.0], 4.0)
     for one, other in zip(first, second, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+@pytest.mark.parametrize(("frequency", "recovers"), [(None, True), (0.0, False)])
+def test_carried_away_it_comes_back_without_swinging(frequency, recovers):
+    """1.5 s of twice what the actuator can do, 140 rad/s of feedback; without a target that gives way it swings."""
+    plant = double_integrator(1, limit=2.0)
+    law = rcaf(plant.model(), preset="robust", reference_frequency=frequency)
+    push = table([[0.0, 0.0], [2.0, 0.0], [2.01, 4.0], [3.5, 4.0], [3.51, 0.0], [20.0, 0.0]])
+    loop = ClosedLoop(plant, law, setpoint([0.0]), push, perfect())
+    run = sampled.simulate(loop, duration=20.0, dt=1e-3, record_every=10)
+    error = np.asarray(run.samples.error)[:, 0]
+    assert np.abs(error).max() > 4.0  # m
+    overshoot = -error[np.abs(error).argmax() :].min() if error[np.abs(error).argmax()] > 0 else error.max()
+    assert (overshoot < 0.02) == recovers, overshoot
+    assert (np.abs(error[-200:]).max() < 1e-4) == recovers
 
 
 class Somersault(AbstractReference):

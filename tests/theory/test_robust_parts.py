@@ -4,20 +4,22 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_continuous_are
 from scipy.optimize import linprog
 
+from undertow.analysis.drift import gain_bound
 from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.reference_filter import ReferenceFilter
+from undertow.controllers.robust.speeds import kalman
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
 from undertow.fuzzy.tsk import gaussian_sets
 from undertow.numerics.integrators import rk4
 from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage, t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.thrusters import first_order, linear_voltage, paper_table3, quadratic_voltage, t200
+from undertow.vehicles import bluerov2_heavy, odin
 
 RNG = np.random.default_rng(4)
 
@@ -74,7 +76,42 @@ def test_letters_of_table_1_mean_the_same_estimator():
 def test_defaults_follow_the_sampling_time():
     slow, fast = (robust(double_integrator(1).model(), sampling_time=dt) for dt in (1e-2, 1e-3))
     np.testing.assert_allclose(fast.estimator.bandwidth, 10 * slow.estimator.bandwidth)
-    np.testing.assert_allclose(fast.feedback, [900.0, 60.0])
+    np.testing.assert_allclose(fast.estimator.bandwidth, 350.0)  # 0.35 / T
+    np.testing.assert_allclose(fast.feedback, [140.0**2, 280.0])
+
+
+def test_motors_noise_and_delay_slow_the_estimator():
+    """Sections 3.1 and 3.12: 1 / lag; (q^2 / (sigma^2 T))^(1/4); 0.35 over the delay. The smallest counts."""
+    axis = double_integrator(1).model()
+    vehicle = hybrid_vehicle(odin(), paper_table3("shaft", supply=24.0)).model()
+    slow = hybrid_vehicle(odin(), first_order(time_constant=0.2)).model()
+    assert float(robust(vehicle).estimator.bandwidth) == pytest.approx(150.0)  # motors made to follow at 0.15 / T
+    assert float(robust(slow).estimator.bandwidth) == pytest.approx(5.0)
+    assert float(robust(axis, delay=0.01).estimator.bandwidth) == pytest.approx(35.0)
+    noisy = robust(axis, velocity_noise=0.01, load_rate=0.5)
+    assert float(noisy.estimator.bandwidth) == pytest.approx((0.5**2 / (0.01**2 * 1e-3)) ** 0.25)
+    assert float(robust(vehicle, bandwidth=10.0).actuator_rate) == pytest.approx(30.0)
+
+
+def test_kalman_is_the_steady_filter_of_a_wandering_load():
+    """v_dot = d, d_dot white of density q^2, v read with noise: the Riccati equation has poles of that frequency."""
+    noise, q, dt = 0.02, 0.7, 1e-3
+    a, c = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[1.0, 0.0]])
+    density = np.array([[noise**2 * dt]])
+    p = solve_continuous_are(a.T, c.T, np.diag([0.0, q**2]), density)
+    gain = (p @ c.T / density).ravel()
+    assert float(kalman(dt, noise, q)) == pytest.approx(np.sqrt(gain[1]), rel=1e-9)
+    assert gain[0] == pytest.approx(np.sqrt(2) * float(kalman(dt, noise, q)), rel=1e-9)
+
+
+@pytest.mark.parametrize("bandwidth", [5.0, 20.0, 150.0])
+def test_weights_in_their_box_add_little_damping(bandwidth):
+    """Section 3.8: c <= theta_max sum |xi'| is at most a tenth of 2 zeta w_o with the sets as they come."""
+    law = robust(double_integrator(1).model(), bandwidth=bandwidth)
+    assert gain_bound(law) == pytest.approx(0.1 * 2 * bandwidth, rel=1e-9)
+    narrow = robust(double_integrator(1).model(), bandwidth=bandwidth, reach=(1.0,))
+    assert gain_bound(narrow) > 90
+    assert float(law.estimator.fuzzy.gathering()) == pytest.approx(float(narrow.estimator.fuzzy.gathering()))
 
 
 @pytest.mark.parametrize(

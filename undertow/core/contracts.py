@@ -137,6 +137,10 @@ class AbstractModel(eqx.Module):
         """Velocity, m/s and rad/s."""
         return y.velocity
 
+    def outward(self, y: Measurement, rates: Outputs) -> Outputs:
+        """Velocity of the outputs for given `rates`, or any small motion likewise."""
+        return rates
+
     def wanted(self, y: Measurement, r: Target) -> tuple[Outputs, Outputs]:
         """Velocity of the target and its time derivative."""
         return r.velocity, r.acceleration

@@ -14,6 +14,10 @@ class AbstractDrive(eqx.Module):
     """From input to force and back, with what the controller remembers of it (propeller speeds, for instance)."""
 
     @abc.abstractmethod
+    def lag(self, rate: Float[Array, ""]) -> Float[Array, ""]:
+        """Time constant of the force, s, where actuators are made to follow at a rate (1/s)."""
+
+    @abc.abstractmethod
     def init(self) -> PyTree:
         """State at rest."""
 
@@ -47,11 +51,15 @@ class AbstractDrive(eqx.Module):
 
 
 class DirectDrive(AbstractDrive):
-    """The force is proportional to the input, at once, within limits of the input."""
+    """The force is proportional to the input, within limits of the input."""
 
     gain: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
     low: Inputs = eqx.field(converter=jnp.asarray, default=-jnp.inf)
     high: Inputs = eqx.field(converter=jnp.asarray, default=jnp.inf)
+    time_constant: Float[Array, ""] | None = None  # s, of a lag that the drive itself leaves out; None: not known
+
+    def lag(self, rate):
+        return 1 / rate if self.time_constant is None else jnp.asarray(self.time_constant, dtype=float)
 
     def init(self) -> tuple[()]:
         return ()

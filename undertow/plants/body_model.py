@@ -50,6 +50,9 @@ class BodyModel(AbstractModel):
         """nu."""
         return kinematics_from_euler(y.position[3:]).to_body(y.velocity)
 
+    def outward(self, y: Measurement, rates: Vector6) -> Vector6:
+        return kinematics_from_euler(y.position[3:]).to_world(rates)
+
     def wanted(self, y: Measurement, r: Target) -> tuple[Vector6, Vector6]:
         """nu of the target as the vehicle sees it in its own axes, and its time derivative."""
         own, other = kinematics_from_euler(y.position[3:]), kinematics_from_euler(r.position[3:])

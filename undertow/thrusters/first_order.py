@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.drive import DirectDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motorless import AbstractMotorlessThruster
@@ -65,6 +66,9 @@ class FirstOrderThruster(AbstractMotorlessThruster):
     def speed_term(self, report):
         hint = "This thruster has no propeller speed. Describe its motor (DCMotor), or leave its lag to the estimator"
         raise BadInput("speed_sensor", "be false with thruster first_order", "true", hint=hint)
+
+    def drive(self, count: int, measured: bool) -> DirectDrive:
+        return DirectDrive(self.voltage_gain(), -self.supply, self.supply, self.time_constant)
 
     def advice(self):
         return ()

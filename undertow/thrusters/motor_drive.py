@@ -46,6 +46,9 @@ class MotorDrive(AbstractDrive):
     count: int = eqx.field(static=True)
     measured: bool = eqx.field(static=True)
 
+    def lag(self, rate):
+        return 1 / rate
+
     def init(self) -> MotorState:
         return MotorState(jnp.zeros(self.count), jnp.zeros(self.count))
 

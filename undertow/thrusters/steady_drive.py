@@ -27,6 +27,9 @@ class SteadyDrive(AbstractDrive):
 
     thruster: Invertible
 
+    def lag(self, rate):
+        return jnp.zeros(())
+
     def init(self) -> tuple[()]:
         return ()
 

@@ -52,7 +52,8 @@ def robust(
         bandwidth: natural frequency of the estimator, rad/s; None: as fast as sampling, noise and delay allow.
         damping: its damping ratio.
         tracking_share: mu, share of the filtered tracking error in the adaptation; 0 for a pure observer.
-        tracking: natural frequency of the tracking error, critically damped, rad/s; None: a fifth of the bandwidth.
+        tracking: natural frequency of the tracking error, critically damped, rad/s; None: 0.4 of the
+            bandwidth, 0.2 where actuators lag.
         feedback: K = (k1, k2) instead of `tracking`, 1/s^2 and 1/s; one pair or one per axis.
         weight: Q of Eq. (21).
         pole: alpha_F, with `adaptation` and `composite` instead of `bandwidth`, `damping` and `tracking_share`, 1/s.
@@ -78,7 +79,10 @@ def robust(
     letters = {"pole": pole, "adaptation": adaptation, "composite": composite}
     if any(value is not None for value in letters.values()):
         bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.gathering()), bandwidth)
-    fast = speeds(sampling_time, bandwidth, tracking, actuator_rate, velocity_noise, load_rate, delay)
+    model = model.own_axes()
+    fast = speeds(
+        sampling_time, bandwidth, tracking, actuator_rate, velocity_noise, load_rate, delay, model.drive().lag
+    )
     if reach is None:
         fuzzy = widened(fuzzy, fast.bandwidth, damping, weights_bound)
     if feedback is None:
@@ -89,7 +93,7 @@ def robust(
         reference_frequency = jnp.minimum(fast.tracking / 2, 2.0)
     jumps = isinstance(reference_frequency, Tracer) or bool(np.any(np.asarray(reference_frequency) != 0))
     return RobustRCAF(
-        model=model.own_axes(),
+        model=model,
         estimator=Estimator(fuzzy, fast.bandwidth, damping, weights_bound),
         filter=ReferenceFilter(reference_frequency) if jumps else None,
         feedback=feedback,

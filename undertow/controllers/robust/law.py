@@ -2,13 +2,14 @@
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.books import COLUMNS, share_at_bound, tracking_books
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
-from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
+from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter, Room
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
@@ -20,6 +21,11 @@ PerAxis = Float[Array, " n"]
 
 # A smaller share than this of what is wanted says that limits bind, not that numbers are rounded.
 _WHOLE = 0.999
+
+# Times what the actuators can do for an axis over its position gain: from up to 16 of these, full force on both sides
+# of the way home does not overshoot. From further away the target comes to meet the vehicle.
+_FAR = 4.0
+_UNLIMITED = 1e9  # N, or whatever unit a force has
 
 
 class RobustState(NamedTuple):
@@ -106,14 +112,29 @@ class RobustRCAF(AbstractController):
     def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
         plan, drive = self._plan(z, y, r), self.model.drive()
         # While limits bind, the reference waits, and the tracking error says nothing about d.
-        going = drive.aim(plan.drive, u_applied, self.actuator_rate)
-        share = attained(self.model.effect(y), plan.forces, going)
+        going, effect = drive.aim(plan.drive, u_applied, self.actuator_rate), self.model.effect(y)
+        share = attained(effect, plan.forces, going)
         learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
         known = self._known(plan.drive, y, u_applied)
         return RobustState(
             estimator=self.estimator.advance(z.estimator, plan.seen, known, learnt, dt),
             drive=drive.advance(plan.drive, u_applied, dt),
-            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model, share, dt),
+            filter=self.filter and self.filter.advance(z.filter, r, self.model, share, dt, self._room(y, plan.off)),
+        )
+
+    def _room(self, y: Measurement, off: Tracking) -> Room:
+        """What the actuators can do for each output, and what of the error is out of their reach."""
+        held = self.model.drive().steady()
+        low, high = held.range(held.init(), self.actuator_rate)
+        force = jnp.minimum(jnp.maximum(-low, high), _UNLIMITED)
+        effect = self.model.effect(y)
+        reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
+        away = jnp.abs(off.error) > reach
+        outward = lambda motion: self.model.outward(y, motion)
+        return Room(
+            most=matvec(jnp.abs(jax.vmap(outward, 1, 1)(effect)), force),
+            excess=outward(off.error - jnp.clip(off.error, -reach, reach)),
+            pace=outward(jnp.where(away, off.rate, 0.0)),
         )
 
     def known(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:

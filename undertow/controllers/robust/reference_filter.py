@@ -19,6 +19,21 @@ class FilterState(NamedTuple):
     elapsed: Float[Array, ""]  # s, since then
 
 
+class Room(NamedTuple):
+    """What the actuators can do, and by how much a vehicle that was carried away is out of their reach."""
+
+    most: Outputs  # acceleration, m/s^2, rad/s^2
+    excess: Outputs  # of the target's lead, m, rad: the target gives way by it
+    pace: Outputs  # of the target's velocity where it gives way: it starts from that of the vehicle
+
+
+UNLIMITED = Room(*(jnp.asarray(value) for value in (1e12, 0.0, 0.0)))  # infinity has no gradient
+
+# Largest acceleration of (p + w)^3 = 0 from rest, as a share of w^2 times the way: (sqrt(2) - 1) / exp(2 - sqrt(2)).
+_PEAK = 0.2306
+_NEAR = 1e-9  # m, rad
+
+
 class ReferenceFilter(eqx.Module):
     """Jumps of position and velocity die out like (p + w)^3 = 0, in closed form, at whatever sampling time.
 
@@ -44,7 +59,9 @@ class ReferenceFilter(eqx.Module):
         offset = self._offset(state, r, model)
         return Target(*(own + left for own, left in zip(r, offset, strict=True)))
 
-    def advance(self, state: FilterState, r: Target, model: AbstractModel, share, dt) -> FilterState:
+    def advance(
+        self, state: FilterState, r: Target, model: AbstractModel, share, dt, room: Room = UNLIMITED
+    ) -> FilterState:
         """State one sampling time later.
 
         Args:
@@ -53,16 +70,19 @@ class ReferenceFilter(eqx.Module):
             model: knows which outputs are angles.
             share: of the wanted acceleration that the actuators give; with less than 1 the filter waits.
             dt: sampling time, s.
+            room: what the actuators can do.
         """
         away, rate, bend = self._offset(state, r, model)
-        w, t = self.frequency, share * dt
+        # From far away it comes more slowly, so that the way home takes half of what the actuators can do.
+        far = jnp.maximum(jnp.abs(away), _NEAR)
+        w, t = jnp.minimum(self.frequency, jnp.sqrt(room.most / (2 * _PEAK * far))), share * dt
         # exp(A t) = exp(-w t) (1 + N t + N^2 t^2 / 2) with N = A + w nilpotent.
         first, second = rate + w * away, bend + 2 * w * rate + w**2 * away
         third = -(w**3) * away - 3 * w**2 * rate - 2 * w * bend
         decay = jnp.exp(-w * t)
         offset = Target(
-            position=decay * (away + t * first + t**2 / 2 * second),
-            velocity=decay * (rate + t * (bend + w * rate) - w * t**2 / 2 * second),
+            position=decay * (away + t * first + t**2 / 2 * second) - room.excess,
+            velocity=decay * (rate + t * (bend + w * rate) - w * t**2 / 2 * second) - room.pace,
             acceleration=decay * (bend + t * third + w**2 * t**2 / 2 * second),
         )
         expected = Target(
