@@ -17,7 +17,7 @@ from undertow.references import setpoint
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
 from undertow.sensors import perfect
-from undertow.studies.prediction import foretold, ground
+from undertow.studies.prediction.grounding import foretold, ground
 from undertow.thrusters import paper_table3
 from undertow.vehicles import odin, remus100
 

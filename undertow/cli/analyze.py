@@ -17,8 +17,9 @@ from undertow.report.prediction_tables import Rows, tables
 from undertow.scenario.build import Built, build
 from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import read
-from undertow.studies.prediction import Prediction, predict, summary
-from undertow.studies.prediction_advice import advice
+from undertow.studies.prediction.doubts import advice
+from undertow.studies.prediction.predict import Prediction, predict
+from undertow.studies.prediction.summary import summary
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 

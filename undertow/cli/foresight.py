@@ -8,7 +8,7 @@ from undertow.analysis.linearised.forecast import Comparison, compare
 from undertow.core.foreign import python_says
 from undertow.scenario.build import Built
 from undertow.scenario.execute import Executed
-from undertow.studies.prediction import foretold, ground
+from undertow.studies.prediction.grounding import foretold, ground
 
 Result = TypeVar("Result")
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.studies.prediction import Prediction
+from undertow.studies.prediction.predict import Prediction
 
 
 class Rows(NamedTuple):

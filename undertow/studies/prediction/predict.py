@@ -1,42 +1,28 @@
 """What will happen, before anything is run: a scenario's loop linearised about where it rests, and driven."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax
 import numpy as np
-from jax.flatten_util import ravel_pytree
 
 from undertow.analysis.linearised import margins
 from undertow.analysis.linearised.closed_forms import ClosedForm, closed_form_poles, drift_bound, estimator, ramp_error
 from undertow.analysis.linearised.closing import LinearLoop
-from undertow.analysis.linearised.forecast import forecast, from_start
 from undertow.analysis.linearised.reach import Reach, reach
 from undertow.analysis.linearised.rest import Rest, rest
-from undertow.analysis.linearised.surroundings import Surroundings, surroundings
 from undertow.plants.reachability import open_loop_advice
 from undertow.scenario.build import Built
+from undertow.studies.prediction.grounding import Ground, foretold, ground
 
 # Loads at which the loop is looked at: larger than these shares of all that act along the reference.
 SHARES = (0.1, 0.5, 0.9)
 
-_MOST_TICKS = 200_000  # that are foretold one by one
 _SLOWEST, _LONGEST = 1e-2, 10.0  # rad/s and s: how far frequencies and margins are searched
 _HIGHEST = 1.0  # frequency times sampling time: a third of what sampling can tell apart
 _NOISE = 0.01  # m/s and rad/s, for gains per unit of noise
 _DEVIATIONS = 3.0  # of noise that must fit between the input at rest and its limit
 
 Progress = Callable[[str, float], None]
-
-
-class Ground(NamedTuple):
-    """A scenario's loop where it rests under its mean load, and what acts on it."""
-
-    built: Built
-    around: Surroundings
-    mean: Rest
-    linear: LinearLoop
-    radius: float  # spectral radius of `linear`
 
 
 class Point(NamedTuple):
@@ -78,35 +64,6 @@ class Prediction(NamedTuple):
     why_not: str  # a sentence where there are none
 
 
-def ground(built: Built) -> Ground:
-    """Where the loop of a scenario rests under the mean load of its steady window, and its linearisation there."""
-    loop, settings = built.closed_loop, built.scenario.loop
-    start, stop = built.window()
-    position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)
-    calm = rest(loop, settings.dt, position, np.zeros(len(position)))
-    ticks = min(round(settings.duration / settings.dt) + 1, _MOST_TICKS)
-    around = surroundings(loop, calm, jax.random.PRNGKey(built.scenario.seed), ticks, settings.dt)
-    inside = (around.time >= start) & (around.time <= stop)
-    load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
-    mean = rest(loop, settings.dt, position, load)
-    linear = margins.closed(mean, settings.dt, settings.kind)
-    return Ground(built, around, mean, linear, margins.spectral_radius(linear))
-
-
-def foretold(known: Ground) -> tuple[dict[str, float] | None, str]:
-    """Metrics of the steady window by the linearised loop; or None, and why."""
-    if not known.mean.found:
-        return None, f"no input holds the mean load: something still moves at {known.mean.moving:.2g} per second"
-    if known.radius >= 1:
-        pole = margins.poles(known.linear)[0]
-        return None, f"the linearised loop is unstable: rightmost pole {pole.real:+.3g} {_turning(pole)}1/s"
-    start, stop = known.built.window()
-    settings = known.built.scenario.loop
-    every = max(1, round(settings.record / settings.dt))
-    begun = from_start(known.linear, known.mean, *_start(known))
-    return forecast(known.mean, begun, known.around, (start, stop), every), ""
-
-
 def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
     """Everything that can be said of a scenario before it is run.
 
@@ -146,14 +103,6 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
         metrics=metrics,
         why_not=why_not,
     )
-
-
-def _start(known: Ground) -> list[np.ndarray]:
-    """States of plant and law at t = 0 as vectors."""
-    loop, initial = known.built.closed_loop, known.built.scenario.initial
-    outputs = loop.outputs_at_start(initial.position, initial.velocity)
-    drawn = loop.draw(jax.random.PRNGKey(known.built.scenario.seed))
-    return [np.asarray(ravel_pytree(state)[0]) for state in drawn.start(*outputs)]
 
 
 def _point(known: Ground, share: float, load: np.ndarray) -> Point:
@@ -205,56 +154,3 @@ def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, n
     missed = (answer["estimate"] - answer["uncertainty"]) @ np.linalg.inv(into_axes)
     own = lambda matrices: np.abs(np.diagonal(matrices, axis1=1, axis2=2))
     return own(answer["error"]), own(missed)
-
-
-def _turning(pole: complex) -> str:
-    return f"+- {abs(pole.imag):.3g}j " if pole.imag else ""
-
-
-def summary(prediction: Prediction) -> dict[str, Any]:
-    """What stands in prediction.json."""
-    known = prediction.ground
-    return {
-        "position": known.mean.parts.target.position.tolist(),
-        "mean_load": known.mean.at["load"].tolist(),
-        "points": [
-            {
-                "share": point.share,
-                "load": point.load.tolist(),
-                "input": point.u.tolist(),
-                "input_used": point.used,
-                "held": point.found,
-                "spectral_radius": point.radius,
-                "poles": [[pole.real, pole.imag] for pole in point.poles],
-            }
-            for point in prediction.points
-        ],
-        "margins": prediction.margins,
-        "noise": {
-            "of_input": prediction.noise.of_input.tolist(),
-            "of_estimate": prediction.noise.of_estimate.tolist(),
-            "largest_velocity_noise": prediction.noise.largest,
-        },
-        "estimators": [
-            dict(zip(("axis", "frequency", "damping", "ramp_error"), row, strict=True)) for row in prediction.estimators
-        ],
-        "closed_forms": [
-            {
-                "meaning": row.meaning,
-                "expected": [row.expected.real, row.expected.imag],
-                "nearest": [row.nearest.real, row.nearest.imag],
-            }
-            for row in prediction.forms
-        ],
-        "drift": prediction.drift,
-        "reach": {
-            "low": prediction.reach.low.tolist(),
-            "high": prediction.reach.high.tolist(),
-            "demand": prediction.reach.demand.tolist(),
-            "held": prediction.reach.held,
-            "smallest_share": float(prediction.reach.share.min()),
-        },
-        "uncontrollable": list(prediction.lost),
-        "metrics": prediction.metrics,
-        "why_no_metrics": prediction.why_not,
-    }

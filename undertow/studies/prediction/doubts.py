@@ -3,7 +3,7 @@
 import numpy as np
 
 from undertow.controllers.law import RCAF
-from undertow.studies.prediction import Prediction
+from undertow.studies.prediction.predict import Prediction
 
 # An estimator faster than this share of the sampling rate is at the mercy of sampling.
 _SAMPLED = 0.35

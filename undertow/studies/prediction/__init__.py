@@ -1,0 +1,1 @@
+"""What will happen, before anything is run."""

@@ -1,0 +1,67 @@
+"""Where a scenario's loop rests under its mean load, and the metrics of its run foretold from there."""
+
+from typing import NamedTuple
+
+import jax
+import numpy as np
+from jax.flatten_util import ravel_pytree
+
+from undertow.analysis.linearised import margins
+from undertow.analysis.linearised.closing import LinearLoop
+from undertow.analysis.linearised.forecast import forecast, from_start
+from undertow.analysis.linearised.rest import Rest, rest
+from undertow.analysis.linearised.surroundings import Surroundings, surroundings
+from undertow.scenario.build import Built
+
+_MOST_TICKS = 200_000  # that are foretold one by one
+
+
+class Ground(NamedTuple):
+    """A scenario's loop where it rests under its mean load, and what acts on it."""
+
+    built: Built
+    around: Surroundings
+    mean: Rest
+    linear: LinearLoop
+    radius: float  # spectral radius of `linear`
+
+
+def ground(built: Built) -> Ground:
+    """Where the loop of a scenario rests under the mean load of its steady window, and its linearisation there."""
+    loop, settings = built.closed_loop, built.scenario.loop
+    start, stop = built.window()
+    position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)
+    calm = rest(loop, settings.dt, position, np.zeros(len(position)))
+    ticks = min(round(settings.duration / settings.dt) + 1, _MOST_TICKS)
+    around = surroundings(loop, calm, jax.random.PRNGKey(built.scenario.seed), ticks, settings.dt)
+    inside = (around.time >= start) & (around.time <= stop)
+    load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
+    mean = rest(loop, settings.dt, position, load)
+    linear = margins.closed(mean, settings.dt, settings.kind)
+    return Ground(built, around, mean, linear, margins.spectral_radius(linear))
+
+
+def foretold(known: Ground) -> tuple[dict[str, float] | None, str]:
+    """Metrics of the steady window by the linearised loop; or None, and why."""
+    if not known.mean.found:
+        return None, f"no input holds the mean load: something still moves at {known.mean.moving:.2g} per second"
+    if known.radius >= 1:
+        pole = margins.poles(known.linear)[0]
+        return None, f"the linearised loop is unstable: rightmost pole {pole.real:+.3g} {_turning(pole)}1/s"
+    start, stop = known.built.window()
+    settings = known.built.scenario.loop
+    every = max(1, round(settings.record / settings.dt))
+    begun = from_start(known.linear, known.mean, *_start(known))
+    return forecast(known.mean, begun, known.around, (start, stop), every), ""
+
+
+def _start(known: Ground) -> list[np.ndarray]:
+    """States of plant and law at t = 0 as vectors."""
+    loop, initial = known.built.closed_loop, known.built.scenario.initial
+    outputs = loop.outputs_at_start(initial.position, initial.velocity)
+    drawn = loop.draw(jax.random.PRNGKey(known.built.scenario.seed))
+    return [np.asarray(ravel_pytree(state)[0]) for state in drawn.start(*outputs)]
+
+
+def _turning(pole: complex) -> str:
+    return f"+- {abs(pole.imag):.3g}j " if pole.imag else ""
