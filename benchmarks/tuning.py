@@ -12,7 +12,7 @@ import undertow  # noqa: F401  (double precision)
 from undertow.scenario.reading import from_data
 from undertow.studies.tuning.tune import judge, tune
 
-# As in examples/bluerov2_heavy.yaml: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors that lag by 0.1 s.
+# The paper's law by hand: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors that lag by 0.1 s.
 BY_HAND = {
     "feedback": [[4.0, 7.0]] * 3 + [[20.0, 13.0]] * 3,
     "pole": [4.0] * 3 + [3.0] * 3,
@@ -32,6 +32,7 @@ TABLE_1 = {
 }
 THRUSTERS = {
     "bluerov2_heavy": {"kind": "t200", "supply": 16.0},
+    "bluerov2": {"kind": "t200", "supply": 16.0},
     "odin": {"kind": "paper_table3", "rung": "shaft", "supply": 24.0},
     "rexrov": {"kind": "first_order", "thrust_per_volt": 60.0, "time_constant": 0.05, "supply": 24.0},
 }

@@ -57,7 +57,7 @@ def flights(duration: float) -> tuple[ut.Run, Flight]:
     """A BlueROV2 Heavy in a current, 2 m away and about, at 100 Hz: in undertow, and in MuJoCo."""
     thruster = ut.thrusters.t200(supply=16.0)
     plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster)
-    law = ut.rcaf(  # gains that a motor with a lag of 0.1 s allows, as in bluerov2_heavy.yaml
+    law = ut.rcaf(  # gains that a motor with a lag of 0.1 s allows
         plant.model(rate_term=True),
         feedback=[[4, 7]] * 3 + [[20, 13]] * 3,
         pole=[4, 4, 4, 3, 3, 3],

@@ -14,6 +14,10 @@ class AbstractDrive(eqx.Module):
     """From input to force and back, with what the controller remembers of it (propeller speeds, for instance)."""
 
     @abc.abstractmethod
+    def quickest(self, sampled: Float[Array, ""]) -> Float[Array, ""]:
+        """Rate, 1/s, at which it can be made to follow where sampling allows `sampled` (1/s)."""
+
+    @abc.abstractmethod
     def lag(self, rate: Float[Array, ""]) -> Float[Array, ""]:
         """Time constant of the force, s, where actuators are made to follow at a rate (1/s)."""
 
@@ -57,6 +61,9 @@ class DirectDrive(AbstractDrive):
     low: Inputs = eqx.field(converter=jnp.asarray, default=-jnp.inf)
     high: Inputs = eqx.field(converter=jnp.asarray, default=jnp.inf)
     time_constant: Float[Array, ""] | None = None  # s, of a lag that the drive itself leaves out; None: not known
+
+    def quickest(self, sampled):
+        return sampled
 
     def lag(self, rate):
         return 1 / rate if self.time_constant is None else jnp.asarray(self.time_constant, dtype=float)

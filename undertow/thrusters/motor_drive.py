@@ -15,6 +15,9 @@ from undertow.thrusters.thruster import PerThruster
 # How much faster the current is made to follow than the speed that it drives.
 _CURRENT_FASTER = 3.0
 
+# Where the winding is slow, the current has to be driven, and that is sampled, too: so much of the rate is left.
+_DRIVEN = 0.43
+
 
 class MotorState(NamedTuple):
     """What the controller believes of its motors."""
@@ -45,6 +48,11 @@ class MotorDrive(AbstractDrive):
     thruster: WithMotor
     count: int = eqx.field(static=True)
     measured: bool = eqx.field(static=True)
+
+    def quickest(self, sampled):
+        motor = self.thruster.motor
+        winding = jnp.min(motor.resistance / jnp.maximum(motor.inductance, 1e-12))
+        return jnp.where(winding > _CURRENT_FASTER * sampled, 1.0, _DRIVEN) * sampled
 
     def lag(self, rate):
         return 1 / rate

@@ -27,6 +27,9 @@ class SteadyDrive(AbstractDrive):
 
     thruster: Invertible
 
+    def quickest(self, sampled):
+        return sampled
+
     def lag(self, rate):
         return jnp.zeros(())
 

@@ -80,9 +80,7 @@ def robust(
     if any(value is not None for value in letters.values()):
         bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.gathering()), bandwidth)
     model = model.own_axes()
-    fast = speeds(
-        sampling_time, bandwidth, tracking, actuator_rate, velocity_noise, load_rate, delay, model.drive().lag
-    )
+    fast = speeds(sampling_time, bandwidth, tracking, actuator_rate, velocity_noise, load_rate, delay, model.drive())
     if reach is None:
         fuzzy = widened(fuzzy, fast.bandwidth, damping, weights_bound)
     if feedback is None:

@@ -1,16 +1,15 @@
 """How fast each part of the law may be: section 3.12 of the theory."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.drive import AbstractDrive, DirectDrive
 
-# Shares of a sampling rate: an estimator faster than the first is at the mercy of sampling, a motor loop faster than
-# the second asks a current loop three times as fast for more than it can do.
-_ESTIMATOR, _ACTUATORS = 0.35, 0.15
+# Share of the sampling rate: what is faster is at the mercy of sampling.
+_SAMPLED = 0.35
 
 # A delay that nobody knows of eats the estimator's margin from about one radian on; a third of that is left to it.
 _DELAYED = 0.35
@@ -40,7 +39,7 @@ def speeds(
     velocity_noise=0.0,
     load_rate=1.0,
     delay: float = 0.0,
-    lag: Callable[[Float[Array, ""]], Float[Array, ""]] = lambda rate: 1 / rate,
+    drive: AbstractDrive | None = None,
 ) -> Speeds:
     """What is not given is as fast as the loop inside it, noise and delay allow.
 
@@ -52,7 +51,7 @@ def speeds(
         velocity_noise: standard deviation of the measured velocities at each tick, m/s and rad/s.
         load_rate: how fast loads wander, m/s^2 per sqrt(s) and rad/s^2 per sqrt(s).
         delay: of measurement and input together that nothing makes up for, s.
-        lag: time constant of the actuators, s, that are made to follow at a rate in 1/s.
+        drive: of the actuators; None for one of which nothing is known.
 
     Raises:
         BadInput: a value that is not positive, or negative.
@@ -61,14 +60,17 @@ def speeds(
     checks.not_negative("velocity_noise", velocity_noise, "m/s, rad/s")
     checks.positive("load_rate", load_rate)
     checks.not_negative("delay", delay, "s")
-    slowest = lag(jnp.asarray(_ACTUATORS / sampling_time if actuators is None else actuators, dtype=float))
+    drive = DirectDrive() if drive is None else drive
+    sampled = jnp.asarray(_SAMPLED / sampling_time, dtype=float)
+    most = drive.quickest(sampled)
+    slowest = drive.lag(most if actuators is None else jnp.asarray(actuators, dtype=float))
     if bandwidth is None:
         inner = jnp.where(slowest > 0, 1 / jnp.where(slowest > 0, slowest, 1.0), jnp.inf)
-        bandwidth = jnp.minimum(_ESTIMATOR / sampling_time, kalman(sampling_time, velocity_noise, load_rate))
+        bandwidth = jnp.minimum(sampled, kalman(sampling_time, velocity_noise, load_rate))
         bandwidth = jnp.minimum(jnp.minimum(bandwidth, inner), _DELAYED / delay if delay else jnp.inf)
     checks.positive("bandwidth", bandwidth, "rad/s")
     if actuators is None:
-        actuators = jnp.minimum(_ACTUATORS / sampling_time, _NEEDED * jnp.max(jnp.asarray(bandwidth, dtype=float)))
+        actuators = jnp.minimum(most, _NEEDED * jnp.max(jnp.asarray(bandwidth, dtype=float)))
     checks.positive("actuator_rate", actuators, "1/s")
     if tracking is None:
         share = jnp.where(slowest > 0, _TRACKING_BEHIND_LAG, _TRACKING)

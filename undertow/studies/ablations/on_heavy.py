@@ -28,7 +28,7 @@ _HARDLY = 1e-9
 
 
 def hand_tuned(model: AbstractModel):
-    """The paper's law with the gains of examples/bluerov2_heavy.yaml."""
+    """The paper's law with gains found by hand."""
     return paper(model, **HAND_TUNED)
 
 

@@ -51,7 +51,7 @@ def scenario(
     } | changes
 
 
-# The paper's law as fast as a T200 allows: the gains of examples/bluerov2_heavy.yaml.
+# The paper's law as fast as a T200 allows: gains for BlueROV2 Heavy, found by hand.
 HAND_TUNED: dict[str, Any] = {
     "feedback": [[4, 7], [4, 7], [4, 7], [20, 13], [20, 13], [20, 13]],
     "pole": [4, 4, 4, 3, 3, 3],

@@ -120,7 +120,7 @@ def _laws(
 
 
 def _at_sea(name: str, law: dict[str, Any]) -> dict[str, Any]:
-    """examples/bluerov2_heavy.yaml with another law."""
+    """As examples/bluerov2_heavy.yaml, with a law to be compared."""
     instruments = [
         "imu",
         {"kind": "dvl", "period": 0.125, "noise": 0.005, "delay": 0.05},
