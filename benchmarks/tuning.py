@@ -32,7 +32,6 @@ TABLE_1 = {
 }
 THRUSTERS = {
     "bluerov2_heavy": {"kind": "t200", "supply": 16.0},
-    "bluerov2": {"kind": "t200", "supply": 16.0},
     "odin": {"kind": "paper_table3", "rung": "shaft", "supply": 24.0},
     "rexrov": {"kind": "first_order", "thrust_per_volt": 60.0, "time_constant": 0.05, "supply": 24.0},
 }
