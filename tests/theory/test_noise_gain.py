@@ -14,11 +14,12 @@ from undertow.references.setpoint import setpoint
 from undertow.sensors.white_noise import white_noise
 
 SEEDS = 20  # one axis each
+AS_FAST = {"bandwidth": 150.0, "tracking": 30.0}  # rad/s, as Table 1
 LAWS = {
     "Table 1": {"sets": 3},
     "Table 1 without robust term": {"sets": 3, "robust_gain": 0.0},
-    "robust": {"preset": "robust"},
-    "robust, with a tracking share": {"preset": "robust", "tracking_share": 0.02, "robust_gain": 1.0},
+    "robust": {"preset": "robust", **AS_FAST},
+    "robust, with a tracking share": {"preset": "robust", **AS_FAST, "tracking_share": 0.02, "robust_gain": 1.0},
 }
 
 

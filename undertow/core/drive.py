@@ -10,6 +10,10 @@ Inputs = Float[Array, " m"]
 Forces = Float[Array, " m"]
 
 
+# Share of what sampling allows, for actuators of which nobody knows how fast they are.
+_UNKNOWN = 0.43
+
+
 class AbstractDrive(eqx.Module):
     """From input to force and back, with what the controller remembers of it (propeller speeds, for instance)."""
 
@@ -63,7 +67,7 @@ class DirectDrive(AbstractDrive):
     time_constant: Float[Array, ""] | None = None  # s, of a lag that the drive itself leaves out; None: not known
 
     def quickest(self, sampled):
-        return sampled
+        return _UNKNOWN * sampled if self.time_constant is None else sampled
 
     def lag(self, rate):
         return 1 / rate if self.time_constant is None else jnp.asarray(self.time_constant, dtype=float)

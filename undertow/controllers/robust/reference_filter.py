@@ -22,16 +22,16 @@ class FilterState(NamedTuple):
 class Room(NamedTuple):
     """What the actuators can do, and by how much a vehicle that was carried away is out of their reach."""
 
-    most: Outputs  # acceleration, m/s^2, rad/s^2
-    excess: Outputs  # of the target's lead, m, rad: the target gives way by it
-    pace: Outputs  # of the target's velocity where it gives way: it starts from that of the vehicle
+    most: Outputs | float  # acceleration, m/s^2, rad/s^2
+    excess: Outputs | float  # of the target's lead, m, rad: the target gives way by it
+    pace: Outputs | float  # of the target's velocity where it gives way: it starts from that of the vehicle
 
 
-UNLIMITED = Room(*(jnp.asarray(value) for value in (1e12, 0.0, 0.0)))  # infinity has no gradient
+UNLIMITED = Room(1e12, 0.0, 0.0)  # infinity has no gradient
 
 # Largest acceleration of (p + w)^3 = 0 from rest, as a share of w^2 times the way: (sqrt(2) - 1) / exp(2 - sqrt(2)).
 _PEAK = 0.2306
-_NEAR = 1e-9  # m, rad
+_NEAR, _LEAST = 1e-9, 1e-9  # m, rad; m/s^2, rad/s^2: a root has no gradient at zero
 
 
 class ReferenceFilter(eqx.Module):
@@ -75,7 +75,7 @@ class ReferenceFilter(eqx.Module):
         away, rate, bend = self._offset(state, r, model)
         # From far away it comes more slowly, so that the way home takes half of what the actuators can do.
         far = jnp.maximum(jnp.abs(away), _NEAR)
-        w, t = jnp.minimum(self.frequency, jnp.sqrt(room.most / (2 * _PEAK * far))), share * dt
+        w, t = jnp.minimum(self.frequency, jnp.sqrt(jnp.maximum(room.most, _LEAST) / (2 * _PEAK * far))), share * dt
         # exp(A t) = exp(-w t) (1 + N t + N^2 t^2 / 2) with N = A + w nilpotent.
         first, second = rate + w * away, bend + 2 * w * rate + w**2 * away
         third = -(w**3) * away - 3 * w**2 * rate - 2 * w * bend
