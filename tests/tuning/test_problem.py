@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.analysis.linearised.pieces import without
 from undertow.controllers import pid
 from undertow.core.contracts import Load, Place
 from undertow.core.errors import BadInput
@@ -19,7 +20,7 @@ from undertow.sensors import navigation
 from undertow.studies.tuning.certifying import Certifier
 from undertow.studies.tuning.descent import descend
 from undertow.studies.tuning.dials import dials, options
-from undertow.studies.tuning.evaluation import Evaluation, without_steps
+from undertow.studies.tuning.evaluation import Evaluation
 from undertow.studies.tuning.journal import Journal
 from undertow.studies.tuning.objective import Objective
 from undertow.studies.tuning.problem import problem
@@ -115,7 +116,7 @@ def test_slopes_are_taken_without_steps():
     sensor = navigation([imu(), dvl(), depth()])
     plant = hybrid_vehicle(bluerov2_heavy(), t200())
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0] * 6), sinusoid(), sensor)
-    smooth = without_steps(loop)
+    smooth = without(loop, ("resolution", "dead_zone"))
     assert float(smooth.plant.thruster.dead_zone) == 0.0 and float(loop.plant.thruster.dead_zone) == 1.2
     pairs = zip(loop.sensor.instruments, smooth.sensor.instruments, strict=True)
     assert [(float(a.sampling.resolution), float(b.sampling.resolution)) for a, b in pairs] == [(0.0, 0.0)] + [

@@ -3,22 +3,21 @@
 from pathlib import Path
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import next_free, results_folder
+from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
 from undertow.report.prediction_page import write_prediction
 from undertow.report.prediction_tables import Rows, tables
-from undertow.scenario.build import Built, build
+from undertow.scenario.build import build
 from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import read
 from undertow.studies.prediction.doubts import advice
-from undertow.studies.prediction.predict import Prediction, predict
+from undertow.studies.prediction.predict import predict
 from undertow.studies.prediction.summary import summary
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
@@ -30,7 +29,8 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool) -> int:
     folder = next_free(Path("runs") / f"{scenario.stem}-prediction") if out is None else out
     with results_folder(folder, _WRITTEN, "prediction.json", overwrite) as staging:
         built = build(read(scenario))
-        prediction = _watched(console, built)
+        with shares(console) as progress:
+            prediction = interruptible(lambda: predict(built, progress))
         doubts = (*built.advice(), *advice(prediction))
         (staging / "prediction.json").write_text(to_json(summary(prediction), indent=1) + "\n", encoding="utf-8")
         write_prediction(prediction, doubts, staging)
@@ -42,19 +42,6 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool) -> int:
         typer.echo(f"Advice: {sentence}", err=True)
     console.print(f"Page: {folder / 'prediction.html'}", highlight=False, soft_wrap=True)
     return DONE
-
-
-def _watched(console: Console, built: Built) -> Prediction:
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
-        task = live.add_task("starting", total=1.0)
-
-        def progress(message: str, share: float) -> None:
-            live.update(task, description=message, completed=share)
-            if not console.is_terminal:
-                console.print(f"{share:4.0%} {message}", markup=False, highlight=False)
-
-        return interruptible(lambda: predict(built, progress))
 
 
 def _table(rows: Rows) -> Table:

@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from undertow.cli.results_folder import results_folder
+from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
 from undertow.report.reproduction import write
 from undertow.studies.paper import reproduce as study
@@ -25,15 +25,7 @@ def reproduce(out: Path, quick: bool) -> None:
 
 
 def _watched(console: Console, folder: Path, quick: bool) -> Path:
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
-        task = live.add_task("starting", total=1.0)
-
-        def progress(message: str, fraction: float) -> None:
-            live.update(task, description=message, completed=fraction)
-            if not console.is_terminal:
-                console.print(f"{fraction:4.0%} {message}", markup=False, highlight=False)
-
+    with shares(console) as progress:
         found = study.reproduce(folder, quick, progress)
         progress("drawing", 0.9)
         return write(found, folder)

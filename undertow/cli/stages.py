@@ -2,10 +2,10 @@
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 
 class Stages:
@@ -23,3 +23,18 @@ class Stages:
             live.add_task(name)
             yield
         self.console.print(f"{name:<24}{time.perf_counter() - started:6.1f} s", highlight=False)
+
+
+@contextlib.contextmanager
+def shares(console: Console) -> Iterator[Callable[[str, float], None]]:
+    """To be told what is being done and the share done: a bar, or a line for each where nobody watches."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
+        task = live.add_task("starting", total=1.0)
+
+        def progress(message: str, share: float) -> None:
+            live.update(task, description=message, completed=share)
+            if not console.is_terminal:
+                console.print(f"{share:4.0%} {message}", markup=False, highlight=False)
+
+        yield progress

@@ -79,7 +79,7 @@ def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.nda
         loop: the five roles.
         position: reference, m and rad.
     """
-    loop = _without_dead_zones(loop)
+    loop = without(loop, ("dead_zone",))  # inside a dead zone nothing has a slope
     position = jnp.asarray(position, dtype=float)
     still = jnp.zeros_like(position)
     target = Target(position, still, still)
@@ -92,9 +92,9 @@ def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.nda
     return Parts(loop, target, plant_state, law_state, sizes), {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
 
 
-def _without_dead_zones(loop: ClosedLoop) -> ClosedLoop:
-    """Same loop with thrusters that turn at any voltage: inside a dead zone nothing has a slope."""
-    named = lambda path: getattr(path[-1], "name", "") == "dead_zone"
+def without(loop: ClosedLoop, parameters: tuple[str, ...]) -> ClosedLoop:
+    """Same loop with every parameter of these names at zero: dead zones and resolutions have no slope."""
+    named = lambda path: getattr(path[-1], "name", "") in parameters
     return jax.tree_util.tree_map_with_path(lambda path, leaf: jnp.zeros_like(leaf) if named(path) else leaf, loop)
 
 

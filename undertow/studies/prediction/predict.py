@@ -29,12 +29,25 @@ class Point(NamedTuple):
     """One operating point."""
 
     share: float  # of all loads that are smaller
-    load: np.ndarray  # m/s^2, rad/s^2
-    u: np.ndarray  # that holds it
+    at: Rest
     used: float  # largest |u| as a share of its limit; 0 without a limit
-    found: bool  # whether there is such an input
     poles: np.ndarray  # 1/s
     radius: float  # spectral radius from tick to tick; below 1 it is stable
+
+    @property
+    def load(self) -> np.ndarray:
+        """m/s^2, rad/s^2."""
+        return self.at.at["load"]
+
+    @property
+    def u(self) -> np.ndarray:
+        """Input that holds it."""
+        return self.at.at["u"]
+
+    @property
+    def found(self) -> bool:
+        """Whether there is such an input."""
+        return self.at.found
 
 
 class Noise(NamedTuple):
@@ -76,8 +89,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     loop, settings = built.closed_loop, built.scenario.loop
     progress("poles at its operating points", 0.5)
     points = tuple(_point(known, *each) for each in zip(SHARES, known.around.operating_loads(SHARES), strict=True))
-    nearest = max(points, key=lambda point: point.radius)
-    worst = rest(loop, settings.dt, known.mean.parts.target.position, nearest.load)
+    worst = max(points, key=lambda point: point.radius).at
     progress("margins", 0.6)
     bears = _margins(worst, settings.dt)
     progress("noise and disturbances", 0.9)
@@ -111,9 +123,7 @@ def _point(known: Ground, share: float, load: np.ndarray) -> Point:
     linear = margins.closed(at, settings.dt, settings.kind)
     low, high = _limits(known.built, at)
     used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
-    return Point(
-        share, load, at.at["u"], float(used.max()), at.found, margins.poles(linear), margins.spectral_radius(linear)
-    )
+    return Point(share, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear))
 
 
 def _margins(at: Rest, dt: float) -> dict[str, float]:

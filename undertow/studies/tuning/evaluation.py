@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.analysis.linearised.pieces import without
 from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -56,7 +57,8 @@ class Bench(NamedTuple):
     ) -> Shares:
         """One closed loop; smooth for a slope that means something."""
         loop = self.with_parts(plant, law, size)
-        loop = without_steps(loop) if smooth else loop
+        # Differentiated as they are, rounding instruments would look as if they were cut off.
+        loop = without(loop, _STEPS) if smooth else loop
         outcome = sampled.simulate(
             loop,
             duration=self.duration,
@@ -70,15 +72,6 @@ class Bench(NamedTuple):
             substeps=self.settings.substeps,
         )
         return shares(outcome.accumulated[0], outcome.ended, self.duration)
-
-
-def without_steps(loop: ClosedLoop) -> ClosedLoop:
-    """Same loop without rounded readings and dead zones.
-
-    The slope of a rounded number is zero: differentiated as they are, instruments would look as if they were cut off.
-    """
-    named = lambda path: getattr(path[-1], "name", "") in _STEPS
-    return jax.tree_util.tree_map_with_path(lambda path, leaf: jnp.zeros_like(leaf) if named(path) else leaf, loop)
 
 
 class Evaluation:
