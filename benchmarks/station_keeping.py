@@ -7,7 +7,7 @@ are told of one published parameter set; every one of them is the truth in turn.
 
 The default position fixes (5 cm, every second, 0.2 s late) keep any controller above the error of its navigation, which
 is printed beside its own. `--fix-noise 0.005` takes fixes of 5 mm, ten a second and 10 ms late, so that what is left is
-the noise of DVL, IMU, depth and compass.
+the noise of DVL, IMU, depth and compass; `--fix-noise 0` knows position and velocity without error.
 """
 
 import argparse
@@ -118,6 +118,8 @@ def fly(scenario, seeds):
 
 def at_sea(name, fix_noise):
     """The scenario with a law as it comes."""
+    if fix_noise == 0:
+        return {**copy.deepcopy(SEA), "controller": LAWS[name], "sensor": {"kind": "perfect"}}
     fix = {"kind": "position_fix", "noise": fix_noise}
     if fix_noise != 0.05:
         fix |= {"period": 0.1, "delay": 0.01}
@@ -157,7 +159,7 @@ def report(title, flown):
         place, turned = 100 * rms(error[of][:, :3]), 1000 * rms(error[of][:, 3:])
         own, left = (np.median(100 * rms(each[of][:, :3])) for each in (navigation, control))
         print(f"  {name:<18}{cut(place):>22}{cut(turned):>24}{own:>16.2f}{left:>12.2f}{np.median(variation[of]):>8.1f}")
-    return rms(error[:, :3])
+    return error
 
 
 def main():
@@ -167,15 +169,18 @@ def main():
     parser.add_argument("--laws", default="pid,robust")
     parser.add_argument("--fix-noise", type=float, default=0.05)
     options = parser.parse_args()
-    place = {}
+    errors = {}
     for name in options.laws.split(","):
         begun = time.perf_counter()
         scenario = tuned(name, at_sea(name, options.fix_noise), options.budget)
-        place[name] = report(name, fly(scenario, options.seeds))
+        errors[name] = report(name, fly(scenario, options.seeds))
         print(f"  ({time.perf_counter() - begun:.0f} s)", flush=True)
-    first, *others = place
+    first, *others = errors
+    whole = lambda name, axes: np.sqrt((errors[name][:, axes] ** 2).mean())
     for name in others:
-        print(f"\n{first} / {name}: position rms {np.sqrt((place[first] ** 2).mean() / (place[name] ** 2).mean()):.2f}")
+        kinds = {"position": slice(0, 3), "attitude": slice(3, 6), "all six axes": slice(0, 6)}
+        ratios = ", ".join(f"{kind} {whole(first, axes) / whole(name, axes):.2f}" for kind, axes in kinds.items())
+        print(f"\n{first} / {name}, rms over all runs: {ratios}")
 
 
 if __name__ == "__main__":

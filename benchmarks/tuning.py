@@ -1,6 +1,6 @@
-"""`undertow tune` against Table 1 and against gains found by hand, on three vehicles at sea: cost on held-out runs.
+"""`undertow tune` against Table 1 and against gains found by hand, on vehicles at sea: cost on held-out runs.
 
-python benchmarks/tuning.py [--budget 240] [--vehicles bluerov2_heavy,odin,rexrov]
+python benchmarks/tuning.py [--budget 240] [--vehicles bluerov2_heavy,bluerov2,odin,rexrov]
 """
 
 import argparse
@@ -32,10 +32,14 @@ TABLE_1 = {
 }
 THRUSTERS = {
     "bluerov2_heavy": {"kind": "t200", "supply": 16.0},
+    "bluerov2": {"kind": "t200", "supply": 16.0},
     "odin": {"kind": "paper_table3", "rung": "shaft", "supply": 24.0},
     "rexrov": {"kind": "first_order", "thrust_per_volt": 60.0, "time_constant": 0.05, "supply": 24.0},
 }
 
+# Truths, where not all published sets are; the law is told of the first. Of BlueROV2's, two are left out that have the
+# damping and the inertia of other vehicles (`undertow describe bluerov2`): no gains suit them and the others.
+SETS = {"bluerov2": ["li2020", "einarsson_lipenitis2020", "gazebo_box_drag"]}
 
 # Where the position is known to a centimetre: else the navigation decides, and no controller.
 INSTRUMENTS = [
@@ -48,15 +52,17 @@ INSTRUMENTS = [
 
 
 def scenario(vehicle, controller):
+    sets = SETS.get(vehicle)
+    told = {"parameters": sets[0]} if sets else {}
     return {
-        "plant": {"vehicle": vehicle, "thruster": THRUSTERS[vehicle], "ledger": False},
+        "plant": {"vehicle": {"kind": vehicle, **told}, "thruster": THRUSTERS[vehicle], "ledger": False},
         "model": {"rate_term": True},
         "controller": {"kind": "rcaf", **controller},
         "reference": {"kind": "setpoint", "position": [2.0, 1.0, 1.0, 0.0, 0.0, 0.5], "settling": 15.0},
         "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0.0]}, {"kind": "waves", "height": 0.5}],
         "sensor": {"kind": "navigation", "instruments": INSTRUMENTS},
         "loop": {"dt": 0.02, "duration": 60.0, "record": 0.1},
-        "tune": {"duration": 16.0},
+        "tune": {"duration": 16.0, "train": {"sets": sets and sets[:2]}, "held_out": {"sets": sets}},
     }
 
 

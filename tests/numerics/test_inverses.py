@@ -7,9 +7,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.numerics.inverses import printed_inverse, pseudo_inverse, regularised_inverse, regularised_sharp
+from undertow.numerics.inverses import (
+    partial_inverse,
+    printed_inverse,
+    pseudo_inverse,
+    regularised_inverse,
+    regularised_sharp,
+)
 from undertow.numerics.rotations import jacobian
-from undertow.vehicles import odin
+from undertow.plants import hybrid_vehicle
+from undertow.thrusters import t200
+from undertow.vehicles import bluerov2, odin
 
 RNG = np.random.default_rng(5)
 COUNT = 50
@@ -130,3 +138,32 @@ def test_number_of_inputs_is_not_the_rank():
     p = np.asarray(pseudo_inverse(jnp.asarray(g)))
     np.testing.assert_allclose(g @ p @ g, g, atol=1e-9)
     np.testing.assert_allclose(g @ p, np.diag([1.0, 1, 0, 0, 0, 1]), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["wide", "square", "odin"])
+def test_at_full_rank_a_partial_inverse_is_the_whole_one(name):
+    found = jax.vmap(lambda gain: partial_inverse(gain, jnp.ones(6), 6))(SHAPES[name])
+    np.testing.assert_array_equal(found, jax.vmap(pseudo_inverse)(SHAPES[name]))
+
+
+@pytest.mark.parametrize("name, rank", [("tall", 4), ("rank 3", 3)])
+def test_a_partial_inverse_serves_as_many_rows_as_the_rank_allows(name, rank):
+    """Exactly, whatever is asked for in the others, and with the smallest input that does it."""
+    for gain in SHAPES[name]:
+        inverse = np.asarray(partial_inverse(jnp.asarray(gain), jnp.ones(6), rank))
+        given = gain @ inverse
+        served = np.abs(given - np.eye(6)).max(axis=1) < 1e-9
+        assert served.sum() == rank
+        np.testing.assert_allclose(inverse[:, ~served], 0, atol=1e-9 * np.abs(inverse).max())
+        np.testing.assert_allclose(inverse[:, served], np.linalg.pinv(gain[served]), rtol=1e-7, atol=1e-9)
+
+
+def test_bluerov2_is_not_asked_to_pitch():
+    """Its horizontal thrusters lie below its centre: G+ would have it surge for the sake of pitch."""
+    model = hybrid_vehicle(bluerov2(), t200()).model().own_axes()
+    given = np.asarray(model.acceleration_per_thrust @ model.allocation)
+    kept = [0, 1, 2, 3, 5]
+    np.testing.assert_allclose(given[kept][:, kept], np.eye(5), atol=1e-12)
+    np.testing.assert_allclose(given[:, 4], 0, atol=1e-12)
+    spread = np.asarray(model.acceleration_per_thrust @ pseudo_inverse(model.acceleration_per_thrust))
+    assert abs(spread[0, 4]) > 0.1

@@ -12,14 +12,15 @@ from undertow.analysis.linearised.surroundings import surroundings
 from undertow.controllers import rcaf
 from undertow.disturbances import none, sinusoid
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.sampled import simulate
 from undertow.plants import double_integrator, hybrid_vehicle
 from undertow.references import setpoint
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
 from undertow.sensors import perfect
 from undertow.studies.prediction.grounding import foretold, ground
-from undertow.thrusters import paper_table3
-from undertow.vehicles import odin, remus100
+from undertow.thrusters import paper_table3, t200
+from undertow.vehicles import bluerov2, odin, remus100
 
 THREE_SETS = {"sets": 3, "reach": (1.0,), "width": 1.0}
 LAWS = {
@@ -130,6 +131,22 @@ def test_counters_and_idle_weights_are_not_poles():
     assert len(poles) == 12 + 12 + 8 + 16  # body, estimator, propellers, and these with their currents as believed
     assert len(closed.matrix) > 100
     assert poles.real.max() < 0
+
+
+def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
+    """BlueROV2 cannot pitch: its weight holds the load, the rest of the loop settles about that, as a run does."""
+    load, dt = np.array([0.1, 0.05, -0.05, 0.0, 0.4, 0.0]), 0.02
+    plant = hybrid_vehicle(bluerov2(), t200(supply=16.0))
+    law = rcaf(plant.model(), preset="robust", sampling_time=dt)
+    still = setpoint([0.0] * 6)
+    found = rest(ClosedLoop(plant, law, still, none(), perfect()), dt, np.zeros(6), load)
+    assert found.found, found.moving
+    pushed = ClosedLoop(plant, law, still, sinusoid(0.0, offset=load), perfect())
+    flown = simulate(pushed, duration=200.0, dt=dt, record_every=100)
+    last = jax.tree.map(lambda series: np.asarray(series)[-1], flown.samples)
+    assert abs(last.error[4]) > 0.05
+    np.testing.assert_allclose(found.local.values["error"], last.error, atol=2e-4)
+    np.testing.assert_allclose(found.at["u"], last.voltage, atol=2e-3)
 
 
 def test_a_load_that_no_input_holds_is_told():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.studies.tuning.certifying import Certificate
+from undertow.studies.tuning.certifying import Certificate, refusal
 from undertow.studies.tuning.descent import descend
 from undertow.studies.tuning.journal import Journal, OutOfTime
 from undertow.studies.tuning.objective import Objective
@@ -36,7 +36,7 @@ class Bowl:
 
 
 def stable(point):
-    return Certificate((0.9, 0.5))
+    return Certificate((0.9, 0.5), ("", ""))
 
 
 def objective(tmp_path, bowl, certify=stable, resume=False, budget=1e9):
@@ -81,7 +81,7 @@ def test_minimum_at_a_bound(tmp_path, method):
 @pytest.mark.parametrize("method", ["gradient", "search"])
 def test_nothing_is_accepted_without_certificate(tmp_path, method):
     """Unstable below x_1 = 0.5, where the minimum lies."""
-    fenced = lambda point: Certificate((0.9 if point[0] >= 0.5 else 1.01,))
+    fenced = lambda point: Certificate((0.9 if point[0] >= 0.5 else 1.01,), ("",))
     asked = objective(tmp_path, Bowl(), fenced)
     best = tune(asked, method)
     assert asked.refused > 0
@@ -125,3 +125,10 @@ def test_journal_of_something_else(tmp_path):
         Journal(tmp_path / "j", "one", 1.0, resume=False)
     with pytest.raises(BadInput, match="another one"):
         Journal(tmp_path / "j", "two", 1.0, resume=True)
+
+
+def test_where_nothing_is_certified_the_worst_truth_is_named():
+    said = str(refusal(Certificate((0.9, 1.25, 0.8), ("wu2018", "px4", "px4")), 12))
+    assert "none of 12 points is certified" in said
+    assert "spectral radius of 1.25 with the parameter set px4 as the truth" in said
+    assert "truth" not in str(refusal(Certificate((1.1,), ("",)), 12))

@@ -31,6 +31,31 @@ def pseudo_inverse(gain: Gain) -> Inverse:
     return jnp.linalg.pinv(gain)
 
 
+def partial_inverse(gain: Gain, scale: Float[Array, " n"], rank: int) -> Inverse:
+    """Smallest inverse that serves as many rows of G as its rank allows exactly, and asks nothing for the others.
+
+    G+ spreads what cannot be had over all rows instead: a vehicle that cannot pitch would surge because pitch is asked
+    for. Given up are the rows that the lost directions mostly consist of (Cholesky of their projector, pivoted).
+
+    Args:
+        gain: G (n x m).
+        scale: what counts as much in each row, m/s^2 and rad/s^2.
+        rank: of G; n for G+ itself.
+    """
+    inverse = pseudo_inverse(gain)
+    if rank == gain.shape[0]:
+        return inverse
+    lost = jnp.eye(gain.shape[0]) - gain @ inverse
+    left, rows = lost * scale[:, None] * scale, []
+    for _ in range(gain.shape[0] - rank):
+        row = jnp.argmax(jnp.diagonal(left))
+        left = left - jnp.outer(left[:, row], left[row]) / left[row, row]
+        rows.append(row)
+    rows = jnp.stack(rows)
+    given_up = jnp.linalg.solve(lost[rows][:, rows], lost[rows])
+    return inverse - inverse[:, rows] @ given_up
+
+
 def regularised_inverse(square: Square, delta: Float[Array, ""]) -> Square:
     """H^r = H^T (delta I + H H^T)^-1, Definition 2."""
     identity = jnp.eye(square.shape[0])

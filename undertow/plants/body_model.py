@@ -30,7 +30,7 @@ class BodyModel(AbstractModel):
     body: Body
     thrusters: AbstractDrive
     acceleration_per_thrust: Float[Array, "6 N"]  # M^-1 B
-    allocation: Float[Array, "N 6"]  # B+
+    allocation: Float[Array, "N 6"]  # inverse of M^-1 B; what no thruster can give is not asked for
     thrust_per_volt: Float[Array, " N"]  # alpha
     angles: tuple[bool, ...] = eqx.field(static=True, default=(False, False, False, True, True, True))
 
@@ -77,7 +77,7 @@ class BodyModel(AbstractModel):
         return self.acceleration_per_thrust
 
     def spread(self, y: Measurement, acceleration: Vector6) -> Float[Array, " N"]:
-        return matvec(self.allocation, matvec(self.body.mass_matrix, acceleration))
+        return matvec(self.allocation, acceleration)
 
     def gain(self, y: Measurement) -> Float[Array, "6 N"]:
         return self.acceleration_per_thrust * self.thrust_per_volt

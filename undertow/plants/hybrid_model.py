@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractModel, Measurement
-from undertow.numerics.inverses import pseudo_inverse, regularised_sharp
+from undertow.numerics.inverses import partial_inverse, pseudo_inverse, regularised_sharp
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import kinematics_from_euler
 from undertow.plants.body_model import BodyModel
@@ -59,11 +59,12 @@ class HybridModel(AbstractModel):
 
     def own_axes(self) -> BodyModel:
         """The same knowledge in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
-        count = self.thruster_matrix.shape[1]
+        count, effect = self.thruster_matrix.shape[1], self.body.inverse_mass_matrix @ self.thruster_matrix
+        alike = 1 / jnp.sqrt(jnp.diagonal(self.body.mass_matrix))  # accelerations of the same kinetic energy
         return BodyModel(
             body=self.body,
             thrusters=self.thruster.drive(count, self.speed_sensor),
-            acceleration_per_thrust=self.body.inverse_mass_matrix @ self.thruster_matrix,
-            allocation=jnp.linalg.pinv(self.thruster_matrix),
+            acceleration_per_thrust=effect,
+            allocation=partial_inverse(effect, alike, self.rank),
             thrust_per_volt=jnp.broadcast_to(self.thruster.voltage_gain(), (count,)),
         )

@@ -1,21 +1,18 @@
 """Where a closed loop rests under a constant load: found by Newton's method, whether the loop is stable or not."""
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.analysis.linearised.balance import Balance
 from undertow.analysis.linearised.pieces import Local, Parts, take_apart
 from undertow.core.contracts import AbstractModel, Measurement
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.reachability import lost_directions
 
-_STEPS = 30
-_LENGTHS = (1.0, 0.5, 0.25, 0.1)  # of a step
 _FIRST_SHARE, _SMALLEST_SHARE = 0.25, 0.02  # of a load that is put on little by little
-_WORSE = 100.0  # times the residual before: further than this nothing is looked for
-_AT_REST = 1e-8  # of what moves, in SI units
 _SETTLING = 400  # sampling times that an actuator is given to come to a force
 
 
@@ -52,14 +49,15 @@ def rest(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Rest:
         load: acceleration of the outputs, m/s^2 and rad/s^2.
     """
     parts, start = take_apart(loop, position)
-    load = np.asarray(load, dtype=float)
-    acting = _acting(parts.differentiate(start, dt))
-    found = _from_afar(parts, start, load, dt, acting)
+    load, model, y = np.asarray(load, dtype=float), parts.loop.controller.model.own_axes(), _output(parts, start)
+    balance = Balance(parts, dt, _acting(parts.differentiate(start, dt)), _steered(model, y))
+    from_afar = lambda load: _from_afar(balance, start | {"load": load, "u": _holding_input(model, y, load)})
+    found = from_afar(load)
     # Where that fails, the load is put on little by little, from a share that can be held.
     share, step = 0.0, _FIRST_SHARE
-    held = found if found.found else _from_afar(parts, start, share * load, dt, acting)
+    held = found if found.found else from_afar(share * load)
     while not found.found and held.found and step > _SMALLEST_SHARE:
-        further = _onward(held, min(1.0, share + step) * load, dt)
+        further = _together(balance, held.at | {"load": min(1.0, share + step) * load})
         if further.found:
             share, held = min(1.0, share + step), further
             found = held if share == 1.0 else found
@@ -68,36 +66,50 @@ def rest(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Rest:
     return found
 
 
-def _from_afar(parts: Parts, start: dict, load: np.ndarray, dt: float, acting: np.ndarray) -> Rest:
-    """Rest under a load, from actuators that stand still."""
-    loop = parts.loop
-    y = loop.plant.output(jnp.zeros(()), parts.plant_state(jnp.asarray(start["plant"])))
-    held = np.asarray(_holding_input(loop.controller.model.own_axes(), y, jnp.asarray(load)))
-    at = start | {"load": load, "u": held}
-    solve = partial(_newton, parts, dt=dt, acting=acting)
-    # The plant first, so that actuators turn (with the input held, else the shortest way to rest is to switch them
-    # off); then what the law learns and believes at that plant; then both together.
-    at = solve(at, unknown=("plant",), still=("plant", "outputs"))
-    at = solve(at, unknown=("plant", "u"), still=("plant", "outputs"))
-    at = solve(at, unknown=("law",), still=("law",))
-    return _together(parts, at, dt, acting)
+def _from_afar(balance: Balance, at: dict) -> Rest:
+    """Rest from actuators that stand still, with an input that is about right.
+
+    The plant first, so that actuators turn (with the input held, else the shortest way to rest is to switch them off);
+    then what the law learns and believes at that plant; then both together.
+    """
+    at = balance.solve(at, unknown=("plant",), still=("plant", "outputs"))
+    at = balance.solve(at, unknown=("plant", "u"), still=("plant", "outputs"))
+    at = balance.solve(at, unknown=("law",), still=("law",))
+    return _together(balance, at)
 
 
-def _onward(held: Rest, load: np.ndarray, dt: float) -> Rest:
-    """Rest under a load, from rest under another."""
-    return _together(held.parts, held.at | {"load": load}, dt, held.acting)
-
-
-def _together(parts: Parts, at: dict, dt: float, acting: np.ndarray) -> Rest:
+def _together(balance: Balance, at: dict) -> Rest:
+    """Rest of plant and law from a point near it."""
     unknown, still = ("plant", "law", "u"), ("plant", "law", "command")
-    at = _newton(parts, at, unknown, still, dt, acting)
-    local = parts.differentiate(at, dt)
-    remaining = _residual(local, at, dt, acting, unknown, still)[0]
-    return Rest(parts, at, local, float(np.abs(remaining).max(initial=0.0)), acting)
+    at = balance.solve(at, unknown, still)
+    local = balance.parts.differentiate(at, balance.dt)
+    remaining = balance.residual(local, at, unknown, still)[0]
+    return Rest(balance.parts, at, local, float(np.abs(remaining).max(initial=0.0)), balance.acting)
+
+
+def _output(parts: Parts, start: dict) -> Measurement:
+    return parts.loop.plant.output(jnp.zeros(()), parts.plant_state(jnp.asarray(start["plant"])))
+
+
+def _steered(model: AbstractModel, y: Measurement) -> np.ndarray:
+    """Projection of the outputs on what some input accelerates; one where that is everything."""
+    into_axes, effect = _reach(model, y)
+    lost = lost_directions(np.linalg.solve(np.asarray(into_axes), np.asarray(effect)))
+    return np.eye(len(into_axes)) - np.linalg.pinv(lost) @ lost
 
 
 @jax.jit
-def _holding_input(model: AbstractModel, y: Measurement, load):
+def _reach(model: AbstractModel, y: Measurement):
+    """From accelerations of the outputs to the axes of the law; and what the forces give there."""
+    return jax.jacfwd(lambda a: model.seen(y, a))(jnp.zeros_like(y.position)), model.effect(y)
+
+
+def _holding_input(model: AbstractModel, y: Measurement, load: np.ndarray) -> np.ndarray:
+    return np.asarray(_settled_input(model, y, jnp.asarray(load)))
+
+
+@jax.jit
+def _settled_input(model: AbstractModel, y: Measurement, load):
     """Input that gives the forces against drift and load, once the actuators have come to them."""
     needed = -model.drift(y) - (model.seen(y, load) - model.seen(y, jnp.zeros_like(load)))
     drive, forces = model.drive(), model.spread(y, needed)
@@ -116,53 +128,3 @@ def _acting(local: Local) -> np.ndarray:
         if (now == acts).all():
             return acts
         acts = now
-
-
-def _residual(local: Local, at: dict, dt: float, acting: np.ndarray, unknown: tuple[str, ...], still: tuple[str, ...]):
-    """What must vanish, and its slopes with respect to the unknown."""
-    values, slopes = local.values, local.slopes
-    own = lambda name, by: np.eye(len(at[name])) if name == by else 0
-    equations = {
-        "plant": lambda: (values["plant"][acting], [slopes["plant"][by][acting] for by in unknown]),
-        "outputs": lambda: (values["error"], [slopes["error"][by] for by in unknown]),
-        "law": lambda: (
-            (values["law"] - at["law"]) / dt,
-            [(slopes["law"][by] - own("law", by)) / dt for by in unknown],
-        ),
-        "command": lambda: (values["u"] - at["u"], [slopes["u"][by] - own("u", by) for by in unknown]),
-    }
-    residuals, rows = zip(*(equations[name]() for name in still), strict=True)
-    return np.concatenate(residuals), np.block(list(rows))
-
-
-def _newton(
-    parts: Parts, at: dict, unknown: tuple[str, ...], still: tuple[str, ...], dt: float, acting: np.ndarray
-) -> dict:
-    """Smallest steps that solve the linearised equations, shortened while they make it worse."""
-
-    def look(at: dict):
-        local = parts.differentiate(at, dt)
-        residual, jacobian = _residual(local, at, dt, acting, unknown, still)
-        sound = np.isfinite(residual).all() and np.isfinite(jacobian).all()
-        return residual, jacobian, float(np.abs(residual).max(initial=0.0)) if sound else np.inf
-
-    residual, jacobian, size = look(at)
-    ends = np.cumsum([len(at[name]) for name in unknown])[:-1]
-    for _ in range(_STEPS):
-        if not _AT_REST < size < np.inf:
-            break
-        scale = np.abs(jacobian).max(axis=1, keepdims=True)
-        scale[scale == 0] = 1.0
-        step = np.split(-np.linalg.lstsq(jacobian / scale, residual / scale[:, 0], rcond=1e-11)[0], ends)
-        for length in _LENGTHS:
-            trial = at | {name: at[name] + length * part for name, part in zip(unknown, step, strict=True)}
-            found = look(trial)
-            if found[2] < size:
-                break
-        else:  # whatever the length: far from rest a larger residual may still be the way
-            trial = at | {name: at[name] + part for name, part in zip(unknown, step, strict=True)}
-            found = look(trial)
-            if not found[2] < _WORSE * size:
-                break
-        at, (residual, jacobian, size) = trial, found
-    return at

@@ -67,6 +67,18 @@ def _at_sea(n: Numbers) -> str:
     )
 
 
+def _navigation(n: Numbers) -> str:
+    pid, sound = (n.rung("station", law) for law in ("pid", "robust"))
+    without, ours = (n.rung("station_known", law)["position_rms"] for law in ("pid", "robust"))
+    centimetres = lambda metres: f"{100 * metres:.2g} cm"
+    return (
+        f"Beyond its navigation. Keeping station in waves with position fixes of 5 cm, navigation itself is off by "
+        f"{centimetres(sound['navigation_rms'])}: a tuned PID holds {centimetres(pid['position_rms'])}, `robust` "
+        f"{centimetres(sound['position_rms'])}. Better fixes help here, not a better law; where position and velocity "
+        f"are known, they hold {centimetres(without)} and {centimetres(ours)}."
+    )
+
+
 def _recovery(n: Numbers) -> str:
     paper, sound = n.rung("overload", "rcafc"), n.rung("overload", "robust")
     if not (sound["steady"] and paper["steady"]):
@@ -109,4 +121,4 @@ def _noisy_motor(n: Numbers) -> str:
 
 
 LOSES = (_motor, _supply, _noise, _drift, _delay, _frequency)
-NEITHER = (_at_sea, _recovery, _beyond, _slow_rate, _noisy_motor)
+NEITHER = (_at_sea, _navigation, _recovery, _beyond, _slow_rate, _noisy_motor)

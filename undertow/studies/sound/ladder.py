@@ -1,13 +1,15 @@
-"""The ladder again: the paper's laws and preset `robust`, all sampled, on every rung and on BlueROV2 Heavy at sea."""
+"""The ladder again: preset `robust` beside the paper's laws on every rung, and at sea beside a PID too; all sampled."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from undertow.core.status import Status
 from undertow.scenario.execute import Executed
 from undertow.studies.paper.setup import HAND_TUNED, RAFC, RCAFC, RUNGS, scenario
+from undertow.studies.sound import station
 
 LAWS = {
     "rcafc": ("RCAFC, Table 1", {"kind": "rcaf", "composite": RCAFC}),
@@ -73,6 +75,7 @@ def places(quick: bool) -> dict[str, Place]:
         found["overload"] = Place(words, two)
         words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own instruments"
         found["sea"] = Place(words, {key: (name, _at_sea(name, law)) for key, (name, law) in _AT_SEA.items()})
+        found |= {place: Place(*each) for place, each in station.places().items()}
     return found
 
 
@@ -149,7 +152,15 @@ def _row(run: Executed) -> dict[str, Any]:
         "diverged_at": None if run.status is Status.OK else float(run.outcome.ended),
         "steady": run.steady,
         "largest_after": _largest_after(run, _PUSHED),
+        "position_rms": _late_rms(run, run.dataset["error"]),
+        "navigation_rms": _late_rms(run, run.dataset["measured_position"] - run.dataset["position"]),
     }
+
+
+def _late_rms(run: Executed, series: xr.DataArray) -> float | None:
+    """Of the first three outputs over the steady window, m for a vehicle."""
+    late = series.sel(time=slice(*run.built.window())).values[:, :3]
+    return float(np.sqrt((late**2).mean())) if run.steady else None
 
 
 def _largest_after(run: Executed, start: float) -> float | None:

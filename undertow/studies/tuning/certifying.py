@@ -11,6 +11,7 @@ from undertow.analysis.linearised import margins
 from undertow.analysis.linearised.rest import rest
 from undertow.analysis.linearised.surroundings import surroundings
 from undertow.core.contracts import AbstractController
+from undertow.core.errors import BadInput
 from undertow.studies.tuning.evaluation import Bench
 from undertow.studies.tuning.trials import Trials
 
@@ -19,14 +20,20 @@ _SHARES = (0.1, 0.5, 0.9)
 
 
 class Certificate(NamedTuple):
-    """Spectral radii of the closed loop from tick to tick, one per operating point."""
+    """Spectral radii of the closed loop from tick to tick, one per operating point, and which plant it was."""
 
     radii: tuple[float, ...]
+    truths: tuple[str, ...]
 
     @property
     def worst(self) -> float:
         """The largest; the loop is stable at every operating point if it is below 1."""
         return max(self.radii)
+
+    @property
+    def worst_truth(self) -> str:
+        """Parameter set of the plant that has it; "" where there is but one."""
+        return self.truths[self.radii.index(self.worst)]
 
     @property
     def holds(self) -> bool:
@@ -46,7 +53,8 @@ class Certifier:
     def __init__(self, bench: Bench, trials: Trials, first: AbstractController):
         self._bench = bench
         self._position = np.asarray(bench.loop.reference.at(jnp.asarray(bench.duration / 2)).position)
-        once = [trials.truths.index(name) for name in dict.fromkeys(trials.truths)]
+        self._truths = tuple(dict.fromkeys(trials.truths))
+        once = [trials.truths.index(name) for name in self._truths]
         self._plants = [_plant(trials, i) for i in once]
         pairs = zip(self._plants, once, strict=True)
         self._loads = [self._operating_loads(plant, trials.keys[i], first) for plant, i in pairs]
@@ -55,9 +63,12 @@ class Certifier:
         """Certificate of a law."""
         dt = self._bench.settings.dt
         radii: list[float] = []
-        for plant, loads in zip(self._plants, self._loads, strict=True):
-            radii += margins.certify(self._bench.with_parts(plant, law), dt, self._position, loads)
-        return Certificate(tuple(radius if np.isfinite(radius) else float("inf") for radius in radii))
+        truths: list[str] = []
+        for name, plant, loads in zip(self._truths, self._plants, self._loads, strict=True):
+            found = margins.certify(self._bench.with_parts(plant, law), dt, self._position, loads)
+            radii += [radius if np.isfinite(radius) else float("inf") for radius in found]
+            truths += [name] * len(found)
+        return Certificate(tuple(radii), tuple(truths))
 
     def _operating_loads(self, plant: Any, key: Any, law: AbstractController) -> np.ndarray:
         loop, dt = self._bench.with_parts(plant, law), self._bench.settings.dt
@@ -68,3 +79,17 @@ class Certifier:
 
 def _plant(trials: Trials, number: int) -> Any:
     return jax.tree.map(lambda leaf: leaf[number] if eqx.is_array(leaf) else leaf, trials.plants)
+
+
+def refusal(given: Certificate, tried: int) -> BadInput:
+    """What to say where no gains are certified.
+
+    Args:
+        given: certificate of the gains of the scenario.
+        tried: how many points were tried.
+    """
+    truth = f" with the parameter set {given.worst_truth} as the truth" if given.worst_truth else ""
+    sets = ", tell the controller another set or leave this one out of tune.train.sets" if truth else ""
+    hint = f"As given, the loop has a spectral radius of {given.worst:.4g}{truth}. Widen the ranges{sets}"
+    must, got = "allow gains with which the loop is stable", f"so that none of {tried} points is certified"
+    return BadInput("tune.parameters", must, got, hint=hint)

@@ -11,7 +11,7 @@ from undertow.core.contracts import AbstractController
 from undertow.core.errors import BadInput
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
-from undertow.studies.tuning.certifying import Certificate, Certifier
+from undertow.studies.tuning.certifying import Certificate, Certifier, refusal
 from undertow.studies.tuning.cost import Shares
 from undertow.studies.tuning.descent import descend
 from undertow.studies.tuning.evaluation import AT_ONCE, Evaluation
@@ -104,8 +104,7 @@ def tune(
     objective.costs(np.vstack([wanted.start, others]))
     start = objective.best
     if start is None:
-        must = "allow gains with which the loop is stable"
-        raise BadInput("tune.parameters", must, f"so that none of {_BEGINNINGS} points is certified")
+        raise refusal(certifier(first), _BEGINNINGS)
     say("tuning")
     finished = True
     try:
