@@ -17,9 +17,9 @@ _LOOKS = {
     "table1": ("RCAFC, Table 1", style.SOLID, "o"),
     "rafc": ("RAFC, Table 1", style.DASHED, "s"),
     "hand_tuned": ("paper's law, by hand", style.Look("#7a5195", (0, (6, 1.5, 1, 1.5)), 1.1, 2), "D"),
-    "pid": ("PID, tuned", style.Look("#8a6d00", (0, (3, 1)), 1.1, 2), "v"),
+    "pid": ("PID", style.Look("#8a6d00", (0, (3, 1)), 1.1, 2), "v"),
     "robust": ("robust", style.Look("#00785a", "-", 1.3, 4), "^"),
-    "measured": ("robust, speeds measured", style.Look("#b0476f", (0, (1, 1)), 1.1, 5), "."),
+    "measured": ("speeds measured", style.Look("#b0476f", (0, (1, 1)), 1.1, 5), "."),
 }
 _SHOWN = ("electromechanical", "24V_03", "overload", "sea")
 _TITLES = {
