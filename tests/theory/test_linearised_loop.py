@@ -136,7 +136,7 @@ def test_counters_and_idle_weights_are_not_poles():
 def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
     """BlueROV2 cannot pitch: its weight holds the load, the rest of the loop settles about that, as a run does."""
     load, dt = np.array([0.1, 0.05, -0.05, 0.0, 0.4, 0.0]), 0.02
-    plant = hybrid_vehicle(bluerov2(), t200(supply=16.0))
+    plant = hybrid_vehicle(bluerov2(), t200(supply=16.0, dead_zone=0.0))
     law = rcaf(plant.model(), preset="robust", sampling_time=dt)
     still = setpoint([0.0] * 6)
     found = rest(ClosedLoop(plant, law, still, none(), perfect()), dt, np.zeros(6), load)

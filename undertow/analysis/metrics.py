@@ -101,22 +101,44 @@ class Metrics(AbstractAccumulator):
 def results(state: MetricsState) -> dict[str, Any]:
     """Metrics by their names in result files: overall values as numbers, per-axis values as `<name>_axes` lists."""
     host = jax.tree.map(np.asarray, state)
-    count, span = max(float(host.samples), 1.0), float(host.span)
-    found: dict[str, Any] = {}
+    count = max(float(host.samples), 1.0)
+    found: dict[str, Any] = {name: float(value) for name, value in overall(host).items()}
     for name, squares in host.squares.items():
-        found[f"{name}_rms"] = float(np.sqrt(squares.mean() / count))
         found[f"{name}_rms_axes"] = np.sqrt(squares / count).tolist()
     return found | {
-        "tracking_max": float(host.largest_error.max()),
         "tracking_max_axes": host.largest_error.tolist(),
-        "voltage_rms": float(np.sqrt(host.voltage_squares / count)),
-        "voltage_peak": float(host.voltage_peak),
-        "voltage_variation": float(host.variation) / span if span > 0 else 0.0,
-        "weights_peak": float(host.weights_peak),
-        "energy": float(host.energy),
-        "settling_time": float(host.settled_at.max()),
         "settling_time_axes": host.settled_at.tolist(),
-        "saturated_fraction": float(host.saturated) / count,
+    }
+
+
+# Names of what `overall` gives.
+OVERALL = (
+    *(f"{name}_rms" for name in _SIGNALS),
+    "tracking_max",
+    "voltage_rms",
+    "voltage_peak",
+    "voltage_variation",
+    "weights_peak",
+    "energy",
+    "settling_time",
+    "saturated_fraction",
+)
+
+
+def overall(state: MetricsState) -> dict[str, np.ndarray]:
+    """Metrics over all axes by their names; of many runs at once where the leaves have leading axes."""
+    host = jax.tree.map(np.asarray, state)
+    count, span = np.maximum(host.samples, 1.0), host.span
+    rms = {f"{name}_rms": np.sqrt(squares.mean(-1) / count) for name, squares in host.squares.items()}
+    return rms | {
+        "tracking_max": host.largest_error.max(-1),
+        "voltage_rms": np.sqrt(host.voltage_squares / count),
+        "voltage_peak": host.voltage_peak,
+        "voltage_variation": np.where(span > 0, host.variation / np.where(span > 0, span, 1.0), 0.0),
+        "weights_peak": host.weights_peak,
+        "energy": host.energy,
+        "settling_time": host.settled_at.max(-1),
+        "saturated_fraction": host.saturated / count,
     }
 
 

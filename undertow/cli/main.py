@@ -119,6 +119,34 @@ def analyze(
     return analyze(scenario, out, overwrite)
 
 
+@app.command()
+def campaign(
+    campaign: Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="A .yaml file; or the word `status`.")],
+    folder: Annotated[Path | None, typer.Argument(metavar="[DIR]", help="After `status`: of a campaign.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME, or the next free one."),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Fly what is missing of a campaign in DIR.")] = False,
+    workers: Annotated[int | None, typer.Option(metavar="N", help="Threads or workers. Default: all cores.")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="WHERE", help="Dask: local, slurm, ssh, or the address of a scheduler.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier campaign in DIR.")] = False,
+) -> int:
+    """Fly one scenario thousands of times.
+
+    Parameters are drawn or crossed, every trial has a seed of its own. Writes trials.zarr, campaign.html, summary.json,
+    figures/ and the scenarios of the worst trials. Ctrl-C, kill -9 or a full disk lose nothing: --resume goes on.
+    `undertow campaign status DIR` says how far it is.
+    """
+    from undertow.cli import campaign as command
+
+    if str(campaign) == "status":
+        return command.status(folder or Path())
+    return command.campaign(campaign, out, resume, workers, cluster, overwrite)
+
+
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,

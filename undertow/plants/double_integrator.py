@@ -6,6 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.core import checks
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
 from undertow.core.drive import DirectDrive
 from undertow.core.param import param
@@ -47,6 +48,9 @@ class DoubleIntegrator(AbstractPlant):
     outputs: tuple[str, ...] = eqx.field(static=True)
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True, default="m/s^2")
+
+    def __check_init__(self):
+        checks.positive("limit", self.limit, finite=False)
 
     def initial_state(self, position=None, velocity=None) -> AxisState:
         zero = jnp.zeros(self.inputs())

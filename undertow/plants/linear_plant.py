@@ -84,6 +84,9 @@ class LinearPlant(AbstractPlant):
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True, default="1")
 
+    def __check_init__(self):
+        checks.positive("limit", self.limit, finite=False)
+
     def initial_state(self, position=None, velocity=None) -> LinearState:
         zero = jnp.zeros(len(self.outputs))
         return LinearState(zero if position is None else position, zero if velocity is None else velocity)

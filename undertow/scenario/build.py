@@ -16,6 +16,7 @@ from undertow.scenario.fitting import check_fit, check_times, placed
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
 from undertow.scenario.stepping import step_advice
+from undertow.scenario.workshop import Workshop
 
 
 class Built(NamedTuple):
@@ -38,11 +39,12 @@ class Built(NamedTuple):
         return self.scenario.steady.of_run(self.scenario.loop.duration)
 
 
-def build(source: Text | Mapping[str, Any]) -> Built:
+def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) -> Built:
     """Objects described by a scenario.
 
     Args:
         source: a scenario as read from a file, or as Python data.
+        workshop: where many similar scenarios are built, so that what they share is made once.
 
     Raises:
         BadInput: anything wrong with it, with key path and place.
@@ -62,8 +64,12 @@ def build(source: Text | Mapping[str, Any]) -> Built:
         part, resolved[key] = one(key, key, getattr(scenario, key), given)
         return part
 
+    workshop = workshop or Workshop()
+
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
-        return placed(text, where, lambda: parts.make(f"{key}s", part.model_dump(), text.folder, given, circumstances))
+        told = {"part": part.model_dump(), "circumstances": circumstances}
+        new = lambda: parts.make(f"{key}s", told["part"], text.folder, given, circumstances)
+        return placed(text, where, lambda: workshop.part(where, told, given, new))
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):
@@ -73,9 +79,8 @@ def build(source: Text | Mapping[str, Any]) -> Built:
         return Together(tuple(member for member, _ in pairs))
 
     plant = make("plant")
-    model, resolved["model"] = placed(
-        text, "model", lambda: parts.call(plant.model, scenario.model, folder=text.folder)
-    )
+    known = lambda: parts.call(plant.model, scenario.model, folder=text.folder)
+    model, resolved["model"] = placed(text, "model", lambda: workshop.part("model", scenario.model, (plant,), known))
     sensor = make("sensor")
     circumstances["velocity_noise"] = np.asarray(sensor.velocity_noise(scenario.loop.dt)).tolist()
     controller = make("controller", (model,))
@@ -84,5 +89,6 @@ def build(source: Text | Mapping[str, Any]) -> Built:
     if scenario.loop.kind == "continuous":
         placed(text, "loop", lambda: continuous.check(loop))
     check_times(text, scenario.loop, scenario.steady)
-    check_fit(text, loop, scenario.initial)
+    if not workshop.seen((loop, [value and len(value) for _, value in scenario.initial])):
+        check_fit(text, loop, scenario.initial)
     return Built(loop, scenario, resolved)

@@ -66,7 +66,7 @@ def read(path: Path, what: str = "SCENARIO") -> Text:
         raise BadInput(what, "be a text file", path.name) from None
     except OSError as error:
         raise BadInput(what, "be a file that can be read", f"{path}: {error.strerror}") from None
-    return _parse(text, path.name, path.resolve().parent, what)
+    return parse(text, path.name, path.resolve().parent, what)
 
 
 def dump(data: Mapping[str, Any]) -> str:
@@ -88,10 +88,21 @@ def _from_result(path: Path, what: str) -> Text:
         raise BadInput(what, "be a result file of undertow", f"{path.name}: {error}") from None
     if text is None:
         raise BadInput(what, "be a result file of undertow", f"{path.name}, which holds no scenario")
-    return _parse(text, path.name, path.resolve().parent, what)
+    return parse(text, path.name, path.resolve().parent, what)
 
 
-def _parse(text: str, name: str, folder: Path, what: str) -> Text:
+def parse(text: str, name: str, folder: Path, what: str) -> Text:
+    """YAML text as plain data with the line of every key.
+
+    Args:
+        text: YAML.
+        name: of its file, for messages.
+        folder: where relative paths in it start.
+        what: the argument or key that names it, for messages.
+
+    Raises:
+        BadInput: malformed.
+    """
     try:
         tree = YAML(typ="rt").load(text)
     except MarkedYAMLError as error:

@@ -38,11 +38,13 @@ OneOrMore = Annotated[
 Numbers = list[float]
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
+    """Keys that are not known, and values of other types, are refused."""
+
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class Loop(_Strict):
+class Loop(Strict):
     """How the closed loop is run."""
 
     kind: Literal["sampled", "continuous"] = Field("sampled", description="a scan at dt, or one ODE")
@@ -57,14 +59,14 @@ class Loop(_Strict):
     atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (adaptive)")
 
 
-class Initial(_Strict):
+class Initial(Strict):
     """State at t = 0; zero where not given."""
 
     position: Numbers | None = Field(None, description="one entry per output, m and rad")
     velocity: Numbers | None = Field(None, description="one entry per output, m/s and rad/s")
 
 
-class Window(_Strict):
+class Window(Strict):
     """Part of the run that the metrics `steady` are taken over."""
 
     start: float | None = Field(default=None, ge=0, description="s; half of the duration unless given")
@@ -76,7 +78,7 @@ class Window(_Strict):
         return start, duration if self.stop is None else self.stop
 
 
-class Tries(_Strict):
+class Tries(Strict):
     """Runs that gains are tried on: every parameter set with every seed."""
 
     seeds: int = Field(2, ge=1, le=1000, description="number of seeds")
@@ -84,7 +86,7 @@ class Tries(_Strict):
     sets: list[str] | None = Field(None, description="true parameter sets of the vehicle; every second unless given")
 
 
-class Weights(_Strict):
+class Weights(Strict):
     """What a run costs, without unit: errors by their scales, inputs as a share of their limit."""
 
     tracking: float = Field(1.0, ge=0, description="of the rms of the error")
@@ -93,7 +95,7 @@ class Weights(_Strict):
     failure: float = Field(100.0, ge=0, description="of the share of the time that a failed run did not last")
 
 
-class Tune(_Strict):
+class Tune(Strict):
     """What `undertow tune` does with this scenario; other commands do not look at it."""
 
     parameters: dict[str, Numbers] = Field(
@@ -115,7 +117,7 @@ class Tune(_Strict):
     weights: Weights = Field(default_factory=Weights, description="of the cost")
 
 
-class Scenario(_Strict):
+class Scenario(Strict):
     """One closed loop, start to finish."""
 
     description: str = Field("", description="free text")
@@ -147,18 +149,19 @@ def validate(text: Text) -> Scenario:
         raise complaint(errors, text) from None
 
 
-def complaint(errors: ValidationError, text: Text) -> BadInput:
+def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scenario) -> BadInput:
     """The first of pydantic's errors in the house grammar; a misspelt key before the key that it leaves missing."""
+    what = model.__name__.lower()
     error: Any = min(errors.errors(), key=lambda each: each["type"] != "extra_forbidden")
     path = tuple(step for step in error["loc"] if step not in (_ONE, _SEVERAL))
     name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).lstrip(".")
     name = " ".join(name.split())
     where = text.where(path)
     if error["type"] == "extra_forbidden":
-        hint = did_you_mean(str(path[-1]), _keys_beside(path))
-        return BadInput(name, "be a key of the scenario", "unknown", hint=hint, where=where)
+        hint = did_you_mean(str(path[-1]), _keys_beside(path, model))
+        return BadInput(name, f"be a key of the {what}", "unknown", hint=hint, where=where)
     if error["type"] == "missing":
-        return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to the scenario", where=where)
+        return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to the {what}", where=where)
     got = error["input"]
     return BadInput(name, _must(error), "empty" if got is None else repr(got), where=where)
 
@@ -166,6 +169,7 @@ def complaint(errors: ValidationError, text: Text) -> BadInput:
 def _must(error: Any) -> str:
     """pydantic's 'Input should be ...' in the house grammar."""
     message = error["msg"].replace("Input should be a valid ", "be a ").replace("Input should be ", "be ")
+    message = message.replace("Value error, ", "")
     return (
         message.replace("be a integer", "be an integer")
         .replace("a dictionary", "a mapping of keys to values")
@@ -173,8 +177,7 @@ def _must(error: Any) -> str:
     )
 
 
-def _keys_beside(path: tuple) -> list[str]:
-    model: Any = Scenario
+def _keys_beside(path: tuple, model: Any) -> list[str]:
     for key in path[:-1]:
         field = model.model_fields.get(key) if hasattr(model, "model_fields") else None
         model = field.annotation if field is not None else None
@@ -195,7 +198,7 @@ def keys(model: type[BaseModel] = Scenario, prefix: str = "") -> Iterator[Key]:
     for name, field in model.model_fields.items():
         inner = field.annotation if isinstance(field.annotation, type) else None
         meaning = field.description or ""
-        if inner is not None and issubclass(inner, _Strict):
+        if inner is not None and issubclass(inner, Strict):
             yield Key(f"{prefix}{name}", "mapping", "see below", meaning)
             yield from keys(inner, f"{prefix}{name}.")
         else:

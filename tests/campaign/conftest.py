@@ -1,0 +1,41 @@
+"""A campaign that takes no time: one axis, pushed and measured with noise."""
+
+import copy
+
+import pytest
+
+SCENARIO = {
+    "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},
+    "controller": {"kind": "pid", "frequency": 2.0},
+    "reference": {"kind": "setpoint", "position": [0.0]},
+    "disturbance": {"kind": "sinusoid", "amplitude": 1.0},
+    "sensor": {"kind": "white_noise", "velocity": 0.01},
+    "loop": {"duration": 2.0, "dt": 0.02, "record": 0.1},
+}
+CAMPAIGN = {
+    "scenario": SCENARIO,
+    "trials": 40,
+    "chunk": 16,
+    "vary": {"disturbance.amplitude": {"uniform": [0.5, 2.0]}},
+    "requirements": {"tracking_rms": {"below": 0.2, "share": 0.5}},
+    "seed": 7,
+}
+
+
+@pytest.fixture
+def campaign():
+    """The campaign, to be changed."""
+    return lambda **changes: copy.deepcopy(CAMPAIGN) | changes
+
+
+@pytest.fixture
+def campaign_file(tmp_path, campaign):
+    """A file of the campaign with changes."""
+    from undertow.scenario.reading import dump
+
+    def write(name="small", **changes):
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(dump(campaign(**changes)), encoding="utf-8")
+        return path
+
+    return write

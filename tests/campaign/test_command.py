@@ -1,0 +1,150 @@
+"""`undertow campaign` as it is typed: results, page, mistakes, kill -9, and a Dask cluster whose workers are killed."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from undertow.cli.main import run
+from undertow.studies.campaign.conduct import STORE
+
+TYPED = (sys.executable, "-W", "ignore", "-m", "undertow.cli.main")
+CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant.limit": [1e30]}
+
+
+def contents(folder):
+    """Bytes of every file of the store."""
+    store = folder / STORE
+    return {str(file.relative_to(store)): file.read_bytes() for file in sorted(store.rglob("*")) if file.is_file()}
+
+
+def test_what_it_leaves(campaign_file, tmp_path, capsys):
+    path, out = campaign_file(trials=20, cross=CROSS, description="Two PIDs"), tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 1  # some failed
+    said = capsys.readouterr()
+    assert "40 of 40 trials" in said.out and "diverged 20" in said.out and said.err == ""
+    found = json.loads((out / "summary.json").read_text())
+    calm, wild = found["combinations"]
+    assert found["status"] == {"ok": 20, "diverged": 20}
+    assert (calm["failed"], wild["failed"]) == (0, 20)
+    assert calm["values"]["controller.frequency"] == "calm"
+    assert calm["requirements"][0]["verdict"] != "fails" and wild["requirements"][0]["verdict"] == "fails"
+    assert found["sensitivity"]["disturbance.amplitude"]["tracking_rms"] > 0.99
+    page = re.sub(r"<[^>]+>", " ", (out / "campaign.html").read_text())
+    for words in ("Two PIDs", "How they ended", "Requirements", "The worst trials", "0.0% [0.0%"):
+        assert words in page
+    assert {file.name for file in (out / "figures").glob("*.svg")} == {"distributions.svg", "sensitivity.svg"}
+    worst = sorted((out / "worst").iterdir())
+    assert len(worst) == 5 and all(int(file.stem.split("-")[1]) >= 20 for file in worst)
+    assert run(["simulate", str(worst[0]), "--no-prediction", "--out", str(tmp_path / "again")]) == 1
+    assert "diverged" in capsys.readouterr().out.lower()
+    assert run(["campaign", "status", str(out)]) == 0
+    assert "40 of 40 trials done" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        (
+            {"trails": 3},
+            r"`trails` must be a key of the campaign, but is unknown \(small.yaml, line \d+\). Did you mean `trials`\?",
+        ),
+        ({"scenario": "no.yaml"}, r"`scenario` must be an existing file, but is .*no.yaml"),
+        (
+            {"vary": {"controller.freq": {"uniform": [1.0, 2.0]}}},
+            r"`controller.freq` must be an option here, but is unknown \(trial 0\)",
+        ),
+        ({"cross": {"loop.dt": []}}, r"`cross.loop.dt` must have an entry"),
+        ({"trials": 0}, r"`trials` must be greater than or equal to 1, but is 0"),
+        ({"series": {"signals": ["positon"]}}, r"`series.signals\[0\]` must be one of .*position.*, but is positon"),
+        (
+            {"requirements": {"tracking": {"below": 1.0}}},
+            r"`requirements.tracking` must be a metric, but is unknown. Did you mean",
+        ),
+        ({"series": {"every": 0.03}}, r"`series.every` must be a whole number of sampling times \(0.02 s\)"),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsys, changes, said):
+    path = campaign_file(**changes)
+    assert run(["campaign", str(path), "--out", str(tmp_path / "out")]) == 2
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1 and re.search(said, complaint), complaint
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):
+    path, out = campaign_file(trials=4), tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
+    assert "find a campaign to go on with" in capsys.readouterr().err
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    before = contents(out)
+    assert run(["campaign", str(path), "--out", str(out)]) == 2
+    assert "Add --resume to go on with it, or --overwrite to begin anew" in capsys.readouterr().err
+    assert contents(out) == before
+    assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 0
+    assert contents(out) == before
+
+
+def typed(path, out, *options, **settings):
+    arguments = [*TYPED, "campaign", str(path), "--out", str(out), *options]
+    return subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **settings)
+
+
+def killed(path, out, kills, longest):
+    """Start the campaign, kill it after a while, and so on; then let it finish. Kills that came before the end."""
+    counted = 0
+    for number in range(kills):
+        process = typed(path, out, *(["--resume"] if (out / STORE).exists() else []))
+        began = time.monotonic()
+        # The first result of a process takes seconds: waiting for the store to grow makes every kill count.
+        before = len(list(out.rglob("*")))
+        while len(list(out.rglob("*"))) == before and process.poll() is None and time.monotonic() - began < 120:
+            time.sleep(0.01)
+        time.sleep(longest * number / max(kills, 1))
+        process.send_signal(signal.SIGKILL)
+        counted += process.wait() == -signal.SIGKILL
+    assert typed(path, out, *(["--resume"] if (out / STORE).exists() else [])).wait() == 0
+    return counted
+
+
+def test_kill_9_loses_nothing(campaign_file, tmp_path):
+    path = campaign_file(trials=400, chunk=20)
+    assert typed(path, tmp_path / "whole").wait() == 0
+    assert killed(path, tmp_path / "killed", kills=2, longest=0.1) == 2
+    assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_kill_9_at_twenty_moments(campaign_file, tmp_path):
+    path = campaign_file(trials=2000, chunk=20)
+    assert typed(path, tmp_path / "whole").wait() == 0
+    assert killed(path, tmp_path / "killed", kills=20, longest=1.0) >= 10
+    assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
+
+
+def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
+    """A real cluster of two processes; one of them dies after the first results."""
+    from distributed import Client, LocalCluster
+
+    from undertow.studies.campaign.conduct import conduct, prepare
+    from undertow.studies.campaign.engines import by_dask
+
+    path = campaign_file(trials=200, chunk=20)
+    assert run(["campaign", str(path), "--out", str(tmp_path / "whole")]) == 0
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        workers = list(client.run(os.getpid).values())
+        seen = []
+
+        def watch(done, total, failed):
+            seen.append(done)
+            if len(seen) == 3:
+                os.kill(workers[0], signal.SIGKILL)
+
+        conduct(prepare(path), tmp_path / "cluster", lambda f, work: by_dask(f, work, client), watch)
+    assert seen[-1] == 200 and len(seen) == 11  # no task twice
+    assert contents(tmp_path / "cluster") == contents(tmp_path / "whole")

@@ -1,0 +1,79 @@
+"""Lanes: the same figures as one run at a time, whoever flies beside; failures stay where they are."""
+
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+from undertow.analysis.metrics import Metrics, results
+from undertow.loop.sampled import simulate
+from undertow.scenario.build import build
+from undertow.scenario.reading import from_data
+from undertow.studies.campaign import flying
+from undertow.studies.campaign.conduct import Prepared
+from undertow.studies.campaign.reading import whole
+from undertow.studies.campaign.schema import validate
+from undertow.studies.campaign.task import REFUSED, fly, site
+from undertow.studies.campaign.trials import trials
+
+
+def prepared(data) -> Prepared:
+    several = trials(validate(from_data(data)), Path())
+    return Prepared(several, whole(several.campaign, several.scenario.data), Path())
+
+
+def columns(data, rows):
+    return fly(prepared(data).text, "", rows)
+
+
+def test_lanes_are_runs(campaign):
+    found = columns(campaign(), range(3))
+    for trial in range(3):
+        built = build(prepared(campaign()).trials.data(trial))
+        key = jax.random.PRNGKey(built.scenario.seed)
+        run = simulate(built.closed_loop, duration=2.0, dt=0.02, key=key, accumulators=(Metrics(1.0, 2.0),))
+        for name, expected in results(run.accumulated[0]).items():
+            if name in found:
+                assert found[name][trial] == pytest.approx(expected, rel=1e-9, abs=1e-12), name
+        assert found["vary:disturbance.amplitude"][trial] == float(built.closed_loop.disturbance.amplitude)
+
+
+def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, monkeypatch):
+    """Tasks of 1, 7 and 40 trials, backwards; fewer and more than there are lanes."""
+    monkeypatch.setattr(flying, "LANES", 8)
+    site.cache_clear()
+    two = campaign(cross={"controller": [{"kind": "pid", "frequency": 2.0}, {"kind": "rcaf", "preset": "robust"}]})
+    at_once = columns(two, range(80))
+    for size in (1, 7, 40):
+        tasks = [range(i, min(i + size, 80)) for i in range(0, 80, size)]
+        pieces = [columns(two, rows) for rows in reversed(tasks)][::-1]
+        for name, expected in at_once.items():
+            np.testing.assert_array_equal(np.concatenate([piece[name] for piece in pieces]), expected, err_msg=name)
+    site.cache_clear()
+
+
+def test_a_run_that_fails_costs_no_other(campaign):
+    """Gains that are far too fast for the sampling time diverge; their neighbours do not notice."""
+    unlimited = lambda *frequencies: campaign(
+        cross={"plant.limit": [1e30], "controller.frequency": list(frequencies)}, trials=4
+    )
+    tame, wild = unlimited(2.0, 3.0), unlimited(2.0, 500.0)
+    good, bad = columns(tame, range(8)), columns(wild, range(8))
+    assert (bad["status"][4:] > 0).all() and np.isnan(bad["tracking_rms"][4:]).all()
+    assert (bad["ended"][4:] < 2.0).all()
+    np.testing.assert_array_equal(bad["tracking_rms"][:4], good["tracking_rms"][:4])
+
+
+def test_a_trial_that_cannot_be_built_is_a_row(campaign):
+    found = columns(campaign(cross={"controller.frequency": [2.0, -1.0]}, trials=2), range(4))
+    assert found["status"].tolist() == [0, 0, REFUSED, REFUSED]
+    assert np.isnan(found["tracking_rms"]).tolist() == [False, False, True, True]
+
+
+def test_series_are_those_of_the_runs(campaign):
+    found = columns(campaign(series={"signals": ["position"], "every": 0.5}), range(2))
+    built = build(prepared(campaign()).trials.data(1))
+    key = jax.random.PRNGKey(built.scenario.seed)
+    run = simulate(built.closed_loop, duration=2.0, dt=0.02, key=key, record_every=25)
+    np.testing.assert_allclose(found["series:position"][1], run.samples.position, rtol=1e-9, atol=1e-12)

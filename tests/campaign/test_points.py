@@ -1,0 +1,73 @@
+"""Draws: distributions by their quantiles, designs by what they are known for, seeds by being a matter of number."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from undertow.core.errors import BadInput
+from undertow.scenario.reading import from_data
+from undertow.studies.campaign.points import points, seeds, value
+from undertow.studies.campaign.schema import Spread, validate
+
+TWO = {"loop.duration": {"uniform": [1, 2]}, "seed": {"uniform": [0, 1]}}
+
+
+@pytest.mark.parametrize(
+    "given, law",
+    [
+        ({"uniform": [2.0, 5.0]}, stats.uniform(2, 3)),
+        ({"log_uniform": [0.1, 10.0]}, stats.loguniform(0.1, 10)),
+        ({"normal": [3.0, 0.5]}, stats.norm(3, 0.5)),
+    ],
+)
+def test_values_are_quantiles(given, law):
+    for share in (0.0, 0.1, 0.5, 0.99):
+        expected = law.ppf(max(share, 2.0**-53))
+        assert value(Spread.model_validate(given), share) == pytest.approx(expected, rel=1e-9)
+
+
+def test_choices_are_equally_likely():
+    spread = Spread.model_validate({"choice": ["a", "b", "c"]})
+    shares = np.arange(300) / 300
+    assert [sum(value(spread, share) == one for share in shares) for one in "abc"] == [100, 100, 100]
+
+
+def test_latin_hypercubes_have_one_point_per_stratum(campaign):
+    found = points(validate(from_data(campaign(design="latin", trials=50, vary=TWO))))
+    for column in np.floor(50 * found).T:
+        assert sorted(column) == list(range(50))
+
+
+def test_sobol_points_are_a_net(campaign):
+    """Every quarter of the square has a quarter of them."""
+    found = points(validate(from_data(campaign(design="sobol", trials=64, vary=TWO))))
+    _, counts = np.unique(np.floor(2 * found), axis=0, return_counts=True)
+    assert counts.tolist() == [16, 16, 16, 16]
+
+
+@pytest.mark.parametrize("design", ["random", "latin", "sobol"])
+def test_draws_are_a_matter_of_the_seed(campaign, design):
+    draw = lambda seed: points(validate(from_data(campaign(design=design, seed=seed))))
+    np.testing.assert_array_equal(draw(1), draw(1))
+    assert (draw(1) != draw(2)).all()
+
+
+def test_no_two_trials_share_a_seed(campaign):
+    assert len(set(seeds(validate(from_data(campaign(trials=10_000)))))) > 9990
+
+
+@pytest.mark.parametrize(
+    "spread, said",
+    [
+        ({"uniform": [2.0, 1.0]}, "have low below high"),
+        ({"log_uniform": [0.0, 1.0]}, "have positive bounds"),
+        ({"normal": [0.0, -1.0]}, "have a standard deviation that is not negative"),
+        ({}, "have one of uniform, log_uniform, normal, choice"),
+        ({"uniform": [0.0, 1.0], "normal": [0.0, 1.0]}, "have one of uniform"),
+        ({"uniform": [1.0]}, "at least 2 items"),
+        ({"unifrom": [0.0, 1.0]}, "be a key of the campaign"),
+    ],
+)
+def test_a_wrong_spread_is_told(campaign, spread, said):
+    with pytest.raises(BadInput, match=said):
+        validate(from_data(campaign(vary={"loop.duration": spread})))

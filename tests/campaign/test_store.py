@@ -1,0 +1,167 @@
+"""The store: what is flown once is kept, what is torn is flown again, and two do not write at once."""
+
+import errno
+from functools import partial
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from undertow.core.errors import BadInput
+from undertow.studies.campaign import store as stores
+from undertow.studies.campaign.conduct import STORE, conduct, prepare
+from undertow.studies.campaign.engines import in_threads
+
+quiet = lambda done, total, failed: None
+threads = partial(in_threads, threads=2)
+
+
+def flown(path, out, engine=threads, watch=quiet):
+    conduct(prepare(path), out, engine, watch)
+    return contents(out / STORE)
+
+
+def contents(folder):
+    """Bytes of every file."""
+    return {str(file.relative_to(folder)): file.read_bytes() for file in sorted(folder.rglob("*")) if file.is_file()}
+
+
+def backwards(function, work):
+    """An engine that takes the last task first."""
+    for i in reversed(range(len(work))):
+        yield i, function(*work[i])
+
+
+@pytest.fixture
+def small(campaign_file, tmp_path):
+    """A campaign, and the bytes of its results."""
+    path = campaign_file()
+    return path, flown(path, tmp_path / "whole")
+
+
+def test_two_lines_of_xarray_open_it(small, tmp_path):
+    results = xr.open_zarr(tmp_path / "whole" / STORE, consolidated=False)
+    assert results["tracking_rms"].sizes == {"trial": 40}
+    assert results["tracking_rms"].attrs["units"] == "m, rad"
+    assert (results["status"] == 0).all() and results["done"].all()
+    amplitude = results["vary:disturbance.amplitude"]
+    assert 0.5 < float(amplitude.min()) < float(amplitude.max()) < 2.0
+    assert np.corrcoef(amplitude, results["tracking_rms"])[0, 1] > 0.99
+
+
+def test_order_and_threads_do_not_matter(small, tmp_path):
+    path, whole = small
+    assert flown(path, tmp_path / "backwards", backwards) == whole
+    assert flown(path, tmp_path / "one", partial(in_threads, threads=1)) == whole
+
+
+def test_what_is_done_is_not_flown_again(small, tmp_path):
+    path, whole = small
+
+    def never(function, work):
+        assert not work
+        return iter(())
+
+    assert flown(path, tmp_path / "whole", never) == whole
+
+
+def stop_after(count):
+    """An engine whose machine dies after some tasks."""
+
+    def engine(function, work):
+        for i, one in enumerate(work):
+            if i == count:
+                raise KeyboardInterrupt
+            yield i, function(*one)
+
+    return engine
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_an_interrupted_campaign_ends_where_it_would_have(small, tmp_path, count):
+    path, whole = small
+    with pytest.raises(KeyboardInterrupt):
+        flown(path, tmp_path / "cut", stop_after(count))
+    assert flown(path, tmp_path / "cut") == whole
+
+
+def test_a_chunk_that_was_torn_is_flown_again(small, tmp_path):
+    path, whole = small
+    torn = tmp_path / "whole" / STORE / "tracking_rms" / "c" / "1"
+    torn.write_bytes(torn.read_bytes()[:-7])
+    counted = []
+    assert flown(path, tmp_path / "whole", watch=lambda done, total, failed: counted.append(done)) == whole
+    assert counted == [24, 40]
+
+
+@pytest.mark.parametrize("at", [0, 3, 11, 30])
+def test_a_full_disk_loses_nothing(small, tmp_path, monkeypatch, at):
+    """Writing fails at some array of some task; what was done before stays, and the rest is flown later."""
+    path, whole = small
+    writes = iter(range(10**6))
+    real = stores.Store._array
+
+    class Full:
+        def __init__(self, array):
+            self._array = array
+
+        def __getattr__(self, name):
+            return getattr(self._array, name)
+
+        def __getitem__(self, key):
+            return self._array[key]
+
+        def __setitem__(self, key, value):
+            if next(writes) == at:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            self._array[key] = value
+
+    class FullGroup:
+        def __init__(self, group):
+            self._group = group
+
+        def __getattr__(self, name):
+            return getattr(self._group, name)
+
+        def __contains__(self, name):
+            return name in self._group
+
+        def __getitem__(self, name):
+            return Full(self._group[name])
+
+    opened = stores.zarr.open_group
+    monkeypatch.setattr(stores.zarr, "open_group", lambda *args, **options: FullGroup(opened(*args, **options)))
+    with pytest.raises(OSError, match="No space left"):
+        flown(path, tmp_path / "full")
+    monkeypatch.undo()
+    assert stores.Store._array is real
+    assert flown(path, tmp_path / "full") == whole
+
+
+def test_another_campaign_is_refused(small, tmp_path, campaign_file):
+    other = campaign_file("other", seed=8)
+    with pytest.raises(BadInput, match=r"by the same versions, but is .*, where campaign, campaign_hash differ"):
+        flown(other, tmp_path / "whole")
+
+
+def test_the_size_of_tasks_may_change_on_the_way(small, tmp_path, campaign_file):
+    path, whole = small
+    with pytest.raises(KeyboardInterrupt):
+        flown(path, tmp_path / "cut", stop_after(1))
+    assert flown(campaign_file("other", chunk=5), tmp_path / "cut") == whole
+
+
+def test_two_do_not_write_at_once(small, tmp_path):
+    path, _ = small
+
+    def during(function, work):
+        with pytest.raises(BadInput, match="nothing else writes to"):
+            flown(path, tmp_path / "two")
+        return threads(function, work)
+
+    flown(path, tmp_path / "two", during)
+
+
+def test_a_row_is_less_than_a_kilobyte(campaign_file, tmp_path):
+    whole = flown(campaign_file(trials=2000, chunk=1000, cross={"loop.duration": [0.2]}), tmp_path / "large")
+    assert sum(map(len, whole.values())) / 2000 < 300

@@ -1,0 +1,66 @@
+"""Trials by their numbers: what is put where, and in which order combinations come."""
+
+from pathlib import Path
+
+import pytest
+
+from undertow.core.errors import BadInput
+from undertow.scenario.reading import from_data
+from undertow.studies.campaign.schema import validate
+from undertow.studies.campaign.trials import trials
+
+LIST = [{"kind": "current", "velocity": [0.1, 0.2, 0.3]}, "waves"]
+
+
+def made(data):
+    return trials(validate(from_data(data)), Path())
+
+
+def test_values_stand_where_the_key_path_says(campaign):
+    data = campaign()
+    data["scenario"] |= {"disturbance": LIST}
+    put = {
+        "disturbance[0].velocity[1]": 5.0,
+        "disturbance[1].height": 0.7,
+        "initial.position": [1.0],
+        "sensor": "perfect",
+    }
+    data |= {"vary": {}, "cross": {key: [value] for key, value in put.items()}}
+    found = made(data).data(0)
+    assert found["disturbance"] == [{"kind": "current", "velocity": [0.1, 5.0, 0.3]}, {"kind": "waves", "height": 0.7}]
+    assert found["initial"] == {"position": [1.0]} and found["sensor"] == "perfect"
+    assert data["scenario"]["disturbance"] is LIST and LIST[0]["velocity"][1] == 0.2
+
+
+def test_every_combination_flies_the_same_draws_and_seeds(campaign):
+    several = made(campaign(trials=5, cross={"controller": ["pid", "rcaf"], "loop.dt": [0.01, 0.02]}))
+    assert several.number == 20
+    assert [several.values(5 * i)["controller"] for i in range(4)] == ["pid", "pid", "rcaf", "rcaf"]
+    assert [several.values(5 * i)["loop.dt"] for i in range(4)] == [0.01, 0.02, 0.01, 0.02]
+    for draw in range(5):
+        same = [several.values(5 * i + draw)["disturbance.amplitude"] for i in range(4)]
+        assert len(set(same)) == 1
+        assert len({several.seed(5 * i + draw) for i in range(4)}) == 1
+
+
+def test_parts_have_names(campaign):
+    parts = [{"kind": "rcaf", "preset": "robust"}, "pid", "pid"]
+    assert list(validate(from_data(campaign(cross={"controller": parts}))).cross["controller"]) == [
+        "rcaf robust",
+        "pid 2",
+        "pid 3",
+    ]
+
+
+@pytest.mark.parametrize(
+    "key, said",
+    [
+        ("disturbance[3].height", "name one of the 2 entries, 0 to 1, but is \\[3\\]"),
+        ("loop.dt.more", "lead to a key of the scenario, but is past 0.02"),
+    ],
+)
+def test_a_key_path_that_leads_nowhere_is_told(campaign, key, said):
+    data = campaign(vary={key: {"uniform": [0.0, 1.0]}})
+    data["scenario"] |= {"disturbance": LIST}
+    with pytest.raises(BadInput, match=said):
+        made(data).data(0)

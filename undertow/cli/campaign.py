@@ -1,0 +1,175 @@
+"""`undertow campaign`: thousands of runs, resumable, and what they say."""
+
+import contextlib
+import os
+import shutil
+import threading
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from undertow.cli.exit_codes import DONE, RUN_FAILED
+from undertow.cli.interruptible import interruptible
+from undertow.cli.results_folder import next_free
+from undertow.cli.tables import wide_console
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.report.campaign_page import write_campaign
+from undertow.scenario.labelling import to_json
+from undertow.scenario.reading import dump
+from undertow.studies.campaign.conduct import STORE, Engine, Prepared, Watch, conduct, prepare
+from undertow.studies.campaign.engines import by_dask, cluster, in_threads
+from undertow.studies.campaign.summary import Results, load, summary
+
+_WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
+
+
+def campaign(
+    path: Path, out: Path | None, resume: bool, workers: int | None, where: str | None, overwrite: bool
+) -> int:
+    """Exit code of a campaign whose results went to `out`, or to a folder under runs/ that was free."""
+    count = os.cpu_count() or 1 if workers is None else workers
+    checks.positive("--workers", count)
+    console = wide_console()
+    prepared = interruptible(lambda: prepare(path))
+    first = Path("runs") / path.stem
+    folder = out or (first if resume else next_free(first))
+    _claim(folder, resume, overwrite)
+    with _engine(where, count) as engine, _live(console, prepared) as watch:
+        try:
+            interruptible(lambda: conduct(prepared, folder, engine, watch))
+        except (KeyboardInterrupt, OSError):
+            typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
+            raise
+    return conclude(console, prepared, folder)
+
+
+def conclude(console: Console, prepared: Prepared, folder: Path) -> int:
+    """Write page, summary and the scenarios of the worst trials; show the short of it."""
+    results = load(folder)
+    found = summary(results)
+    (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
+    _write_worst(prepared, found["worst"], folder / "worst")
+    title = prepared.trials.campaign.description or "A campaign"
+    page = write_campaign(title, results, found, folder)
+    console.print(_table(results, found))
+    for sentence in sentences(found):
+        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+    console.print(f"Page: {page}", highlight=False, soft_wrap=True)
+    return DONE if set(found["status"]) <= {"ok"} else RUN_FAILED
+
+
+def status(folder: Path) -> int:
+    """How far the campaign in a folder is."""
+    try:
+        results = load(folder)
+    except FileNotFoundError:
+        raise BadInput("DIR", "be the folder of a campaign", str(folder)) from None
+    found = summary(results) if results.rows.sizes.get("trial") else {"status": {}}
+    console = wide_console()
+    done = sum(found["status"].values())
+    console.print(f"{done} of {results.total} trials done", highlight=False)
+    for word, number in found["status"].items():
+        console.print(f"  {word}: {number}", highlight=False)
+    return DONE
+
+
+def sentences(found: dict) -> list[str]:
+    """Endings and verdicts in words."""
+    ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
+    said = [f"{found['done']} trials: {ended}."]
+    for one in found["combinations"]:
+        of = "".join(f", {key} {value}" for key, value in one["values"].items())
+        for wanted in one["requirements"]:
+            low, high = wanted["interval"]
+            asked = f"{wanted['metric']} < {wanted['below']:g} in {wanted['share']:.0%} of the trials{of}"
+            said.append(f"{asked}: {wanted['verdict']}; {wanted['kept']:.1%} did [{low:.1%}, {high:.1%}].")
+    return said
+
+
+def _claim(folder: Path, resume: bool, overwrite: bool) -> None:
+    """Whether the folder may be written to.
+
+    Raises:
+        BadInput: it may not.
+    """
+    there = (folder / STORE).exists()
+    if folder.exists() and not folder.is_dir():
+        raise BadInput("--out", "be a folder", str(folder))
+    if resume and not there:
+        raise BadInput("--resume", "find a campaign to go on with", f"none in {folder}")
+    if there and overwrite and not resume:
+        for name in _WRITTEN:
+            target = folder / name
+            shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
+    elif there and not resume:
+        hint = "Add --resume to go on with it, or --overwrite to begin anew"
+        raise BadInput("--out", "be a folder without an earlier campaign", f"{folder}, which has one", hint=hint)
+
+
+@contextlib.contextmanager
+def _engine(where: str | None, count: int) -> Iterator[Engine]:
+    if where is None:
+        yield partial(in_threads, threads=count)
+        return
+    with cluster(where, count) as client:
+        yield partial(by_dask, client=client)
+
+
+@contextlib.contextmanager
+def _live(console: Console, prepared: Prepared) -> Iterator[Watch]:
+    """Trials done, how fast, and how long it will take."""
+    columns = (
+        TextColumn("{task.completed:.0f} of {task.total:.0f} trials"),
+        BarColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    begun, lock, first = time.perf_counter(), threading.Lock(), [-1]
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
+        bar = live.add_task("", total=prepared.trials.number, rate="compiling")
+
+        def watch(done: int, total: int, failed: int) -> None:
+            with lock:
+                first[0] = done if first[0] < 0 else first[0]
+                rate = (done - first[0]) / max(time.perf_counter() - begun, 1e-9)
+                said = f"{rate:.3g} per second, {failed} failed" if done > first[0] else "compiling"
+                live.update(bar, completed=done, rate=said)
+                if not console.is_terminal:
+                    console.print(f"{done} of {total} trials, {said}", highlight=False)
+
+        yield watch
+
+
+def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    for trial in trials:
+        text = f"# Trial {trial}.\n{dump(prepared.trials.data(trial))}"
+        (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
+
+
+def _table(results: Results, found: dict) -> Table:
+    table = Table(title="Median [5 %, 95 %] of the trials that lasted", title_justify="left", title_style="bold")
+    crossed = list(results.campaign.cross)
+    for column in (*crossed, "trials", "failed", "tracking rms", "voltage rms"):
+        table.add_column(column)
+    for one in found["combinations"]:
+        cells = [_spread(one["metrics"].get(name)) for name in ("tracking_rms", "voltage_rms")]
+        table.add_row(*(one["values"][key] for key in crossed), str(one["trials"]), str(one["failed"]), *cells)
+    return table
+
+
+def _spread(quantiles: dict | None) -> str:
+    if quantiles is None:
+        return "-"
+    low, middle, high = quantiles.values()
+    return f"{middle:.3g} [{low:.3g}, {high:.3g}]"

@@ -1,0 +1,124 @@
+"""Who flies the tasks of a campaign: the threads of this process, or the workers of a Dask cluster."""
+
+import contextlib
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from typing import Any
+
+import numpy as np
+
+from undertow.core.errors import BadInput
+
+Columns = dict[str, np.ndarray]
+Work = tuple[Any, ...]  # arguments of the function
+
+# Tasks per worker that are under way or waiting: enough to keep it busy, few enough to stay in memory.
+_AHEAD = 2
+
+CLUSTERS = ("local", "slurm", "ssh")
+
+
+def in_threads(function: Callable[..., Columns], work: Sequence[Work], threads: int) -> Iterator[tuple[int, Columns]]:
+    """Number and result of each piece of work as it is done, by threads of this process."""
+    with ThreadPoolExecutor(threads) as pool:
+        waiting = enumerate(work)
+        going = {pool.submit(function, *one): i for i, one in itertools.islice(waiting, _AHEAD * threads)}
+        try:
+            while going:
+                done, _ = wait(going, return_when=FIRST_COMPLETED)
+                for future in done:
+                    number = going.pop(future)
+                    for i, one in itertools.islice(waiting, 1):
+                        going[pool.submit(function, *one)] = i
+                    yield number, future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any) -> Iterator[tuple[int, Columns]]:
+    """Number and result of each piece of work as it is done, by the workers of a `dask.distributed` client.
+
+    A worker that is killed loses nothing: its work is given to another one.
+
+    Raises:
+        OSError: the cluster is gone.
+    """
+    from distributed import as_completed
+    from distributed.client import FutureCancelledError
+
+    waiting = enumerate(work)
+    start = lambda i, one: (client.submit(function, *one, pure=False, retries=3), i)
+    ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+    going = dict(start(i, one) for i, one in itertools.islice(waiting, ahead))
+    numbers = {future.key: i for future, i in going.items()}
+    done = as_completed(list(going), raise_errors=False)
+    try:
+        for future in done:
+            number = numbers.pop(future.key)
+            result = future.result()
+            future.release()
+            for i, one in itertools.islice(waiting, 1):
+                further, _ = start(i, one)
+                numbers[further.key] = i
+                done.add(further)
+            yield number, result
+    except (FutureCancelledError, TimeoutError) as error:
+        raise OSError(f"the Dask cluster is gone ({error})") from error
+    if numbers:
+        raise OSError("the Dask cluster is gone")
+
+
+@contextlib.contextmanager
+def cluster(kind: str, workers: int) -> Iterator[Any]:
+    """A client of a cluster that is started for this campaign, or of the scheduler at an address.
+
+    Args:
+        kind: local, slurm, ssh (hosts in the environment variable UNDERTOW_HOSTS, separated by commas), or an address
+            such as tcp://10.0.0.1:8786.
+        workers: how many are started.
+
+    Raises:
+        BadInput: Dask is not installed, or no such cluster can be reached.
+    """
+    try:
+        from dask import config
+        from distributed import Client
+    except ImportError:
+        hint = "pip install 'undertow[campaign]'"
+        raise BadInput("--cluster", "have Dask installed", "not", hint=hint) from None
+    with config.set({"distributed.scheduler.allowed-failures": 100}), contextlib.ExitStack() as stack:
+        where = kind if "://" in kind else stack.enter_context(_started(kind, workers))
+        try:
+            client = stack.enter_context(Client(where, timeout=10))
+        except OSError as error:
+            raise BadInput("--cluster", "be a scheduler that answers", f"{kind}: {error}") from None
+        client.wait_for_workers(1)
+        yield client
+
+
+def _started(kind: str, workers: int) -> Any:
+    import os
+
+    if kind == "local":
+        from distributed import LocalCluster
+
+        return LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+    if kind == "ssh":
+        from distributed import SSHCluster
+
+        hosts = os.environ.get("UNDERTOW_HOSTS", "").split(",")
+        if hosts == [""]:
+            raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
+        return SSHCluster([hosts[0], *hosts])
+    if kind == "slurm":
+        try:
+            from dask_jobqueue import SLURMCluster  # pyright: ignore[reportMissingImports]
+        except ImportError:
+            hint = "pip install dask-jobqueue"
+            raise BadInput("--cluster", "have dask-jobqueue installed", "not", hint=hint) from None
+        found = SLURMCluster()
+        found.scale(jobs=workers)
+        return found
+    raise BadInput("--cluster", f"be one of {', '.join(CLUSTERS)}, or an address", kind)

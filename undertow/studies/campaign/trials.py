@@ -1,0 +1,116 @@
+"""Trials of a campaign by their numbers: each is a scenario that `undertow simulate` could run."""
+
+import copy
+import itertools
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from undertow.core.errors import BadInput
+from undertow.scenario.reading import Text, from_data, key_path, read
+from undertow.studies.campaign.points import points, seeds, value
+from undertow.studies.campaign.schema import Campaign
+
+
+class Trials(NamedTuple):
+    """All trials: draws one after another, for every combination of `cross` in turn.
+
+    Attributes:
+        campaign: what was asked for.
+        scenario: what it varies, and where relative paths in it start.
+        points: one row per draw, in [0, 1); columns as in `vary`.
+        seeds: one per draw.
+        combinations: values of `cross`, one tuple per combination.
+    """
+
+    campaign: Campaign
+    scenario: Text
+    points: np.ndarray
+    seeds: np.ndarray
+    combinations: tuple[tuple[Any, ...], ...]
+
+    @property
+    def number(self) -> int:
+        """How many trials there are."""
+        return len(self.combinations) * self.campaign.trials
+
+    def values(self, trial: int) -> dict[str, Any]:
+        """What this trial puts into the scenario, by key path."""
+        combination, draw = divmod(trial, self.campaign.trials)
+        crossed = dict(zip(self.campaign.cross, self.combinations[combination], strict=True))
+        drawn = zip(self.campaign.vary.items(), self.points[draw], strict=True)
+        return crossed | {key: value(spread, float(share)) for (key, spread), share in drawn}
+
+    def seed(self, trial: int) -> int:
+        """Of everything random in this trial."""
+        return int(self.seeds[trial % self.campaign.trials])
+
+    def data(self, trial: int) -> dict[str, Any]:
+        """The scenario of this trial."""
+        data = copy.deepcopy(self.scenario.data)
+        for key, put in self.values(trial).items():
+            _put(data, key, copy.deepcopy(put))
+        return data | {"seed": self.seed(trial)}
+
+    def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
+        """Key paths that differ between trials, with the values by name where those are not numbers."""
+        for key, entries in self.campaign.cross.items():
+            yield key, None if _numbers(entries.values()) else entries
+        for key, spread in self.campaign.vary.items():
+            named = spread.choice is not None and not _numbers(spread.choice)
+            yield key, {str(entry): entry for entry in spread.choice or []} if named else None
+
+
+def trials(campaign: Campaign, folder: Path) -> Trials:
+    """The trials of a campaign.
+
+    Args:
+        campaign: what is asked for.
+        folder: where the path of its scenario starts.
+
+    Raises:
+        BadInput: no such scenario, or a key path that leads nowhere.
+    """
+    given = campaign.scenario
+    if isinstance(given, str):
+        scenario = read(folder / given, "scenario")
+    else:
+        scenario = from_data(given)._replace(folder=folder)
+    combinations = tuple(itertools.product(*(entries.values() for entries in campaign.cross.values())))
+    whole = math.prod(len(entries) for entries in campaign.cross.values()) * campaign.trials
+    if whole >= 2**31:
+        raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", whole)
+    return Trials(campaign, scenario, points(campaign), seeds(campaign), combinations)
+
+
+def _numbers(entries: Iterable[Any]) -> bool:
+    return all(isinstance(entry, int | float) and not isinstance(entry, bool) for entry in entries)
+
+
+def _put(data: dict[str, Any], key: str, put: Any) -> None:
+    """Set the value at a key path; a part given by its name alone becomes a mapping."""
+    *way, last = key_path(key)
+    node: Any = data
+    for step in way:
+        inner = _entry(node, step, key)
+        if isinstance(inner, str):
+            inner = {"kind": inner}
+        elif inner is None:
+            inner = {}
+        node[step] = inner
+        node = inner
+    _entry(node, last, key)
+    node[last] = put
+
+
+def _entry(node: Any, step: str | int, key: str) -> Any:
+    if isinstance(node, list):
+        if isinstance(step, int) and 0 <= step < len(node):
+            return node[step]
+        raise BadInput(key, f"name one of the {len(node)} entries, 0 to {len(node) - 1}", f"[{step}]")
+    if not isinstance(node, dict):
+        raise BadInput(key, "lead to a key of the scenario", f"past {node!r}")
+    return node.get(step)
