@@ -15,8 +15,8 @@ from undertow.studies.campaign.summary import Results
 
 _CAPTIONS = {
     "distributions": "Every trial that lasted, one step each. The further left, the better.",
-    "sensitivity": "Spearman's rank correlation over the trials that lasted: +1 where a metric grows with a parameter, "
-    "-1 where it falls, 0 where one says nothing about the other.",
+    "sensitivity": "Spearman's rank correlation over the trials that lasted, mean over the combinations: +1 where a "
+    "metric grows with a parameter, -1 where it falls, 0 where one says nothing about the other.",
 }
 
 

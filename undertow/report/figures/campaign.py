@@ -12,6 +12,7 @@ from undertow.report.figures import style
 _SHOWN = ("tracking_rms", "tracking_max", "estimation_rms", "voltage_rms", "voltage_variation", "saturated_fraction")
 _LOOKS = (style.SOLID, style.DASHED, style.Look("#00785a", "-", 1.3, 4), style.Look("#b0476f", (0, (1, 1)), 1.1, 5))
 _COLUMNS = 3
+_DARK = 0.6  # correlations beyond this stand on dark ground
 
 
 def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]]) -> Figure:
@@ -22,7 +23,7 @@ def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]]) -> Figu
     """
     shown = [name for name in _SHOWN if name in values]
     rows = -(-len(shown) // _COLUMNS)
-    figure = style.blank(9.6, 0.7 + 2.25 * rows)
+    figure = style.blank(9.6, 0.35 + 2.25 * rows)
     names = list(dict.fromkeys(name for each in values.values() for name in each))
     looks = {name: _LOOKS[i % len(_LOOKS)] for i, name in enumerate(names)}
     style.head(figure, "Share of the trials below", looks if len(names) > 1 else {})
@@ -47,14 +48,15 @@ def sensitivity_figure(found: Mapping[str, Mapping[str, Any]]) -> Figure:
         found: parameter -> metric -> correlation.
     """
     metrics = list(dict.fromkeys(metric for each in found.values() for metric in each))
-    figure = style.blank(9.6, 1.6 + 0.3 * len(metrics))
+    figure = style.blank(9.6, 1.0 + 0.3 * len(metrics))
     style.head(figure, "Rank correlation with what varies", {})
     panel = style.place(figure, 2.2, 0.6, 7.0, 0.3 * len(metrics))
     field = np.array([[each.get(metric, np.nan) for each in found.values()] for metric in metrics])
     panel.imshow(field, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
     for row, column in np.ndindex(*field.shape):
         number = field[row, column]
-        panel.text(column, row, f"{number:+.2f}", ha="center", va="center", fontsize=style.SMALL)
+        ink = "white" if abs(number) > _DARK else "black"
+        panel.text(column, row, f"{number:+.2f}", ha="center", va="center", fontsize=style.SMALL, color=ink)
     panel.set_xticks(range(len(found)), list(found), fontsize=style.SMALL)
     panel.set_yticks(range(len(metrics)), [metric.replace("_", " ") for metric in metrics], fontsize=style.SMALL)
     panel.grid(visible=False)

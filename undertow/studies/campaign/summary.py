@@ -51,11 +51,12 @@ def load(folder: Path) -> Results:
     Raises:
         FileNotFoundError: there are none.
     """
-    whole = xr.open_zarr(folder / STORE, consolidated=False)
+    whole = xr.open_zarr(folder / STORE, consolidated=False, chunks=None)
+    whole = whole.drop_vars([name for name in whole if str(name).startswith("series:")])
     done, chunk = whole["done"].values.astype(bool), int(whole.attrs["chunk"])
     total = whole.sizes.get("trial", 0)
     rows = whole.drop_vars("done").assign_coords(trial=np.arange(total)).isel(trial=np.repeat(done, chunk)[:total])
-    return Results(read_text(whole.attrs["campaign"]), rows, total)
+    return Results(read_text(whole.attrs["campaign"]), rows.load(), total)
 
 
 def summary(results: Results) -> dict[str, Any]:
@@ -106,17 +107,21 @@ def _requirement(rows: xr.Dataset, name: str, wanted: Any) -> dict[str, Any]:
 
 
 def _sensitivity(results: Results) -> dict[str, dict[str, float]]:
-    """Rank correlation (Spearman) of every metric with every parameter that is a number and varies."""
-    lasted = results.rows.isel(trial=results.rows["status"].values == int(Status.OK))
+    """Rank correlation (Spearman) of every metric with every number that is drawn: mean over the combinations."""
     found: dict[str, dict[str, float]] = {}
-    for column in map(str, lasted.data_vars):
-        values = lasted[column].values
-        if column.startswith("vary:") and "choices" not in lasted[column].attrs and np.ptp(values) > 0:
-            found[column.removeprefix("vary:")] = {
-                name: float(spearmanr(values, lasted[name].values)[0])
-                for name in results.metrics
-                if np.ptp(lasted[name].values) > 0
-            }
+    lasted = results.rows["status"].values == int(Status.OK)
+    groups = [lasted & (results.combinations == number) for number in np.unique(results.combinations)]
+    for key in results.campaign.vary:
+        column = results.rows[f"vary:{key}"]
+        if "choices" in column.attrs:
+            continue
+        for name in results.metrics:
+            pairs = [(column.values[group], results.rows[name].values[group]) for group in groups]
+            known = [
+                float(spearmanr(*pair)[0]) for pair in pairs if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
+            ]
+            if known:
+                found.setdefault(key, {})[name] = sum(known) / len(known)
     return found
 
 
