@@ -121,3 +121,26 @@ def test_bad_input_as_a_process(tmp_path):
     assert done.returncode == 2
     assert done.stderr == "Error: `plant.vehicle.mass` must be positive, but is -1 kg (s.yaml, line 2)\n"
     assert os.listdir(tmp_path) == ["s.yaml"]
+
+
+def test_an_interrupt_that_was_swallowed_ends_the_next_wait():
+    """As compiled code does when it calls back into Python: the exception gets no further than the callback."""
+    code = """
+import signal, time
+from undertow.cli.interruptible import interruptible, remember_interrupts
+remember_interrupts()
+try:
+    signal.raise_signal(signal.SIGINT)
+except KeyboardInterrupt:
+    pass
+try:
+    interruptible(lambda: time.sleep(30))
+except KeyboardInterrupt:
+    print("ended")
+"""
+    began = time.monotonic()
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ended\n"
+        process.kill()
+    assert time.monotonic() - began < 25

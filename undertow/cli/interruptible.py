@@ -1,10 +1,24 @@
 """Waiting for compiled code in a way that Ctrl-C can end."""
 
+import signal
 import threading
 from collections.abc import Callable
+from types import FrameType
 from typing import TypeVar
 
 Result = TypeVar("Result")
+
+_asked = threading.Event()
+
+
+def remember_interrupts() -> None:
+    """From now on a Ctrl-C that compiled code swallows on its way up ends the next wait all the same."""
+
+    def handler(number: int, frame: FrameType | None) -> None:
+        _asked.set()
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, handler)
 
 
 def interruptible(work: Callable[[], Result]) -> Result:
@@ -21,6 +35,8 @@ def interruptible(work: Callable[[], Result]) -> Result:
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
     while thread.is_alive():
+        if _asked.is_set():
+            raise KeyboardInterrupt
         thread.join(0.1)
     if errors:
         raise errors[0]

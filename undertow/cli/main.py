@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from undertow.cli.exit_codes import INTERRUPTED, run_guarded
+from undertow.cli.interruptible import remember_interrupts
 
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
 
@@ -218,6 +219,7 @@ def main() -> None:
     """Entry point of the `undertow` command."""
     if not os.environ.get("UNDERTOW_TRACEBACK"):
         warnings.simplefilter("ignore")
+    remember_interrupts()
     code = run(sys.argv[1:])
     if code == INTERRUPTED:  # a compiled loop may still be running in its thread; nothing can stop it gently
         sys.stdout.flush()

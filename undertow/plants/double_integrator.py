@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.core import checks
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
 from undertow.core.drive import DirectDrive
+from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.status import Status
 
@@ -50,7 +51,8 @@ class DoubleIntegrator(AbstractPlant):
     input_unit: str = eqx.field(static=True, default="m/s^2")
 
     def __check_init__(self):
-        checks.positive("limit", self.limit, finite=False)
+        if not (np.asarray(self.limit) >= 0).all():
+            raise BadInput("limit", "be zero or positive", self.limit)
 
     def initial_state(self, position=None, velocity=None) -> AxisState:
         zero = jnp.zeros(self.inputs())

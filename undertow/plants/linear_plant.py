@@ -85,7 +85,8 @@ class LinearPlant(AbstractPlant):
     input_unit: str = eqx.field(static=True, default="1")
 
     def __check_init__(self):
-        checks.positive("limit", self.limit, finite=False)
+        if not (np.asarray(self.limit) >= 0).all():
+            raise BadInput("limit", "be zero or positive", self.limit)
 
     def initial_state(self, position=None, velocity=None) -> LinearState:
         zero = jnp.zeros(len(self.outputs))
