@@ -50,7 +50,7 @@ class Store:
             self._chunk = _same(dict(self._group.attrs), dict(attributes), path.parent)
         else:
             self._group.attrs.update({**attributes, "chunk": chunk})
-            self._array(_DONE, np.uint8, (self.tasks,), (1,), ("task",), 0)
+            self._array(_DONE, np.uint8, (self.tasks,), (1,), ("task",), 0, {})
 
     @property
     def tasks(self) -> int:
@@ -83,8 +83,8 @@ class Store:
                 shape, chunks = (self._trials, *values.shape[1:]), (self._chunk, *values.shape[1:])
                 dimensions = ("trial", *(f"{name}_{i}" for i in range(1, values.ndim)))
                 empty = np.nan if values.dtype.kind == "f" else 0
-                array = self._array(name, values.dtype, shape, chunks, dimensions, empty)
-                array.attrs.update({**notes.get(name, {}), **_meaning(name)})
+                told = {**notes.get(name, {}), **_meaning(name)}
+                self._array(name, values.dtype, shape, chunks, dimensions, empty, told)
             self._group[name][first:last] = values
         self._group[_DONE][task] = 1
 
@@ -102,7 +102,10 @@ class Store:
             return False
         return True
 
-    def _array(self, name: str, dtype: Any, shape: tuple, chunks: tuple, dimensions: tuple, empty: Any) -> Any:
+    def _array(
+        self, name: str, dtype: Any, shape: tuple, chunks: tuple, dimensions: tuple, empty: Any, told: dict[str, Any]
+    ) -> Any:
+        # With its attributes at once: killed between the two, an array would stay without them.
         return self._group.create_array(
             name,
             shape=shape,
@@ -111,6 +114,7 @@ class Store:
             fill_value=empty,
             dimension_names=dimensions,
             compressors=[_CODEC],
+            attributes=told,
             config={"write_empty_chunks": True},
         )
 
