@@ -71,6 +71,12 @@ def test_a_trial_that_cannot_be_built_is_a_row(campaign):
     assert np.isnan(found["tracking_rms"]).tolist() == [False, False, True, True]
 
 
+def test_a_task_in_which_no_trial_can_be_built(campaign):
+    found = columns(campaign(cross={"controller.frequency": [2.0, -1.0]}, trials=2), range(2, 4))
+    assert found["status"].tolist() == [REFUSED, REFUSED]
+    assert np.isnan(found["tracking_rms"]).all() and np.isnan(found["ended"]).all()
+
+
 def test_series_are_those_of_the_runs(campaign):
     found = columns(campaign(series={"signals": ["position"], "every": 0.5}), range(2))
     built = build(prepared(campaign()).trials.data(1))

@@ -99,42 +99,18 @@ def test_a_full_disk_loses_nothing(small, tmp_path, monkeypatch, at):
     """Writing fails at some array of some task; what was done before stays, and the rest is flown later."""
     path, whole = small
     writes = iter(range(10**6))
-    real = stores.Store._array
+    real = stores.zarr.Array.__setitem__
 
-    class Full:
-        def __init__(self, array):
-            self._array = array
+    def full(array, key, value):
+        if next(writes) == at:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(array, key, value)
 
-        def __getattr__(self, name):
-            return getattr(self._array, name)
-
-        def __getitem__(self, key):
-            return self._array[key]
-
-        def __setitem__(self, key, value):
-            if next(writes) == at:
-                raise OSError(errno.ENOSPC, "No space left on device")
-            self._array[key] = value
-
-    class FullGroup:
-        def __init__(self, group):
-            self._group = group
-
-        def __getattr__(self, name):
-            return getattr(self._group, name)
-
-        def __contains__(self, name):
-            return name in self._group
-
-        def __getitem__(self, name):
-            return Full(self._group[name])
-
-    opened = stores.zarr.open_group
-    monkeypatch.setattr(stores.zarr, "open_group", lambda *args, **options: FullGroup(opened(*args, **options)))
+    monkeypatch.setattr(stores.zarr.Array, "__setitem__", full)
     with pytest.raises(OSError, match="No space left"):
         flown(path, tmp_path / "full")
     monkeypatch.undo()
-    assert stores.Store._array is real
+    assert stores.zarr.Array.__setitem__ is real
     assert flown(path, tmp_path / "full") == whole
 
 

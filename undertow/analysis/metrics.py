@@ -1,5 +1,6 @@
 """The benchmark's metrics, defined once: gathered tick by tick inside the loop, or from a recorded series."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -111,35 +112,26 @@ def results(state: MetricsState) -> dict[str, Any]:
     }
 
 
-# Names of what `overall` gives.
-OVERALL = (
-    *(f"{name}_rms" for name in _SIGNALS),
-    "tracking_max",
-    "voltage_rms",
-    "voltage_peak",
-    "voltage_variation",
-    "weights_peak",
-    "energy",
-    "settling_time",
-    "saturated_fraction",
-)
+# Over all axes: name -> value of a state whose leaves may have leading axes, given its number of samples.
+_OVERALL: dict[str, Callable[[MetricsState, Any], Any]] = {
+    **{f"{name}_rms": lambda s, count, name=name: np.sqrt(s.squares[name].mean(-1) / count) for name in _SIGNALS},
+    "tracking_max": lambda s, count: s.largest_error.max(-1),
+    "voltage_rms": lambda s, count: np.sqrt(s.voltage_squares / count),
+    "voltage_peak": lambda s, count: s.voltage_peak,
+    "voltage_variation": lambda s, count: np.where(s.span > 0, s.variation / np.where(s.span > 0, s.span, 1.0), 0.0),
+    "weights_peak": lambda s, count: s.weights_peak,
+    "energy": lambda s, count: s.energy,
+    "settling_time": lambda s, count: s.settled_at.max(-1),
+    "saturated_fraction": lambda s, count: s.saturated / count,
+}
+OVERALL = tuple(_OVERALL)
 
 
 def overall(state: MetricsState) -> dict[str, np.ndarray]:
     """Metrics over all axes by their names; of many runs at once where the leaves have leading axes."""
     host = jax.tree.map(np.asarray, state)
-    count, span = np.maximum(host.samples, 1.0), host.span
-    rms = {f"{name}_rms": np.sqrt(squares.mean(-1) / count) for name, squares in host.squares.items()}
-    return rms | {
-        "tracking_max": host.largest_error.max(-1),
-        "voltage_rms": np.sqrt(host.voltage_squares / count),
-        "voltage_peak": host.voltage_peak,
-        "voltage_variation": np.where(span > 0, host.variation / np.where(span > 0, span, 1.0), 0.0),
-        "weights_peak": host.weights_peak,
-        "energy": host.energy,
-        "settling_time": host.settled_at.max(-1),
-        "saturated_fraction": host.saturated / count,
-    }
+    count = np.maximum(host.samples, 1.0)
+    return {name: value(host, count) for name, value in _OVERALL.items()}
 
 
 def measure(outcome: Outcome, start: float = 0.0, stop: float = float("inf")) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import shutil
-import threading
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -11,12 +10,12 @@ from pathlib import Path
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from undertow.cli.exit_codes import DONE, RUN_FAILED
 from undertow.cli.interruptible import interruptible
-from undertow.cli.results_folder import next_free
+from undertow.cli.results_folder import check_folder, next_free
+from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
@@ -25,7 +24,7 @@ from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import dump
 from undertow.studies.campaign.conduct import STORE, Engine, Prepared, Watch, conduct, prepare
 from undertow.studies.campaign.engines import by_dask, cluster, in_threads
-from undertow.studies.campaign.summary import Results, load, summary
+from undertow.studies.campaign.summary import Results, endings, load, summary
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
@@ -41,16 +40,16 @@ def campaign(
     first = Path("runs") / path.stem
     folder = out or (first if resume else next_free(first))
     _claim(folder, resume, overwrite)
-    with _engine(where, count) as engine, _live(console, prepared) as watch:
+    with _engine(where, count) as engine, _live(console) as watch:
         try:
             interruptible(lambda: conduct(prepared, folder, engine, watch))
         except (KeyboardInterrupt, OSError):
             typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
             raise
-    return conclude(console, prepared, folder)
+    return _conclude(console, prepared, folder)
 
 
-def conclude(console: Console, prepared: Prepared, folder: Path) -> int:
+def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
     """Write page, summary and the scenarios of the worst trials; show the short of it."""
     results = load(folder)
     found = summary(results)
@@ -59,7 +58,7 @@ def conclude(console: Console, prepared: Prepared, folder: Path) -> int:
     title = prepared.trials.campaign.description or "A campaign"
     page = write_campaign(title, results, found, folder)
     console.print(_table(results, found))
-    for sentence in sentences(found):
+    for sentence in _sentences(found):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
     return DONE if set(found["status"]) <= {"ok"} else RUN_FAILED
@@ -71,16 +70,15 @@ def status(folder: Path) -> int:
         results = load(folder)
     except FileNotFoundError:
         raise BadInput("DIR", "be the folder of a campaign", str(folder)) from None
-    found = summary(results) if results.rows.sizes.get("trial") else {"status": {}}
+    ended = endings(results)
     console = wide_console()
-    done = sum(found["status"].values())
-    console.print(f"{done} of {results.total} trials done", highlight=False)
-    for word, number in found["status"].items():
+    console.print(f"{sum(ended.values())} of {results.total} trials done", highlight=False)
+    for word, number in ended.items():
         console.print(f"  {word}: {number}", highlight=False)
     return DONE
 
 
-def sentences(found: dict) -> list[str]:
+def _sentences(found: dict) -> list[str]:
     """Endings and verdicts in words."""
     ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
     said = [f"{found['done']} trials: {ended}."]
@@ -94,23 +92,20 @@ def sentences(found: dict) -> list[str]:
 
 
 def _claim(folder: Path, resume: bool, overwrite: bool) -> None:
-    """Whether the folder may be written to.
+    """Make sure that the folder may be written to, and that nothing is left in it of a campaign that is replaced.
 
     Raises:
         BadInput: it may not.
     """
-    there = (folder / STORE).exists()
-    if folder.exists() and not folder.is_dir():
-        raise BadInput("--out", "be a folder", str(folder))
-    if resume and not there:
-        raise BadInput("--resume", "find a campaign to go on with", f"none in {folder}")
-    if there and overwrite and not resume:
-        for name in _WRITTEN:
-            target = folder / name
-            shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
-    elif there and not resume:
-        hint = "Add --resume to go on with it, or --overwrite to begin anew"
-        raise BadInput("--out", "be a folder without an earlier campaign", f"{folder}, which has one", hint=hint)
+    if resume:
+        if not (folder / STORE).exists():
+            raise BadInput("--resume", "find a campaign to go on with", f"none in {folder}")
+        return
+    hint = "Add --resume to go on with it, or --overwrite to begin anew"
+    check_folder(folder, _WRITTEN, STORE, overwrite, hint)
+    for name in _WRITTEN:
+        target = folder / name
+        shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -123,28 +118,17 @@ def _engine(where: str | None, count: int) -> Iterator[Engine]:
 
 
 @contextlib.contextmanager
-def _live(console: Console, prepared: Prepared) -> Iterator[Watch]:
+def _live(console: Console) -> Iterator[Watch]:
     """Trials done, how fast, and how long it will take."""
-    columns = (
-        TextColumn("{task.completed:.0f} of {task.total:.0f} trials"),
-        BarColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    begun, lock, first = time.perf_counter(), threading.Lock(), [-1]
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
-        bar = live.add_task("", total=prepared.trials.number, rate="compiling")
+    begun, first = time.perf_counter(), None
+    with shares(console, remaining=True) as progress:
 
         def watch(done: int, total: int, failed: int) -> None:
-            with lock:
-                first[0] = done if first[0] < 0 else first[0]
-                rate = (done - first[0]) / max(time.perf_counter() - begun, 1e-9)
-                said = f"{rate:.3g} per second, {failed} failed" if done > first[0] else "compiling"
-                live.update(bar, completed=done, rate=said)
-                if not console.is_terminal:
-                    console.print(f"{done} of {total} trials, {said}", highlight=False)
+            nonlocal first
+            first = done if first is None else first
+            rate = (done - first) / max(time.perf_counter() - begun, 1e-9)
+            said = f"{rate:.3g} per second, {failed} failed" if done > first else "compiling"
+            progress(f"{done} of {total} trials, {said}", done / total)
 
         yield watch
 

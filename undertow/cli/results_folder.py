@@ -32,7 +32,7 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
     Raises:
         BadInput: `folder` cannot be used. Raised before anything is computed.
     """
-    _check(folder, names, marker, overwrite)
+    check_folder(folder, names, marker, overwrite)
     made = [parent for parent in (folder.parent, *folder.parent.parents) if not parent.exists()]
     staging = _stage(folder)
     try:
@@ -46,7 +46,18 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
         raise
 
 
-def _check(folder: Path, names: Sequence[str], marker: str, overwrite: bool) -> None:
+def check_folder(
+    folder: Path,
+    names: Sequence[str],
+    marker: str,
+    overwrite: bool,
+    hint: str = "Add --overwrite to replace it, or choose another folder",
+) -> None:
+    """Whether results may go to a folder; see `results_folder`, and `hint` for what may be done about an earlier one.
+
+    Raises:
+        BadInput: they may not.
+    """
     for part in (folder, *folder.parents):
         if part.exists() and not part.is_dir():
             raise BadInput("--out", "be a folder", f"{folder}, and {part} is a file")
@@ -56,7 +67,6 @@ def _check(folder: Path, names: Sequence[str], marker: str, overwrite: bool) -> 
     if not (folder / marker).exists():
         raise BadInput("--out", "be a folder without files of these names", f"{folder}, which has {taken[0]}")
     if not overwrite:
-        hint = "Add --overwrite to replace it, or choose another folder"
         raise BadInput("--out", "be a folder without an earlier result", f"{folder}, which has {marker}", hint=hint)
 
 

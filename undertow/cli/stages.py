@@ -5,7 +5,15 @@ import time
 from collections.abc import Callable, Iterator
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 
 class Stages:
@@ -26,9 +34,15 @@ class Stages:
 
 
 @contextlib.contextmanager
-def shares(console: Console) -> Iterator[Callable[[str, float], None]]:
-    """To be told what is being done and the share done: a bar, or a line for each where nobody watches."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+def shares(console: Console, remaining: bool = False) -> Iterator[Callable[[str, float], None]]:
+    """To be told what is being done and the share done: a bar, or a line for each where nobody watches.
+
+    Args:
+        console: where it is shown.
+        remaining: whether to show the time left, too; for work that goes on evenly.
+    """
+    left = (TextColumn("left"), TimeRemainingColumn()) if remaining else ()
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), *left)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
         task = live.add_task("starting", total=1.0)
 

@@ -13,9 +13,9 @@ def positive(name: str, value: Any, unit: str = "", finite: bool = True) -> None
     _each(name, value, lambda x: (x > 0) & (np.isfinite(x) | (not finite)), "be positive", unit)
 
 
-def not_negative(name: str, value: Any, unit: str = "") -> None:
-    """Every entry finite and >= 0."""
-    _each(name, value, lambda x: (x >= 0) & np.isfinite(x), "be zero or positive", unit)
+def not_negative(name: str, value: Any, unit: str = "", finite: bool = True) -> None:
+    """Every entry >= 0, and finite unless told otherwise."""
+    _each(name, value, lambda x: (x >= 0) & (np.isfinite(x) | (not finite)), "be zero or positive", unit)
 
 
 def finite(name: str, value: Any, unit: str = "") -> None:

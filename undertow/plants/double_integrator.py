@@ -4,12 +4,11 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.core import checks
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
 from undertow.core.drive import DirectDrive
-from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.status import Status
 
@@ -51,8 +50,7 @@ class DoubleIntegrator(AbstractPlant):
     input_unit: str = eqx.field(static=True, default="m/s^2")
 
     def __check_init__(self):
-        if not (np.asarray(self.limit) >= 0).all():
-            raise BadInput("limit", "be zero or positive", self.limit)
+        checks.not_negative("limit", self.limit, finite=False)
 
     def initial_state(self, position=None, velocity=None) -> AxisState:
         zero = jnp.zeros(self.inputs())

@@ -85,8 +85,7 @@ class LinearPlant(AbstractPlant):
     input_unit: str = eqx.field(static=True, default="1")
 
     def __check_init__(self):
-        if not (np.asarray(self.limit) >= 0).all():
-            raise BadInput("limit", "be zero or positive", self.limit)
+        checks.not_negative("limit", self.limit, finite=False)
 
     def initial_state(self, position=None, velocity=None) -> LinearState:
         zero = jnp.zeros(len(self.outputs))

@@ -53,10 +53,15 @@ def check_times(text: Text, loop: Loop, window: Window) -> None:
         if loop.duration / step > most and (stepped or key == "record"):
             must = f"be at least {loop.duration / most:g} s, so that the run has at most {most} {what}"
             raise BadInput(f"loop.{key}", must, f"{step:g} s", where=text.where(("loop", key)))
-    ratio = loop.record / loop.dt
-    if stepped and (round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6 * ratio):
+    if stepped and not whole_steps(loop.record, loop.dt):
         must, got = f"be a whole number of steps ({loop.dt:g} s)", f"{loop.record:g} s"
         raise BadInput("loop.record", must, got, where=text.where(("loop", "record")))
+
+
+def whole_steps(interval: float, step: float) -> bool:
+    """Whether an interval is a whole number of steps, one at least."""
+    ratio = interval / step
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6 * ratio
 
 
 def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:

@@ -10,6 +10,7 @@ from undertow.analysis.metrics import OVERALL
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.loop.closed_loop import Sample
+from undertow.scenario.fitting import whole_steps
 from undertow.scenario.provenance import text_hash, versions
 from undertow.scenario.schema import Loop
 from undertow.studies.campaign import task as tasks
@@ -60,8 +61,7 @@ def _check(campaign: Campaign, loop: Loop) -> None:
         return
     for i, name in enumerate(campaign.series.signals):
         checks.choice(f"series.signals[{i}]", name, [field for field in Sample._fields if field != "books"])
-    ticks = campaign.series.every / loop.dt
-    if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6 * ticks:
+    if not whole_steps(campaign.series.every, loop.dt):
         must = f"be a whole number of sampling times ({loop.dt:g} s)"
         raise BadInput("series.every", must, f"{campaign.series.every:g} s")
     if campaign.series.every > loop.duration:

@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from typing import Any
@@ -49,19 +50,17 @@ def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any)
     from distributed.client import FutureCancelledError
 
     waiting = enumerate(work)
-    start = lambda i, one: (client.submit(function, *one, pure=False, retries=3), i)
     ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-    going = dict(start(i, one) for i, one in itertools.islice(waiting, ahead))
-    numbers = {future.key: i for future, i in going.items()}
-    done = as_completed(list(going), raise_errors=False)
+    start = lambda one: client.submit(function, *one, pure=False, retries=3)
+    numbers = {start(one): i for i, one in itertools.islice(waiting, ahead)}
+    done = as_completed(list(numbers), raise_errors=False)
     try:
         for future in done:
-            number = numbers.pop(future.key)
-            result = future.result()
+            number, result = numbers.pop(future), future.result()
             future.release()
             for i, one in itertools.islice(waiting, 1):
-                further, _ = start(i, one)
-                numbers[further.key] = i
+                further = start(one)
+                numbers[further] = i
                 done.add(further)
             yield number, result
     except (FutureCancelledError, TimeoutError) as error:
@@ -99,8 +98,6 @@ def cluster(kind: str, workers: int) -> Iterator[Any]:
 
 
 def _started(kind: str, workers: int) -> Any:
-    import os
-
     if kind == "local":
         from distributed import LocalCluster
 

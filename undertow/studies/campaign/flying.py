@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from undertow.analysis.metrics import Metrics, overall
+from undertow.analysis.metrics import OVERALL, Metrics, overall
 from undertow.core.status import Status
 from undertow.loop import sampled
 from undertow.scenario.build import Built
@@ -57,32 +57,33 @@ class Hangar:
             signals: of which series are kept.
             every: time between their records, s.
         """
+        if not built:
+            return Flown(dict.fromkeys(OVERALL, np.zeros(0)), np.zeros(0, dtype=np.int8), np.zeros(0), {})
         loops = [_arguments(one) for one in built]
         kinds: dict[Any, list[int]] = {}
         for i, (one, loop) in enumerate(zip(built, loops, strict=True)):
             kinds.setdefault((structure(loop), _plan(one, signals, every)), []).append(i)
         pieces, order = [], []
-        for (_, plan), members in kinds.items():
+        for kind, members in kinds.items():
             for first in range(0, len(members), LANES):
                 some = members[first : first + LANES]
-                pieces.append(self._lanes([loops[i] for i in some], plan))
+                pieces.append(self._lanes(kind, [loops[i] for i in some]))
                 order += some
         back = np.argsort(order)
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
-    def _lanes(self, loops: list[Any], plan: Plan) -> Flown:
-        """At most `LANES` runs; idle lanes fly the last one again."""
+    def _lanes(self, kind: tuple[Any, Plan], loops: list[Any]) -> Flown:
+        """At most `LANES` runs of one kind; idle lanes fly the last one again."""
         count = len(loops)
         together = [*loops, *[loops[-1]] * (LANES - count)]
         numbers = [eqx.filter(loop, eqx.is_array) for loop in together]
         stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *numbers)
         rest = eqx.filter(loops[0], eqx.is_array, inverse=True)
-        key = (structure(loops[0]), plan)
         with self._lock:
-            if key not in self._programs:
-                program = jax.jit(jax.vmap(partial(_run, rest, plan)))
-                self._programs[key] = program.lower(stacked).compile()
-        state, status, ended, series = jax.tree.map(np.asarray, self._programs[key](stacked))
+            if kind not in self._programs:
+                program = jax.jit(jax.vmap(partial(_run, rest, kind[1])))
+                self._programs[kind] = program.lower(stacked).compile()
+        state, status, ended, series = jax.tree.map(np.asarray, self._programs[kind](stacked))
         lasted = status == int(Status.OK)
         metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(state).items()}
         return jax.tree.map(lambda leaf: leaf[:count], Flown(metrics, status.astype(np.int8), ended, series))

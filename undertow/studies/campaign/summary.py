@@ -61,15 +61,20 @@ def load(folder: Path) -> Results:
 
 def summary(results: Results) -> dict[str, Any]:
     """Everything that stands in summary.json."""
-    status = results.rows["status"].values
     return {
         "trials": results.total,
-        "done": int(status.size),
-        "status": {_word(code): int((status == code).sum()) for code in np.unique(status)},
+        "done": results.rows.sizes["trial"],
+        "status": endings(results),
         "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
         "sensitivity": _sensitivity(results),
         "worst": [int(trial) for trial in _worst(results)],
     }
+
+
+def endings(results: Results) -> dict[str, int]:
+    """How many trials ended how; empty before the first is done."""
+    codes = results.rows["status"].values if "status" in results.rows else np.zeros(0)
+    return {_word(code): int((codes == code).sum()) for code in np.unique(codes)}
 
 
 def _word(code: int) -> str:

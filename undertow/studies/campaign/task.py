@@ -47,7 +47,7 @@ def fly(text: str, folder: str, rows: range) -> dict[str, np.ndarray]:
     columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
     kept = (tuple(asked.signals), asked.every) if asked else ()
     flown = here.hangar.fly(list(built.values()), *kept)
-    where = np.array([row - rows.start for row in built])
+    where = np.array([row - rows.start for row in built], dtype=int)
     spread = functools.partial(_spread, len(rows), where)
     columns["status"] = spread(flown.status, REFUSED)
     columns["ended"] = spread(flown.ended, np.nan)

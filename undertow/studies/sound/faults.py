@@ -69,7 +69,10 @@ def _at_sea(n: Numbers) -> str:
 
 def _navigation(n: Numbers) -> str:
     pid, sound = (n.rung("station", law) for law in ("pid", "robust"))
-    without, ours = (n.rung("station_known", law)["position_rms"] for law in ("pid", "robust"))
+    known = [n.rung("station_known", law) for law in ("pid", "robust")]
+    if not all(row["steady"] for row in (pid, sound, *known)):
+        return ""
+    without, ours = (row["position_rms"] for row in known)
     centimetres = lambda metres: f"{100 * metres:.2g} cm"
     return (
         f"Beyond its navigation. Keeping station in waves with position fixes of 5 cm, navigation itself is off by "
