@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from undertow.analysis.metrics import Metrics, results
+from undertow.lanes import batches
+from undertow.lanes.errors import Unsupported
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 from undertow.studies.campaign import flying
 from undertow.studies.campaign.conduct import Prepared
+from undertow.studies.campaign.flying import Hangar
 from undertow.studies.campaign.reading import whole
 from undertow.studies.campaign.schema import validate
 from undertow.studies.campaign.task import REFUSED, fly, site
@@ -27,7 +30,7 @@ def columns(data, rows):
     return fly(prepared(data).text, "", rows)
 
 
-def test_lanes_are_runs(campaign):
+def test_lanes_are_runs(campaign, engine):
     found = columns(campaign(), range(3))
     for trial in range(3):
         built = build(prepared(campaign()).trials.data(trial))
@@ -39,10 +42,23 @@ def test_lanes_are_runs(campaign):
         assert found["vary:disturbance.amplitude"][trial] == float(built.closed_loop.disturbance.amplitude)
 
 
-def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, monkeypatch):
-    """Tasks of 1, 7 and 40 trials, backwards; fewer and more than there are lanes."""
-    monkeypatch.setattr(flying, "LANES", 8)
+@pytest.fixture(params=["lanes", "vmap"])
+def engine(request, monkeypatch):
+    """Programs of lanes, and what is used where there is no such program."""
+    if request.param == "vmap":
+
+        def none(*_):
+            raise Unsupported("anything")
+
+        monkeypatch.setattr(flying.in_lanes, "Fleet", none)
+        monkeypatch.setattr(batches, "_WIDTH", 8)
     site.cache_clear()
+    yield request.param
+    site.cache_clear()
+
+
+def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, engine):
+    """Tasks of 1, 7 and 40 trials, backwards; fewer and more than there are lanes."""
     two = campaign(cross={"controller": [{"kind": "pid", "frequency": 2.0}, {"kind": "rcaf", "preset": "robust"}]})
     at_once = columns(two, range(80))
     for size in (1, 7, 40):
@@ -50,10 +66,33 @@ def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, monkeypatch):
         pieces = [columns(two, rows) for rows in reversed(tasks)][::-1]
         for name, expected in at_once.items():
             np.testing.assert_array_equal(np.concatenate([piece[name] for piece in pieces]), expected, err_msg=name)
+
+
+def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
+    """The same trials with everything that probes share built in, and with nothing built in."""
+    found = columns(campaign(), range(9))
+    monkeypatch.setattr(Hangar, "_commons", lambda self: {})
     site.cache_clear()
+    general = columns(campaign(), range(9))
+    site.cache_clear()
+    for name, expected in found.items():
+        np.testing.assert_array_equal(general[name], expected, err_msg=name)
 
 
-def test_a_run_that_fails_costs_no_other(campaign):
+def test_a_trial_unlike_all_probes(campaign):
+    """A choice that no probe drew is flown all the same, and like the run itself."""
+    rare = campaign(vary={"plant.limit": {"choice": [20.0] * 19 + [0.1]}}, design="random")
+    limits = [prepared(rare).trials.values(trial)["plant.limit"] for trial in range(40)]
+    odd = limits.index(0.1)
+    assert odd >= 4  # the first four are the probes
+    found = columns(rare, range(odd, odd + 1))
+    built = build(prepared(rare).trials.data(odd))
+    key = jax.random.PRNGKey(built.scenario.seed)
+    run = simulate(built.closed_loop, duration=2.0, dt=0.02, key=key, accumulators=(Metrics(1.0, 2.0),))
+    assert found["tracking_rms"][0] == pytest.approx(results(run.accumulated[0])["tracking_rms"], rel=1e-9)
+
+
+def test_a_run_that_fails_costs_no_other(campaign, engine):
     """Gains that are far too fast for the sampling time diverge; their neighbours do not notice."""
     unlimited = lambda *frequencies: campaign(
         cross={"plant.limit": [1e30], "controller.frequency": list(frequencies)}, trials=4

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jax.scipy.special import ndtr
+from jax.scipy.special import ndtri
 from jaxtyping import Array, Bool, Float, Int
 
 from undertow.core import checks
@@ -96,7 +96,7 @@ class Sampling(eqx.Module):
         readings = jnp.where(
             new[:, None], self._rounded(truth + state.offset + self.noise * chance[:-1]), state.readings
         )
-        lost = jnp.where(new, ndtr(chance[-1]) < self.dropout, state.lost)
+        lost = jnp.where(new, chance[-1] < ndtri(self.dropout), state.lost)
         slot = due % self.slots
         fresh = (due > state.arrived) & (due >= 0) & ~lost[slot]
         spoken = Spoken(newest, jnp.maximum(due, state.arrived), readings, lost, state.offset)

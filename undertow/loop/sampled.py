@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
+from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
@@ -74,23 +75,30 @@ def simulate(
 @eqx.filter_jit
 def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) -> Outcome:
     ticks, record_every, method, substeps = plan
-    drawn = loop.draw(key)
-    x, z = drawn.start(*start)
-    tick = partial(_tick, drawn, accumulators, dt, METHODS[method], substeps)
-    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.look, dt, x, z, drawn.listen(x)))
-    gathered = tuple(a.init(blank) for a in accumulators)
-    carry = ((x, z, drawn.listen(x)), gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
+    drawn, carry = begin(loop, key, start, accumulators)
+    one = partial(tick, drawn, accumulators, dt, METHODS[method], substeps)
     if record_every == 0:
-        carry = jax.lax.fori_loop(0, ticks, lambda k, c: tick(c, k), carry)
+        carry = jax.lax.fori_loop(0, ticks, lambda k, c: one(c, k), carry)
+        blank = jax.eval_shape(drawn.look, dt, *carry[0])
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
     else:
         ticks -= ticks % record_every
-        carry, (time, samples) = record(drawn, tick, carry, dt, ticks, record_every)
+        carry, (time, samples) = record(drawn, one, carry, dt, ticks, record_every)
     final, gathered, status, ended = carry
     return Outcome(time, samples, gathered, final[:2], status, jnp.where(status == int(Status.OK), ticks * dt, ended))
 
 
-def _tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
+def begin(loop: ClosedLoop, key: PRNGKeyArray, start: tuple[Outputs, Outputs], accumulators) -> tuple[Drawn, PyTree]:
+    """A loop with everything random drawn, and what goes from tick to tick, as it is before the first one."""
+    drawn = loop.draw(key)
+    x, z = drawn.start(*start)
+    states = (x, z, drawn.listen(x))
+    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.look, jnp.zeros(()), *states))
+    gathered = tuple(a.init(blank) for a in accumulators)
+    return drawn, (states, gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
+
+
+def tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     """Command, move the plant with the input held, then let the controller learn from what was applied."""
     (x, z, heard), gathered, status, ended = carry
     loop, t = drawn.loop, instant(k, dt)

@@ -44,9 +44,9 @@ def prepare(path: Path) -> Prepared:
     several = trials(campaign, folder)
     text = whole(campaign, several.scenario.data)
     prepared = Prepared(several, text, several.scenario.folder)
-    here = tasks.site(text, str(prepared.folder))
+    workshop = tasks.site(text, str(prepared.folder)).workshop
     for combination in range(len(several.combinations)):
-        _check(campaign, tasks.build_trial(here, combination * campaign.trials).scenario.loop)
+        _check(campaign, tasks.build_trial(several, workshop, combination * campaign.trials).scenario.loop)
     return prepared
 
 

@@ -1,8 +1,7 @@
-"""Trials flown many at once: loops that differ in their numbers only, stacked, one per lane of one compiled program."""
+"""Trials flown many at once: those that differ in their numbers only share a compiled program."""
 
 import threading
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -11,26 +10,13 @@ import numpy as np
 
 from undertow.analysis.metrics import OVERALL, Metrics, overall
 from undertow.core.status import Status
-from undertow.loop import sampled
+from undertow.lanes.errors import Unsupported
+from undertow.loop import in_lanes, vmapped
+from undertow.loop.in_lanes import Plan, Run
 from undertow.scenario.build import Built
 from undertow.scenario.workshop import structure
 
-# Lanes of a program. Its width decides about the last bits of a result, who flies in the other lanes does not: every
-# program has this width, however few trials there are, so that no result depends on how they are cut into tasks.
-LANES = 64
-
 _STARTS = ("position", "velocity")
-
-
-class Plan(NamedTuple):
-    """What a program is compiled for, beside the structure of its loops."""
-
-    duration: float
-    dt: float
-    record_every: int  # ticks; 0 for no series
-    signals: tuple[str, ...]
-    method: str
-    substeps: int
 
 
 class Flown(NamedTuple):
@@ -42,15 +28,30 @@ class Flown(NamedTuple):
     series: dict[str, np.ndarray]  # (trials, records, ...)
 
 
-class Hangar:
-    """Programs that were compiled, for any number of threads."""
+class _Kind(NamedTuple):
+    """What trials of one program have in common."""
 
-    def __init__(self) -> None:
-        self._programs: dict[Any, Any] = {}
+    structure: Any
+    plan: Plan
+    usual: bool  # numbers that were the same in all probes are the same here
+
+
+class Hangar:
+    """Programs that were compiled, for any number of threads.
+
+    Args:
+        probes: some trials; numbers that are the same in all of one structure are built into its program. Which
+            program flies a trial is then a matter of the campaign, not of the task that it is in.
+    """
+
+    def __init__(self, probes: Callable[[], Sequence[Built]]):
+        self._probes = probes
+        self._common: dict[Any, list[np.ndarray | None]] | None = None
+        self._programs: dict[_Kind, Any] = {}
         self._lock = threading.Lock()
 
     def fly(self, built: Sequence[Built], signals: tuple[str, ...] = (), every: float = 0.0) -> Flown:
-        """Run trials; those of one structure together.
+        """Run trials; those of one kind together.
 
         Args:
             built: the trials, sampled loops.
@@ -59,62 +60,71 @@ class Hangar:
         """
         if not built:
             return Flown(dict.fromkeys(OVERALL, np.zeros(0)), np.zeros(0, dtype=np.int8), np.zeros(0), {})
-        loops = [_arguments(one) for one in built]
-        kinds: dict[Any, list[int]] = {}
-        for i, (one, loop) in enumerate(zip(built, loops, strict=True)):
-            kinds.setdefault((structure(loop), _plan(one, signals, every)), []).append(i)
-        pieces, order = [], []
-        for kind, members in kinds.items():
-            for first in range(0, len(members), LANES):
-                some = members[first : first + LANES]
-                pieces.append(self._lanes(kind, [loops[i] for i in some]))
-                order += some
-        back = np.argsort(order)
+        runs = [_run(one) for one in built]
+        kinds: dict[_Kind, list[int]] = {}
+        for i, (one, run) in enumerate(zip(built, runs, strict=True)):
+            kinds.setdefault(self._kind(run, _plan(one, signals, every)), []).append(i)
+        pieces = [self._together(kind, [runs[i] for i in members]) for kind, members in kinds.items()]
+        back = np.argsort([i for members in kinds.values() for i in members])
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
-    def _lanes(self, kind: tuple[Any, Plan], loops: list[Any]) -> Flown:
-        """At most `LANES` runs of one kind; idle lanes fly the last one again."""
-        count = len(loops)
-        together = [*loops, *[loops[-1]] * (LANES - count)]
-        numbers = [eqx.filter(loop, eqx.is_array) for loop in together]
+    def _together(self, kind: _Kind, runs: list[Run]) -> Flown:
+        numbers = [eqx.filter(run, eqx.is_array) for run in runs]
         stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *numbers)
-        rest = eqx.filter(loops[0], eqx.is_array, inverse=True)
         with self._lock:
             if kind not in self._programs:
-                program = jax.jit(jax.vmap(partial(_run, rest, kind[1])))
-                self._programs[kind] = program.lower(stacked).compile()
-        state, status, ended, series = jax.tree.map(np.asarray, self._programs[kind](stacked))
-        lasted = status == int(Status.OK)
-        metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(state).items()}
-        return jax.tree.map(lambda leaf: leaf[:count], Flown(metrics, status.astype(np.int8), ended, series))
+                self._programs[kind] = _program(runs[0], kind, self._commons().get(kind.structure, []))
+        flown = self._programs[kind].fly(stacked)
+        lasted = flown.status == int(Status.OK)
+        metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(flown.accumulated[0]).items()}
+        return Flown(metrics, flown.status.astype(np.int8), flown.ended, flown.series)
+
+    def _kind(self, run: Run, plan: Plan) -> _Kind:
+        form = structure(run)
+        with self._lock:
+            common = self._commons().get(form)
+        usual = common is not None and all(
+            shared is None or leaf is shared or np.array_equal(leaf, shared)
+            for leaf, shared in zip(_leaves(run), common, strict=True)
+        )
+        return _Kind(form, plan, usual)
+
+    def _commons(self) -> dict[Any, list[np.ndarray | None]]:
+        """Numbers that all probes of a structure share, by structure: None for those that differ."""
+        if self._common is None:
+            probes: dict[Any, list[list[Any]]] = {}
+            for built in self._probes():
+                run = _run(built)
+                probes.setdefault(structure(run), []).append(_leaves(run))
+            same = lambda column: all(np.array_equal(column[0], other) for other in column[1:])
+            self._common = {
+                form: [column[0] if same(column) else None for column in zip(*several, strict=True)]
+                for form, several in probes.items()
+                if len(several) > 1
+            }
+        return self._common
 
 
-def _arguments(built: Built) -> Any:
-    """Everything of a trial that is a number of its run: loop, window, start and key."""
+def _program(run: Run, kind: _Kind, common: list[Any]) -> in_lanes.Fleet | vmapped.Fleet:
+    leaves = _leaves(run)
+    constant = [shared is not None for shared in common] if kind.usual else [False] * len(leaves)
+    try:
+        return in_lanes.Fleet(run, kind.plan, constant)
+    except Unsupported:
+        return vmapped.Fleet(run, kind.plan)
+
+
+def _leaves(run: Run) -> list[Any]:
+    return jax.tree.leaves(eqx.filter(run, eqx.is_array))
+
+
+def _run(built: Built) -> Run:
     scenario = built.scenario
     start = built.closed_loop.outputs_at_start(*(getattr(scenario.initial, name) for name in _STARTS))
-    return built.closed_loop, Metrics(*built.window()), start, jax.random.PRNGKey(scenario.seed)
+    return Run(built.closed_loop, (Metrics(*built.window()),), start, jax.random.PRNGKey(scenario.seed))
 
 
 def _plan(built: Built, signals: tuple[str, ...], every: float) -> Plan:
     loop = built.scenario.loop
     record = round(every / loop.dt) if signals else 0
-    return Plan(loop.duration, loop.dt, record, signals, loop.method, loop.substeps)
-
-
-def _run(rest: Any, plan: Plan, numbers: Any):
-    loop, metrics, (position, velocity), key = eqx.combine(numbers, rest)
-    outcome = sampled.simulate(
-        loop,
-        duration=plan.duration,
-        dt=plan.dt,
-        key=key,
-        position=position,
-        velocity=velocity,
-        record_every=plan.record_every,
-        accumulators=(metrics,),
-        method=plan.method,
-        substeps=plan.substeps,
-    )
-    series = {name: getattr(outcome.samples, name) for name in plan.signals}
-    return outcome.accumulated[0], outcome.status, outcome.ended, series
+    return Plan(round(loop.duration / loop.dt), loop.dt, record, signals, loop.method, loop.substeps)

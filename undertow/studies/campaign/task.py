@@ -1,5 +1,6 @@
 """A task: some trials, built and flown. It needs a text and two numbers, so that any process anywhere can do it."""
 
+import contextlib
 import functools
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,6 +15,9 @@ from undertow.scenario.workshop import Workshop
 from undertow.studies.campaign.flying import Hangar
 from undertow.studies.campaign.reading import read_text
 from undertow.studies.campaign.trials import Trials, trials
+
+# Trials of each combination that tell which numbers differ.
+_PROBES = 4
 
 # Status of a trial whose scenario cannot be built, beside those of `undertow.core.status`.
 REFUSED = -1
@@ -35,14 +39,15 @@ def site(text: str, folder: str) -> Site:
         text: of the campaign file.
         folder: where relative paths in it start.
     """
-    return Site(trials(read_text(text), Path(folder)), Workshop(), Hangar())
+    several, workshop = trials(read_text(text), Path(folder)), Workshop()
+    return Site(several, workshop, Hangar(lambda: _probes(several, workshop)))
 
 
 def fly(text: str, folder: str, rows: range) -> dict[str, np.ndarray]:
     """Columns of some trials: what differs between them, how they ended, and their metrics."""
     here = site(text, folder)
     asked = here.trials.campaign.series
-    built = {row: one for row in rows if (one := _built(here, row)) is not None}
+    built = _built(here.trials, here.workshop, rows)
     columns = {f"vary:{key}": column for key, column in _columns(here.trials, rows)}
     columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
     kept = (tuple(asked.signals), asked.every) if asked else ()
@@ -55,24 +60,33 @@ def fly(text: str, folder: str, rows: range) -> dict[str, np.ndarray]:
     return columns | {f"series:{name}": spread(values, np.nan) for name, values in flown.series.items()}
 
 
-def build_trial(here: Site, row: int) -> Built:
+def build_trial(several: Trials, workshop: Workshop, row: int) -> Built:
     """One trial, ready to run.
 
     Raises:
         BadInput: its scenario cannot be built.
     """
-    scenario = here.trials.scenario
+    scenario = several.scenario
     try:
-        return build(Text(here.trials.data(row), scenario.name, scenario.folder, scenario.lines), here.workshop)
+        return build(Text(several.data(row), scenario.name, scenario.folder, scenario.lines), workshop)
     except BadInput as error:
         raise error.at(where=f"trial {row}") from error.__cause__
 
 
-def _built(here: Site, row: int) -> Built | None:
-    try:
-        return build_trial(here, row)
-    except BadInput:
-        return None
+def _built(several: Trials, workshop: Workshop, rows: Iterable[int]) -> dict[int, Built]:
+    """Those trials that can be built."""
+    found = {}
+    for row in rows:
+        with contextlib.suppress(BadInput):
+            found[row] = build_trial(several, workshop, row)
+    return found
+
+
+def _probes(several: Trials, workshop: Workshop) -> list[Built]:
+    """The first trials of every combination."""
+    draws = several.campaign.trials
+    rows = [first + i for first in range(0, several.number, draws) for i in range(min(_PROBES, draws))]
+    return list(_built(several, workshop, rows).values())
 
 
 def _columns(several: Trials, rows: range) -> Iterable[tuple[str, np.ndarray]]:

@@ -1,0 +1,77 @@
+"""What a program begins with: numbers of a run, and what is made of them before the first tick."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+from undertow.lanes.batches import batched
+from undertow.lanes.errors import Unsupported
+from undertow.lanes.graph import Graph
+from undertow.lanes.scalarise import Nodes, evaluate, nodes_of
+from undertow.lanes.tracing import Traced
+
+# Operations before the first tick; a longer start (drawing waves, for example) is left to XLA.
+_MOST = 15_000
+
+
+class Beginning:
+    """Start of a program: done in lanes where that can be, and by XLA before where not.
+
+    Args:
+        start: the function, of `numbers`.
+        numbers: of one run; a tree of arrays.
+        constant: which of its leaves are the same in every run.
+
+    Attributes:
+        graph: with what the start does in lanes.
+        nodes: of its results.
+        inputs: shapes and types of what every lane brings along, in the order of its slots.
+    """
+
+    def __init__(self, start: Traced, numbers: Any, constant: list[bool]):
+        leaves = jax.tree.leaves(numbers)
+        self._varying = [i for i, same in enumerate(constant) if not same]
+        self._before: Callable[[Any], list[np.ndarray]] | None = None
+        self.inputs = [leaves[i] for i in self._varying]
+        try:
+            self.graph, given = self._given(leaves)
+            self.nodes = evaluate(self.graph, start.closed, given, _MOST)
+        except Unsupported:
+            passed_on = start.passed_on()
+            made = [place is None for place in passed_on]
+            self.inputs += [leaf for leaf, new in zip(start.leaves, made, strict=True) if new]
+            self._before = batched(start.only(made), numbers)
+            self.graph, given = self._given(leaves)
+            further = iter(given[len(leaves) :])
+            self.nodes = [next(further) if place is None else given[place] for place in passed_on]
+
+    def packed(self, numbers: Any) -> list[np.ndarray]:
+        """Arrays of `inputs`, with a leading axis over runs, from those of `numbers`."""
+        leaves = jax.tree.leaves(numbers)
+        before = self._before(numbers) if self._before else []
+        return [*(leaves[i] for i in self._varying), *before]
+
+    def _given(self, leaves: list[Any]) -> tuple[Graph, list[Nodes]]:
+        """A new graph, and nodes of all numbers and then of what is made before."""
+        graph = Graph()
+        made = inputs(graph, "number", self.inputs)
+        nodes = [np.zeros(0, dtype=np.int64)] * len(leaves)
+        for i, leaf in enumerate(leaves):
+            if i not in self._varying:
+                nodes[i] = nodes_of(graph, leaf)
+        for i, several in zip(self._varying, made, strict=False):
+            nodes[i] = several
+        return graph, nodes + made[len(self._varying) :]
+
+
+def inputs(graph: Graph, kind: str, leaves: list[Any]) -> list[Nodes]:
+    """Nodes of arrays that lie in memory, slot after slot."""
+    several, slot = [], 0
+    for leaf in leaves:
+        size = int(np.prod(leaf.shape))
+        nodes = [graph.input((kind, slot + i), str(leaf.dtype)) for i in range(size)]
+        several.append(np.array(nodes, dtype=np.int64).reshape(leaf.shape))
+        slot += size
+    return several

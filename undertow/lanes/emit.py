@@ -1,0 +1,157 @@
+"""A program of lanes as LLVM's assembly: every number a vector, one entry per lane.
+
+The program starts every lane, then goes from tick to tick; now and then it looks. What does not change from tick to
+tick is done once.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from undertow.lanes.graph import BOOL, I64, Graph, Node
+
+# Numbers of a program lie in slots of this many bytes per lane, whatever their type.
+SLOT = 8
+
+_TYPES = {
+    "float64": "double",
+    "float32": "float",
+    "int64": "i64",
+    "uint64": "i64",
+    "int32": "i32",
+    "uint32": "i32",
+    BOOL: "i1",
+}
+
+_FLOATS = {
+    "add": "fadd {T} {0}, {1}",
+    "sub": "fsub {T} {0}, {1}",
+    "mul": "fmul {T} {0}, {1}",
+    "div": "fdiv {T} {0}, {1}",
+    "rem": "frem {T} {0}, {1}",
+    "neg": "fneg {T} {0}",
+    "abs": "call {T} @llvm.fabs.{N}({T} {0})",
+    "sqrt": "call {T} @llvm.sqrt.{N}({T} {0})",
+    "floor": "call {T} @llvm.floor.{N}({T} {0})",
+    "ceil": "call {T} @llvm.ceil.{N}({T} {0})",
+    "round": "call {T} @llvm.rint.{N}({T} {0})",
+    "ne": "fcmp une {T} {0}, {1}",
+    **{name: f"fcmp o{name} {{T}} {{0}}, {{1}}" for name in ("lt", "le", "gt", "ge", "eq")},
+}
+_INTEGERS = {
+    "add": "add {T} {0}, {1}",
+    "sub": "sub {T} {0}, {1}",
+    "mul": "mul {T} {0}, {1}",
+    "div": "{s}div {T} {0}, {1}",
+    "rem": "{s}rem {T} {0}, {1}",
+    "neg": "sub {T} zeroinitializer, {0}",
+    "and": "and {T} {0}, {1}",
+    "or": "or {T} {0}, {1}",
+    "xor": "xor {T} {0}, {1}",
+    "shift_left": "shl {T} {0}, {1}",
+    "shift_right": "{shift} {T} {0}, {1}",
+    "eq": "icmp eq {T} {0}, {1}",
+    "ne": "icmp ne {T} {0}, {1}",
+    **{name: f"icmp {{s}}{name} {{T}} {{0}}, {{1}}" for name in ("lt", "le", "gt", "ge")},
+}
+
+
+class Emitter:
+    """Lines of assembly.
+
+    Args:
+        graph: what they compute.
+        lanes: entries of a vector.
+    """
+
+    def __init__(self, graph: Graph, lanes: int):
+        self.graph, self.lanes = graph, lanes
+        self.lines: list[str] = []
+        self.functions: set[str] = set()
+
+    def vector(self, dtype: str) -> str:
+        """LLVM's name of a vector of a type."""
+        return f"<{self.lanes} x {_TYPES[dtype]}>"
+
+    def line(self, text: str, name: str) -> str:
+        """A line that gives a value its name."""
+        self.lines.append(f"  {name} = {text}")
+        return name
+
+    def load(self, base: str, slot: int, dtype: str, name: str) -> str:
+        """What lies in a slot."""
+        stored = I64 if dtype == BOOL else dtype
+        self._place(base, slot, name)
+        kept = name if stored == dtype else f"{name}w"
+        self.line(f"load {self.vector(stored)}, ptr {name}p, align {SLOT * self.lanes}", kept)
+        return kept if kept == name else self.line(f"trunc {self.vector(I64)} {kept} to {self.vector(BOOL)}", name)
+
+    def store(self, value: str, dtype: str, base: str, slot: int, name: str) -> None:
+        """Put a value into a slot."""
+        stored = I64 if dtype == BOOL else dtype
+        if stored != dtype:
+            value = self.line(f"zext {self.vector(dtype)} {value} to {self.vector(stored)}", f"{name}w")
+        self._place(base, slot, name)
+        self.lines.append(f"  store {self.vector(stored)} {value}, ptr {name}p, align {SLOT * self.lanes}")
+
+    def _place(self, base: str, slot: int, name: str) -> None:
+        self.line(f"getelementptr i8, ptr {base}, i64 {slot * SLOT * self.lanes}", f"{name}p")
+
+    def operation(self, node: Node, operands: Sequence[str], name: str) -> None:
+        """Do what a node says."""
+        what, *given = self.graph.operations[node]
+        dtype, before = self.graph.types[node], self.graph.types[given[-1]]
+        if what == "select":
+            truth, kind = self.vector(BOOL), self.vector(dtype)
+            self.line(f"select {truth} {operands[0]}, {kind} {operands[1]}, {kind} {operands[2]}", name)
+        elif what == "bits":
+            self.line(f"bitcast {self.vector(before)} {operands[0]} to {self.vector(dtype)}", name)
+        elif what == "convert":
+            self._convert(before, dtype, operands[0], name)
+        else:
+            templates = _FLOATS if before.startswith("float") else _INTEGERS
+            signed = before.startswith("int")
+            short = f"v{self.lanes}f{before[5:]}"
+            words = {"T": self.vector(before), "N": short, "s": "s" if signed else "u"}
+            text = templates[what].format(*operands, shift="ashr" if signed else "lshr", **words)
+            if text.startswith("call"):
+                called = text.split("(")[0].split("@")[1]
+                self.functions.add(f"declare {self.vector(before)} @{called}({self.vector(before)})")
+            self.line(text, name)
+
+    def _convert(self, before: str, dtype: str, operand: str, name: str) -> None:
+        from_float, to_float = before.startswith("float"), dtype.startswith("float")
+        wider = np.dtype(dtype).itemsize - (0 if before == BOOL else np.dtype(before).itemsize)
+        if from_float and not to_float:  # out of range it gives the nearest
+            sign = "s" if dtype.startswith("int") else "u"
+            call = f"llvm.fpto{sign}i.sat.v{self.lanes}{_TYPES[dtype]}.v{self.lanes}f{before[5:]}"
+            self.functions.add(f"declare {self.vector(dtype)} @{call}({self.vector(before)})")
+            self.line(f"call {self.vector(dtype)} @{call}({self.vector(before)} {operand})", name)
+            return
+        if wider == 0 and not to_float:
+            word = "bitcast"
+        elif from_float:
+            word = "fpext" if wider > 0 else "fptrunc"
+        elif to_float:
+            word = "sitofp" if before.startswith("int") else "uitofp"
+        elif wider > 0:
+            word = "sext" if before.startswith("int") else "zext"
+        else:
+            word = "trunc"
+        self.line(f"{word} {self.vector(before)} {operand} to {self.vector(dtype)}", name)
+
+    def constant(self, node: Node) -> str:
+        """A constant, the same in every lane."""
+        value, dtype = self.graph.value(node), self.graph.types[node]
+        if dtype.startswith("float"):
+            # LLVM writes numbers of single precision by the digits of the double that they are.
+            text = f"0x{np.float64(value).view(np.uint64):016X}"
+        else:
+            text = str(value).lower()
+        return f"splat ({_TYPES[dtype]} {text})"
+
+    def splat(self, scalar: str, dtype: str, name: str) -> str:
+        """A number of the program in every lane."""
+        kind = self.vector(dtype)
+        self.line(f"insertelement {kind} poison, {_TYPES[dtype]} {scalar}, i64 0", f"{name}s")
+        return self.line(f"shufflevector {kind} {name}s, {kind} poison, <{self.lanes} x i32> zeroinitializer", name)

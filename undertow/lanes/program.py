@@ -1,0 +1,87 @@
+"""A program of lanes: made from functions of one run, run for any number of them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.lanes.assembly import TICK, Sections, assembly
+from undertow.lanes.beginning import Beginning, inputs
+from undertow.lanes.errors import Unsupported
+from undertow.lanes.graph import I64
+from undertow.lanes.machine import Code, lanes_of
+from undertow.lanes.memory import Layout
+from undertow.lanes.scalarise import Nodes, evaluate
+from undertow.lanes.tracing import Traced
+
+# Machine code of a longer program would take too long to make, and not fit the processor's cache.
+_MOST = 60_000
+
+
+class Program:
+    """Start, ticks and looks, compiled for vector registers.
+
+    Args:
+        start: numbers -> (drawn, carry).
+        tick: drawn, carry, number of the tick -> carry.
+        look: drawn, carry, number of the tick -> what is to be kept of an instant.
+        numbers: of one run; a tree of arrays.
+        constant: which leaves of `numbers` are the same in every run; they make the program short.
+        lanes: runs at once; as many as fit a register unless given. No result depends on it.
+
+    Raises:
+        Unsupported: a function needs something that lanes cannot do.
+    """
+
+    def __init__(
+        self, start: Callable, tick: Callable, look: Callable, numbers: Any, constant: list[bool], lanes: int = 0
+    ):
+        begun = Traced(start, numbers)
+        self._beginning = Beginning(begun, numbers, constant)
+        graph, (drawn, _) = self._beginning.graph, begun.shapes
+        drawn_count = len(jax.tree.leaves(drawn))
+        paths, first = self._beginning.nodes[:drawn_count], self._beginning.nodes[drawn_count:]
+        carry = begun.leaves[drawn_count:]
+
+        number = jax.ShapeDtypeStruct((), jnp.asarray(0).dtype)
+        k = graph.input(TICK, I64)
+        k = k if number.dtype == I64 else graph.apply("convert", k, dtype=str(number.dtype))
+        given = [*paths, *inputs(graph, "carry", carry), np.array(k)]
+        of_arrays = lambda function: lambda arrays, k: function(*eqx.combine(arrays, begun.still), k)
+        self._tick, self._look = (Traced(of_arrays(function), begun.shapes, number) for function in (tick, look))
+        if self._tick.types != [leaf.dtype for leaf in carry]:
+            raise Unsupported("a carry that changes its type")
+        ticked, looked = (evaluate(graph, traced.closed, given, _MOST) for traced in (self._tick, self._look))
+
+        lanes = lanes or lanes_of(64)
+        several = (self._beginning.inputs, carry, self._look.leaves)
+        self._numbers_layout, self._carry_layout, self._look_layout = (Layout(leaves, lanes) for leaves in several)
+        self._code = Code(assembly(graph, Sections(*map(_flat, (first, ticked, looked))), lanes))
+
+    def run(self, numbers: Any, ticks: int, every: int = 0) -> tuple[Any, Any]:
+        """Run it.
+
+        Args:
+            numbers: as in the example, with a leading axis over runs.
+            ticks: how many; whole times `every`.
+            every: ticks between looks, the first before the first tick; 0 for none.
+
+        Returns:
+            The carry after the last tick, and what was looked at with an axis over looks; both with a leading axis
+            over runs.
+        """
+        runs = len(jax.tree.leaves(numbers)[0])
+        given = self._numbers_layout.packed(self._beginning.packed(numbers), runs)
+        carry = self._carry_layout.memory(len(given))
+        series = self._look_layout.memory(len(given), ticks // every + 1 if every else 0)
+        for group in range(len(given)):
+            self._code.run(*(memory[group].ctypes.data for memory in (given, carry, series)), ticks, every)
+        final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
+        return self._tick.whole(final), self._look.whole(self._look_layout.unpacked(series, runs))
+
+
+def _flat(several: list[Nodes]) -> list[int]:
+    return [int(node) for nodes in several for node in nodes.ravel()]

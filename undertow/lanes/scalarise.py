@@ -1,0 +1,120 @@
+"""From a traced function to the arithmetic of its scalars."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import inf
+from typing import Any
+
+import numpy as np
+from jax.extend.core import ClosedJaxpr
+
+from undertow.lanes import collecting, elementwise, indexing, moving, threefry
+from undertow.lanes.errors import Unsupported
+from undertow.lanes.graph import Graph
+
+# Arrays of nodes, one for each scalar of an array.
+Nodes = np.ndarray
+
+# A loop of at most so many rounds is written out.
+_ROUNDS = 64
+
+
+def nodes_of(graph: Graph, values: Any) -> Nodes:
+    """Constants."""
+    values = np.asarray(values)
+    return _filled(values.shape, [graph.constant(value, str(values.dtype)) for value in values.ravel()])
+
+
+def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float = inf) -> list[Nodes]:
+    """Results of a closed jaxpr.
+
+    Args:
+        graph: gets the operations.
+        closed: what `jax.make_jaxpr` gives.
+        arguments: nodes of its arguments.
+        most: operations of the graph.
+
+    Raises:
+        Unsupported: it has a primitive without a rule, or too many operations.
+    """
+    known = dict(zip(closed.jaxpr.invars, arguments, strict=True))
+    fixed = zip(closed.jaxpr.constvars, closed.consts, strict=True)
+    known |= {variable: nodes_of(graph, value) for variable, value in fixed}
+    read = lambda variable: nodes_of(graph, variable.val) if hasattr(variable, "val") else known[variable]
+    for equation in closed.jaxpr.eqns:
+        known |= zip(equation.outvars, _results(graph, equation, [read(v) for v in equation.invars]), strict=True)
+        if len(graph.operations) > most:
+            raise Unsupported(f"more than {most} operations")
+    return [read(variable) for variable in closed.jaxpr.outvars]
+
+
+def _results(graph: Graph, equation: Any, given: list[Nodes]) -> Sequence[Nodes]:
+    """Results of one equation."""
+    name, params = equation.primitive.name, equation.params
+    if name in _CONTROL:
+        return _CONTROL[name](graph, given, params)
+    if (inner := _inner(params)) is not None:
+        return evaluate(graph, inner, given)
+    out = equation.outvars[0].aval
+    if name in moving.RULES:
+        moved = moving.RULES[name](given, params, out)
+        return moved if equation.primitive.multiple_results else [moved]
+    for rules in (collecting.RULES, indexing.RULES):
+        if name in rules:
+            return [rules[name](graph, given, params, out)]
+    if name in threefry.RULES:
+        return [_random(graph, name, given, params)]
+    rule = elementwise.rule(name, params, str(out.dtype))
+    if rule is None:
+        raise Unsupported(name)
+    rows = zip(*(np.broadcast_to(nodes, out.shape).ravel().tolist() for nodes in given), strict=True)
+    return [_filled(out.shape, [rule(graph, *row) for row in rows])]
+
+
+def _random(graph: Graph, name: str, given: list[Nodes], params: dict[str, Any]) -> Nodes:
+    usual = params.get("bit_width", 32) in (32, 64) and str(params.get("impl", "fry")) == "fry"
+    if not (usual and threefry.available()):
+        raise Unsupported("random numbers of another kind")
+    return threefry.RULES[name](graph, given, params)
+
+
+def _inner(params: dict[str, Any]) -> Any:
+    """What an equation calls, if calling is all it does."""
+    for key in ("jaxpr", "call_jaxpr", "fun_jaxpr"):
+        if key in params:
+            return params[key] if hasattr(params[key], "jaxpr") else ClosedJaxpr(params[key], ())
+    return None
+
+
+def _filled(shape: Sequence[int], nodes: list[int]) -> Nodes:
+    return np.array(nodes, dtype=np.int64).reshape(shape)
+
+
+def _cond(graph: Graph, given: list[Nodes], params: dict[str, Any]) -> Sequence[Nodes]:
+    """All branches, and the choice between their results."""
+    which, *rest = given
+    branches = [evaluate(graph, branch, rest) for branch in params["branches"]]
+    choose = partial(elementwise.rule("select_n", {}, ""), graph, int(which))
+    return [
+        _filled(cases[0].shape, [choose(*row) for row in zip(*(case.ravel().tolist() for case in cases), strict=True)])
+        for cases in zip(*branches, strict=True)
+    ]
+
+
+def _scan(graph: Graph, given: list[Nodes], params: dict[str, Any]) -> Sequence[Nodes]:
+    """Written out."""
+    if params["length"] > _ROUNDS:
+        raise Unsupported(f"scan of {params['length']} rounds")
+    constants, carried = params["num_consts"], params["num_carry"]
+    fixed, carry, rows = given[:constants], given[constants:][:carried], given[constants + carried :]
+    rounds = range(params["length"])
+    stacks = []
+    for i in reversed(rounds) if params["reverse"] else rounds:
+        results = evaluate(graph, params["jaxpr"], [*fixed, *carry, *(row[i] for row in rows)])
+        carry = results[:carried]
+        stacks.append(results[carried:])
+    stacks = stacks[::-1] if params["reverse"] else stacks
+    return [*carry, *(np.stack(column) for column in zip(*stacks, strict=True))]
+
+
+_CONTROL: dict[str, Callable[..., Sequence[Nodes]]] = {"cond": _cond, "scan": _scan}

@@ -1,0 +1,130 @@
+"""What is known of a result without computing it in every lane."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+# What each operation gives for numbers and the type of its result: the same bits as the machine's instruction.
+RESULTS: dict[str, Callable[..., Any]] = {
+    "add": lambda a, b, _: a + b,
+    "sub": lambda a, b, _: a - b,
+    "mul": lambda a, b, _: a * b,
+    "div": lambda a, b, _: a / b if a.dtype.kind == "f" else np.sign(a) * np.sign(b) * (abs(a) // abs(b)),
+    "rem": lambda a, b, _: np.fmod(a, b),
+    "neg": lambda a, _: -a,
+    "abs": lambda a, _: abs(a),
+    "sqrt": lambda a, _: np.sqrt(a),
+    "floor": lambda a, _: np.floor(a),
+    "ceil": lambda a, _: np.ceil(a),
+    "round": lambda a, _: np.rint(a),
+    "lt": lambda a, b, _: a < b,
+    "le": lambda a, b, _: a <= b,
+    "gt": lambda a, b, _: a > b,
+    "ge": lambda a, b, _: a >= b,
+    "eq": lambda a, b, _: a == b,
+    "ne": lambda a, b, _: a != b,
+    "and": lambda a, b, _: a & b,
+    "or": lambda a, b, _: a | b,
+    "xor": lambda a, b, _: a ^ b,
+    "shift_left": lambda a, b, _: a << b,
+    "shift_right": lambda a, b, _: a >> b,
+    "select": lambda which, a, b, _: a if which else b,
+    "convert": lambda a, dtype: a.astype(dtype),
+    "bits": lambda a, dtype: a.view(dtype),
+}
+COMPARISONS = ("lt", "le", "gt", "ge", "eq", "ne")
+
+
+def simpler(graph: Any, name: str, nodes: tuple[int, ...], values: list[Any]) -> int | None:
+    """A node that is the same as an operation on others, None where it has to be done.
+
+    For numbers that are finite. Neither the sign of a zero nor infinity times zero is kept: a run that overflows is
+    at its end anyway.
+    """
+    rule = _RULES.get(name)
+    return rule(graph, nodes, values) if rule else None
+
+
+def _is(value: Any, number: float) -> bool:
+    return value is not None and value == number
+
+
+def _negated(graph, node) -> int | None:
+    """What a node is the negative of."""
+    name, *rest = graph.operations[node]
+    return rest[0] if name == "neg" else None
+
+
+def _add(graph, nodes, values):
+    for value, one, other in zip(values, nodes, reversed(nodes), strict=True):
+        if _is(value, 0):
+            return other
+        if (minus := _negated(graph, one)) is not None:
+            return graph.apply("sub", other, minus)
+    return None
+
+
+def _sub(graph, nodes, values):
+    if _is(values[1], 0):
+        return nodes[0]
+    if (minus := _negated(graph, nodes[1])) is not None:
+        return graph.apply("add", nodes[0], minus)
+    return graph.apply("neg", nodes[1]) if _is(values[0], 0) else None
+
+
+def _mul(graph, nodes, values):
+    for value, one, other in zip(values, nodes, reversed(nodes), strict=True):
+        if _is(value, 0):
+            return one
+        if _is(value, 1):
+            return other
+        if _is(value, -1):
+            return graph.apply("neg", other)
+    minus = [_negated(graph, node) for node in nodes]
+    return None if None in minus else graph.apply("mul", *minus)
+
+
+def _div(graph, nodes, values):
+    return nodes[0] if _is(values[1], 1) or _is(values[0], 0) else None
+
+
+def _neg(graph, nodes, values):
+    return _negated(graph, nodes[0])
+
+
+def _abs(graph, nodes, values):
+    if (minus := _negated(graph, nodes[0])) is not None:
+        return graph.apply("abs", minus)
+    return nodes[0] if graph.operations[nodes[0]][0] == "abs" else None
+
+
+def _select(graph, nodes, values):
+    if values[0] is not None:
+        return nodes[1] if values[0] else nodes[2]
+    return nodes[1] if nodes[1] == nodes[2] else None
+
+
+def _decided_by(deciding: bool):
+    """Of two truths, one of which may decide."""
+
+    def rule(graph, nodes, values):
+        for value, one, other in zip(values, nodes, reversed(nodes), strict=True):
+            if value is not None and graph.types[one] == "bool":
+                return one if bool(value) is deciding else other
+        return nodes[0] if nodes[0] == nodes[1] else None
+
+    return rule
+
+
+_RULES: dict[str, Callable[..., int | None]] = {
+    "add": _add,
+    "sub": _sub,
+    "mul": _mul,
+    "div": _div,
+    "neg": _neg,
+    "abs": _abs,
+    "select": _select,
+    "and": _decided_by(False),
+    "or": _decided_by(True),
+}

@@ -1,0 +1,62 @@
+"""A function as JAX traces it, beside what its results hold that is no array."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+
+class Traced:
+    """A traced function.
+
+    Args:
+        function: of trees of arrays.
+        arguments: examples of them, or shapes and types.
+
+    Attributes:
+        closed: its jaxpr.
+        shapes: of its results; a tree.
+        still: the rest of its results; a tree.
+    """
+
+    def __init__(self, function: Callable, *arguments: Any):
+        kept = []
+
+        def arrays_only(*arguments):
+            arrays, still = eqx.partition(function(*arguments), eqx.is_array)
+            kept.append(still)
+            return arrays
+
+        self._function = arrays_only
+        self.closed, self.shapes = jax.make_jaxpr(arrays_only, return_shape=True)(*arguments)
+        self.still = kept[0]
+
+    def whole(self, leaves: list[Any]) -> Any:
+        """The tree of results, of its arrays."""
+        return eqx.combine(jax.tree.unflatten(jax.tree.structure(self.shapes), leaves), self.still)
+
+    def passed_on(self) -> list[int | None]:
+        """Which results are just arguments: their places among all arguments, None for others."""
+        places = {variable: i for i, variable in enumerate(self.closed.jaxpr.invars)}
+        return [None if hasattr(out, "val") else places.get(out) for out in self.closed.jaxpr.outvars]
+
+    def only(self, wanted: list[bool]) -> Callable[..., list[jax.Array]]:
+        """The function with some of its results."""
+
+        def function(*arguments):
+            leaves = jax.tree.leaves(self._function(*arguments))
+            return [leaf for leaf, asked in zip(leaves, wanted, strict=True) if asked]
+
+        return function
+
+    @property
+    def leaves(self) -> list[Any]:
+        """Shapes of the results."""
+        return jax.tree.leaves(self.shapes)
+
+    @property
+    def types(self) -> list[np.dtype]:
+        """Types of the results."""
+        return [leaf.dtype for leaf in self.leaves]

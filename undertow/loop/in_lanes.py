@@ -1,0 +1,122 @@
+"""The sampled loop in the lanes of vector registers: any number of runs of one kind at once.
+
+Same figures as `sampled.simulate` to rounding; their bits do not depend on the machine, nor on who flies beside.
+"""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import PRNGKeyArray
+
+from undertow.core.contracts import Outputs
+from undertow.core.status import Status
+from undertow.lanes.program import Program
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop, Sample
+from undertow.loop.outcome import Outcome
+from undertow.loop.recording import instant
+from undertow.numerics.integrators import METHODS
+
+
+class Run(NamedTuple):
+    """Everything that may differ between runs of one kind: trees of arrays, and what is no array is the same."""
+
+    loop: ClosedLoop
+    accumulators: tuple[sampled.AbstractAccumulator, ...]
+    start: tuple[Outputs, Outputs]
+    key: PRNGKeyArray
+
+
+class Plan(NamedTuple):
+    """How a run is run.
+
+    Attributes:
+        ticks: how many.
+        dt: sampling time, s.
+        every: ticks per record; 0 for none.
+        signals: of a `Sample`, which are recorded.
+        method, substeps: integration of the plant within one tick.
+    """
+
+    ticks: int
+    dt: float
+    every: int
+    signals: tuple[str, ...]
+    method: str
+    substeps: int
+
+
+class Ended(NamedTuple):
+    """Runs at their end, one entry each: as in `Outcome`."""
+
+    accumulated: Any
+    final: Any
+    status: np.ndarray
+    ended: np.ndarray
+    time: np.ndarray
+    series: dict[str, Any]
+
+
+class Fleet:
+    """Runs of one kind, compiled once.
+
+    Args:
+        run: one of them.
+        plan: how they are run.
+        constant: which arrays of `run` are the same for all, in the order of its leaves; they make the program short.
+        lanes: runs at once; as many as fit a register unless given.
+
+    Raises:
+        Unsupported: a part needs something that lanes cannot do.
+    """
+
+    def __init__(self, run: Run, plan: Plan, constant: list[bool], lanes: int = 0):
+        numbers, rest = eqx.partition(run, eqx.is_array)
+        self._plan = plan
+        step, dt = METHODS[plan.method], plan.dt
+
+        def start(numbers):
+            loop, accumulators, at, key = eqx.combine(numbers, rest)
+            drawn, carry = sampled.begin(loop, key, at, accumulators)
+            return (drawn, accumulators), carry
+
+        def tick(drawn, carry, k):
+            loop, accumulators = drawn
+            return sampled.tick(loop, accumulators, jnp.asarray(dt), step, plan.substeps, carry, k)
+
+        def look(drawn, carry, k):
+            t = instant(k, jnp.asarray(dt))
+            loop, _ = drawn
+            sample = loop.look(t, *carry[0])
+            return t, {name: getattr(sample, name) for name in plan.signals}
+
+        self._program = Program(start, tick, look, numbers, constant, lanes)
+
+    def fly(self, numbers: Any) -> Ended:
+        """Run them.
+
+        Args:
+            numbers: arrays of the runs, as in `run`, with a leading axis over runs.
+        """
+        ticks, every = self._plan.ticks, self._plan.every
+        ticks -= ticks % every if every else 0
+        carry, (time, series) = self._program.run(numbers, ticks, every)
+        states, accumulated, status, ended = carry
+        ended = np.where(status == int(Status.OK), ticks * self._plan.dt, ended)
+        return Ended(accumulated, states[:2], status, ended, time, series)
+
+
+def simulate(run: Run, plan: Plan) -> Outcome:
+    """One run; `plan.signals` is not looked at, everything is recorded.
+
+    Raises:
+        Unsupported: a part needs something that lanes cannot do.
+    """
+    numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[None], eqx.filter(run, eqx.is_array))
+    constant = [True] * len(jax.tree.leaves(numbers))
+    found = Fleet(run, plan._replace(signals=Sample._fields), constant, lanes=1).fly(numbers)
+    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, found)
+    return Outcome(one.time, Sample(**one.series), one.accumulated, one.final, one.status, one.ended)
