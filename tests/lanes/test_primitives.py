@@ -36,6 +36,51 @@ def test_of_rows(in_lanes, name):
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-13, atol=1e-15), found, wanted)
 
 
+def halved(x):
+    """Rounds that each lane needs its own number of."""
+    return jax.lax.while_loop(lambda y: jnp.abs(y).max() > 0.01, lambda y: y / 2 + 1e-4 * x[0], x)
+
+
+def work(x, rounds=40):
+    """Enough that it is left out where no lane needs it."""
+    return jax.lax.fori_loop(0, rounds, lambda i, y: jnp.sin(y) + x[i % 5] / 3, x)
+
+
+LOOPS = {
+    "while": halved,
+    "counted": lambda x: jax.lax.fori_loop(0, (3 * jnp.abs(x[0])).astype(int), lambda i, y: y * x + 1, x),
+    "long": lambda x: jax.lax.fori_loop(0, 1000, lambda i, y: 0.9 * y + x / (1 + i), x),
+    "within": lambda x: jax.lax.fori_loop(0, (3 * jnp.abs(x[0])).astype(int), lambda i, y: halved(y + i), x),
+    "branch": lambda x: jax.lax.cond(x[0] > 1.0, work, lambda x: -x, x),
+    "branch_of_loop": lambda x: jax.lax.cond(x[0] > 0.0, halved, lambda x: -x, x),
+    "branch_in_loop": lambda x: jax.lax.fori_loop(
+        0, 100, lambda i, y: jax.lax.cond(y[0] > x[1], work, lambda y: y + 0.1, y), x
+    ),
+    "branches": lambda x: jax.lax.switch((2 * jnp.abs(x[0])).astype(int), [work, halved, lambda x: work(halved(x))], x),
+    "of_what_stays": lambda x: jax.lax.cond(x[0] > 0.0, lambda: work(x), lambda: halved(x)),
+    "nobody": lambda x: jax.lax.cond(x[0] > 100.0, lambda: (work(x), x[0]), lambda: (x, x[1])),
+}
+
+
+@pytest.mark.parametrize("lanes", [0, 1])
+@pytest.mark.parametrize("name", LOOPS)
+def test_loops_and_branches(in_lanes, name, lanes):
+    found, wanted = in_lanes(LOOPS[name], lanes=lanes)(ROWS), jax.vmap(LOOPS[name])(ROWS)
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14), found, wanted)
+
+
+def test_a_loop_that_never_ends_elsewhere_does_not_hold_up_a_branch(in_lanes):
+    """Where the branch is not taken the loop would not end; nobody waits for it."""
+
+    def function(x):
+        endless = lambda: jax.lax.while_loop(lambda y: y < 1.0, lambda y: y + jnp.maximum(x[0], 0.0), 0.0)
+        return jax.lax.cond(x[0] > 0.1, endless, lambda: x[0])
+
+    x = ROWS[:, 0]
+    steps = np.ceil(1.0 / np.where(x > 0.1, x, 1.0))
+    np.testing.assert_allclose(in_lanes(function)(ROWS), np.where(x > 0.1, steps * x, x), rtol=1e-12)
+
+
 OF_MATRICES = {
     "products": lambda a: (a @ a.T, jnp.einsum("ij,kj->ik", a, a), a.T @ a[:, 0], jnp.trace(a[:, :3])),
     "batches": lambda a: jnp.einsum("ij,ij->i", a, a),
@@ -98,7 +143,7 @@ def test_normal_numbers(in_lanes):
 
 UNKNOWN = {
     "sort": jnp.sort,
-    "a long scan": lambda x: jax.lax.fori_loop(0, 1000, lambda i, y: y + x, x),
+    "a long scan": lambda x: jax.lax.scan(lambda total, entry: (total + entry, total), x[0], jnp.arange(100.0)),
     "eigenvalues": lambda x: jnp.linalg.eigvalsh(jnp.outer(x, x)),
 }
 

@@ -4,7 +4,7 @@ The program starts every lane, then goes from tick to tick; now and then it look
 tick is done once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -68,10 +68,44 @@ class Emitter:
         self.graph, self.lanes = graph, lanes
         self.lines: list[str] = []
         self.functions: set[str] = set()
+        self.block = "entry"
 
     def vector(self, dtype: str) -> str:
         """LLVM's name of a vector of a type."""
         return f"<{self.lanes} x {_TYPES[dtype]}>"
+
+    def taken(self) -> str:
+        """The lines so far; the next ones begin anew."""
+        lines, self.lines = self.lines, []
+        return "\n".join(lines)
+
+    def label(self, block: str) -> None:
+        """What follows is another block."""
+        self.lines.append(f"{block}:")
+        self.block = block
+
+    def enter(self, block: str) -> None:
+        """Go on in another block."""
+        self.lines.append(f"  br label %{block}")
+        self.label(block)
+
+    def fork(self, test: str, block: str, otherwise: str, name: str) -> None:
+        """Go on in a block where a truth holds in any lane, else in another one."""
+        kind = self.vector(BOOL)
+        self.functions.add(f"declare i1 @llvm.vector.reduce.or.v{self.lanes}i1({kind})")
+        self.line(f"call i1 @llvm.vector.reduce.or.v{self.lanes}i1({kind} {test})", f"%{name}")
+        self.lines.append(f"  br i1 %{name}, label %{block}, label %{otherwise}")
+        self.label(block)
+
+    def joined(self, dtype: str, ways: Mapping[str, str], name: str) -> str:
+        """A value that depends on the block that one comes from."""
+        pairs = ", ".join(f"[ {value}, %{block} ]" for block, value in ways.items())
+        return self.line(f"phi {self.vector(dtype)} {pairs}", name)
+
+    def choice(self, test: str, one: str, other: str, dtype: str, name: str) -> str:
+        """One or the other, lane by lane."""
+        kind = self.vector(dtype)
+        return self.line(f"select {self.vector(BOOL)} {test}, {kind} {one}, {kind} {other}", name)
 
     def line(self, text: str, name: str) -> str:
         """A line that gives a value its name."""
@@ -99,11 +133,10 @@ class Emitter:
 
     def operation(self, node: Node, operands: Sequence[str], name: str) -> None:
         """Do what a node says."""
-        what, *given = self.graph.operations[node]
+        what, given, _ = self.graph.operations[node]
         dtype, before = self.graph.types[node], self.graph.types[given[-1]]
         if what == "select":
-            truth, kind = self.vector(BOOL), self.vector(dtype)
-            self.line(f"select {truth} {operands[0]}, {kind} {operands[1]}, {kind} {operands[2]}", name)
+            self.choice(*operands, dtype, name)
         elif what == "bits":
             self.line(f"bitcast {self.vector(before)} {operands[0]} to {self.vector(dtype)}", name)
         elif what == "convert":

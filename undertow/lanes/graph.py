@@ -1,6 +1,7 @@
 """Arithmetic on scalars as a graph: every operation once, and none whose result is known."""
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,36 +15,76 @@ BOOL, F64, I64, U64, U32 = "bool", "float64", "int64", "uint64", "uint32"
 _EITHER_WAY = ("add", "mul", "and", "or", "xor", "eq", "ne")
 
 
+class Operation(NamedTuple):
+    """What a node is.
+
+    Attributes:
+        name: one of `simplify.RESULTS`, or constant, input, region, result.
+        operands: nodes that it works on.
+        detail: number of a constant, name of an input, number of a region, place of a result among a region's.
+    """
+
+    name: str
+    operands: tuple[Node, ...] = ()
+    detail: Any = None
+
+
+class Region(NamedTuple):
+    """Operations that are done several times or not at all; see `regions`.
+
+    Attributes:
+        repeats: done for as long as the test holds in any lane, rather than once if it does.
+        inputs: stand for the first operands of the region's node, and when it repeats for its results so far.
+        test: in which lanes it is done.
+        results: what it gives.
+    """
+
+    repeats: bool
+    inputs: tuple[Node, ...]
+    test: Node
+    results: tuple[Node, ...]
+
+
 class Graph:
     """Operations in an order in which they can be done.
 
     Attributes:
-        operations: ("constant", number), ("input", name) or the name of an operation and the nodes it works on.
+        operations: one per node.
         types: NumPy's name of the type of each node.
+        homes: number of the innermost region that a node depends on; None outside of all.
+        regions: by number.
+        parents: the region around each region, None where there is none.
+        open: the region that is being made.
+        active: the lanes that need what is being made; None for all.
     """
 
     def __init__(self) -> None:
-        self.operations: list[tuple] = []
+        self.operations: list[Operation] = []
         self.types: list[str] = []
+        self.homes: list[int | None] = []
+        self.regions: dict[int, Region] = {}
+        self.parents: list[int | None] = []
+        self.open: int | None = None
+        self.active: Node | None = None
         self._known: dict[Any, Node] = {}
 
     def constant(self, value: Any, dtype: str) -> Node:
         """A number that is the same in every lane."""
         number = np.asarray(value).astype(dtype)[()]
-        return self._node(("constant", number), dtype, (number.tobytes(), dtype))
+        return self.node(Operation("constant", detail=number), dtype, key=(number.tobytes(), dtype))
 
     def like(self, value: Any, node: Node) -> Node:
         """A constant of the type of another node."""
         return self.constant(value, self.types[node])
 
-    def input(self, name: Any, dtype: str) -> Node:
-        """A number that every lane brings along."""
-        return self._node(("input", name), dtype, ("input", name))
+    def input(self, name: Any, dtype: str, home: int | None = None) -> Node:
+        """A number that comes from elsewhere: from memory, or into a region."""
+        return self.node(Operation("input", detail=name), dtype, home)
 
     def value(self, node: Node) -> Any:
         """The number of a constant, None for what may differ between lanes."""
-        name, *rest = self.operations[node]
-        return rest[0] if name == "constant" else None
+        operation = self.operations[node]
+        return operation.detail if operation.name == "constant" else None
 
     def apply(self, name: str, *nodes: Node, dtype: str = "") -> Node:
         """Result of an operation.
@@ -62,22 +103,44 @@ class Graph:
             nodes = tuple(sorted(nodes))
             values = [self.value(node) for node in nodes]
         same = simpler(self, name, nodes, values)
-        return self._node((name, *nodes), dtype, (name, *nodes, dtype)) if same is None else same
+        return self.node(Operation(name, nodes), dtype) if same is None else same
 
-    def needed(self, wanted: Any) -> list[bool]:
-        """Which nodes the wanted ones are made from, themselves included."""
-        needed = [False] * len(self.operations)
-        for node in map(int, wanted):
-            needed[node] = True
-        for node in reversed(range(len(needed))):
-            if needed[node] and self.operations[node][0] not in ("constant", "input"):
-                for operand in self.operations[node][1:]:
-                    needed[operand] = True
-        return needed
-
-    def _node(self, operation: tuple, dtype: str, key: Any) -> Node:
+    def node(self, operation: Operation, dtype: str, home: int | None = None, key: Any = None) -> Node:
+        """The node of an operation, the same for the same one."""
+        key = (operation, dtype) if key is None else key
         if key not in self._known:
             self._known[key] = len(self.operations)
             self.operations.append(operation)
             self.types.append(dtype)
+            homes = [self.homes[operand] for operand in operation.operands]
+            self.homes.append(max([home, *homes], key=self._depth))
         return self._known[key]
+
+    def inside(self, node: Node, region: int) -> bool:
+        """Whether a node depends on what happens in a region."""
+        home = self.homes[node]
+        while home is not None and home != region:
+            home = self.parents[home]
+        return home == region
+
+    def needed(self, wanted: Iterable[Node]) -> list[bool]:
+        """Which nodes the wanted ones are made from, themselves included."""
+        needed = [False] * len(self.operations)
+        for node in wanted:
+            needed[node] = True
+        for node in reversed(range(len(needed))):
+            if needed[node]:
+                for operand in self.uses(node):
+                    needed[operand] = True
+        return needed
+
+    def uses(self, node: Node) -> tuple[Node, ...]:
+        """What a node is made from, and what a region does inside."""
+        name, operands, detail = self.operations[node]
+        if name != "region":
+            return operands
+        region = self.regions[detail]
+        return (*operands, region.test, *region.results)
+
+    def _depth(self, home: int | None) -> int:
+        return 0 if home is None else 1 + self._depth(self.parents[home])

@@ -17,8 +17,8 @@ from undertow.lanes.memory import Layout
 from undertow.lanes.scalarise import Nodes, evaluate
 from undertow.lanes.tracing import Traced
 
-# Machine code of a longer program would take too long to make, and not fit the processor's cache.
-_MOST = 60_000
+# Operations; machine code of a longer program would take minutes to make.
+_MOST = 200_000
 
 
 class Program:

@@ -1,22 +1,18 @@
 """From a traced function to the arithmetic of its scalars."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from math import inf
 from typing import Any
 
 import numpy as np
 from jax.extend.core import ClosedJaxpr
 
-from undertow.lanes import collecting, elementwise, indexing, moving, threefry
+from undertow.lanes import collecting, control, elementwise, indexing, moving, threefry
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import Graph
 
 # Arrays of nodes, one for each scalar of an array.
 Nodes = np.ndarray
-
-# A loop of at most so many rounds is written out.
-_ROUNDS = 64
 
 
 def nodes_of(graph: Graph, values: Any) -> Nodes:
@@ -51,8 +47,8 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
 def _results(graph: Graph, equation: Any, given: list[Nodes]) -> Sequence[Nodes]:
     """Results of one equation."""
     name, params = equation.primitive.name, equation.params
-    if name in _CONTROL:
-        return _CONTROL[name](graph, given, params)
+    if name in control.RULES:
+        return control.RULES[name](graph, given, params, evaluate)
     if (inner := _inner(params)) is not None:
         return evaluate(graph, inner, given)
     out = equation.outvars[0].aval
@@ -88,33 +84,3 @@ def _inner(params: dict[str, Any]) -> Any:
 
 def _filled(shape: Sequence[int], nodes: list[int]) -> Nodes:
     return np.array(nodes, dtype=np.int64).reshape(shape)
-
-
-def _cond(graph: Graph, given: list[Nodes], params: dict[str, Any]) -> Sequence[Nodes]:
-    """All branches, and the choice between their results."""
-    which, *rest = given
-    branches = [evaluate(graph, branch, rest) for branch in params["branches"]]
-    choose = partial(elementwise.rule("select_n", {}, ""), graph, int(which))
-    return [
-        _filled(cases[0].shape, [choose(*row) for row in zip(*(case.ravel().tolist() for case in cases), strict=True)])
-        for cases in zip(*branches, strict=True)
-    ]
-
-
-def _scan(graph: Graph, given: list[Nodes], params: dict[str, Any]) -> Sequence[Nodes]:
-    """Written out."""
-    if params["length"] > _ROUNDS:
-        raise Unsupported(f"scan of {params['length']} rounds")
-    constants, carried = params["num_consts"], params["num_carry"]
-    fixed, carry, rows = given[:constants], given[constants:][:carried], given[constants + carried :]
-    rounds = range(params["length"])
-    stacks = []
-    for i in reversed(rounds) if params["reverse"] else rounds:
-        results = evaluate(graph, params["jaxpr"], [*fixed, *carry, *(row[i] for row in rows)])
-        carry = results[:carried]
-        stacks.append(results[carried:])
-    stacks = stacks[::-1] if params["reverse"] else stacks
-    return [*carry, *(np.stack(column) for column in zip(*stacks, strict=True))]
-
-
-_CONTROL: dict[str, Callable[..., Sequence[Nodes]]] = {"cond": _cond, "scan": _scan}

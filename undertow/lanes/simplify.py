@@ -52,8 +52,8 @@ def _is(value: Any, number: float) -> bool:
 
 def _negated(graph, node) -> int | None:
     """What a node is the negative of."""
-    name, *rest = graph.operations[node]
-    return rest[0] if name == "neg" else None
+    operation = graph.operations[node]
+    return operation.operands[0] if operation.name == "neg" else None
 
 
 def _add(graph, nodes, values):
@@ -96,7 +96,7 @@ def _neg(graph, nodes, values):
 def _abs(graph, nodes, values):
     if (minus := _negated(graph, nodes[0])) is not None:
         return graph.apply("abs", minus)
-    return nodes[0] if graph.operations[nodes[0]][0] == "abs" else None
+    return nodes[0] if graph.operations[nodes[0]].name == "abs" else None
 
 
 def _select(graph, nodes, values):
