@@ -17,7 +17,8 @@ def in_lanes():
             fixed = [i in constant for i in range(len(rows))]
             nothing = np.zeros(())
             program = Program(
-                lambda numbers: (numbers, nothing),
+                lambda numbers: numbers,
+                lambda numbers: nothing,
                 lambda numbers, carry, k: carry,
                 lambda numbers, carry, k: function(*numbers),
                 example,

@@ -1,4 +1,4 @@
-"""What a program begins with: numbers of a run, and what is made of them before the first tick."""
+"""What a program begins with: the numbers of a run, and what is drawn from them."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,37 +12,37 @@ from undertow.lanes.graph import Graph
 from undertow.lanes.scalarise import Nodes, evaluate, nodes_of
 from undertow.lanes.tracing import Traced
 
-# Operations before the first tick; a longer start (drawing waves, for example) is left to XLA.
+# Operations; to draw what needs more of them (a spectrum of waves) is left to XLA.
 _MOST = 15_000
 
 
 class Beginning:
-    """Start of a program: done in lanes where that can be, and by XLA before where not.
+    """What does not depend on the tick: drawn in lanes where that can be, and by XLA before where not.
 
     Args:
-        start: the function, of `numbers`.
+        draw: the function, of `numbers`.
         numbers: of one run; a tree of arrays.
         constant: which of its leaves are the same in every run.
 
     Attributes:
-        graph: with what the start does in lanes.
+        graph: with what is drawn in lanes.
         nodes: of its results.
         inputs: shapes and types of what every lane brings along, in the order of its slots.
     """
 
-    def __init__(self, start: Traced, numbers: Any, constant: list[bool]):
+    def __init__(self, draw: Traced, numbers: Any, constant: list[bool]):
         leaves = jax.tree.leaves(numbers)
         self._varying = [i for i, same in enumerate(constant) if not same]
         self._before: Callable[[Any], list[np.ndarray]] | None = None
         self.inputs = [leaves[i] for i in self._varying]
         try:
             self.graph, given = self._given(leaves)
-            self.nodes = evaluate(self.graph, start.closed, given, _MOST)
+            self.nodes = evaluate(self.graph, draw.closed, given, _MOST)
         except Unsupported:
-            passed_on = start.passed_on()
+            passed_on = draw.passed_on()
             made = [place is None for place in passed_on]
-            self.inputs += [leaf for leaf, new in zip(start.leaves, made, strict=True) if new]
-            self._before = batched(start.only(made), numbers)
+            self.inputs += [leaf for leaf, new in zip(draw.leaves, made, strict=True) if new]
+            self._before = batched(draw.only(made), numbers)
             self.graph, given = self._given(leaves)
             further = iter(given[len(leaves) :])
             self.nodes = [next(further) if place is None else given[place] for place in passed_on]

@@ -25,9 +25,10 @@ class Program:
     """Start, ticks and looks, compiled for vector registers.
 
     Args:
-        start: numbers -> (drawn, carry).
-        tick: drawn, carry, number of the tick -> carry.
-        look: drawn, carry, number of the tick -> what is to be kept of an instant.
+        draw: numbers -> all that is known from then on.
+        start: known -> carry.
+        tick: known, carry, number of the tick -> carry.
+        look: known, carry, number of the tick -> what is to be kept of an instant.
         numbers: of one run; a tree of arrays.
         constant: which leaves of `numbers` are the same in every run; they make the program short.
         lanes: runs at once; as many as fit a register unless given. No result depends on it.
@@ -37,27 +38,36 @@ class Program:
     """
 
     def __init__(
-        self, start: Callable, tick: Callable, look: Callable, numbers: Any, constant: list[bool], lanes: int = 0
+        self,
+        draw: Callable,
+        start: Callable,
+        tick: Callable,
+        look: Callable,
+        numbers: Any,
+        constant: list[bool],
+        lanes: int = 0,
     ):
-        begun = Traced(start, numbers)
-        self._beginning = Beginning(begun, numbers, constant)
-        graph, (drawn, _) = self._beginning.graph, begun.shapes
-        drawn_count = len(jax.tree.leaves(drawn))
-        paths, first = self._beginning.nodes[:drawn_count], self._beginning.nodes[drawn_count:]
-        carry = begun.leaves[drawn_count:]
+        drawn = Traced(draw, numbers)
+        self._beginning = Beginning(drawn, numbers, constant)
+        graph, known = self._beginning.graph, self._beginning.nodes
+        of_arrays = lambda function: lambda arrays, *rest: function(eqx.combine(arrays, drawn.still), *rest)
+        begun = Traced(of_arrays(start), drawn.shapes)
+        first = evaluate(graph, begun.closed, known, _MOST)
 
         number = jax.ShapeDtypeStruct((), jnp.asarray(0).dtype)
         k = graph.input(TICK, I64)
         k = k if number.dtype == I64 else graph.apply("convert", k, dtype=str(number.dtype))
-        given = [*paths, *inputs(graph, "carry", carry), np.array(k)]
-        of_arrays = lambda function: lambda arrays, k: function(*eqx.combine(arrays, begun.still), k)
-        self._tick, self._look = (Traced(of_arrays(function), begun.shapes, number) for function in (tick, look))
-        if self._tick.types != [leaf.dtype for leaf in carry]:
+        given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
+        carried = lambda function: lambda known, carry, k: function(known, eqx.combine(carry, begun.still), k)
+        self._tick, self._look = (
+            Traced(of_arrays(carried(function)), drawn.shapes, begun.shapes, number) for function in (tick, look)
+        )
+        if self._tick.types != begun.types:
             raise Unsupported("a carry that changes its type")
         ticked, looked = (evaluate(graph, traced.closed, given, _MOST) for traced in (self._tick, self._look))
 
-        lanes = lanes or lanes_of(64)
-        several = (self._beginning.inputs, carry, self._look.leaves)
+        lanes = lanes or lanes_of(8 * number.dtype.itemsize)
+        several = (self._beginning.inputs, begun.leaves, self._look.leaves)
         self._numbers_layout, self._carry_layout, self._look_layout = (Layout(leaves, lanes) for leaves in several)
         self._code = Code(assembly(graph, Sections(*map(_flat, (first, ticked, looked))), lanes))
 

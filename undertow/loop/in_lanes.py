@@ -78,22 +78,24 @@ class Fleet:
         self._plan = plan
         step, dt = METHODS[plan.method], plan.dt
 
-        def start(numbers):
+        def draw(numbers):
             loop, accumulators, at, key = eqx.combine(numbers, rest)
-            drawn, carry = sampled.begin(loop, key, at, accumulators)
-            return (drawn, accumulators), carry
+            return loop.draw(key), accumulators, at
 
-        def tick(drawn, carry, k):
-            loop, accumulators = drawn
-            return sampled.tick(loop, accumulators, jnp.asarray(dt), step, plan.substeps, carry, k)
+        def start(known):
+            drawn, accumulators, at = known
+            return sampled.begin(drawn, at, accumulators)
 
-        def look(drawn, carry, k):
+        def tick(known, carry, k):
+            drawn, accumulators, _ = known
+            return sampled.tick(drawn, accumulators, jnp.asarray(dt), step, plan.substeps, carry, k)
+
+        def look(known, carry, k):
             t = instant(k, jnp.asarray(dt))
-            loop, _ = drawn
-            sample = loop.look(t, *carry[0])
+            sample = known[0].look(t, *carry[0])
             return t, {name: getattr(sample, name) for name in plan.signals}
 
-        self._program = Program(start, tick, look, numbers, constant, lanes)
+        self._program = Program(draw, start, tick, look, numbers, constant, lanes)
 
     def fly(self, numbers: Any) -> Ended:
         """Run them.

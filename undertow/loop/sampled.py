@@ -75,7 +75,8 @@ def simulate(
 @eqx.filter_jit
 def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) -> Outcome:
     ticks, record_every, method, substeps = plan
-    drawn, carry = begin(loop, key, start, accumulators)
+    drawn = loop.draw(key)
+    carry = begin(drawn, start, accumulators)
     one = partial(tick, drawn, accumulators, dt, METHODS[method], substeps)
     if record_every == 0:
         carry = jax.lax.fori_loop(0, ticks, lambda k, c: one(c, k), carry)
@@ -88,14 +89,13 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
     return Outcome(time, samples, gathered, final[:2], status, jnp.where(status == int(Status.OK), ticks * dt, ended))
 
 
-def begin(loop: ClosedLoop, key: PRNGKeyArray, start: tuple[Outputs, Outputs], accumulators) -> tuple[Drawn, PyTree]:
-    """A loop with everything random drawn, and what goes from tick to tick, as it is before the first one."""
-    drawn = loop.draw(key)
+def begin(drawn: Drawn, start: tuple[Outputs, Outputs], accumulators) -> PyTree:
+    """What goes from tick to tick, as it is before the first one."""
     x, z = drawn.start(*start)
     states = (x, z, drawn.listen(x))
     blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.look, jnp.zeros(()), *states))
     gathered = tuple(a.init(blank) for a in accumulators)
-    return drawn, (states, gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
+    return (states, gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
 
 
 def tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
