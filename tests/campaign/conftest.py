@@ -4,6 +4,9 @@ import copy
 
 import pytest
 
+from undertow.lanes import batches
+from undertow.studies.campaign.task import site
+
 SCENARIO = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},
     "controller": {"kind": "pid", "frequency": 2.0},
@@ -39,3 +42,13 @@ def campaign_file(tmp_path, campaign):
         return path
 
     return write
+
+
+@pytest.fixture(params=["lanes", "xla"])
+def engine(request, monkeypatch):
+    """Programs of lanes, and what is used where there is no such program."""
+    monkeypatch.setattr(batches, "_WIDTH", 8)
+    monkeypatch.setitem(SCENARIO["loop"], "engine", request.param)
+    site.cache_clear()
+    yield request.param
+    site.cache_clear()

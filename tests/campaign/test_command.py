@@ -8,8 +8,11 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
+import xarray as xr
 
+from undertow.analysis.metrics import OVERALL
 from undertow.cli.main import run
 from undertow.studies.campaign.conduct import STORE
 
@@ -45,6 +48,23 @@ def test_what_it_leaves(campaign_file, tmp_path, capsys):
     assert "diverged" in capsys.readouterr().out.lower()
     assert run(["campaign", "status", str(out)]) == 0
     assert "40 of 40 trials done" in capsys.readouterr().out
+
+
+def test_the_worst_trials_are_repeated_bit_for_bit(campaign_file, tmp_path):
+    """Metrics and series of a scenario file from `worst/`, run alone, are those of the lane that it flew in."""
+    out = tmp_path / "out"
+    path = campaign_file(series={"signals": ["position", "voltage"], "every": 0.1})
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    rows = xr.open_zarr(out / "trials.zarr", consolidated=False).load()
+    for file in sorted((out / "worst").iterdir())[:2]:
+        trial, again = int(file.stem.split("-")[1]), tmp_path / file.stem
+        assert run(["simulate", str(file), "--no-prediction", "--out", str(again)]) == 0
+        steady = json.loads((again / "metrics.json").read_text())["steady"]
+        for name in OVERALL:
+            assert steady[name] == float(rows[name][trial]), name
+        series = xr.open_dataset(again / "run.nc")
+        for name in ("position", "voltage"):
+            np.testing.assert_array_equal(series[name].values, rows[f"series:{name}"][trial].values)
 
 
 @pytest.mark.parametrize(

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 from undertow.analysis.metrics import Metrics, results
-from undertow.lanes import batches
-from undertow.lanes.errors import Unsupported
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign import flying
 from undertow.studies.campaign.conduct import Prepared
 from undertow.studies.campaign.flying import Hangar
 from undertow.studies.campaign.reading import whole
@@ -30,7 +27,7 @@ def columns(data, rows):
     return fly(prepared(data).text, "", rows)
 
 
-def test_lanes_are_runs(campaign, engine):
+def test_rows_are_runs(campaign, engine):
     found = columns(campaign(), range(3))
     for trial in range(3):
         built = build(prepared(campaign()).trials.data(trial))
@@ -40,21 +37,6 @@ def test_lanes_are_runs(campaign, engine):
             if name in found:
                 assert found[name][trial] == pytest.approx(expected, rel=1e-9, abs=1e-12), name
         assert found["vary:disturbance.amplitude"][trial] == float(built.closed_loop.disturbance.amplitude)
-
-
-@pytest.fixture(params=["lanes", "vmap"])
-def engine(request, monkeypatch):
-    """Programs of lanes, and what is used where there is no such program."""
-    if request.param == "vmap":
-
-        def none(*_):
-            raise Unsupported("anything")
-
-        monkeypatch.setattr(flying.in_lanes, "Fleet", none)
-        monkeypatch.setattr(batches, "_WIDTH", 8)
-    site.cache_clear()
-    yield request.param
-    site.cache_clear()
 
 
 def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, engine):

@@ -120,6 +120,7 @@ RANDOM = {
     "split": lambda key: jax.random.split(key, 3),
     "folded": lambda key: jax.random.fold_in(key, 77),
     "keys": lambda key: jax.vmap(lambda one: jax.random.bits(one, (2,)))(jax.random.split(key, 2)),
+    "one": lambda key: jax.random.bits(key, (), jnp.uint32),
     "uniform": lambda key: jax.random.uniform(key, (4,), minval=-1.0, maxval=3.0),
 }
 

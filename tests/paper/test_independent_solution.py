@@ -1,18 +1,11 @@
 """Examples 1 and 2 against an independent plain-NumPy solution, and against the published reference figures."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from undertow.scenario.execute import execute
 from undertow.studies.paper.setup import CONTROLLERS, scenario
-
-_FILE = Path(__file__).parents[2] / "benchmarks" / "plain_numpy.py"
-_SPEC = importlib.util.spec_from_file_location("plain_numpy", _FILE)
-plain_numpy = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(plain_numpy)
+from undertow.studies.speed import plain_numpy
 
 # Benchmark definitions, section 4: tracking, estimation, uncertainty and robust rms on rung `ideal`, suite U1.
 REFERENCE = {

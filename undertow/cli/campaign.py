@@ -137,7 +137,9 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     for trial in trials:
-        text = f"# Trial {trial}.\n{dump(prepared.trials.data(trial))}"
+        data = prepared.trials.data(trial)
+        data["steady"] = (data.get("steady") or {}) | {"every_tick": True}
+        text = f"# Trial {trial}: its steady metrics are those of the campaign.\n{dump(data)}"
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
 
 

@@ -77,6 +77,19 @@ def simulate(
 
 
 @app.command()
+def bench(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+) -> int:
+    """Measure how fast undertow is here, beside plain NumPy.
+
+    Workload W1: a vehicle with eight motors under the paper's law at 1 kHz. Takes about half a minute.
+    """
+    from undertow.cli.bench import bench
+
+    return bench(as_json)
+
+
+@app.command()
 def tune(
     scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
     out: Annotated[

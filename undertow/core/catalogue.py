@@ -5,6 +5,7 @@ with `def odin()`. Parts from elsewhere are named `./my_rov.py:my_rov`, or come 
 group `undertow.<kind>`.
 """
 
+import functools
 import importlib
 import importlib.metadata
 import importlib.util
@@ -59,9 +60,13 @@ def publish(package_name: str) -> Callable[[str], Any]:
 def names(kind: str) -> dict[str, Part]:
     """All parts of a kind: shipped ones and those of installed entry points."""
     parts = collect(importlib.import_module(f"undertow.{kind}"))
-    for entry in importlib.metadata.entry_points(group=f"undertow.{kind}"):
-        parts[entry.name] = entry.load()
-    return parts
+    return parts | {entry.name: entry.load() for entry in _entry_points(f"undertow.{kind}")}
+
+
+@functools.cache
+def _entry_points(group: str) -> tuple[importlib.metadata.EntryPoint, ...]:
+    # Reads a file of every installed package: too slow to be done for each trial of a campaign.
+    return tuple(importlib.metadata.entry_points(group=group))
 
 
 def find(kind: str, name: str, folder: Path | None = None) -> Part:

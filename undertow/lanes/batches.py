@@ -11,20 +11,22 @@ import numpy as np
 _WIDTH = 64
 
 
-def batched(function: Callable[[Any], Any], numbers: Any) -> Callable[[Any], Any]:
+def batched(function: Callable[[Any], Any], numbers: Any, width: int = 0) -> Callable[[Any], Any]:
     """The function with a leading axis over runs, on arrays and with arrays of NumPy.
 
     Args:
         function: of a tree of arrays.
         numbers: an example of that.
+        width: runs of a program; the usual unless given.
     """
-    stacked = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((_WIDTH, *np.shape(leaf)), leaf.dtype), numbers)
+    width = width or _WIDTH
+    stacked = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((width, *np.shape(leaf)), leaf.dtype), numbers)
     program = jax.jit(jax.vmap(function)).lower(stacked).compile()
 
     def run(numbers: Any) -> Any:
         runs, pieces = len(jax.tree.leaves(numbers)[0]), []
-        for first in range(0, runs, _WIDTH):
-            which = np.minimum(np.arange(first, first + _WIDTH), runs - 1)
+        for first in range(0, runs, width):
+            which = np.minimum(np.arange(first, first + width), runs - 1)
             results = program(jax.tree.map(lambda leaf, which=which: leaf[which], numbers))
             pieces.append(jax.tree.map(np.asarray, results))
         return jax.tree.map(lambda *parts: np.concatenate(parts)[:runs], *pieces)

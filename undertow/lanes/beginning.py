@@ -31,7 +31,8 @@ class Beginning:
     """
 
     def __init__(self, draw: Traced, numbers: Any, constant: list[bool]):
-        leaves = jax.tree.leaves(numbers)
+        given = zip(jax.tree.leaves(numbers), draw.closed.in_avals, strict=True)
+        leaves = [np.asarray(leaf, dtype=kind.dtype) for leaf, kind in given]  # as JAX takes them, doubles or not
         self._varying = [i for i, same in enumerate(constant) if not same]
         self._before: Callable[[Any], list[np.ndarray]] | None = None
         self.inputs = [leaves[i] for i in self._varying]

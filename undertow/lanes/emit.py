@@ -136,7 +136,7 @@ class Emitter:
         what, given, _ = self.graph.operations[node]
         dtype, before = self.graph.types[node], self.graph.types[given[-1]]
         if what == "select":
-            self.choice(*operands, dtype, name)
+            self.choice(operands[0], operands[1], operands[2], dtype, name)
         elif what == "bits":
             self.line(f"bitcast {self.vector(before)} {operands[0]} to {self.vector(dtype)}", name)
         elif what == "convert":

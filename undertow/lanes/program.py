@@ -66,7 +66,7 @@ class Program:
             raise Unsupported("a carry that changes its type")
         ticked, looked = (evaluate(graph, traced.closed, given, _MOST) for traced in (self._tick, self._look))
 
-        lanes = lanes or lanes_of(8 * number.dtype.itemsize)
+        lanes = lanes or lanes_of(8 * np.dtype(number.dtype).itemsize)
         several = (self._beginning.inputs, begun.leaves, self._look.leaves)
         self._numbers_layout, self._carry_layout, self._look_layout = (Layout(leaves, lanes) for leaves in several)
         self._code = Code(assembly(graph, Sections(*map(_flat, (first, ticked, looked))), lanes))

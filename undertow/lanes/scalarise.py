@@ -5,11 +5,14 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from jax.extend.core import ClosedJaxpr
+from jax.extend.core import ClosedJaxpr, Literal
 
 from undertow.lanes import collecting, control, elementwise, indexing, moving, threefry
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import Graph
+
+# Primitives that only call another function.
+_CALLS = ("jit", "pjit", "closed_call", "core_call", "checkpoint", "custom_jvp_call", "custom_vjp_call")
 
 # Arrays of nodes, one for each scalar of an array.
 Nodes = np.ndarray
@@ -36,7 +39,12 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
     known = dict(zip(closed.jaxpr.invars, arguments, strict=True))
     fixed = zip(closed.jaxpr.constvars, closed.consts, strict=True)
     known |= {variable: nodes_of(graph, value) for variable, value in fixed}
-    read = lambda variable: nodes_of(graph, variable.val) if hasattr(variable, "val") else known[variable]
+
+    def read(variable: Any) -> Nodes:
+        if isinstance(variable, Literal):
+            return nodes_of(graph, np.asarray(variable.val, dtype=variable.aval.dtype))
+        return known[variable]
+
     for equation in closed.jaxpr.eqns:
         known |= zip(equation.outvars, _results(graph, equation, [read(v) for v in equation.invars]), strict=True)
         if len(graph.operations) > most:
@@ -49,8 +57,8 @@ def _results(graph: Graph, equation: Any, given: list[Nodes]) -> Sequence[Nodes]
     name, params = equation.primitive.name, equation.params
     if name in control.RULES:
         return control.RULES[name](graph, given, params, evaluate)
-    if (inner := _inner(params)) is not None:
-        return evaluate(graph, inner, given)
+    if name in _CALLS:
+        return evaluate(graph, _called(params), given)
     out = equation.outvars[0].aval
     if name in moving.RULES:
         moved = moving.RULES[name](given, params, out)
@@ -74,12 +82,10 @@ def _random(graph: Graph, name: str, given: list[Nodes], params: dict[str, Any])
     return threefry.RULES[name](graph, given, params)
 
 
-def _inner(params: dict[str, Any]) -> Any:
-    """What an equation calls, if calling is all it does."""
-    for key in ("jaxpr", "call_jaxpr", "fun_jaxpr"):
-        if key in params:
-            return params[key] if hasattr(params[key], "jaxpr") else ClosedJaxpr(params[key], ())
-    return None
+def _called(params: dict[str, Any]) -> ClosedJaxpr:
+    """What an equation calls."""
+    (called,) = (params[key] for key in ("jaxpr", "call_jaxpr", "fun_jaxpr") if key in params)
+    return called if isinstance(called, ClosedJaxpr) else ClosedJaxpr(called, ())
 
 
 def _filled(shape: Sequence[int], nodes: list[int]) -> Nodes:

@@ -59,7 +59,7 @@ def _bits(graph: Graph, given: list[np.ndarray], params: dict[str, Any]) -> np.n
     else:
         made = [one ^ other for one, other in words]
     nodes = np.array([entry.node for entry in made], dtype=np.int64)
-    return nodes.reshape(*given[0].shape[:-1], *params["shape"])
+    return nodes.reshape((*given[0].shape[:-1], *params["shape"]))
 
 
 def _nodes(words: list[tuple[Scalar, Scalar]]) -> np.ndarray:

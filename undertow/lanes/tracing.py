@@ -6,6 +6,7 @@ from typing import Any
 import equinox as eqx
 import jax
 import numpy as np
+from jax.extend.core import Literal
 
 
 class Traced:
@@ -40,7 +41,7 @@ class Traced:
     def passed_on(self) -> list[int | None]:
         """Which results are just arguments: their places among all arguments, None for others."""
         places = {variable: i for i, variable in enumerate(self.closed.jaxpr.invars)}
-        return [None if hasattr(out, "val") else places.get(out) for out in self.closed.jaxpr.outvars]
+        return [None if isinstance(out, Literal) else places.get(out) for out in self.closed.jaxpr.outvars]
 
     def only(self, wanted: list[bool]) -> Callable[..., list[jax.Array]]:
         """The function with some of its results."""

@@ -111,14 +111,30 @@ class Fleet:
         return Ended(accumulated, states[:2], status, ended, time, series)
 
 
-def simulate(run: Run, plan: Plan) -> Outcome:
-    """One run; `plan.signals` is not looked at, everything is recorded.
+def simulate(
+    loop: ClosedLoop,
+    *,
+    duration: float,
+    dt: float = 1e-3,
+    key: PRNGKeyArray | None = None,
+    position: Any = None,
+    velocity: Any = None,
+    record_every: int = 10,
+    accumulators: tuple[sampled.AbstractAccumulator, ...] = (),
+    method: str = "rk4",
+    substeps: int = 1,
+) -> Outcome:
+    """One run; arguments, result and errors of `sampled.simulate`.
 
     Raises:
         Unsupported: a part needs something that lanes cannot do.
     """
+    ticks = sampled.ticks_of(duration, dt, record_every)
+    start = loop.outputs_at_start(position, velocity)
+    run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
     numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[None], eqx.filter(run, eqx.is_array))
     constant = [True] * len(jax.tree.leaves(numbers))
-    found = Fleet(run, plan._replace(signals=Sample._fields), constant, lanes=1).fly(numbers)
-    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, found)
+    plan = Plan(ticks, dt, record_every, Sample._fields, method, substeps)
+    flown = Fleet(run, plan, constant, lanes=1).fly(numbers)
+    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, flown)
     return Outcome(one.time, Sample(**one.series), one.accumulated, one.final, one.status, one.ended)

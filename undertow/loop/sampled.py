@@ -61,15 +61,21 @@ def simulate(
     Raises:
         BadInput: duration or dt not positive, or duration shorter than one record.
     """
+    ticks = ticks_of(duration, dt, record_every)
+    key = jax.random.PRNGKey(0) if key is None else key
+    start = loop.outputs_at_start(position, velocity)
+    plan = (ticks, record_every, method, substeps)
+    return _run(loop, key, start, jnp.asarray(dt, dtype=float), accumulators, plan)
+
+
+def ticks_of(duration: float, dt: float, record_every: int) -> int:
+    """Ticks of a run; for arguments and errors see `simulate`."""
     if not (0 < dt < float("inf")):
         raise BadInput("dt", "be positive", f"{dt:g} s")
     ticks = round(duration / dt) if 0 < duration < float("inf") else 0
     if ticks < max(1, record_every):
         raise BadInput("duration", f"be at least one record ({max(1, record_every) * dt:g} s)", f"{duration:g} s")
-    key = jax.random.PRNGKey(0) if key is None else key
-    start = loop.outputs_at_start(position, velocity)
-    plan = (ticks, record_every, method, substeps)
-    return _run(loop, key, start, jnp.asarray(dt, dtype=float), accumulators, plan)
+    return ticks
 
 
 @eqx.filter_jit

@@ -17,11 +17,12 @@ class Fleet:
     Args:
         run: one of them.
         plan: how they are run.
+        width: at once; the usual number unless given.
     """
 
-    def __init__(self, run: Run, plan: Plan):
+    def __init__(self, run: Run, plan: Plan, width: int = 0):
         numbers, rest = eqx.partition(run, eqx.is_array)
-        self.fly: Callable[[Any], Ended] = batched(partial(_one, rest, plan), numbers)
+        self.fly: Callable[[Any], Ended] = batched(partial(_one, rest, plan), numbers, width)
 
 
 def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:

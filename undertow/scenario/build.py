@@ -56,7 +56,7 @@ def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) ->
     resolved = scenario.model_dump(include={"description", "loop", "initial", "seed", "precision"})
 
     start, stop = scenario.steady.of_run(scenario.loop.duration)
-    resolved["steady"] = {"start": start, "stop": stop}
+    resolved["steady"] = {"start": start, "stop": stop, "every_tick": scenario.steady.every_tick}
 
     circumstances: dict[str, Any] = {"sampling_time": scenario.loop.dt}
 

@@ -10,8 +10,10 @@ import jax
 import numpy as np
 import xarray as xr
 
+from undertow.analysis.metrics import Metrics
 from undertow.core.status import Status
-from undertow.loop import continuous, sampled
+from undertow.lanes.errors import Unsupported
+from undertow.loop import continuous, in_lanes, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.scenario.build import Built, build
@@ -43,7 +45,8 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
     """
     built = source if isinstance(source, Built) else build(source)
     scenario, text = built.scenario, dump(built.resolved)
-    outcome = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed)
+    gathered = (Metrics(*built.window()),) if scenario.steady.every_tick else ()
+    outcome = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
     attributes = {
         "title": scenario.description or "a closed loop run by undertow",
         "scenario": text,
@@ -54,23 +57,33 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
     return Executed(built, outcome, *finished)
 
 
-def run_loop(loop: ClosedLoop, settings: Loop, start: Initial, seed: int) -> Outcome:
-    """Run a closed loop as `loop:` and `initial:` of a scenario say."""
+def run_loop(
+    loop: ClosedLoop,
+    settings: Loop,
+    start: Initial,
+    seed: int,
+    accumulators: tuple[sampled.AbstractAccumulator, ...] = (),
+) -> Outcome:
+    """Run a closed loop as `loop:` and `initial:` of a scenario say; `accumulators` for a sampled one."""
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
     common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
     if settings.kind == "continuous":
         adaptive = (settings.rtol, settings.atol) if settings.method == "adaptive" else None
-        outcome = continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
-    else:
-        outcome = sampled.simulate(
-            loop,
-            dt=settings.dt,
-            record_every=round(settings.record / settings.dt),
-            method=settings.method,
-            substeps=settings.substeps,
-            **common,
+        return jax.block_until_ready(
+            continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
         )
-    return jax.block_until_ready(outcome)
+    engine = in_lanes.simulate if settings.engine == "lanes" else sampled.simulate
+    common |= {
+        "dt": settings.dt,
+        "record_every": round(settings.record / settings.dt),
+        "method": settings.method,
+        "substeps": settings.substeps,
+        "accumulators": accumulators,
+    }
+    try:
+        return jax.block_until_ready(engine(loop, **common))
+    except Unsupported:
+        return jax.block_until_ready(sampled.simulate(loop, **common))
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from undertow.analysis.certificate import certify
-from undertow.analysis.metrics import measure
+from undertow.analysis.metrics import measure, results
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
@@ -32,7 +32,7 @@ def label(
 
     Args:
         loop: what was run.
-        outcome: how it went.
+        outcome: how it went; the steady metrics are those it has accumulated, if any.
         window: start and stop of the steady metrics, s.
         dt: sampling time, s.
         attributes: of the dataset, beside status, metrics, versions and content hash.
@@ -42,6 +42,8 @@ def label(
     dataset = to_dataset(outcome, loop.plant, loop.controller)
     over = lambda start, stop: measure(outcome, start, stop) | closure(dataset, start, stop) | rules
     steady, whole = over(*window) if covered else None, over(0.0, ended)
+    if steady is not None and outcome.accumulated:
+        steady |= results(outcome.accumulated[0])
     certified = certify(dataset, loop.controller, window, dt)
     if certified is not None:
         dataset = dataset.assign(certified.signals)

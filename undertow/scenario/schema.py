@@ -55,6 +55,10 @@ class Loop(Strict):
         "rk4", description="integration: rk4; euler (sampled); adaptive, to rtol and atol (continuous)"
     )
     substeps: int = Field(1, ge=1, le=100, description="plant steps per dt (sampled)")
+    engine: Literal["lanes", "xla"] = Field(
+        "lanes",
+        description="what compiles it (sampled): lanes, the same bits everywhere; xla, also for what lanes lack",
+    )
     rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (adaptive)")
     atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (adaptive)")
 
@@ -71,6 +75,9 @@ class Window(Strict):
 
     start: float | None = Field(default=None, ge=0, description="s; half of the duration unless given")
     stop: float | None = Field(default=None, gt=0, description="s; the end unless given")
+    every_tick: bool = Field(
+        False, description="metrics of every tick, as in campaigns, rather than of records (sampled)"
+    )
 
     def of_run(self, duration: float) -> "tuple[float, float]":
         """Start and stop, s."""

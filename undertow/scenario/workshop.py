@@ -6,7 +6,6 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import numpy as np
 
 _MOST = 512  # parts that are remembered
 
@@ -48,7 +47,5 @@ class Workshop:
 
 def structure(tree: Any) -> Any:
     """Everything about a tree of parts but its numbers: equal where one compiled program serves both."""
-    numbers, rest = eqx.partition(tree, eqx.is_array)
-    leaves, form = jax.tree.flatten(numbers)
-    shapes = tuple((np.shape(leaf), str(leaf.dtype)) for leaf in leaves)
-    return form, shapes, tuple(jax.tree.leaves(rest))
+    leaves, form = jax.tree.flatten(tree)
+    return form, tuple((leaf.shape, leaf.dtype) if eqx.is_array(leaf) else leaf for leaf in leaves)

@@ -1,5 +1,6 @@
 """Trials flown many at once: those that differ in their numbers only share a compiled program."""
 
+import contextlib
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -34,6 +35,7 @@ class _Kind(NamedTuple):
     structure: Any
     plan: Plan
     usual: bool  # numbers that were the same in all probes are the same here
+    engine: str
 
 
 class Hangar:
@@ -63,23 +65,30 @@ class Hangar:
         runs = [_run(one) for one in built]
         kinds: dict[_Kind, list[int]] = {}
         for i, (one, run) in enumerate(zip(built, runs, strict=True)):
-            kinds.setdefault(self._kind(run, _plan(one, signals, every)), []).append(i)
+            kinds.setdefault(self._kind(run, _plan(one, signals, every), one.scenario.loop.engine), []).append(i)
         pieces = [self._together(kind, [runs[i] for i in members]) for kind, members in kinds.items()]
         back = np.argsort([i for members in kinds.values() for i in members])
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
     def _together(self, kind: _Kind, runs: list[Run]) -> Flown:
-        numbers = [eqx.filter(run, eqx.is_array) for run in runs]
-        stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *numbers)
         with self._lock:
+            common = (kind.usual and self._commons().get(kind.structure)) or [None] * len(_leaves(runs[0]))
             if kind not in self._programs:
-                self._programs[kind] = _program(runs[0], kind, self._commons().get(kind.structure, []))
+                self._programs[kind] = _program(runs[0], kind, [shared is not None for shared in common])
+        columns = zip(common, *map(_leaves, runs), strict=True)
+        stacked = jax.tree.unflatten(
+            jax.tree.structure(eqx.filter(runs[0], eqx.is_array)),
+            [
+                np.stack(column) if shared is None else np.broadcast_to(shared, (len(runs), *np.shape(shared)))
+                for shared, *column in columns
+            ],
+        )
         flown = self._programs[kind].fly(stacked)
         lasted = flown.status == int(Status.OK)
         metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(flown.accumulated[0]).items()}
         return Flown(metrics, flown.status.astype(np.int8), flown.ended, flown.series)
 
-    def _kind(self, run: Run, plan: Plan) -> _Kind:
+    def _kind(self, run: Run, plan: Plan, engine: str) -> _Kind:
         form = structure(run)
         with self._lock:
             common = self._commons().get(form)
@@ -87,7 +96,7 @@ class Hangar:
             shared is None or leaf is shared or np.array_equal(leaf, shared)
             for leaf, shared in zip(_leaves(run), common, strict=True)
         )
-        return _Kind(form, plan, usual)
+        return _Kind(form, plan, usual, engine)
 
     def _commons(self) -> dict[Any, list[np.ndarray | None]]:
         """Numbers that all probes of a structure share, by structure: None for those that differ."""
@@ -105,17 +114,15 @@ class Hangar:
         return self._common
 
 
-def _program(run: Run, kind: _Kind, common: list[Any]) -> in_lanes.Fleet | vmapped.Fleet:
-    leaves = _leaves(run)
-    constant = [shared is not None for shared in common] if kind.usual else [False] * len(leaves)
-    try:
-        return in_lanes.Fleet(run, kind.plan, constant)
-    except Unsupported:
-        return vmapped.Fleet(run, kind.plan)
+def _program(run: Run, kind: _Kind, constant: list[bool]) -> in_lanes.Fleet | vmapped.Fleet:
+    if kind.engine == "lanes":
+        with contextlib.suppress(Unsupported):
+            return in_lanes.Fleet(run, kind.plan, constant)
+    return vmapped.Fleet(run, kind.plan)
 
 
 def _leaves(run: Run) -> list[Any]:
-    return jax.tree.leaves(eqx.filter(run, eqx.is_array))
+    return [leaf for leaf in jax.tree.leaves(run) if eqx.is_array(leaf)]
 
 
 def _run(built: Built) -> Run:

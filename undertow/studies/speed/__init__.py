@@ -1,0 +1,1 @@
+"""How fast undertow is, beside what anyone would write in NumPy."""

@@ -1,0 +1,108 @@
+"""Times of workload W1, taken one after another on one machine, so that their ratios mean something."""
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.lanes.machine import lanes_of
+from undertow.loop import sampled
+from undertow.loop.in_lanes import Run
+from undertow.loop.vmapped import Fleet as Vmapped
+from undertow.studies.speed import plain_numpy, workload
+from undertow.studies.speed.workload import TICKS
+
+# Runs of a batch, and how often everything is done; the shortest time counts.
+_BATCH = 64
+_REPETITIONS = 7
+# Ticks of the yardstick, which is slow.
+_NUMPY_TICKS = 2_000
+
+Watch = Callable[[str, float], None]
+
+
+def measure(watch: Watch) -> dict[str, Any]:
+    """Nanoseconds per tick, and per run where several fly at once; seconds of compiling.
+
+    Args:
+        watch: told what is being done, and the share done.
+    """
+    threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    found: dict[str, Any] = {"ticks": TICKS, "threads": threads, "lanes": lanes_of(64)}
+    watch("one run, in lanes", 0.0)
+    run = workload.one()
+    single, found["single_compile_s"] = _timed(lambda: workload.fleet(run, lanes=1))
+    numbers = workload.alone(run)
+    found["single_ns"] = _shortest(lambda: single.fly(numbers)) / TICKS
+    found["tracking_rms"] = float(workload.tracking(single.fly(numbers).accumulated)[0])
+    watch("one run, by XLA", 0.2)
+    found |= _by_xla(run)
+    for i, kind in enumerate(("float64", "float32")):
+        watch(f"many runs, {kind}", 0.4 + 0.2 * i)
+        with workload.precision(kind):
+            found |= {f"batch_{kind}_{key}": value for key, value in _batch(workload.one(), threads).items()}
+    watch("plain NumPy", 0.8)
+    found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_TICKS), 1) / _NUMPY_TICKS
+    found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
+    found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
+    watch("", 1.0)
+    return found | _on_accelerator()
+
+
+def _by_xla(run: Run) -> dict[str, float]:
+    def fly():
+        at = dict(zip(("position", "velocity"), run.start, strict=True))
+        return jax.block_until_ready(
+            sampled.simulate(run.loop, duration=TICKS * 1e-3, record_every=0, accumulators=run.accumulators, **at)
+        )
+
+    _, first = _timed(fly)
+    shortest = _shortest(fly)
+    return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / TICKS}
+
+
+def _batch(run: Run, threads: int) -> dict[str, float]:
+    """Several runs per thread, all threads at once and one alone."""
+    program, compiling = _timed(lambda: workload.fleet(run))
+    numbers = workload.several(run, _BATCH)
+
+    def together(count: int) -> float:
+        with ThreadPoolExecutor(count) as pool:
+            return _shortest(lambda: list(pool.map(lambda _: program.fly(numbers), range(count)))) / count
+
+    each = TICKS * _BATCH
+    return {"compile_s": compiling, "one_thread_ns": together(1) / each, "ns": together(threads) / each}
+
+
+def _on_accelerator(runs: int = 65_536) -> dict[str, Any]:
+    """The same by `jax.vmap` where JAX sees a GPU, with so many runs at once."""
+    if jax.default_backend() != "gpu":
+        return {}
+    found: dict[str, Any] = {"gpu": jax.devices()[0].device_kind}
+    for kind in ("float64", "float32"):
+        with workload.precision(kind):
+            found[f"gpu_{kind}_ns"] = vmapped_ns(workload.one(), runs, ticks=200)
+    return found
+
+
+def vmapped_ns(run: Run, runs: int, ticks: int) -> float:
+    """Nanoseconds per tick and run by `jax.vmap` on the device that JAX uses."""
+    program = Vmapped(run, workload.PLAN._replace(ticks=ticks), width=runs)
+    numbers = jax.tree.map(jnp.asarray, workload.several(run, runs))
+    return _shortest(lambda: program.fly(numbers), 3) / (ticks * runs)
+
+
+def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    start = time.perf_counter()
+    return work(), time.perf_counter() - start
+
+
+def _shortest(work: Callable[[], Any], repetitions: int = _REPETITIONS) -> float:
+    """Nanoseconds."""
+    work()
+    return float(np.min([_timed(work)[1] for _ in range(repetitions)])) * 1e9

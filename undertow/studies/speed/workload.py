@@ -1,0 +1,61 @@
+"""Workload W1: ODIN with the paper's whole motors under the paper's law at 1 kHz for 20 s."""
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.metrics import Metrics, overall
+from undertow.loop.in_lanes import Fleet, Plan, Run
+from undertow.scenario.build import build
+from undertow.studies.paper.setup import scenario
+
+TICKS = 20_000
+PLAN = Plan(TICKS, 1e-3, 0, (), "rk4", 1)
+
+
+@contextlib.contextmanager
+def precision(name: str) -> Iterator[None]:
+    """Where everything is made in float64 or float32."""
+    jax.clear_caches()  # or functions traced before keep constants of the other kind
+    with jax.enable_x64(name == "float64"):  # pyright: ignore[reportCallIssue]
+        yield
+    jax.clear_caches()
+
+
+def one() -> Run:
+    """One run."""
+    loop = build(scenario("W1", rung="electromechanical", composite=20.0, loop={"kind": "sampled"})).closed_loop
+    return Run(loop, (Metrics(10.0, 20.0),), loop.outputs_at_start(None, None), jax.random.PRNGKey(0))
+
+
+def constant(run: Run) -> list[bool]:
+    """Which of its numbers are the same in `several`: all but those that `drawn` changes."""
+    return [leaf is not run.start[0] for leaf in jax.tree.leaves(run) if eqx.is_array(leaf)]
+
+
+def several(run: Run, count: int) -> Any:
+    """Numbers of so many runs, from different places."""
+    numbers = eqx.filter(run, eqx.is_array)
+    stacked = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (count, *leaf.shape)), numbers)
+    places = np.random.default_rng(0).normal(scale=0.1, size=(count, *run.start[0].shape))
+    return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
+
+
+def fleet(run: Run, lanes: int = 0) -> Fleet:
+    """The program of W1."""
+    return Fleet(run, PLAN, constant(run), lanes)
+
+
+def tracking(accumulated: Any) -> np.ndarray:
+    """rms of the error of runs, m and rad."""
+    return overall(accumulated[0])["tracking_rms"]
+
+
+def alone(run: Run) -> Any:
+    """Numbers of the run itself."""
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], eqx.filter(run, eqx.is_array))
