@@ -3,13 +3,15 @@
 import os
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.core import runtime
 from undertow.lanes.machine import lanes_of
 from undertow.loop import sampled
 from undertow.loop.in_lanes import Run
@@ -20,6 +22,7 @@ from undertow.studies.speed.workload import TICKS
 # Runs of a batch, and how often everything is done; the shortest time counts.
 _BATCH = 64
 _REPETITIONS = 7
+_ON_GPU = 65_536
 # Ticks of the yardstick, which is slow.
 _NUMPY_TICKS = 2_000
 
@@ -44,14 +47,13 @@ def measure(watch: Watch) -> dict[str, Any]:
     found |= _by_xla(run)
     for i, kind in enumerate(("float64", "float32")):
         watch(f"many runs, {kind}", 0.4 + 0.2 * i)
-        with workload.precision(kind):
-            found |= {f"batch_{kind}_{key}": value for key, value in _batch(workload.one(), threads).items()}
+        found |= _by_itself(_many, kind, threads)
     watch("plain NumPy", 0.8)
     found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_TICKS), 1) / _NUMPY_TICKS
     found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
     found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
     watch("", 1.0)
-    return found | _on_accelerator()
+    return found
 
 
 def _by_xla(run: Run) -> dict[str, float]:
@@ -66,6 +68,23 @@ def _by_xla(run: Run) -> dict[str, float]:
     return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / TICKS}
 
 
+def _by_itself(function: Callable[..., dict[str, Any]], *arguments: Any) -> dict[str, Any]:
+    """What a function gives in a process of its own: JAX keeps to the precision that it began with."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return pool.submit(function, *arguments).result()
+
+
+def _many(kind: str, threads: int) -> dict[str, Any]:
+    """Many runs in a precision, on this machine's processor and on its GPU if it has one."""
+    if kind == "float32":
+        runtime.use_single_precision()
+    run = workload.one()
+    found = {f"batch_{kind}_{key}": value for key, value in _batch(run, threads).items()}
+    if jax.default_backend() == "gpu":
+        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_ns": vmapped_ns(run, _ON_GPU, ticks=200)}
+    return found
+
+
 def _batch(run: Run, threads: int) -> dict[str, float]:
     """Several runs per thread, all threads at once and one alone."""
     program, compiling = _timed(lambda: workload.fleet(run))
@@ -77,17 +96,6 @@ def _batch(run: Run, threads: int) -> dict[str, float]:
 
     each = TICKS * _BATCH
     return {"compile_s": compiling, "one_thread_ns": together(1) / each, "ns": together(threads) / each}
-
-
-def _on_accelerator(runs: int = 65_536) -> dict[str, Any]:
-    """The same by `jax.vmap` where JAX sees a GPU, with so many runs at once."""
-    if jax.default_backend() != "gpu":
-        return {}
-    found: dict[str, Any] = {"gpu": jax.devices()[0].device_kind}
-    for kind in ("float64", "float32"):
-        with workload.precision(kind):
-            found[f"gpu_{kind}_ns"] = vmapped_ns(workload.one(), runs, ticks=200)
-    return found
 
 
 def vmapped_ns(run: Run, runs: int, ticks: int) -> float:

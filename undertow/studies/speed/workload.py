@@ -1,7 +1,5 @@
 """Workload W1: ODIN with the paper's whole motors under the paper's law at 1 kHz for 20 s."""
 
-import contextlib
-from collections.abc import Iterator
 from typing import Any
 
 import equinox as eqx
@@ -16,15 +14,6 @@ from undertow.studies.paper.setup import scenario
 
 TICKS = 20_000
 PLAN = Plan(TICKS, 1e-3, 0, (), "rk4", 1)
-
-
-@contextlib.contextmanager
-def precision(name: str) -> Iterator[None]:
-    """Where everything is made in float64 or float32."""
-    jax.clear_caches()  # or functions traced before keep constants of the other kind
-    with jax.enable_x64(name == "float64"):  # pyright: ignore[reportCallIssue]
-        yield
-    jax.clear_caches()
 
 
 def one() -> Run:
