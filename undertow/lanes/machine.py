@@ -4,10 +4,11 @@ import ctypes
 import hashlib
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from llvmlite import binding
+
+from undertow.lanes.cache import cache_folder
 
 # Arguments of a program: numbers, carry, series; ticks, ticks between looks.
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
@@ -61,9 +62,3 @@ def _object(assembly: str) -> bytes:
     except OSError:
         pass
     return made
-
-
-def cache_folder() -> Path:
-    """Where compiled code is kept: UNDERTOW_CACHE, or undertow in the user's folder of caches."""
-    told = os.environ.get("UNDERTOW_CACHE")
-    return Path(told) if told else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "undertow"

@@ -42,7 +42,8 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
 
     def read(variable: Any) -> Nodes:
         if isinstance(variable, Literal):
-            return nodes_of(graph, np.asarray(variable.val, dtype=variable.aval.dtype))
+            aval: Any = variable.aval
+            return nodes_of(graph, np.asarray(variable.val, dtype=aval.dtype))
         return known[variable]
 
     for equation in closed.jaxpr.eqns:

@@ -76,7 +76,7 @@ class Window(Strict):
     start: float | None = Field(default=None, ge=0, description="s; half of the duration unless given")
     stop: float | None = Field(default=None, gt=0, description="s; the end unless given")
     every_tick: bool = Field(
-        False, description="metrics of every tick, as in campaigns, rather than of records (sampled)"
+        default=False, description="metrics of every tick, as in campaigns, rather than of records (sampled)"
     )
 
     def of_run(self, duration: float) -> "tuple[float, float]":

@@ -107,14 +107,14 @@ def paper_example(rung, composite, duration=20.0, h=1e-3, every=10):
 
     def rate(t, y):
         eta, eta_dot = y[:2]
-        voltage, v_hat_dot, theta_dot, (_, _, _, known) = law(*y, composite)
+        voltage, v_hat_dot, theta_dot, (_, _, _, known) = law(y[0], y[1], y[2], y[3], composite)
         unexplained = jacobian(eta) @ M_INV @ B @ (thrust(voltage) - ALPHA * voltage)
         return eta_dot, known + unexplained + suite_u1(t), v_hat_dot, theta_dot
 
     y, kept = (np.zeros(6), np.zeros(6), np.zeros(6), np.zeros((6, 5))), []
     for k in range(round(duration / h) + 1):
         if k % every == 0 and k * h >= 10 - 1e-9:
-            voltage, _, _, (e, d_hat, u_r, _) = law(*y, composite)
+            voltage, _, _, (e, d_hat, u_r, _) = law(y[0], y[1], y[2], y[3], composite)
             d = jacobian(y[0]) @ M_INV @ B @ (thrust(voltage) - ALPHA * voltage) + suite_u1(k * h)
             kept.append((e, d_hat - d, u_r))
         y = rk4(rate, k * h, y, h)
