@@ -1,0 +1,93 @@
+"""Closed loops in lanes are those of `sampled.simulate`, and no bit depends on who flies beside."""
+
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import numpy as np
+import pytest
+
+from undertow.analysis.metrics import Metrics, overall
+from undertow.loop import in_lanes, sampled
+from undertow.scenario.build import build
+from undertow.scenario.reading import read
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+QUICK = ("inverted_pendulum", "recorded_disturbance")
+SLOW = (
+    "bluerov2_heavy",
+    "own_vehicle",
+    "magnetic_levitation",
+    "two_link_arm",
+    "under_actuated",
+    "voltage_limited",
+    "w1",
+)
+
+
+def example(name, duration=1.0):
+    """Everything that both ways to fly it take."""
+    built = build(read(EXAMPLES / f"{name}.yaml"))
+    scenario, loop = built.scenario, built.scenario.loop
+    return built.closed_loop, {
+        "duration": duration,
+        "dt": loop.dt,
+        "key": jax.random.PRNGKey(scenario.seed),
+        "position": scenario.initial.position and np.array(scenario.initial.position),
+        "velocity": scenario.initial.velocity and np.array(scenario.initial.velocity),
+        "record_every": 10,
+        "accumulators": (Metrics(0.0, duration),),
+        "method": loop.method,
+        "substeps": loop.substeps,
+    }
+
+
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+def test_examples_fly_as_they_do_by_xla(name):
+    """Every signal, within 1e-10 of its largest; from noisy instruments 1e-8, as JAX rounds normal numbers earlier."""
+    loop, how = example(name)
+    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
+    close = 1e-8 if name == "bluerov2_heavy" else 1e-10
+    for signal, here, there in zip(found.samples._fields, found.samples, wanted.samples, strict=True):
+        if signal != "books" and there.size:
+            scale = np.abs(there).max()
+            np.testing.assert_allclose(here, there, rtol=0, atol=close * max(scale, 1e-9), err_msg=signal)
+    for key, here in overall(found.accumulated[0]).items():
+        np.testing.assert_allclose(here, overall(wanted.accumulated[0])[key], rtol=1e-7, atol=1e-12, err_msg=key)
+    assert found.status == wanted.status == 0 and found.ended == float(wanted.ended)
+
+
+def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
+    """Eleven runs from different places: in one fleet, backwards, one by one, and with nothing built in."""
+    loop, how = example("inverted_pendulum")
+    start = loop.outputs_at_start(None, None)
+    run = in_lanes.Run(loop, how["accumulators"], start, how["key"])
+    plan = in_lanes.Plan(500, how["dt"], 50, ("position", "voltage"), how["method"], how["substeps"])
+    numbers = eqx.filter(run, eqx.is_array)
+    leaves = jax.tree.leaves(numbers)
+    many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (11, *leaf.shape)), numbers)
+    places = np.random.default_rng(0).normal(scale=0.05, size=(11, *start[0].shape))
+    many = many._replace(start=(places, many.start[1]))
+    varies = [leaf is start[0] for leaf in leaves]
+    fleet = in_lanes.Fleet(run, plan, [not one for one in varies])
+    found = fleet.fly(many)
+    backwards = fleet.fly(jax.tree.map(lambda leaf: leaf[::-1], many))
+    general = in_lanes.Fleet(run, plan, [False] * len(leaves)).fly(many)
+    alone = in_lanes.Fleet(run, plan, [not one for one in varies], lanes=1)
+    for i in range(11):
+        single = alone.fly(jax.tree.map(lambda leaf, i=i: leaf[i : i + 1], many))
+        same = lambda a, b, i=i: np.testing.assert_array_equal(a[0], b[i])
+        jax.tree.map(same, (single.accumulated, single.series), (found.accumulated, found.series))
+    pair = lambda one: (one.accumulated, one.series)
+    jax.tree.map(lambda a, b: np.testing.assert_array_equal(a[::-1], b), pair(backwards), pair(found))
+    jax.tree.map(np.testing.assert_array_equal, pair(general), pair(found))
+
+
+def test_a_run_that_diverges_ends_where_it_does_by_xla():
+    """Its last sound state is kept, and its end is told."""
+    loop, how = example("inverted_pendulum", 3.0)
+
+    how |= {"position": np.full(len(loop.plant.outputs), 3.0)}
+    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
+    assert found.status == int(wanted.status) != 0 and found.ended == float(wanted.ended)
+    np.testing.assert_allclose(found.samples.position[-1], wanted.samples.position[-1], rtol=1e-6)
