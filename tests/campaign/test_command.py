@@ -1,5 +1,6 @@
 """`undertow campaign` as it is typed: results, page, mistakes, kill -9, and a Dask cluster whose workers are killed."""
 
+import contextlib
 import json
 import os
 import re
@@ -11,10 +12,12 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
+from distributed import Client, LocalCluster
 
 from undertow.analysis.metrics import OVERALL
 from undertow.cli.main import run
-from undertow.studies.campaign.conduct import STORE
+from undertow.studies.campaign.conduct import STORE, conduct, prepare
+from undertow.studies.campaign.engines import by_dask
 
 TYPED = (sys.executable, "-W", "ignore", "-m", "undertow.cli.main")
 CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant.limit": [1e30]}
@@ -149,11 +152,6 @@ def test_kill_9_at_twenty_moments(campaign_file, tmp_path):
 
 def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
     """A real cluster of two processes; one of them dies after the first results."""
-    from distributed import Client, LocalCluster
-
-    from undertow.studies.campaign.conduct import conduct, prepare
-    from undertow.studies.campaign.engines import by_dask
-
     path = campaign_file(trials=200, chunk=20)
     assert run(["campaign", str(path), "--out", str(tmp_path / "whole")]) == 0
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
@@ -168,3 +166,42 @@ def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
         conduct(prepare(path), tmp_path / "cluster", lambda f, work: by_dask(f, work, client), watch)
     assert seen[-1] == 200 and len(seen) == 11  # no task twice
     assert contents(tmp_path / "cluster") == contents(tmp_path / "whole")
+
+
+def test_a_dead_scheduler_loses_nothing(campaign_file, tmp_path):
+    """A scheduler in a process of its own is killed after the first results; the rest is flown without it."""
+    path, out, file = campaign_file(trials=200, chunk=20), tmp_path / "cluster", tmp_path / "scheduler.json"
+    assert run(["campaign", str(path), "--out", str(tmp_path / "whole")]) == 0
+    with contextlib.ExitStack() as stack:
+        process = lambda *words: stack.enter_context(
+            started(sys.executable, "-m", *words, "--scheduler-file", str(file))
+        )
+        scheduler = process("distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard")
+        waited = time.monotonic() + 60
+        while not file.exists() and time.monotonic() < waited:
+            time.sleep(0.1)
+        process("distributed.cli.dask_worker", "--nworkers", "1", "--nthreads", "1", "--no-dashboard", "--no-nanny")
+        client = stack.enter_context(Client(json.loads(file.read_text())["address"], timeout=60))
+        client.wait_for_workers(1, timeout=60)
+        seen = []
+
+        def watch(done, total, failed):
+            seen.append(done)
+            if len(seen) == 3:
+                scheduler.kill()
+
+        with pytest.raises(OSError, match="Dask cluster is gone"):
+            conduct(prepare(path), out, lambda f, work: by_dask(f, work, client), watch)
+    assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
+    assert contents(out) == contents(tmp_path / "whole")
+
+
+@contextlib.contextmanager
+def started(*words):
+    """A process that does not outlive its use."""
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()

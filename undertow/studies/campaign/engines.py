@@ -48,6 +48,7 @@ def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any)
     """
     from distributed import as_completed
     from distributed.client import FutureCancelledError
+    from distributed.comm import CommClosedError
 
     waiting = enumerate(work)
     ahead = _AHEAD * max(1, sum(client.nthreads().values()))
@@ -63,7 +64,7 @@ def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any)
                 numbers[further] = i
                 done.add(further)
             yield number, result
-    except (FutureCancelledError, TimeoutError) as error:
+    except (FutureCancelledError, CommClosedError, TimeoutError) as error:
         raise OSError(f"the Dask cluster is gone ({error})") from error
     if numbers:
         raise OSError("the Dask cluster is gone")
