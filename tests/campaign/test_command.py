@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -194,6 +195,21 @@ def test_a_dead_scheduler_loses_nothing(campaign_file, tmp_path):
             conduct(prepare(path), out, lambda f, work: by_dask(f, work, client), watch)
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
     assert contents(out) == contents(tmp_path / "whole")
+
+
+@pytest.mark.slurm
+def test_slurm(campaign_file, tmp_path, monkeypatch):
+    """A real SLURM of one machine: `--cluster slurm` as it is typed, two jobs of one worker each."""
+    script, folder = Path(__file__).with_name("slurm.sh"), tmp_path / "slurm"
+    subprocess.run([script, "start", folder], check=True)
+    monkeypatch.setenv("SLURM_CONF", str(folder / "slurm.conf"))
+    path = campaign_file(trials=200, chunk=20)
+    try:
+        assert typed(path, tmp_path / "cluster", "--cluster", "slurm", "--workers", "2", cwd=tmp_path).wait() == 0
+    finally:
+        subprocess.run([script, "stop", folder], check=True)
+    assert run(["campaign", str(path), "--out", str(tmp_path / "whole")]) == 0
+    assert contents(tmp_path / "cluster") == contents(tmp_path / "whole")
 
 
 @contextlib.contextmanager

@@ -111,12 +111,11 @@ def _started(kind: str, workers: int) -> Any:
             raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
         return SSHCluster([hosts[0], *hosts])
     if kind == "slurm":
-        try:
-            from dask_jobqueue import SLURMCluster  # pyright: ignore[reportMissingImports]
-        except ImportError:
-            hint = "pip install dask-jobqueue"
-            raise BadInput("--cluster", "have dask-jobqueue installed", "not", hint=hint) from None
-        found = SLURMCluster()
+        from dask import config
+        from dask_jobqueue import SLURMCluster
+
+        told = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
+        found = SLURMCluster(cores=told("cores", 1), memory=told("memory", "2 GB"))
         found.scale(jobs=workers)
         return found
     raise BadInput("--cluster", f"be one of {', '.join(CLUSTERS)}, or an address", kind)
