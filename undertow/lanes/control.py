@@ -71,7 +71,7 @@ def _while(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: E
 
 def _scan(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Evaluate) -> list[Nodes]:
     """Written out; where it is long and only carries, a loop."""
-    constants, carried = params["num_consts"], params["num_carry"]
+    constants, carried = _counts(params)
     fixed, carry, rows = given[:constants], given[constants:][:carried], given[constants + carried :]
     rounds, body = params["length"], params["jaxpr"]
     if rounds > _ROUNDS:
@@ -93,6 +93,14 @@ def _scan(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Ev
         stacks.append(results[carried:])
     stacks = stacks[::-1] if params["reverse"] else stacks
     return [*carry, *(np.stack(column) for column in zip(*stacks, strict=True))]
+
+
+def _counts(params: dict[str, Any]) -> tuple[int, int]:
+    """How many arguments of a scan are constants, and how many are carried; told differently since JAX 0.12."""
+    if "ft_in" in params:
+        constants, carried, _ = map(len, params["ft_in"].unpack())
+        return constants, carried
+    return params["num_consts"], params["num_carry"]
 
 
 RULES: dict[str, Callable[..., list[Nodes]]] = {"cond": _cond, "scan": _scan, "while": _while}

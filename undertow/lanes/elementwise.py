@@ -88,6 +88,7 @@ _FORMULAS: dict[str, Callable[..., Scalar]] = {
     "sign": _sign,
     "not": _not,
     "square": lambda x: x * x,
+    "one_minus_square": lambda x: 1.0 - x * x,
     "rsqrt": lambda x: 1.0 / x.apply("sqrt"),
     "is_finite": lambda x: abs(x) < float("inf"),
     "select_n": _select,

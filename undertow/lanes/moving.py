@@ -37,5 +37,6 @@ RULES: dict[str, Callable[[list[np.ndarray], dict[str, Any], Any], Any]] = {
     "transpose": lambda given, params, out: given[0].transpose(params["permutation"]),
     "concatenate": lambda given, params, out: np.concatenate(given, axis=params["dimension"]),
     "stack": lambda given, params, out: np.stack(given, axis=params["axis"]),
+    "unstack": lambda given, params, out: list(np.moveaxis(given[0], params["axis"], 0)),
     "rev": lambda given, params, out: np.flip(given[0], params["dimensions"]),
 }

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import Any
 
+import jax
 import numpy as np
 from jax.extend.core import ClosedJaxpr, Literal
 
@@ -60,6 +61,8 @@ def _results(graph: Graph, equation: Any, given: list[Nodes]) -> Sequence[Nodes]
         return control.RULES[name](graph, given, params, evaluate)
     if name in _CALLS:
         return evaluate(graph, _called(params), given)
+    if name == "call_hi_primitive":
+        return evaluate(graph, _expanded(params["_prim"]), given)
     out = equation.outvars[0].aval
     if name in moving.RULES:
         moved = moving.RULES[name](given, params, out)
@@ -87,6 +90,12 @@ def _called(params: dict[str, Any]) -> ClosedJaxpr:
     """What an equation calls."""
     (called,) = (params[key] for key in ("jaxpr", "call_jaxpr", "fun_jaxpr") if key in params)
     return called if isinstance(called, ClosedJaxpr) else ClosedJaxpr(called, ())
+
+
+def _expanded(primitive: Any) -> ClosedJaxpr:
+    """What a primitive of primitives does; JAX has some since 0.12."""
+    whole = lambda *flat: primitive.expand(*jax.tree.unflatten(primitive.in_tree, flat))
+    return jax.make_jaxpr(whole)(*primitive.in_avals_flat)
 
 
 def _filled(shape: Sequence[int], nodes: list[int]) -> Nodes:
