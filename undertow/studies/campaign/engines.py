@@ -48,7 +48,7 @@ def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any)
     """
     from distributed import as_completed
     from distributed.client import FutureCancelledError
-    from distributed.comm import CommClosedError
+    from distributed.comm.core import CommClosedError
 
     waiting = enumerate(work)
     ahead = _AHEAD * max(1, sum(client.nthreads().values()))
@@ -112,7 +112,7 @@ def _started(kind: str, workers: int) -> Any:
         return SSHCluster([hosts[0], *hosts])
     if kind == "slurm":
         from dask import config
-        from dask_jobqueue import SLURMCluster
+        from dask_jobqueue.slurm import SLURMCluster
 
         told = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
         found = SLURMCluster(cores=told("cores", 1), memory=told("memory", "2 GB"))
