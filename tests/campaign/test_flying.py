@@ -1,5 +1,7 @@
 """Lanes: the same figures as one run at a time, whoever flies beside; failures stay where they are."""
 
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import jax
@@ -104,3 +106,14 @@ def test_series_are_those_of_the_runs(campaign):
     key = jax.random.PRNGKey(built.scenario.seed)
     run = simulate(built.closed_loop, duration=2.0, dt=0.02, key=key, record_every=25)
     np.testing.assert_allclose(found["series:position"][1], run.samples.position, rtol=1e-9, atol=1e-12)
+
+
+def test_single_precision(campaign):
+    """In a process of its own, as precision is a matter of the process; without noise, which is drawn differently."""
+    scenario = campaign()["scenario"] | {"sensor": "perfect"}
+    single = prepared(campaign(scenario=scenario | {"precision": "float32"})).text
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        found = pool.submit(fly, single, "", range(9)).result()
+    wanted = columns(campaign(scenario=scenario), range(9))
+    assert found["tracking_rms"].dtype == np.float32 and wanted["tracking_rms"].dtype == np.float64
+    np.testing.assert_allclose(found["tracking_rms"], wanted["tracking_rms"], rtol=1e-4)
