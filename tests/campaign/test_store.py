@@ -141,3 +141,11 @@ def test_two_do_not_write_at_once(small, tmp_path):
 def test_a_row_is_less_than_a_kilobyte(campaign_file, tmp_path):
     whole = flown(campaign_file(trials=500, chunk=250), tmp_path / "large")
     assert sum(map(len, whole.values())) / 500 < 300
+
+
+def test_what_a_killed_process_left_is_cleared_away(small, tmp_path):
+    path, whole = small
+    flown(path, tmp_path / "again")
+    left = next((tmp_path / "again" / STORE).rglob("c")) / "0.0123456789abcdef.partial"
+    left.write_bytes(b"half")
+    assert flown(path, tmp_path / "again") == whole

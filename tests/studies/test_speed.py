@@ -44,6 +44,7 @@ def test_bench(capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["tracking_rms"] == pytest.approx(0.004312, abs=1e-6)
     assert found["single_times_numpy"] == pytest.approx(found["numpy_ns"] / found["single_ns"], rel=1e-4)
+    assert found["first_cold_s"] > found["first_kept_s"] > 0
     assert found["batch_float64_ns"] < found["single_ns"] < found["numpy_ns"]
     assert run(["bench"]) == 0
     assert "plain NumPy" in capsys.readouterr().out

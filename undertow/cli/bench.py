@@ -43,6 +43,8 @@ def bench(as_json: bool) -> int:
     console.print(table)
     compiling = f"lanes {found['single_compile_s']:.2g} s, XLA {found['single_xla_compile_s']:.2g} s"
     console.print(f"Made ready in: {compiling}. Tracking rms {found['tracking_rms']:.6f}.", highlight=False)
+    first = f"{found['first_cold_s']:.2g} s, {found['first_kept_s']:.2g} s with compiled code from before"
+    console.print(f"From the start of a process to its first result: {first}.", highlight=False)
     return DONE
 
 

@@ -45,6 +45,8 @@ class Store:
         self._trials, self._chunk = trials, chunk
         path.mkdir(parents=True, exist_ok=True)
         self._lock = _locked(path)
+        for left in path.rglob("*.partial"):  # by a process that was killed while zarr wrote a file
+            left.unlink()
         self._group = zarr.open_group(path, mode="a")
         if _DONE in self._group:
             self._chunk = _same(dict(self._group.attrs), dict(attributes), path.parent)

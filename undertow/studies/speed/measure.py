@@ -1,6 +1,9 @@
 """Times of workload W1, taken one after another on one machine, so that their ratios mean something."""
 
 import os
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -37,7 +40,9 @@ def measure(watch: Watch) -> dict[str, Any]:
     """
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     found: dict[str, Any] = {"ticks": TICKS, "threads": threads, "lanes": lanes_of(64)}
-    watch("one run, in lanes", 0.0)
+    watch("first results", 0.0)
+    found["first_cold_s"], found["first_kept_s"] = _first_results()
+    watch("one run, in lanes", 0.1)
     run = workload.one()
     single, found["single_compile_s"] = _timed(lambda: workload.fleet(run, lanes=1))
     numbers = workload.alone(run)
@@ -54,6 +59,16 @@ def measure(watch: Watch) -> dict[str, Any]:
     found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
     watch("", 1.0)
     return found
+
+
+def _first_results() -> tuple[float, float]:
+    """Seconds from the start of a process to its first result: without compiled code from before, and with it."""
+    with tempfile.TemporaryDirectory() as folder:
+        settings = {**os.environ, "UNDERTOW_CACHE": folder}
+        settings.pop("JAX_COMPILATION_CACHE_DIR", None)
+        command = [sys.executable, "-W", "ignore", "-m", "undertow.studies.speed.first"]
+        work = lambda: subprocess.run(command, env=settings, check=True, capture_output=True)
+        return _timed(work)[1], _timed(work)[1]
 
 
 def _by_xla(run: Run) -> dict[str, float]:

@@ -1,0 +1,18 @@
+"""What a new process does until it has its first result: python -m undertow.studies.speed.first"""
+
+from undertow.lanes.cache import keep_xla_code
+
+keep_xla_code()
+
+from undertow.scenario.execute import execute
+from undertow.studies.paper.setup import scenario
+
+
+def main() -> None:
+    """Run W1 and print its tracking rms."""
+    steady = execute(scenario("W1", rung="electromechanical", composite=20.0, loop={"kind": "sampled"})).steady
+    print(steady and steady["tracking_rms"])
+
+
+if __name__ == "__main__":
+    main()
