@@ -9,7 +9,8 @@ import numpy as np
 from undertow.lanes.batches import batched
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import Graph
-from undertow.lanes.scalarise import Nodes, evaluate, nodes_of
+from undertow.lanes.nodes import Nodes, filled
+from undertow.lanes.scalarise import evaluate, nodes_of
 from undertow.lanes.tracing import Traced
 
 # Operations; to draw what needs more of them (a spectrum of waves) is left to XLA.
@@ -73,6 +74,6 @@ def inputs(graph: Graph, kind: str, leaves: list[Any]) -> list[Nodes]:
     for leaf in leaves:
         size = int(np.prod(leaf.shape))
         nodes = [graph.input((kind, slot + i), str(leaf.dtype)) for i in range(size)]
-        several.append(np.array(nodes, dtype=np.int64).reshape(leaf.shape))
+        several.append(filled(leaf.shape, nodes))
         slot += size
     return several

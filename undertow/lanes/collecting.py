@@ -10,13 +10,9 @@ import numpy as np
 from undertow.lanes import elementwise
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import Graph, Node
+from undertow.lanes.nodes import Nodes, filled
 
-Nodes = np.ndarray
 Rule = Callable[[Graph, list[Nodes], dict[str, Any], Any], Nodes]
-
-
-def _filled(shape: Sequence[int], nodes: list[Node]) -> Nodes:
-    return np.array(nodes, dtype=np.int64).reshape(shape)
 
 
 def _two(graph: Graph, name: str) -> Callable[[Node, Node], Node]:
@@ -33,7 +29,7 @@ def _reduction(name: str, nothing: float) -> Rule:
         if not count:
             return np.full(out.shape, graph.constant(nothing, str(out.dtype)))
         rows = given[0].transpose([*kept, *axes]).reshape(-1, count).tolist()
-        return _filled(out.shape, [reduce(_two(graph, name), row) for row in rows])
+        return filled(out.shape, [reduce(_two(graph, name), row) for row in rows])
 
     return rule
 
@@ -43,7 +39,7 @@ def _running(name: str) -> Rule:
         lines = np.moveaxis(given[0], params["axis"], -1)
         way = slice(None, None, -1) if params["reverse"] else slice(None)
         rows = lines[..., way].reshape(-1, lines.shape[-1]).tolist()
-        found = _filled(lines.shape, [list(accumulate(row, _two(graph, name))) for row in rows])  # type: ignore[misc]
+        found = filled(lines.shape, [node for row in rows for node in accumulate(row, _two(graph, name))])
         return np.moveaxis(found[..., way], -1, params["axis"])
 
     return rule
@@ -63,7 +59,7 @@ def _place(name: str) -> Rule:
                 better = graph.apply(name, node, best)
                 best, place = graph.apply("select", better, node, best), graph.apply("select", better, here, place)
             places.append(place)
-        return _filled(out.shape, places)
+        return filled(out.shape, places)
 
     return rule
 
@@ -84,7 +80,7 @@ def _dot(graph: Graph, given: list[Nodes], params: dict[str, Any], out: Any) -> 
         for one in ones
         for other in others
     ]
-    return _filled(out.shape, sums)
+    return filled(out.shape, sums)
 
 
 def _iota(graph: Graph, given: list[Nodes], params: dict[str, Any], out: Any) -> Nodes:

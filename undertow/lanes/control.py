@@ -10,8 +10,8 @@ import numpy as np
 from undertow.lanes import elementwise, regions
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import BOOL, Graph, Node
+from undertow.lanes.nodes import Nodes, filled, flat
 
-Nodes = np.ndarray
 Evaluate = Callable[[Graph, Any, Sequence[Nodes]], list[Nodes]]
 
 # A loop of at most so many rounds is written out.
@@ -21,15 +21,11 @@ _ROUNDS = 64
 _WORTH = 300
 
 
-def _flat(several: Sequence[Nodes]) -> list[Node]:
-    return [node for nodes in several for node in nodes.ravel().tolist()]
-
-
-def _shaped(flat: Sequence[Node], like: Sequence[Any]) -> list[Nodes]:
+def _shaped(nodes: Sequence[Node], like: Sequence[Any]) -> list[Nodes]:
     """Arrays of the shapes of others."""
     ends = np.cumsum([0, *(int(np.prod(other.shape)) for other in like)]).tolist()
     parts = zip(pairwise(ends), like, strict=True)
-    return [np.array(flat[first:last], dtype=np.int64).reshape(other.shape) for (first, last), other in parts]
+    return [filled(other.shape, nodes[first:last]) for (first, last), other in parts]
 
 
 def _cond(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Evaluate) -> list[Nodes]:
@@ -41,7 +37,7 @@ def _cond(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Ev
         return evaluate(graph, params["branches"][int(known)], rest)
     cases = [_case(graph, index, i, branch, rest, evaluate) for i, branch in enumerate(params["branches"])]
     choose = partial(elementwise.rule("select_n", {}, ""), graph, index)  # pyright: ignore[reportArgumentType]
-    return _shaped([choose(*row) for row in zip(*map(_flat, cases), strict=True)], cases[0])
+    return _shaped([choose(*row) for row in zip(*map(flat, cases), strict=True)], cases[0])
 
 
 def _case(graph: Graph, index: Node, number: int, branch: Any, rest: list[Nodes], evaluate: Evaluate) -> list[Nodes]:
@@ -53,8 +49,8 @@ def _case(graph: Graph, index: Node, number: int, branch: Any, rest: list[Nodes]
         here = index if number else graph.apply("xor", index, graph.constant(True, BOOL))
     else:
         here = graph.apply("eq", index, graph.like(number, index))
-    body = lambda inner: _flat(evaluate(graph, branch, _shaped(inner, rest)))
-    return _shaped(regions.branch(graph, here, _flat(rest), body), plain)
+    body = lambda inner: flat(evaluate(graph, branch, _shaped(inner, rest)))
+    return _shaped(regions.branch(graph, here, flat(rest), body), plain)
 
 
 def _while(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Evaluate) -> list[Nodes]:
@@ -65,8 +61,8 @@ def _while(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: E
         (going,) = evaluate(graph, params["cond_jaxpr"], [*of_test, *_shaped(inner, carry)])
         return int(going)
 
-    body = lambda inner: _flat(evaluate(graph, params["body_jaxpr"], [*of_body, *_shaped(inner, carry)]))
-    return _shaped(regions.repeated(graph, _flat(carry), test, body), carry)
+    body = lambda inner: flat(evaluate(graph, params["body_jaxpr"], [*of_body, *_shaped(inner, carry)]))
+    return _shaped(regions.repeated(graph, flat(carry), test, body), carry)
 
 
 def _scan(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Evaluate) -> list[Nodes]:
@@ -83,9 +79,9 @@ def _scan(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Ev
         def step(inner: list[Node]) -> list[Node]:
             count, *now = _shaped(inner, [counter, *carry])
             following = graph.apply("add", int(count), graph.like(1, int(count)))
-            return [following, *_flat(evaluate(graph, body, [*fixed, *now]))]
+            return [following, *flat(evaluate(graph, body, [*fixed, *now]))]
 
-        return _shaped(regions.repeated(graph, _flat([counter, *carry]), more, step)[1:], carry)
+        return _shaped(regions.repeated(graph, flat([counter, *carry]), more, step)[1:], carry)
     stacks = []
     for i in reversed(range(rounds)) if params["reverse"] else range(rounds):
         results = evaluate(graph, body, [*fixed, *carry, *(row[i] for row in rows)])

@@ -7,8 +7,7 @@ import numpy as np
 
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import Graph, Node
-
-Nodes = np.ndarray
+from undertow.lanes.nodes import Nodes, filled
 
 # More places than these would be too many instructions.
 _PLACES = 128
@@ -16,7 +15,7 @@ _PLACES = 128
 
 def _choice(graph: Graph, which: Node, one: Nodes, other: Nodes) -> Nodes:
     pairs = zip(one.ravel().tolist(), np.broadcast_to(other, one.shape).ravel().tolist(), strict=True)
-    return np.array([graph.apply("select", which, a, b) for a, b in pairs], dtype=np.int64).reshape(one.shape)
+    return filled(one.shape, [graph.apply("select", which, a, b) for a, b in pairs])
 
 
 def _known(graph: Graph, start: Node, last: int) -> int | None:

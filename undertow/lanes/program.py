@@ -14,7 +14,8 @@ from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import I64
 from undertow.lanes.machine import Code, lanes_of
 from undertow.lanes.memory import Layout
-from undertow.lanes.scalarise import Nodes, evaluate
+from undertow.lanes.nodes import flat
+from undertow.lanes.scalarise import evaluate
 from undertow.lanes.tracing import Traced
 
 # Operations; machine code of a longer program would take minutes to make.
@@ -69,7 +70,7 @@ class Program:
         lanes = lanes or lanes_of(8 * np.dtype(number.dtype).itemsize)
         several = (self._beginning.inputs, begun.leaves, self._look.leaves)
         self._numbers_layout, self._carry_layout, self._look_layout = (Layout(leaves, lanes) for leaves in several)
-        self._code = Code(assembly(graph, Sections(*map(_flat, (first, ticked, looked))), lanes))
+        self._code = Code(assembly(graph, Sections(*map(flat, (first, ticked, looked))), lanes))
 
     def run(self, numbers: Any, ticks: int, every: int = 0) -> tuple[Any, Any]:
         """Run it.
@@ -91,7 +92,3 @@ class Program:
             self._code.run(*(memory[group].ctypes.data for memory in (given, carry, series)), ticks, every)
         final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
         return self._tick.whole(final), self._look.whole(self._look_layout.unpacked(series, runs))
-
-
-def _flat(several: list[Nodes]) -> list[int]:
-    return [int(node) for nodes in several for node in nodes.ravel()]

@@ -11,18 +11,16 @@ from jax.extend.core import ClosedJaxpr, Literal
 from undertow.lanes import collecting, control, elementwise, indexing, moving, threefry
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import Graph
+from undertow.lanes.nodes import Nodes, filled
 
 # Primitives that only call another function.
 _CALLS = ("jit", "pjit", "closed_call", "core_call", "checkpoint", "custom_jvp_call", "custom_vjp_call")
-
-# Arrays of nodes, one for each scalar of an array.
-Nodes = np.ndarray
 
 
 def nodes_of(graph: Graph, values: Any) -> Nodes:
     """Constants."""
     values = np.asarray(values)
-    return _filled(values.shape, [graph.constant(value, str(values.dtype)) for value in values.ravel()])
+    return filled(values.shape, [graph.constant(value, str(values.dtype)) for value in values.ravel()])
 
 
 def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float = inf) -> list[Nodes]:
@@ -76,7 +74,7 @@ def _results(graph: Graph, equation: Any, given: list[Nodes]) -> Sequence[Nodes]
     if rule is None:
         raise Unsupported(name)
     rows = zip(*(np.broadcast_to(nodes, out.shape).ravel().tolist() for nodes in given), strict=True)
-    return [_filled(out.shape, [rule(graph, *row) for row in rows])]
+    return [filled(out.shape, [rule(graph, *row) for row in rows])]
 
 
 def _random(graph: Graph, name: str, given: list[Nodes], params: dict[str, Any]) -> Nodes:
@@ -96,7 +94,3 @@ def _expanded(primitive: Any) -> ClosedJaxpr:
     """What a primitive of primitives does; JAX has some since 0.12."""
     whole = lambda *flat: primitive.expand(*jax.tree.unflatten(primitive.in_tree, flat))
     return jax.make_jaxpr(whole)(*primitive.in_avals_flat)
-
-
-def _filled(shape: Sequence[int], nodes: list[int]) -> Nodes:
-    return np.array(nodes, dtype=np.int64).reshape(shape)

@@ -23,7 +23,7 @@ def one() -> Run:
 
 
 def constant(run: Run) -> list[bool]:
-    """Which of its numbers are the same in `several`: all but those that `drawn` changes."""
+    """Which of its numbers are the same in `several`: all but where they start."""
     return [leaf is not run.start[0] for leaf in jax.tree.leaves(run) if eqx.is_array(leaf)]
 
 
