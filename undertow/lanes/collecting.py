@@ -15,10 +15,6 @@ from undertow.lanes.nodes import Nodes, filled
 Rule = Callable[[Graph, list[Nodes], dict[str, Any], Any], Nodes]
 
 
-def _two(graph: Graph, name: str) -> Callable[[Node, Node], Node]:
-    return partial(elementwise.rule(name, {}, ""), graph)  # pyright: ignore[reportArgumentType]  (there is such a rule)
-
-
 def _reduction(name: str, nothing: float) -> Rule:
     """Entries along some axes; `nothing` is what none of them give."""
 
@@ -29,7 +25,7 @@ def _reduction(name: str, nothing: float) -> Rule:
         if not count:
             return np.full(out.shape, graph.constant(nothing, str(out.dtype)))
         rows = given[0].transpose([*kept, *axes]).reshape(-1, count).tolist()
-        return filled(out.shape, [reduce(_two(graph, name), row) for row in rows])
+        return filled(out.shape, [reduce(elementwise.on(graph, name), row) for row in rows])
 
     return rule
 
@@ -39,7 +35,7 @@ def _running(name: str) -> Rule:
         lines = np.moveaxis(given[0], params["axis"], -1)
         way = slice(None, None, -1) if params["reverse"] else slice(None)
         rows = lines[..., way].reshape(-1, lines.shape[-1]).tolist()
-        found = filled(lines.shape, [node for row in rows for node in accumulate(row, _two(graph, name))])
+        found = filled(lines.shape, [node for row in rows for node in accumulate(row, elementwise.on(graph, name))])
         return np.moveaxis(found[..., way], -1, params["axis"])
 
     return rule

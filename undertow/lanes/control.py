@@ -36,7 +36,7 @@ def _cond(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Ev
     if known is not None:
         return evaluate(graph, params["branches"][int(known)], rest)
     cases = [_case(graph, index, i, branch, rest, evaluate) for i, branch in enumerate(params["branches"])]
-    choose = partial(elementwise.rule("select_n", {}, ""), graph, index)  # pyright: ignore[reportArgumentType]
+    choose = partial(elementwise.on(graph, "select_n"), index)
     return _shaped([choose(*row) for row in zip(*map(flat, cases), strict=True)], cases[0])
 
 

@@ -1,11 +1,11 @@
 """JAX's primitives that work entry by entry, on scalars."""
 
 from collections.abc import Callable
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 from undertow.lanes import functions
-from undertow.lanes.graph import BOOL, Node
+from undertow.lanes.graph import BOOL, Graph, Node
 from undertow.lanes.inverse_error import erf_inv
 from undertow.lanes.scalar import Scalar, larger, smaller, where
 
@@ -31,6 +31,13 @@ def rule(name: str, params: dict[str, Any], dtype: str) -> Rule | None:
     if name == "integer_pow":
         return lambda graph, node: _integer_power(Scalar(graph, node), params["y"]).node
     return None
+
+
+def on(graph: Graph, name: str) -> Rule:
+    """The rule of a primitive that has one and needs no parameters, on a graph."""
+    found = rule(name, {}, "")
+    assert found is not None, name
+    return partial(found, graph)
 
 
 def _sign(x: Scalar) -> Scalar:
