@@ -15,9 +15,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from undertow.lanes.cache import keep_xla_code
+from undertow.process import prepare
 
-keep_xla_code()
+prepare()
 
 from undertow.scenario.reading import dump
 from undertow.studies.campaign import task

@@ -1,8 +1,8 @@
 """Strict arithmetic for every test: double precision, no silent broadcasting of ranks, no silent promotion of types."""
 
-from undertow.lanes.cache import keep_xla_code  # isort: skip  (before JAX is imported)
+from undertow.process import prepare  # isort: skip  (before JAX is imported)
 
-keep_xla_code()
+prepare()
 
 from undertow.core import runtime  # isort: skip  (sets up JAX before anything else touches it)
 

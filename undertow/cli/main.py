@@ -11,7 +11,7 @@ import typer
 
 from undertow.cli.exit_codes import INTERRUPTED, run_guarded
 from undertow.cli.interruptible import remember_interrupts
-from undertow.lanes.cache import keep_xla_code
+from undertow.process import prepare
 
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
 
@@ -234,7 +234,7 @@ def main() -> None:
     if not os.environ.get("UNDERTOW_TRACEBACK"):
         warnings.simplefilter("ignore")
     remember_interrupts()
-    keep_xla_code()
+    prepare()
     code = run(sys.argv[1:])
     if code == INTERRUPTED:  # a compiled loop may still be running in its thread; nothing can stop it gently
         sys.stdout.flush()

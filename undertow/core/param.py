@@ -73,7 +73,10 @@ def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]
 
 
 def _to_array(value: Any) -> Any:
-    return value if isinstance(value, jax.Array) else jnp.asarray(value, dtype=float)
+    if isinstance(value, jax.Array):
+        return value
+    made_of_arrays = any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value))
+    return jnp.asarray(value if made_of_arrays else np.asarray(value, dtype=float), dtype=float)  # numpy: no XLA
 
 
 def _freeze(sources: Mapping[str, str] | tuple) -> tuple:

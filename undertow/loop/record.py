@@ -39,18 +39,26 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant, controller: AbstractContr
         dims = {None: ("time",), "rule": ("time", "axis", "rule")}.get(dimension, ("time", dimension))
         rates = ", ".join(f"{u}{rate}" for u in dict.fromkeys(units))
         shown = rates if "axis" in dims else rate or plant.input_unit
-        variables[name] = (dims, values, {"long_name": meaning, "units": shown})
+        variables[name] = series(dims, values, meaning, shown)
     columns = plant.columns() | controller.columns()
     for name, values in outcome.samples.books.items():
         meaning, unit = columns[name]
-        variables[name] = (("time",), np.asarray(values), {"long_name": meaning, "units": unit})
+        variables[name] = series(("time",), np.asarray(values), meaning, unit)
     status = Status(int(outcome.status))
+    axis = series(("axis",), np.array(plant.outputs), "output")
+    axis.attrs["unit_of_each"] = ", ".join(units)
     return xr.Dataset(
         variables,
         coords={
-            "time": ("time", np.asarray(outcome.time), {"units": "s", "long_name": "time"}),
-            "axis": ("axis", list(plant.outputs), {"long_name": "output", "unit_of_each": ", ".join(units)}),
-            "input": ("input", np.arange(1, plant.inputs() + 1), {"long_name": "input"}),
+            "time": series(("time",), np.asarray(outcome.time), "time", "s"),
+            "axis": axis,
+            "input": series(("input",), np.arange(1, plant.inputs() + 1), "input"),
         },
         attrs={"status": status.word, "status_sentence": status.sentence, "ended": float(outcome.ended)},
     )
+
+
+def series(dimensions: tuple[str, ...], values: np.ndarray, meaning: str, unit: str | None = None) -> xr.Variable:
+    """One variable of a dataset; as a plain array, without xarray asking (and importing) dask whether it is one."""
+    units = {} if unit is None else {"units": unit}
+    return xr.Variable(dimensions, values, {"long_name": meaning, **units}, fastpath=True)

@@ -1,6 +1,7 @@
 """The vehicle together with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -168,21 +169,29 @@ class HybridVehicle(AbstractPlant):
             raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{told.inputs()}")
         if regularisation is not None:
             checks.positive("regularisation", regularisation)
-        still = self.thruster.report(self.thruster.initial_state(self.inputs()))
-        if speed_sensor and still is None:  # thrusters without a speed to measure complain here, not in the loop
-            self.thruster.speed_term(still)
-        alpha = jnp.broadcast_to(self.thruster.voltage_gain(), (self.inputs(),))
+        if speed_sensor:
+            still = self.thruster.report(self.thruster.initial_state(self.inputs()))
+            if still is None:  # thrusters without a speed to measure complain here, not in the loop
+                self.thruster.speed_term(still)
+        gain, allocation = _static(told.body.inverse_mass_matrix, told.thruster_matrix, self.thruster.voltage_gain())
         return HybridModel(
             body=told.body,
             thruster=self.thruster,
             thruster_matrix=told.thruster_matrix,
-            body_gain=told.body.inverse_mass_matrix @ told.thruster_matrix * alpha,
-            allocation=jnp.linalg.pinv(told.thruster_matrix * alpha),
+            body_gain=gain,
+            allocation=allocation,
             rank=told.rank(),
             regularisation=regularisation,
             speed_sensor=speed_sensor,
             rate_term=rate_term,
         )
+
+
+@jax.jit
+def _static(inverse_mass, thruster_matrix, voltage_gain):
+    """What volts do to a body at rest, and the volts of least norm for a wrench; voltage gain of all or of each."""
+    per_volt = thruster_matrix * voltage_gain
+    return inverse_mass @ per_volt, jnp.linalg.pinv(per_volt)
 
 
 def hybrid_vehicle(

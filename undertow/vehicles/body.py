@@ -1,6 +1,7 @@
 """Rigid body in water: M, C(nu) nu, D(nu) nu and g of Eq. (2), in the form of Fossen (2021), ch. 3, 6 and 8."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -67,6 +68,7 @@ class Body(eqx.Module):
         return -(self.weight - self.buoyancy) * position[2] - (lever * down).sum()
 
 
+@jax.jit
 def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> Matrix6:
     """M_RB about the body origin. Fossen (2021), Eq. (3.49).
 

@@ -1,6 +1,7 @@
 """A vehicle as data: published numbers with their sources, and what follows from them."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -74,8 +75,7 @@ class Vehicle(eqx.Module):
 
     def thruster_matrix(self) -> Float[Array, "6 N"]:
         """B of Eq. (6) from the thruster poses: column j is (e_j, r_j x e_j)."""
-        moments = jnp.cross(self.thruster_positions, self.thruster_directions)
-        return jnp.concatenate([self.thruster_directions, moments], axis=1).T
+        return _columns(self.thruster_positions, self.thruster_directions)
 
     def body(self) -> Body:
         """Coefficients of the equation of motion."""
@@ -109,3 +109,8 @@ class Vehicle(eqx.Module):
             self,
             (self.thruster_positions[index], self.thruster_directions[index]),
         )
+
+
+@jax.jit
+def _columns(positions: Float[Array, "N 3"], directions: Float[Array, "N 3"]) -> Float[Array, "6 N"]:
+    return jnp.concatenate([directions, jnp.cross(positions, directions)], axis=1).T

@@ -11,6 +11,7 @@ from undertow.analysis.certificate.hypotheses import Hypothesis
 from undertow.controllers.law import RCAF
 from undertow.controllers.robust.law import RobustRCAF
 from undertow.core.contracts import AbstractController
+from undertow.loop.record import series
 
 # V rises where it grows by more than this share of its largest value.
 _RISE = 1e-10
@@ -76,10 +77,7 @@ def _signals(function: Lyapunov, rate: np.ndarray) -> dict[str, xr.Variable]:
         "lyapunov_estimation": ("its part that eps and the weights make", function.estimation, _UNITS),
         "lyapunov_rate": ("its mean rate since the record before", rate, "m^2/s^3, rad^2/s^3"),
     }
-    return {
-        name: xr.Variable("time", values, {"long_name": meaning, "units": units})
-        for name, (meaning, values, units) in described.items()
-    }
+    return {name: series(("time",), values, meaning, units) for name, (meaning, values, units) in described.items()}
 
 
 def _rate(value: np.ndarray, time: np.ndarray) -> np.ndarray:

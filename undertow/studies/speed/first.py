@@ -1,8 +1,8 @@
 """What a new process does until it has its first result: python -m undertow.studies.speed.first"""
 
-from undertow.lanes.cache import keep_xla_code
+from undertow.process import prepare
 
-keep_xla_code()
+prepare()
 
 from undertow.scenario.execute import execute
 from undertow.studies.paper.setup import scenario

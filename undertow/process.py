@@ -1,0 +1,43 @@
+"""Set-up of a process that is undertow's own: the command line, a test run, a benchmark. Imports no JAX."""
+
+import atexit
+import gc
+import hashlib
+import os
+import platform
+from pathlib import Path
+
+from undertow.lanes.cache import cache_folder
+
+# Objects before the youngest are looked through. Tracing makes millions that live: Python's 700 cost half a second.
+_YOUNG, _MIDDLE, _OLD = 50_000, 20, 100
+
+
+def prepare() -> None:
+    """Keep compiled code from one process to the next, and look for garbage seldom; before JAX is imported."""
+    keep_xla_code()
+    gc.set_threshold(_YOUNG, _MIDDLE, _OLD)
+    atexit.register(gc.freeze)  # or Python looks through everything once more before it goes: half a second
+
+
+def keep_xla_code() -> None:
+    """Let XLA keep its code, unless JAX was told of a place already.
+
+    The code is for one kind of processor: machines that share a home folder have a folder each.
+    """
+    folder = cache_folder() / f"xla-{_processor()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "0")
+
+
+def _processor() -> str:
+    try:
+        features = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags"))
+    except (OSError, StopIteration):
+        features = platform.processor()
+    return hashlib.sha256(f"{platform.machine()} {features}".encode()).hexdigest()[:12]
