@@ -15,9 +15,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from undertow.process import prepare
+from undertow import process
 
-prepare()
+process.prepare()
 
 from undertow.scenario.reading import dump
 from undertow.studies.campaign import task

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -116,7 +117,8 @@ def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):
 
 def typed(path, out, *options, **settings):
     arguments = [*TYPED, "campaign", str(path), "--out", str(out), *options]
-    return subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **settings)
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return subprocess.Popen(arguments, **(quiet | settings))
 
 
 def killed(path, out, kills, longest):
@@ -206,6 +208,26 @@ def test_slurm(campaign_file, tmp_path, monkeypatch):
     path = campaign_file(trials=200, chunk=20)
     try:
         assert typed(path, tmp_path / "cluster", "--cluster", "slurm", "--workers", "2", cwd=tmp_path).wait() == 0
+    finally:
+        subprocess.run([script, "stop", folder], check=True)
+    assert run(["campaign", str(path), "--out", str(tmp_path / "whole")]) == 0
+    assert contents(tmp_path / "cluster") == contents(tmp_path / "whole")
+
+
+@pytest.mark.ssh
+def test_ssh(campaign_file, tmp_path):
+    """A real SSH server on this machine: `--cluster ssh` as it is typed, two workers; and who is not let in."""
+    script, folder = Path(__file__).with_name("sshd.sh"), tmp_path / "ssh"
+    subprocess.run([script, "start", folder], check=True)
+    path = campaign_file(trials=200, chunk=20)
+    start = partial(typed, path, tmp_path / "cluster", "--cluster", "ssh", "--workers", "2")
+    known = {**os.environ, "HOME": str(folder), "UNDERTOW_HOSTS": "127.0.0.1"}
+    try:
+        stranger = start(env={**known, "HOME": str(tmp_path)}, stderr=subprocess.PIPE)
+        complaint = stranger.communicate()[1].decode()
+        assert stranger.returncode == 2 and not (tmp_path / "cluster" / STORE).exists()
+        assert re.fullmatch(r"Error: `UNDERTOW_HOSTS` must be hosts that let us in, but is 127.0.0.1: .*\n", complaint)
+        assert start(env=known).wait() == 0
     finally:
         subprocess.run([script, "stop", folder], check=True)
     assert run(["campaign", str(path), "--out", str(tmp_path / "whole")]) == 0

@@ -34,6 +34,7 @@ KINDS = (
 Part = Callable[..., Any]
 
 
+@functools.cache
 def collect(package: ModuleType) -> dict[str, Part]:
     """Parts that the modules of a package define, by name."""
     parts = {}

@@ -1,5 +1,6 @@
 """Building parts from their descriptions: a part's own signature says what may be given."""
 
+import functools
 import inspect
 import typing
 from collections.abc import Callable, Mapping, Sequence
@@ -106,12 +107,12 @@ def call(
     Raises:
         BadInput: unknown, missing or mistyped option, or the function's own complaint.
     """
-    signature = list(inspect.signature(function).parameters.items())[len(given) :]
-    known = {name: parameter for name, parameter in signature if parameter.kind not in _VARIABLE}
+    declared = _declared_once if inspect.isfunction(function) else _declared
+    signature, hints = declared(function)
+    known = {name: option for name, option in signature[len(given) :] if option.kind not in _VARIABLE}
     for key in options:
         if key not in known:
             raise BadInput(key, "be an option here", "unknown", hint=did_you_mean(key, known) if known else "")
-    hints = typing.get_type_hints(function)
     arguments, resolved = {}, {}
     for name, parameter in known.items():
         if name in INNER:
@@ -185,6 +186,14 @@ def _title(contract: Any) -> str:
 
 def _sized(shape: tuple[int, ...]) -> str:
     return {0: "be one number", 1: f"be a list of {sum(shape)} numbers"}.get(len(shape), f"have shape {shape}")
+
+
+def _declared(function: Callable[..., Any]) -> tuple[list[tuple[str, inspect.Parameter]], dict[str, Any]]:
+    """Options of a function, and their annotations."""
+    return list(inspect.signature(function).parameters.items()), typing.get_type_hints(function)
+
+
+_declared_once = functools.cache(_declared)  # of thousands of trials; methods are of parts that come and go
 
 
 def _made(make: Callable[[], Any]) -> Any:

@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
@@ -77,7 +78,7 @@ def cluster(kind: str, workers: int) -> Iterator[Any]:
     Args:
         kind: local, slurm, ssh (hosts in the environment variable UNDERTOW_HOSTS, separated by commas), or an address
             such as tcp://10.0.0.1:8786.
-        workers: how many are started.
+        workers: how many are started; on each host where they are several.
 
     Raises:
         BadInput: Dask is not installed, or no such cluster can be reached.
@@ -104,12 +105,7 @@ def _started(kind: str, workers: int) -> Any:
 
         return LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
     if kind == "ssh":
-        from distributed import SSHCluster
-
-        hosts = os.environ.get("UNDERTOW_HOSTS", "").split(",")
-        if hosts == [""]:
-            raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
-        return SSHCluster([hosts[0], *hosts])
+        return _over_ssh(os.environ.get("UNDERTOW_HOSTS", ""), workers)
     if kind == "slurm":
         from dask import config
         from dask_jobqueue.slurm import SLURMCluster
@@ -119,3 +115,19 @@ def _started(kind: str, workers: int) -> Any:
         found.scale(jobs=workers)
         return found
     raise BadInput("--cluster", f"be one of {', '.join(CLUSTERS)}, or an address", kind)
+
+
+def _over_ssh(names: str, workers: int) -> Any:
+    from asyncssh import Error
+    from distributed import SSHCluster
+
+    hosts = [name.strip() for name in names.split(",") if name.strip()]
+    if not hosts:
+        raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
+    logging.getLogger("distributed.deploy").setLevel(logging.ERROR)  # what goes wrong is said once, below
+    try:
+        return SSHCluster([hosts[0], *hosts], worker_options={"nthreads": 1, "n_workers": workers})
+    except (OSError, Error, RuntimeError) as error:
+        reason = error.__cause__ or error
+        hint = "`ssh HOST` must work without a question"
+        raise BadInput("UNDERTOW_HOSTS", "be hosts that let us in", f"{names}: {reason}", hint=hint) from None
