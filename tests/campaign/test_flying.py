@@ -7,8 +7,11 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
+from lanes.emulated_gpu import EmulatedGpu
 
 from undertow.analysis.metrics import Metrics, results
+from undertow.lanes import nvidia
+from undertow.lanes.cuda import Driver
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
@@ -50,6 +53,21 @@ def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, engine):
         pieces = [columns(two, rows) for rows in reversed(tasks)][::-1]
         for name, expected in at_once.items():
             np.testing.assert_array_equal(np.concatenate([piece[name] for piece in pieces]), expected, err_msg=name)
+
+
+def test_a_gpu_changes_no_bit(campaign, monkeypatch):
+    """Trials of two laws in tasks of 50, by a GPU that this processor stands in for."""
+    two = campaign(cross={"controller": [{"kind": "pid", "frequency": 2.0}, {"kind": "rcaf", "preset": "robust"}]})
+    tasks = [range(0, 50), range(50, 80)]
+    found = [columns(two, rows) for rows in tasks]
+    emulated = EmulatedGpu()
+    monkeypatch.setattr(nvidia, "ptx", lambda assembly, generation: assembly)
+    monkeypatch.setattr(nvidia, "gpu", lambda: Driver(emulated))
+    site.cache_clear()
+    for rows, expected in zip(tasks, found, strict=True):
+        jax.tree.map(np.testing.assert_array_equal, columns(two, rows), expected)
+    site.cache_clear()
+    assert len(emulated.launches) == 3 and not emulated.buffers
 
 
 def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):

@@ -6,8 +6,11 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
+from lanes.emulated_gpu import EmulatedGpu
 
 from undertow.cli.main import run
+from undertow.lanes import nvidia
+from undertow.lanes.cuda import Driver
 from undertow.loop import sampled
 from undertow.loop.in_lanes import Fleet
 from undertow.studies.speed import measure, plain_numpy, workload
@@ -33,9 +36,13 @@ def test_runs_of_a_batch_start_from_different_places():
     assert rms[4] == pytest.approx(workload.tracking(wanted.accumulated), rel=1e-9)
 
 
-def test_what_a_gpu_would_do():
-    """The program that is measured on a GPU, a narrow one here."""
-    assert measure.vmapped_ns(workload.one(), runs=3, ticks=5) > 0
+def test_what_a_gpu_would_do(monkeypatch):
+    """What is measured on a GPU: by `jax.vmap`, a narrow program here, and by threads, for which this processor stands in."""
+    one = workload.one()
+    assert measure.vmapped_ns(one, runs=3, ticks=5) > 0
+    monkeypatch.setattr(nvidia, "ptx", lambda assembly, generation: assembly)
+    found = measure.on_gpu(one, Driver(EmulatedGpu()), runs=40, ticks=5)
+    assert found["ns"] > 0 and found["ticks_per_second"] == pytest.approx(1e9 / found["ns"])
 
 
 @pytest.mark.slow

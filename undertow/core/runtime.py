@@ -4,6 +4,8 @@ Imported first by `undertow.core`; must run before JAX touches a device to have 
 """
 
 import os
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
 
 import jax
 
@@ -25,6 +27,14 @@ def configure() -> None:
 def use_single_precision() -> None:
     """Build and run everything made from now on in float32 (meant for large campaigns on a GPU)."""
     jax.config.update("jax_enable_x64", False)
+
+
+def on_processor() -> AbstractContextManager[Any]:
+    """What JAX does inside, it does on this machine's processor: thousands of small things, slow on a GPU."""
+    try:
+        return jax.default_device(jax.devices("cpu")[0])
+    except RuntimeError:  # JAX_PLATFORMS leaves it out
+        return nullcontext()
 
 
 configure()

@@ -24,10 +24,31 @@ class Sections(NamedTuple):
     look: Sequence[Node]
 
 
-# Arguments: numbers, carry and series in their slots; ticks in all; ticks between looks, 0 for none.
-_FRAME = """\
-define void @run(ptr noalias %numbers, ptr noalias %carry, ptr noalias %series, i64 %ticks, i64 %every) {{
+class Head(NamedTuple):
+    """How a program begins: from its arguments to %numbers, %carry and %series in their slots, %ticks, %every.
+
+    Attributes:
+        text: up to block `begin`; may leave by block `end`.
+        place: where in %row, the slots of one look, a thread finds its own.
+        threads: whether every lane is a thread; a vector otherwise holds all lanes.
+        functions: what it calls.
+    """
+
+    text: str
+    place: str = ""
+    threads: bool = False
+    functions: tuple[str, ...] = ()
+
+
+# Arguments: numbers, carry and series; ticks in all; ticks between looks, 0 for none.
+VECTORS = Head("""\
+define void @run(ptr noalias %numbers, ptr noalias %carry, ptr noalias %series, i64 %ticks, i64 %every) {
 entry:
+  br label %begin""")
+
+_FRAME = """\
+{head}
+begin:
 {start}
   br label %started
 started:
@@ -38,6 +59,7 @@ straight:
 look:
   %first = phi i64 [ 0, %started ], [ %next, %after ]
   %row = phi ptr [ %series, %started ], [ %later, %after ]
+{place}
 {look}
   %nextrow = getelementptr i8, ptr %row, i64 {row}
   %then = add i64 %first, %every
@@ -64,15 +86,17 @@ end:
 """
 
 
-def assembly(graph: Graph, sections: Sections, lanes: int) -> str:
+def assembly(graph: Graph, sections: Sections, lanes: int, head: Head = VECTORS) -> str:
     """LLVM's assembly of a program.
 
     Args:
         graph: with inputs ("number", slot), ("carry", slot) and TICK.
         sections: what it stores.
-        lanes: entries of a vector.
+        lanes: runs side by side in memory.
+        head: how it begins.
     """
-    emitter = Emitter(graph, lanes)
+    emitter = Emitter(graph, lanes, 1 if head.threads else lanes)
+    emitter.functions.update(head.functions)
     fixed, needed = _fixed(graph), graph.needed([*sections.start, *sections.tick, *sections.look])
     start = Section(emitter, "s", tick="0")
     start.do([node for node, same in enumerate(fixed) if same and needed[node]])
@@ -86,7 +110,7 @@ def assembly(graph: Graph, sections: Sections, lanes: int) -> str:
         section.store(wanted, base)
         texts[name] = emitter.taken()
     row, functions = len(sections.look) * SLOT * lanes, "\n".join(sorted(emitter.functions))
-    return _FRAME.format(**texts, row=row, functions=functions)
+    return _FRAME.format(head=head.text, place=head.place, **texts, row=row, functions=functions)
 
 
 def _fixed(graph: Graph) -> list[bool]:

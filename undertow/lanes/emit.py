@@ -61,18 +61,19 @@ class Emitter:
 
     Args:
         graph: what they compute.
-        lanes: entries of a vector.
+        lanes: runs side by side in memory.
+        width: of them in one vector: all, or 1 where each has a thread of its own.
     """
 
-    def __init__(self, graph: Graph, lanes: int):
-        self.graph, self.lanes = graph, lanes
+    def __init__(self, graph: Graph, lanes: int, width: int):
+        self.graph, self.width, self._lanes = graph, width, lanes
         self.lines: list[str] = []
         self.functions: set[str] = set()
-        self.block = "entry"
+        self.block = "begin"
 
     def vector(self, dtype: str) -> str:
         """LLVM's name of a vector of a type."""
-        return f"<{self.lanes} x {_TYPES[dtype]}>"
+        return f"<{self.width} x {_TYPES[dtype]}>"
 
     def taken(self) -> str:
         """The lines so far; the next ones begin anew."""
@@ -92,8 +93,8 @@ class Emitter:
     def fork(self, test: str, block: str, otherwise: str, name: str) -> None:
         """Go on in a block where a truth holds in any lane, else in another one."""
         kind = self.vector(BOOL)
-        self.functions.add(f"declare i1 @llvm.vector.reduce.or.v{self.lanes}i1({kind})")
-        self.line(f"call i1 @llvm.vector.reduce.or.v{self.lanes}i1({kind} {test})", f"%{name}")
+        self.functions.add(f"declare i1 @llvm.vector.reduce.or.v{self.width}i1({kind})")
+        self.line(f"call i1 @llvm.vector.reduce.or.v{self.width}i1({kind} {test})", f"%{name}")
         self.lines.append(f"  br i1 %{name}, label %{block}, label %{otherwise}")
         self.label(block)
 
@@ -115,9 +116,9 @@ class Emitter:
     def load(self, base: str, slot: int, dtype: str, name: str) -> str:
         """What lies in a slot."""
         stored = I64 if dtype == BOOL else dtype
-        self._place(base, slot, name)
+        place = self._place(base, slot, stored, name)
         kept = name if stored == dtype else f"{name}w"
-        self.line(f"load {self.vector(stored)}, ptr {name}p, align {SLOT * self.lanes}", kept)
+        self.line(f"load {self.vector(stored)}, {place}", kept)
         return kept if kept == name else self.line(f"trunc {self.vector(I64)} {kept} to {self.vector(BOOL)}", name)
 
     def store(self, value: str, dtype: str, base: str, slot: int, name: str) -> None:
@@ -125,11 +126,15 @@ class Emitter:
         stored = I64 if dtype == BOOL else dtype
         if stored != dtype:
             value = self.line(f"zext {self.vector(dtype)} {value} to {self.vector(stored)}", f"{name}w")
-        self._place(base, slot, name)
-        self.lines.append(f"  store {self.vector(stored)} {value}, ptr {name}p, align {SLOT * self.lanes}")
+        place = self._place(base, slot, stored, name)
+        self.lines.append(f"  store {self.vector(stored)} {value}, {place}")
 
-    def _place(self, base: str, slot: int, name: str) -> None:
-        self.line(f"getelementptr i8, ptr {base}, i64 {slot * SLOT * self.lanes}", f"{name}p")
+    def _place(self, base: str, slot: int, dtype: str, name: str) -> str:
+        """Where the numbers of a slot lie; a thread finds its own beyond a base of its own."""
+        size = np.dtype(dtype).itemsize
+        base, align = (base, SLOT * self.width) if self.width == self._lanes else (f"{base}{size}", size)
+        self.line(f"getelementptr i8, ptr {base}, i64 {slot * SLOT * self._lanes}", f"{name}p")
+        return f"ptr {name}p, align {align}"
 
     def operation(self, node: Node, operands: Sequence[str], name: str) -> None:
         """Do what a node says."""
@@ -144,7 +149,7 @@ class Emitter:
         else:
             templates = _FLOATS if before.startswith("float") else _INTEGERS
             signed = before.startswith("int")
-            short = f"v{self.lanes}f{before[5:]}"
+            short = f"v{self.width}f{before[5:]}"
             words = {"T": self.vector(before), "N": short, "s": "s" if signed else "u"}
             text = templates[what].format(*operands, shift="ashr" if signed else "lshr", **words)
             if text.startswith("call"):
@@ -157,7 +162,7 @@ class Emitter:
         wider = np.dtype(dtype).itemsize - (0 if before == BOOL else np.dtype(before).itemsize)
         if from_float and not to_float:  # out of range it gives the nearest
             sign = "s" if dtype.startswith("int") else "u"
-            call = f"llvm.fpto{sign}i.sat.v{self.lanes}{_TYPES[dtype]}.v{self.lanes}f{before[5:]}"
+            call = f"llvm.fpto{sign}i.sat.v{self.width}{_TYPES[dtype]}.v{self.width}f{before[5:]}"
             self.functions.add(f"declare {self.vector(dtype)} @{call}({self.vector(before)})")
             self.line(f"call {self.vector(dtype)} @{call}({self.vector(before)} {operand})", name)
             return
@@ -187,4 +192,4 @@ class Emitter:
         """A number of the program in every lane."""
         kind = self.vector(dtype)
         self.line(f"insertelement {kind} poison, {_TYPES[dtype]} {scalar}, i64 0", f"{name}s")
-        return self.line(f"shufflevector {kind} {name}s, {kind} poison, <{self.lanes} x i32> zeroinitializer", name)
+        return self.line(f"shufflevector {kind} {name}s, {kind} poison, <{self.width} x i32> zeroinitializer", name)

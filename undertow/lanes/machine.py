@@ -1,14 +1,13 @@
-"""Machine code for this processor, kept from one process to the next."""
+"""Machine code for this processor."""
 
 import ctypes
-import hashlib
-import os
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from llvmlite import binding
 
-from undertow.lanes.cache import cache_folder
+from undertow.lanes.cache import kept
 
 # Arguments of a program: numbers, carry, series; ticks, ticks between looks.
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
@@ -25,7 +24,12 @@ class Code:
         self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
         self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly)))
         self._engine.finalize_object()
-        self.run: Callable[..., None] = _SIGNATURE(self._engine.get_function_address("run"))
+        self._run: Callable[..., None] = _SIGNATURE(self._engine.get_function_address("run"))
+
+    def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, ticks: int, every: int) -> None:
+        """Run it for every group of lanes; memories as `memory.Layout` makes them."""
+        for group in range(len(numbers)):
+            self._run(*(memory[group].ctypes.data for memory in (numbers, carry, series)), ticks, every)
 
 
 def lanes_of(bits: int) -> int:
@@ -44,21 +48,10 @@ def _target() -> Any:
 
 
 def _object(assembly: str) -> bytes:
-    """Machine code, from an earlier process where there is some."""
+    def make() -> bytes:
+        module = binding.parse_assembly(assembly)
+        module.verify()
+        return _target().emit_object(module)
+
     told = (assembly, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten(), binding.llvm_version_info)
-    kept = cache_folder() / f"{hashlib.sha256(repr(told).encode()).hexdigest()}.o"
-    try:
-        return kept.read_bytes()
-    except OSError:
-        pass
-    module = binding.parse_assembly(assembly)
-    module.verify()
-    made = _target().emit_object(module)
-    try:  # a cache that cannot be written is none
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        part = kept.with_suffix(f".{os.getpid()}")
-        part.write_bytes(made)
-        part.replace(kept)
-    except OSError:
-        pass
-    return made
+    return kept(told, ".o", make)

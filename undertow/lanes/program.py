@@ -8,8 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.lanes import nvidia
 from undertow.lanes.assembly import TICK, Sections, assembly
 from undertow.lanes.beginning import Beginning, inputs
+from undertow.lanes.cuda import Driver
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import I64
 from undertow.lanes.machine import Code, lanes_of
@@ -23,7 +25,7 @@ _MOST = 200_000
 
 
 class Program:
-    """Start, ticks and looks, compiled for vector registers.
+    """Start, ticks and looks, compiled for vector registers or for a GPU.
 
     Args:
         draw: numbers -> all that is known from then on.
@@ -33,9 +35,11 @@ class Program:
         numbers: of one run; a tree of arrays.
         constant: which leaves of `numbers` are the same in every run; they make the program short.
         lanes: runs at once; as many as fit a register unless given. No result depends on it.
+        driver: of the GPU that is to run it; None for this processor. No result depends on it.
 
     Raises:
         Unsupported: a function needs something that lanes cannot do.
+        OSError: the GPU's driver fails.
     """
 
     def __init__(
@@ -47,6 +51,7 @@ class Program:
         numbers: Any,
         constant: list[bool],
         lanes: int = 0,
+        driver: Driver | None = None,
     ):
         drawn = Traced(draw, numbers)
         self._beginning = Beginning(drawn, numbers, constant)
@@ -67,10 +72,15 @@ class Program:
             raise Unsupported("a carry that changes its type")
         ticked, looked = (evaluate(graph, traced.closed, given, _MOST) for traced in (self._tick, self._look))
 
-        lanes = lanes or lanes_of(8 * np.dtype(number.dtype).itemsize)
+        sections = Sections(*map(flat, (first, ticked, looked)))
+        if driver is None:
+            lanes = lanes or lanes_of(8 * np.dtype(number.dtype).itemsize)
+            self._code = Code(assembly(graph, sections, lanes))
+        else:
+            lanes = nvidia.LANES
+            self._code = nvidia.Kernel(assembly(graph, sections, lanes, nvidia.THREADS), driver)
         several = (self._beginning.inputs, begun.leaves, self._look.leaves)
         self._numbers_layout, self._carry_layout, self._look_layout = (Layout(leaves, lanes) for leaves in several)
-        self._code = Code(assembly(graph, Sections(*map(flat, (first, ticked, looked))), lanes))
 
     def run(self, numbers: Any, ticks: int, every: int = 0) -> tuple[Any, Any]:
         """Run it.
@@ -88,7 +98,6 @@ class Program:
         given = self._numbers_layout.packed(self._beginning.packed(numbers), runs)
         carry = self._carry_layout.memory(len(given))
         series = self._look_layout.memory(len(given), ticks // every + 1 if every else 0)
-        for group in range(len(given)):
-            self._code.run(*(memory[group].ctypes.data for memory in (given, carry, series)), ticks, every)
+        self._code.run(given, carry, series, ticks, every)
         final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
         return self._tick.whole(final), self._look.whole(self._look_layout.unpacked(series, runs))

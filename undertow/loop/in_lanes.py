@@ -13,6 +13,7 @@ from jaxtyping import PRNGKeyArray
 
 from undertow.core.contracts import Outputs
 from undertow.core.status import Status
+from undertow.lanes.cuda import Driver
 from undertow.lanes.program import Program
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop, Sample
@@ -68,12 +69,14 @@ class Fleet:
         plan: how they are run.
         constant: which arrays of `run` are the same for all, in the order of its leaves; they make the program short.
         lanes: runs at once; as many as fit a register unless given.
+        driver: of the GPU that flies them; None for this processor.
 
     Raises:
         Unsupported: a part needs something that lanes cannot do.
+        OSError: the GPU's driver fails.
     """
 
-    def __init__(self, run: Run, plan: Plan, constant: list[bool], lanes: int = 0):
+    def __init__(self, run: Run, plan: Plan, constant: list[bool], lanes: int = 0, driver: Driver | None = None):
         numbers, rest = eqx.partition(run, eqx.is_array)
         self._plan = plan
         step, dt = METHODS[plan.method], plan.dt
@@ -95,7 +98,7 @@ class Fleet:
             sample = known[0].look(t, *carry[0])
             return t, {name: getattr(sample, name) for name in plan.signals}
 
-        self._program = Program(draw, start, tick, look, numbers, constant, lanes)
+        self._program = Program(draw, start, tick, look, numbers, constant, lanes, driver)
 
     def fly(self, numbers: Any) -> Ended:
         """Run them.

@@ -11,6 +11,7 @@ import numpy as np
 
 from undertow.analysis.metrics import OVERALL, Metrics, overall
 from undertow.core.status import Status
+from undertow.lanes import nvidia
 from undertow.lanes.errors import Unsupported
 from undertow.loop import in_lanes, vmapped
 from undertow.loop.in_lanes import Plan, Run
@@ -116,8 +117,9 @@ class Hangar:
 
 def _program(run: Run, kind: _Kind, constant: list[bool]) -> in_lanes.Fleet | vmapped.Fleet:
     if kind.engine == "lanes":
-        with contextlib.suppress(Unsupported):
-            return in_lanes.Fleet(run, kind.plan, constant)
+        for driver in dict.fromkeys((nvidia.gpu(), None)):
+            with contextlib.suppress(Unsupported):
+                return in_lanes.Fleet(run, kind.plan, constant, driver=driver)
     return vmapped.Fleet(run, kind.plan)
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import Text
@@ -45,7 +46,11 @@ def site(text: str, folder: str) -> Site:
 
 def fly(text: str, folder: str, rows: range) -> dict[str, np.ndarray]:
     """Columns of some trials: what differs between them, how they ended, and their metrics."""
-    here = site(text, folder)
+    with runtime.on_processor():
+        return _flown(site(text, folder), rows)
+
+
+def _flown(here: Site, rows: range) -> dict[str, np.ndarray]:
     asked = here.trials.campaign.series
     built = _built(here.trials, here.workshop, rows)
     columns = {f"vary:{key}": column for key, column in _columns(here.trials, rows)}

@@ -15,9 +15,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core import runtime
+from undertow.lanes import nvidia
+from undertow.lanes.cuda import Driver
 from undertow.lanes.machine import lanes_of
 from undertow.loop import sampled
-from undertow.loop.in_lanes import Run
+from undertow.loop.in_lanes import Fleet, Run
 from undertow.loop.vmapped import Fleet as Vmapped
 from undertow.studies.speed import plain_numpy, workload
 from undertow.studies.speed.workload import TICKS
@@ -42,14 +44,12 @@ def measure(watch: Watch) -> dict[str, Any]:
     found: dict[str, Any] = {"ticks": TICKS, "threads": threads, "lanes": lanes_of(64)}
     watch("first results", 0.0)
     found["first_cold_s"], found["first_kept_s"] = _first_results()
-    watch("one run, in lanes", 0.1)
-    run = workload.one()
-    single, found["single_compile_s"] = _timed(lambda: workload.fleet(run, lanes=1))
-    numbers = workload.alone(run)
-    found["single_ns"] = _shortest(lambda: single.fly(numbers)) / TICKS
-    found["tracking_rms"] = float(workload.tracking(single.fly(numbers).accumulated)[0])
-    watch("one run, by XLA", 0.2)
-    found |= _by_xla(run)
+    with runtime.on_processor():
+        watch("one run, in lanes", 0.1)
+        run = workload.one()
+        found |= _in_a_lane(run)
+        watch("one run, by XLA", 0.2)
+        found |= _by_xla(run)
     for i, kind in enumerate(("float64", "float32")):
         watch(f"many runs, {kind}", 0.4 + 0.2 * i)
         found |= _by_itself(_many, kind, threads)
@@ -69,6 +69,14 @@ def _first_results() -> tuple[float, float]:
         command = [sys.executable, "-W", "ignore", "-m", "undertow.studies.speed.first"]
         work = lambda: subprocess.run(command, env=settings, check=True, capture_output=True)
         return _timed(work)[1], _timed(work)[1]
+
+
+def _in_a_lane(run: Run) -> dict[str, float]:
+    single, compiling = _timed(lambda: workload.fleet(run, lanes=1))
+    numbers = workload.alone(run)
+    tracking = float(workload.tracking(single.fly(numbers).accumulated)[0])
+    each = _shortest(lambda: single.fly(numbers)) / TICKS
+    return {"single_compile_s": compiling, "single_ns": each, "tracking_rms": tracking}
 
 
 def _by_xla(run: Run) -> dict[str, float]:
@@ -93,10 +101,15 @@ def _many(kind: str, threads: int) -> dict[str, Any]:
     """Many runs in a precision, on this machine's processor and on its GPU if it has one."""
     if kind == "float32":
         runtime.use_single_precision()
-    run = workload.one()
-    found = {f"batch_{kind}_{key}": value for key, value in _batch(run, threads).items()}
+    with runtime.on_processor():
+        run = workload.one()
+        found = {f"batch_{kind}_{key}": value for key, value in _batch(run, threads).items()}
     if jax.default_backend() == "gpu":
-        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_ns": vmapped_ns(run, _ON_GPU, ticks=200)}
+        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(run, _ON_GPU, ticks=200)}
+    driver = nvidia.gpu()
+    if driver is not None:
+        by_threads = on_gpu(run, driver, _ON_GPU, TICKS)
+        found |= {f"gpu_{kind}_{key}": value for key, value in by_threads.items()}
     return found
 
 
@@ -111,6 +124,16 @@ def _batch(run: Run, threads: int) -> dict[str, float]:
 
     each = TICKS * _BATCH
     return {"compile_s": compiling, "one_thread_ns": together(1) / each, "ns": together(threads) / each}
+
+
+def on_gpu(run: Run, driver: Driver, runs: int, ticks: int) -> dict[str, float]:
+    """Many runs on a GPU, a thread each; copying to and fro is counted."""
+    program, compiling = _timed(
+        lambda: Fleet(run, workload.PLAN._replace(ticks=ticks), workload.constant(run), driver=driver)
+    )
+    numbers = workload.several(run, runs)
+    each = _shortest(lambda: program.fly(numbers), 3) / (ticks * runs)
+    return {"compile_s": compiling, "ns": each, "ticks_per_second": 1e9 / each}
 
 
 def vmapped_ns(run: Run, runs: int, ticks: int) -> float:
