@@ -32,13 +32,13 @@ class Hypothesis(NamedTuple):
 def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterator[Hypothesis]:
     """What both laws need; `bound` is theta_max of each axis, (n,)."""
     d = run["uncertainty"].values
-    told = [(run[f"measured_{name}"] == run[name]).values.all(-1) for name in ("position", "velocity")]
+    true = lambda name: (run[f"measured_{name}"].values == run[name].values).all(-1)
     yield Hypothesis("limits", "no input is at its limit", (run["saturated"].values == 0).all(-1))
     full = run["attained_share"].values >= 1 - ROUNDING
     yield Hypothesis("demand", "the command gives the whole wanted acceleration (sigma = 0)", full)
     unknown = "G depends on what actuators report"
     yield Hypothesis("rank", "G has full rank: every axis can be accelerated", _full_rank(law.model, run), unknown)
-    yield Hypothesis("measurement", "the measurement is the truth", told[0] & told[1])
+    yield Hypothesis("measurement", "the measurement is the truth", true("position") & true("velocity"))
     yield Hypothesis("weights", "no weight is at its bound (projection idle)", run["weights_at_bound"].values == 0)
     yield Hypothesis("box", "|d| is inside the box of the weights", (np.abs(d) <= bound).all(-1))
     yield Hypothesis("constant", "d is constant: theta* = d does not move", _constant(d))
