@@ -6,11 +6,24 @@ prepare()
 
 from undertow.core import runtime  # isort: skip  (sets up JAX before anything else touches it)
 
+import os
+
 import jax
 import pytest
 
 assert runtime
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+
+def pytest_configure(config):
+    """Quick tests compile far longer than they run: XLA need not try hard, unless XLA_FLAGS says so. It halves the time."""
+    flags, slow = os.environ.get("XLA_FLAGS", ""), config.getoption("-m") == "slow"
+    if "xla_backend_optimization_level" in flags or slow:
+        return
+    flags += " --xla_backend_optimization_level=0"
+    if jax.__version_info__ < (0, 11):  # later ones know no other emitters, and stop at a flag that they do not know
+        flags += " --xla_cpu_use_fusion_emitters=false"
+    os.environ["XLA_FLAGS"] = flags.strip()
 
 
 @pytest.fixture
