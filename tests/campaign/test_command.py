@@ -55,16 +55,20 @@ def test_what_it_leaves(campaign_file, tmp_path, capsys):
     assert "40 of 40 trials done" in capsys.readouterr().out
 
 
-def test_the_worst_trials_are_repeated_bit_for_bit(campaign_file, tmp_path):
+@pytest.mark.parametrize("duration", [2.0, 2.06])  # ends at a record, and between two
+def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_path, duration):
     """Metrics and series of a scenario file from `worst/`, run alone, are those of the lane that it flew in."""
-    out = tmp_path / "out"
-    path = campaign_file(series={"signals": ["position", "voltage"], "every": 0.1})
+    out, scenario = tmp_path / "out", campaign()["scenario"]
+    scenario["loop"]["duration"] = duration
+    path = campaign_file(scenario=scenario, series={"signals": ["position", "voltage"], "every": 0.1})
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     rows = xr.open_zarr(out / "trials.zarr", consolidated=False).load()
     for file in sorted((out / "worst").iterdir())[:2]:
         trial, again = int(file.stem.split("-")[1]), tmp_path / file.stem
         assert run(["simulate", str(file), "--no-prediction", "--out", str(again)]) == 0
-        steady = json.loads((again / "metrics.json").read_text())["steady"]
+        found = json.loads((again / "metrics.json").read_text())
+        steady = found["steady"]
+        assert found["ended"] == float(rows["ended"][trial]) == duration
         for name in OVERALL:
             assert steady[name] == float(rows[name][trial]), name
         series = xr.open_dataset(again / "run.nc")
@@ -91,6 +95,10 @@ def test_the_worst_trials_are_repeated_bit_for_bit(campaign_file, tmp_path):
             {"requirements": {"tracking": {"below": 1.0}}},
             r"`requirements.tracking` must be a metric, but is unknown. Did you mean",
         ),
+        (
+            {"series": {"every": 0.1}, "vary": {"loop.duration": {"uniform": [1.0, 2.0]}}},
+            r"`series` must be of runs of one length and sampling time, but is beside loop.duration, which differs",
+        ),
         ({"series": {"every": 0.03}}, r"`series.every` must be a whole number of sampling times \(0.02 s\)"),
     ],
 )
@@ -100,6 +108,41 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1 and re.search(said, complaint), complaint
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "cluster, said",
+    [
+        ("slurm", r"`--cluster` must find a SLURM that answers, but is sinfo: no configuration"),
+        ("ssh", r"`UNDERTOW_HOSTS` must name the hosts, separated by commas, but is not set"),
+        ("pbs", r"`--cluster` must be one of local, slurm, ssh, or an address, but is pbs"),
+    ],
+)
+def test_a_cluster_that_is_not_there_is_told(campaign_file, tmp_path, capsys, monkeypatch, cluster, said):
+    (tmp_path / "sinfo").write_text("#!/bin/sh\necho 'sinfo: no configuration' >&2; exit 1\n")
+    (tmp_path / "sinfo").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("UNDERTOW_HOSTS", raising=False)
+    assert run(["campaign", str(campaign_file()), "--out", str(tmp_path / "out"), "--cluster", cluster]) == 2
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1 and re.search(said, complaint), complaint
+    assert not (tmp_path / "out").exists()
+
+
+def test_trials_that_cannot_be_built_are_neither_worst_nor_a_failure_of_the_law(campaign_file, tmp_path, capsys):
+    """A frequency below zero is no controller: trials with one are counted apart."""
+    path, out = (
+        campaign_file(trials=12, vary={"controller.frequency": {"uniform": [-1.0, 2.0]}}, seed=5),
+        tmp_path / "out",
+    )
+    assert run(["campaign", str(path), "--out", str(out)]) == 1
+    found = json.loads((out / "summary.json").read_text())
+    rows = xr.open_zarr(out / STORE, consolidated=False).load()
+    flown = rows["status"].values == 0
+    assert 0 < found["status"]["refused"] == (~flown).sum() < 7
+    assert flown[found["worst"]].all() and len(found["worst"]) == 5
+    share = (rows["tracking_rms"].values[flown] < 0.2).mean()
+    assert found["combinations"][0]["requirements"][0]["kept"] == pytest.approx(share)
 
 
 def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):

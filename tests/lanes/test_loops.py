@@ -57,6 +57,20 @@ def test_examples_fly_as_they_do_by_xla(name):
     assert found.status == wanted.status == 0 and found.ended == float(wanted.ended)
 
 
+@pytest.mark.parametrize("every", [0, 10, 35, 70])
+def test_a_run_lasts_as_long_however_seldom_it_is_recorded(every):
+    """70 ticks, recorded at whole multiples of 35, 10, 70 or never: the same end and statistics by lanes and by XLA."""
+    loop, how = example("inverted_pendulum", 70 * 0.001)
+    how |= {"dt": 0.001, "duration": 0.07, "record_every": every or 0}
+    odd = how | {"record_every": 32}
+    for simulate in (in_lanes.simulate, sampled.simulate):
+        found, wanted = simulate(loop, **odd), simulate(loop, **how)
+        np.testing.assert_allclose(found.time, [0.0, 0.032, 0.064], rtol=1e-12)
+        assert found.ended == wanted.ended == pytest.approx(0.07)
+        close = lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-15)
+        jax.tree.map(close, (found.accumulated, found.final), (wanted.accumulated, wanted.final))
+
+
 def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     """Eleven runs from different places: in one fleet, backwards, one by one, and with nothing built in."""
     loop, how = example("inverted_pendulum")

@@ -57,19 +57,21 @@ started:
 straight:
   br label %tick
 look:
-  %first = phi i64 [ 0, %started ], [ %next, %after ]
-  %row = phi ptr [ %series, %started ], [ %later, %after ]
+  %first = phi i64 [ 0, %started ], [ %next, %paused ]
+  %row = phi ptr [ %series, %started ], [ %later, %paused ]
 {place}
 {look}
   %nextrow = getelementptr i8, ptr %row, i64 {row}
   %then = add i64 %first, %every
+  %early = icmp slt i64 %then, %ticks
+  %stop = select i1 %early, i64 %then, i64 %ticks
   %more = icmp slt i64 %first, %ticks
   br i1 %more, label %go, label %end
 go:
   br label %tick
 tick:
   %k = phi i64 [ 0, %straight ], [ %first, %go ], [ %next, %ticked ]
-  %until = phi i64 [ %ticks, %straight ], [ %then, %go ], [ %until, %ticked ]
+  %until = phi i64 [ %ticks, %straight ], [ %stop, %go ], [ %until, %ticked ]
   %later = phi ptr [ %series, %straight ], [ %nextrow, %go ], [ %later, %ticked ]
 {tick}
   br label %ticked
@@ -78,7 +80,11 @@ ticked:
   %again = icmp slt i64 %next, %until
   br i1 %again, label %tick, label %after
 after:
-  br i1 %looking, label %look, label %end
+  br i1 %looking, label %paused, label %end
+paused:
+  %over = urem i64 %next, %every
+  %whole = icmp eq i64 %over, 0
+  br i1 %whole, label %look, label %end
 end:
   ret void
 }}

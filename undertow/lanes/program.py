@@ -87,7 +87,7 @@ class Program:
 
         Args:
             numbers: as in the example, with a leading axis over runs.
-            ticks: how many; whole times `every`.
+            ticks: how many.
             every: ticks between looks, the first before the first tick; 0 for none.
 
         Returns:

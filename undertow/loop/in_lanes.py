@@ -107,7 +107,6 @@ class Fleet:
             numbers: arrays of the runs, as in `run`, with a leading axis over runs.
         """
         ticks, every = self._plan.ticks, self._plan.every
-        ticks -= ticks % every if every else 0
         carry, (time, series) = self._program.run(numbers, ticks, every)
         states, accumulated, status, ended = carry
         ended = np.where(status == int(Status.OK), ticks * self._plan.dt, ended)

@@ -15,19 +15,19 @@ from undertow.loop.outcome import health
 def record(
     drawn: Drawn, tick: Callable[[Any, Int[Array, ""]], Any], carry: Any, dt: Float[Array, ""], ticks: int, every: int
 ) -> tuple[Any, tuple[Float[Array, " records"], Sample]]:
-    """Run `ticks` ticks and look at every `every`-th instant, first and last included.
+    """Run `ticks` ticks and look at every `every`-th instant, the first included.
 
     Args:
         drawn: what is run.
         tick: carry and number of the tick -> carry one tick later.
         carry: what goes from tick to tick; the states (x, z, ...) first.
         dt: time between ticks, s.
-        ticks: how many; whole records.
+        ticks: how many.
         every: ticks per record.
     """
 
     def block(carry, first):
-        """Record, then run to the next record; the last block only records."""
+        """Record, then run to the next record, or to the end."""
         t, until = instant(first, dt), jnp.minimum(first + every, ticks)
         sample = drawn.look(t, *carry[0])
         return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), (t, sample)

@@ -47,7 +47,7 @@ def simulate(
 
     Args:
         loop: the five roles.
-        duration: s; rounded to whole records.
+        duration: s; rounded to whole ticks.
         dt: sampling time of the controller, s.
         key: for everything random; None for key 0.
         position, velocity: outputs at t = 0; None for zero.
@@ -89,7 +89,6 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
         blank = jax.eval_shape(drawn.look, dt, *carry[0])
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
     else:
-        ticks -= ticks % record_every
         carry, (time, samples) = record(drawn, one, carry, dt, ticks, record_every)
     final, gathered, status, ended = carry
     return Outcome(time, samples, gathered, final[:2], status, jnp.where(status == int(Status.OK), ticks * dt, ended))

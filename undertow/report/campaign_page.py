@@ -86,7 +86,9 @@ def _requirements(found: Mapping[str, Any]) -> list[Html]:
     if not rows:
         return []
     said = "Share of the trials that keep to it, with the exact interval of 95 % (Clopper and Pearson). A trial that "
-    said += "failed does not keep to it; `open` means that more trials are needed."
+    said += (
+        "failed does not keep to it, one whose scenario cannot be built is not counted; `open`: more trials are needed."
+    )
     head = ("required", "of", "share", "verdict")
     return [section("requirements", "Requirements", tag("p", prose(said)), table(head, rows, wide=True))]
 

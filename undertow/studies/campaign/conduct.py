@@ -59,6 +59,9 @@ def _check(campaign: Campaign, loop: Loop) -> None:
             raise BadInput(f"requirements.{name}", "be a metric", "unknown", hint=did_you_mean(name, OVERALL))
     if campaign.series is None:
         return
+    for key in (*campaign.vary, *campaign.cross):
+        if key.startswith("loop"):
+            raise BadInput("series", "be of runs of one length and sampling time", f"beside {key}, which differs")
     for i, name in enumerate(campaign.series.signals):
         checks.choice(f"series.signals[{i}]", name, [field for field in Sample._fields if field != "books"])
     if not whole_steps(campaign.series.every, loop.dt):

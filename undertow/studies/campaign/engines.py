@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import logging
 import os
+import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from typing import Any
@@ -107,13 +108,7 @@ def _started(kind: str, workers: int) -> Any:
     if kind == "ssh":
         return _over_ssh(os.environ.get("UNDERTOW_HOSTS", ""), workers)
     if kind == "slurm":
-        from dask import config
-        from dask_jobqueue.slurm import SLURMCluster
-
-        told = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
-        found = SLURMCluster(cores=told("cores", 1), memory=told("memory", "2 GB"))
-        found.scale(jobs=workers)
-        return found
+        return _in_slurm(workers)
     raise BadInput("--cluster", f"be one of {', '.join(CLUSTERS)}, or an address", kind)
 
 
@@ -131,3 +126,20 @@ def _over_ssh(names: str, workers: int) -> Any:
         reason = error.__cause__ or error
         hint = "`ssh HOST` must work without a question"
         raise BadInput("UNDERTOW_HOSTS", "be hosts that let us in", f"{names}: {reason}", hint=hint) from None
+
+
+def _in_slurm(workers: int) -> Any:
+    from dask import config
+    from dask_jobqueue.slurm import SLURMCluster
+
+    try:  # jobs that cannot be queued would be asked for again and again
+        subprocess.run(["sinfo", "--noheader"], check=True, capture_output=True, text=True)
+    except OSError as error:
+        raise BadInput("--cluster", "find a SLURM here", str(error)) from None
+    except subprocess.CalledProcessError as error:
+        said = error.stderr.strip().splitlines() or ["sinfo fails"]
+        raise BadInput("--cluster", "find a SLURM that answers", said[-1]) from None
+    told = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
+    found = SLURMCluster(cores=told("cores", 1), memory=told("memory", "2 GB"))
+    found.scale(jobs=workers)
+    return found

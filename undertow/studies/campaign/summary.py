@@ -96,9 +96,12 @@ def _combination(results: Results, number: int) -> dict[str, Any]:
 
 
 def _requirement(rows: xr.Dataset, name: str, wanted: Any) -> dict[str, Any]:
-    """Whether enough trials keep to it, with the exact interval of Clopper and Pearson (1934); failed trials do not."""
+    """Whether enough trials keep to it, with the exact interval of Clopper and Pearson (1934).
+
+    Trials that failed do not keep to it; those that were refused do not count.
+    """
     kept = int((rows[name].values < wanted.below).sum())
-    count = rows.sizes["trial"]
+    count = max(1, int((rows["status"].values != REFUSED).sum()))
     interval = binomtest(kept, count).proportion_ci(_CONFIDENCE, method="exact")
     verdict = "holds" if interval.low >= wanted.share else "fails" if interval.high < wanted.share else "open"
     return {
@@ -131,8 +134,8 @@ def _sensitivity(results: Results) -> dict[str, dict[str, float]]:
 
 
 def _worst(results: Results) -> np.ndarray:
-    """Trials that failed, the earliest first; then those with the largest error."""
-    rows = results.rows
+    """Trials that failed, the earliest first; then those with the largest error. What was refused was not flown."""
+    rows = results.rows.isel(trial=results.rows["status"].values != REFUSED)
     failed = rows["status"].values != int(Status.OK)
     error = np.where(failed, np.inf, rows[_RANKED_BY].values)
     order = np.lexsort((rows["ended"].values, -error))
