@@ -96,6 +96,23 @@ def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_
             r"`requirements.tracking` must be a metric, but is unknown. Did you mean",
         ),
         (
+            {"vary": {"": {"uniform": [1.0, 2.0]}}},
+            r"`vary` must be a key path such as plant.vehicle.mass .*, but is ''",
+        ),
+        ({"vary": {"controller..gain]": {"uniform": [1.0, 2.0]}}}, r"`vary` must be a key path .*'controller..gain\]'"),
+        (
+            {"vary": {"disturbance[0].amplitude": {"uniform": [1.0, 2.0]}}},
+            r"`disturbance\[0\].amplitude` must name an entry of a list only where there is a list, but is \[0\] of kind",
+        ),
+        (
+            {"vary": {"disturbance.amplitude": {"uniform": [3.0]}}},
+            r"`vary.disturbance.amplitude.uniform` must have at least 2 entries, but is \[3.0\]",
+        ),
+        (
+            {"requirements": {"tracking_rms": 0.1}},
+            r"`requirements.tracking_rms` must be a mapping of keys to values, but is 0.1",
+        ),
+        (
             {"series": {"every": 0.1}, "vary": {"loop.duration": {"uniform": [1.0, 2.0]}}},
             r"`series` must be of runs of one length and sampling time, but is beside loop.duration, which differs",
         ),
@@ -108,6 +125,19 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1 and re.search(said, complaint), complaint
     assert not (tmp_path / "out").exists()
+
+
+def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
+    path, out = campaign_file(trials=8, chunk=4), tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    before = contents(out)
+    torn = out / STORE / "tracking_rms" / "c" / "1"
+    torn.write_bytes(torn.read_bytes()[:-1] + b"?")
+    capsys.readouterr()
+    assert run(["campaign", "status", str(out)]) == 4
+    assert re.search(r"is damaged .* --resume` flies it again\n$", capsys.readouterr().err)
+    assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
+    assert contents(out) == before
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """What a scenario file may say. Validated before anything is built or compiled."""
 
+import re
 import typing
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, NamedTuple
@@ -176,12 +177,10 @@ def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scen
 def _must(error: Any) -> str:
     """pydantic's 'Input should be ...' in the house grammar."""
     message = error["msg"].replace("Input should be a valid ", "be a ").replace("Input should be ", "be ")
-    message = message.replace("Value error, ", "")
-    return (
-        message.replace("be a integer", "be an integer")
-        .replace("a dictionary", "a mapping of keys to values")
-        .replace(" or instance of Part", "")
-    )
+    message = message.replace("Value error, ", "").replace("Keys should be strings", "have words for keys")
+    message = re.sub(r"\w+ should have at (\w+) (\d+) items?.*", r"have at \1 \2 entries", message)
+    message = re.sub(r" or instance of \w+", "", message)
+    return message.replace("be a integer", "be an integer").replace("a dictionary", "a mapping of keys to values")
 
 
 def _keys_beside(path: tuple, model: Any) -> list[str]:

@@ -1,5 +1,6 @@
 """What a campaign file may say."""
 
+import re
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
@@ -7,6 +8,8 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import Text
 from undertow.scenario.schema import Strict, complaint
+
+_PATH = re.compile(r"[\w-]+(\.[\w-]+|\[\d+\])*")
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
@@ -98,6 +101,11 @@ def validate(text: Text) -> Campaign:
         found = Campaign.model_validate(text.data)
     except ValidationError as errors:
         raise complaint(errors, text, Campaign) from None
+    for section, keys in (("vary", found.vary), ("cross", found.cross)):
+        for key in keys:
+            if not _PATH.fullmatch(key):
+                must = "be a key path such as plant.vehicle.mass or initial.position[0]"
+                raise BadInput(section, must, repr(key), where=text.where((section, key)))
     for key in found.cross:
         if not found.cross[key]:
             raise BadInput(f"cross.{key}", "have an entry", where=text.where(("cross", key)))

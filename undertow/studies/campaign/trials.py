@@ -113,4 +113,6 @@ def _entry(node: Any, step: str | int, key: str) -> Any:
         raise BadInput(key, f"name one of the {len(node)} entries, 0 to {len(node) - 1}", f"[{step}]")
     if not isinstance(node, dict):
         raise BadInput(key, "lead to a key of the scenario", f"past {node!r}")
+    if isinstance(step, int):
+        raise BadInput(key, "name an entry of a list only where there is a list", f"[{step}] of {', '.join(node)}")
     return node.get(step)
