@@ -64,7 +64,7 @@ def test_no_two_trials_share_a_seed(campaign):
         ({"normal": [0.0, -1.0]}, "have a standard deviation that is not negative"),
         ({}, "have one of uniform, log_uniform, normal, choice"),
         ({"uniform": [0.0, 1.0], "normal": [0.0, 1.0]}, "have one of uniform"),
-        ({"uniform": [1.0]}, "at least 2 items"),
+        ({"uniform": [1.0]}, "at least 2 entries"),
         ({"unifrom": [0.0, 1.0]}, "be a key of the campaign"),
     ],
 )
