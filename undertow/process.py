@@ -15,12 +15,12 @@ _YOUNG, _MIDDLE, _OLD = 50_000, 20, 100
 
 def prepare() -> None:
     """Keep compiled code from one process to the next, and look for garbage seldom; before JAX is imported."""
-    keep_xla_code()
+    _keep_xla_code()
     gc.set_threshold(_YOUNG, _MIDDLE, _OLD)
     atexit.register(gc.freeze)  # or Python looks through everything once more before it goes: half a second
 
 
-def keep_xla_code() -> None:
+def _keep_xla_code() -> None:
     """Let XLA keep its code, unless JAX was told of a place already.
 
     The code is for one kind of processor: machines that share a home folder have a folder each.

@@ -70,8 +70,6 @@ def status(folder: Path) -> int:
         results = load(folder)
     except FileNotFoundError:
         raise BadInput("DIR", "be the folder of a campaign", str(folder)) from None
-    except RuntimeError as error:  # zarr's word for a chunk that is not what was written
-        raise OSError(f"{folder / STORE} is damaged ({error}); `undertow campaign --resume` flies it again") from error
     ended = endings(results)
     console = wide_console()
     console.print(f"{sum(ended.values())} of {results.total} trials done", highlight=False)

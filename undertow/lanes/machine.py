@@ -47,11 +47,13 @@ def _target() -> Any:
     return binding.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=2, jit=True)
 
 
-def _object(assembly: str) -> bytes:
-    def make() -> bytes:
-        module = binding.parse_assembly(assembly)
-        module.verify()
-        return _target().emit_object(module)
+def parsed(assembly: str) -> binding.ModuleRef:
+    """LLVM's module of an assembly, verified."""
+    module = binding.parse_assembly(assembly)
+    module.verify()
+    return module
 
+
+def _object(assembly: str) -> bytes:
     told = (assembly, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten(), binding.llvm_version_info)
-    return kept(told, ".o", make)
+    return kept(told, ".o", lambda: _target().emit_object(parsed(assembly)))

@@ -14,6 +14,7 @@ from undertow.lanes.assembly import Head
 from undertow.lanes.cache import kept
 from undertow.lanes.cuda import Driver
 from undertow.lanes.errors import Unsupported
+from undertow.lanes.machine import parsed
 
 # Threads of a warp, which lie side by side in memory.
 LANES = 32
@@ -59,8 +60,8 @@ entry:
   %inside = icmp ult i64 %thread, %threads
   br i1 %inside, label %own, label %end
 own:
-  %group = lshr i64 %thread, 5
-  %lane = and i64 %thread, 31
+  %group = udiv i64 %thread, {LANES}
+  %lane = urem i64 %thread, {LANES}
   %before4 = shl i64 %lane, 2
   %before8 = shl i64 %lane, 3
 {_OWN}
@@ -117,12 +118,7 @@ class Kernel:
 
 def ptx(assembly: str, generation: int) -> str:
     """Assembly of NVIDIA's for GPUs from a generation on, such as 90 for Hopper."""
-
-    def make() -> bytes:
-        module = binding.parse_assembly(assembly)
-        module.verify()
-        return _target(generation).emit_assembly(module).encode()
-
+    make = lambda: _target(generation).emit_assembly(parsed(assembly)).encode()
     return kept((assembly, generation, binding.llvm_version_info), ".ptx", make).decode()
 
 

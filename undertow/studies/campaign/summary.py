@@ -50,13 +50,18 @@ def load(folder: Path) -> Results:
 
     Raises:
         FileNotFoundError: there are none.
+        OSError: they are damaged.
     """
     whole = xr.open_zarr(folder / STORE, consolidated=False, chunks=None)
     whole = whole.drop_vars([name for name in whole if str(name).startswith("series:")])
     done, chunk = whole["done"].values.astype(bool), int(whole.attrs["chunk"])
     total = whole.sizes.get("trial", 0)
     rows = whole.drop_vars("done").assign_coords(trial=np.arange(total)).isel(trial=np.repeat(done, chunk)[:total])
-    return Results(read_text(whole.attrs["campaign"]), rows.load(), total)
+    try:
+        rows = rows.load()
+    except RuntimeError as error:  # zarr's word for a chunk that is not what was written
+        raise OSError(f"{folder / STORE} is damaged ({error}); `undertow campaign --resume` flies it again") from error
+    return Results(read_text(whole.attrs["campaign"]), rows, total)
 
 
 def summary(results: Results) -> dict[str, Any]:

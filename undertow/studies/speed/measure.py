@@ -19,7 +19,7 @@ from undertow.lanes import nvidia
 from undertow.lanes.cuda import Driver
 from undertow.lanes.machine import lanes_of
 from undertow.loop import sampled
-from undertow.loop.in_lanes import Fleet, Run
+from undertow.loop.in_lanes import Run
 from undertow.loop.vmapped import Fleet as Vmapped
 from undertow.studies.speed import plain_numpy, workload
 from undertow.studies.speed.workload import TICKS
@@ -128,9 +128,7 @@ def _batch(run: Run, threads: int) -> dict[str, float]:
 
 def on_gpu(run: Run, driver: Driver, runs: int, ticks: int) -> dict[str, float]:
     """Many runs on a GPU, a thread each; copying to and fro is counted."""
-    program, compiling = _timed(
-        lambda: Fleet(run, workload.PLAN._replace(ticks=ticks), workload.constant(run), driver=driver)
-    )
+    program, compiling = _timed(lambda: workload.fleet(run, ticks=ticks, driver=driver))
     numbers = workload.several(run, runs)
     each = _shortest(lambda: program.fly(numbers), 3) / (ticks * runs)
     return {"compile_s": compiling, "ns": each, "ticks_per_second": 1e9 / each}

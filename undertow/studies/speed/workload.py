@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.metrics import Metrics, overall
+from undertow.lanes.cuda import Driver
 from undertow.loop.in_lanes import Fleet, Plan, Run
 from undertow.scenario.build import build
 from undertow.studies.paper.setup import scenario
@@ -35,9 +36,9 @@ def several(run: Run, count: int) -> Any:
     return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
 
 
-def fleet(run: Run, lanes: int = 0) -> Fleet:
-    """The program of W1."""
-    return Fleet(run, PLAN, constant(run), lanes)
+def fleet(run: Run, lanes: int = 0, ticks: int = TICKS, driver: Driver | None = None) -> Fleet:
+    """The program of W1; arguments as of `Fleet`."""
+    return Fleet(run, PLAN._replace(ticks=ticks), constant(run), lanes, driver)
 
 
 def tracking(accumulated: Any) -> np.ndarray:
