@@ -18,6 +18,7 @@ from distributed import Client, LocalCluster
 
 from undertow.analysis.metrics import OVERALL
 from undertow.cli.main import run
+from undertow.scenario.reading import dump
 from undertow.studies.campaign.conduct import STORE, conduct, prepare
 from undertow.studies.campaign.engines import by_dask
 
@@ -44,7 +45,8 @@ def test_what_it_leaves(campaign_file, tmp_path, capsys):
     assert calm["requirements"][0]["verdict"] != "fails" and wild["requirements"][0]["verdict"] == "fails"
     assert found["sensitivity"]["disturbance.amplitude"]["tracking_rms"] > 0.99
     page = re.sub(r"<[^>]+>", " ", (out / "campaign.html").read_text())
-    for words in ("Two PIDs", "How they ended", "Requirements", "The worst trials", "0.0% [0.0%"):
+    assert "seed 7" in page and "uniform, 0.5 to 2" in page
+    for words in ("Two PIDs", "How they ended", "Requirements", "The worst trials", "0.0 % [0.0"):
         assert words in page
     assert {file.name for file in (out / "figures").glob("*.svg")} == {"distributions.svg", "sensitivity.svg"}
     worst = sorted((out / "worst").iterdir())
@@ -74,6 +76,9 @@ def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_
         series = xr.open_dataset(again / "run.nc")
         for name in ("position", "voltage"):
             np.testing.assert_array_equal(series[name].values, rows[f"series:{name}"][trial].values)
+            assert rows[f"series:{name}"].dims[1:] == series[name].dims
+        for name in ("time", "axis", "input"):
+            np.testing.assert_array_equal(rows[name].values, series[name].values)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +91,7 @@ def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_
         ({"scenario": "no.yaml"}, r"`scenario` must be an existing file, but is .*no.yaml"),
         (
             {"vary": {"controller.freq": {"uniform": [1.0, 2.0]}}},
-            r"`controller.freq` must be an option here, but is unknown \(trial 0\)",
+            r"`controller.freq` must be an option here, but is unknown \(small.yaml, line 13, trial 0\)",
         ),
         ({"cross": {"loop.dt": []}}, r"`cross.loop.dt` must have an entry"),
         ({"trials": 0}, r"`trials` must be greater than or equal to 1, but is 0"),
@@ -116,6 +121,23 @@ def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_
             {"series": {"every": 0.1}, "vary": {"loop.duration": {"uniform": [1.0, 2.0]}}},
             r"`series` must be of runs of one length and sampling time, but is beside loop.duration, which differs",
         ),
+        (
+            {"vary": {"plant.limit": {"unifrom": [1.0, 2.0]}}},
+            r"`vary.plant.limit.unifrom` must be a key of the campaign, .*line 14\). Did you mean `uniform`\?",
+        ),
+        (
+            {"requirements": {"tracking_rms": {"below": 1.0, "sahre": 0.5}}},
+            r"`requirements.tracking_rms.sahre` must be .* Did you mean `share`\?",
+        ),
+        ({"series": {"evry": 1.0}}, r"`series.evry` must be .* Did you mean `every`\?"),
+        (
+            {"vary": {"controller.frequency": {"uniform": [-2.0, -1.0]}}},  # none of the first trials can be built
+            r"`controller.frequency` must be positive, but is -1.\d+ \(small.yaml, line 13, trial 0\)",
+        ),
+        (
+            {"vary": {}, "scenario": {"reference": "setpont"}},
+            r"`reference.kind` .* \(small.yaml, line 1, trial 0\). Did you mean `setpoint`",
+        ),
         ({"series": {"every": 0.03}}, r"`series.every` must be a whole number of sampling times \(0.02 s\)"),
     ],
 )
@@ -125,6 +147,32 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1 and re.search(said, complaint), complaint
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (
+            ["campaign", "scenario.yaml"],
+            r"`CAMPAIGN` must be a campaign, but is a scenario .*`undertow simulate` runs it",
+        ),
+        (
+            ["simulate", "campaign.yaml"],
+            r"`scenario` must be a key of campaigns only .*`undertow campaign` flies campaigns",
+        ),
+        (["campaign", "campaign.yaml", "out"], r"`DIR` must follow the word `status`, but is out. .*`--out out`"),
+        (["campaign", "status", "out", "--resume"], r"`--resume` must be left out with `status`"),
+        (["campaign", "campaign.yaml", "--out", "/proc/out"], r"files could not be read or written: .* \(/proc/out"),
+    ],
+)
+def test_a_mistake_on_the_command_line(campaign, campaign_file, tmp_path, capsys, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    campaign_file("campaign")
+    Path("scenario.yaml").write_text(dump(campaign()["scenario"]))
+    assert run(arguments) in (2, 4)
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1 and re.search(said, complaint), complaint
+    assert {file.name for file in tmp_path.iterdir()} == {"campaign.yaml", "scenario.yaml"}
 
 
 def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
@@ -173,6 +221,57 @@ def test_trials_that_cannot_be_built_are_neither_worst_nor_a_failure_of_the_law(
     assert flown[found["worst"]].all() and len(found["worst"]) == 5
     share = (rows["tracking_rms"].values[flown] < 0.2).mean()
     assert found["combinations"][0]["requirements"][0]["kept"] == pytest.approx(share)
+    first = int(np.argmin(flown))
+    (refused,) = found["refused"]
+    assert refused["trials"] == (~flown).sum()
+    assert re.fullmatch(rf"`controller.frequency` must be positive, .*, line 13, trial {first}\)", refused["why"])
+    assert refused["why"] in capsys.readouterr().out
+
+
+def test_other_requirements_need_no_flight(campaign_file, tmp_path, capsys):
+    """The rows stay as they are, and the summary says what is required now."""
+    out = tmp_path / "out"
+    verdict = lambda: json.loads((out / "summary.json").read_text())["combinations"][0]["requirements"][0]["verdict"]
+    assert run(["campaign", str(campaign_file()), "--out", str(out)]) == 0
+    before = contents(out)
+    stricter = campaign_file("stricter", requirements={"tracking_rms": {"below": 1e-6, "share": 0.5}})
+    assert run(["campaign", str(stricter), "--out", str(out), "--resume"]) == 0
+    after = contents(out)
+    assert verdict() == "fails"
+    assert {name for name in after if before.get(name) != after[name]} == {"zarr.json"}
+    assert run(["campaign", str(campaign_file()), "--out", str(out), "--resume"]) == 0
+    assert verdict() == "holds" and contents(out) == before
+
+
+def test_what_is_drawn_from_words_is_told_apart(campaign_file, tmp_path):
+    """By choice: as many trials as drew it, and the quantiles of those."""
+    path = campaign_file(vary={"sensor": {"choice": ["perfect", {"kind": "white_noise", "velocity": 0.5}]}}, seed=3)
+    out = tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    found = json.loads((out / "summary.json").read_text())["choices"]["sensor"]
+    rows = xr.open_zarr(out / STORE, consolidated=False).load()
+    for number, one in enumerate(found.values()):
+        chosen = rows["tracking_rms"].values[rows["vary:sensor"].values == number]
+        assert one["trials"] == len(chosen) > 5
+        assert one["metrics"]["tracking_rms"]["0.5"] == np.median(chosen)
+    assert list(found) == rows["vary:sensor"].attrs["choices"]
+
+
+def test_a_mass_without_its_weight_is_told(campaign_file, tmp_path, capsys):
+    """Both by a run and by a campaign, before they begin."""
+    scenario = {
+        "plant": {"vehicle": {"kind": "odin", "mass": 200.0}},
+        "controller": {"kind": "pid", "frequency": 1.0},
+        "reference": {"kind": "setpoint", "position": [0.0] * 6},
+        "loop": {"duration": 0.1, "dt": 0.01, "record": 0.1},
+    }
+    said = r"`weight` must be the weight of the mass, 1962 N, but is .*"
+    path = campaign_file(scenario=scenario, vary={}, trials=1, requirements={})
+    assert run(["campaign", str(path), "--out", str(tmp_path / "campaign")]) == 0
+    assert re.search(f"Advice: trial 0: {said}", capsys.readouterr().err)
+    (tmp_path / "one.yaml").write_text(dump(scenario))
+    assert run(["simulate", str(tmp_path / "one.yaml"), "--no-prediction", "--out", str(tmp_path / "run")]) == 0
+    assert re.search(f"Advice: {said}", capsys.readouterr().err)
 
 
 def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):

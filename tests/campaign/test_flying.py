@@ -2,7 +2,6 @@
 
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from pathlib import Path
 
 import jax
 import numpy as np
@@ -15,27 +14,31 @@ from undertow.lanes.cuda import Driver
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign.conduct import Prepared
 from undertow.studies.campaign.flying import Hangar
 from undertow.studies.campaign.reading import whole
 from undertow.studies.campaign.schema import validate
 from undertow.studies.campaign.task import REFUSED, fly, site
-from undertow.studies.campaign.trials import trials
+from undertow.studies.campaign.trials import Trials, trials
 
 
-def prepared(data) -> Prepared:
-    several = trials(validate(from_data(data)), Path())
-    return Prepared(several, whole(several.campaign, several.scenario.data), Path())
+def made(data) -> Trials:
+    text = from_data(data)
+    return trials(validate(text), text)
+
+
+def text_of(data) -> str:
+    several = made(data)
+    return whole(several.campaign, several.scenario.data)
 
 
 def columns(data, rows):
-    return fly(prepared(data).text, "", rows)
+    return fly(text_of(data), "", rows)
 
 
 def test_rows_are_runs(campaign, engine):
     found = columns(campaign(), range(3))
     for trial in range(3):
-        built = build(prepared(campaign()).trials.data(trial))
+        built = build(made(campaign()).data(trial))
         key = jax.random.PRNGKey(built.scenario.seed)
         run = simulate(built.closed_loop, duration=2.0, dt=0.02, key=key, accumulators=(Metrics(1.0, 2.0),))
         for name, expected in results(run.accumulated[0]).items():
@@ -84,11 +87,11 @@ def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
 def test_a_trial_unlike_all_probes(campaign):
     """A choice that no probe drew is flown all the same, and like the run itself."""
     rare = campaign(vary={"plant.limit": {"choice": [20.0] * 19 + [0.1]}}, design="random")
-    limits = [prepared(rare).trials.values(trial)["plant.limit"] for trial in range(40)]
+    limits = [made(rare).values(trial)["plant.limit"] for trial in range(40)]
     odd = limits.index(0.1)
     assert odd >= 4  # the first four are the probes
     found = columns(rare, range(odd, odd + 1))
-    built = build(prepared(rare).trials.data(odd))
+    built = build(made(rare).data(odd))
     key = jax.random.PRNGKey(built.scenario.seed)
     run = simulate(built.closed_loop, duration=2.0, dt=0.02, key=key, accumulators=(Metrics(1.0, 2.0),))
     assert found["tracking_rms"][0] == pytest.approx(results(run.accumulated[0])["tracking_rms"], rel=1e-9)
@@ -120,7 +123,7 @@ def test_a_task_in_which_no_trial_can_be_built(campaign):
 
 def test_series_are_those_of_the_runs(campaign):
     found = columns(campaign(series={"signals": ["position"], "every": 0.5}), range(2))
-    built = build(prepared(campaign()).trials.data(1))
+    built = build(made(campaign()).data(1))
     key = jax.random.PRNGKey(built.scenario.seed)
     run = simulate(built.closed_loop, duration=2.0, dt=0.02, key=key, record_every=25)
     np.testing.assert_allclose(found["series:position"][1], run.samples.position, rtol=1e-9, atol=1e-12)
@@ -129,7 +132,7 @@ def test_series_are_those_of_the_runs(campaign):
 def test_single_precision(campaign):
     """In a process of its own, as precision is a matter of the process; without noise, which is drawn differently."""
     scenario = campaign()["scenario"] | {"sensor": "perfect"}
-    single = prepared(campaign(scenario=scenario | {"precision": "float32"})).text
+    single = text_of(campaign(scenario=scenario | {"precision": "float32"}))
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         found = pool.submit(fly, single, "", range(9)).result()
     wanted = columns(campaign(scenario=scenario), range(9))

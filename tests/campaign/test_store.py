@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 from undertow.core.errors import BadInput
+from undertow.core.status import Status
 from undertow.studies.campaign import store as stores
 from undertow.studies.campaign.conduct import STORE, conduct, prepare
 from undertow.studies.campaign.engines import in_threads
@@ -44,6 +45,10 @@ def test_two_lines_of_xarray_open_it(small, tmp_path):
     assert results["tracking_rms"].sizes == {"trial": 40}
     assert results["tracking_rms"].attrs["units"] == "m, rad"
     assert (results["status"] == 0).all() and results["done"].all()
+    words = dict(
+        zip(results["status"].attrs["flag_values"], results["status"].attrs["flag_meanings"].split(), strict=True)
+    )
+    assert words == {-1: "refused"} | {int(status): status.word for status in Status}
     amplitude = results["vary:disturbance.amplitude"]
     assert 0.5 < float(amplitude.min()) < float(amplitude.max()) < 2.0
     assert np.corrcoef(amplitude, results["tracking_rms"])[0, 1] > 0.99
@@ -116,7 +121,7 @@ def test_a_full_disk_loses_nothing(small, tmp_path, monkeypatch, at):
 
 def test_another_campaign_is_refused(small, tmp_path, campaign_file):
     other = campaign_file("other", seed=8)
-    with pytest.raises(BadInput, match=r"by the same versions, but is .*, where campaign, campaign_hash differ"):
+    with pytest.raises(BadInput, match=r"by the same versions, but is .*, with another campaign"):
         flown(other, tmp_path / "whole")
 
 

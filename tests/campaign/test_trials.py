@@ -1,7 +1,5 @@
 """Trials by their numbers: what is put where, and in which order combinations come."""
 
-from pathlib import Path
-
 import pytest
 
 from undertow.core.errors import BadInput
@@ -13,7 +11,8 @@ LIST = [{"kind": "current", "velocity": [0.1, 0.2, 0.3]}, "waves"]
 
 
 def made(data):
-    return trials(validate(from_data(data)), Path())
+    text = from_data(data)
+    return trials(validate(text), text)
 
 
 def test_values_stand_where_the_key_path_says(campaign):

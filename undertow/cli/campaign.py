@@ -4,9 +4,10 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from typing import NoReturn
 
 import typer
 from rich.console import Console
@@ -24,7 +25,8 @@ from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import dump
 from undertow.studies.campaign.conduct import STORE, Engine, Prepared, Watch, conduct, prepare
 from undertow.studies.campaign.engines import by_dask, cluster, in_threads
-from undertow.studies.campaign.summary import Results, endings, load, summary
+from undertow.studies.campaign.results import Results, load
+from undertow.studies.campaign.summary import endings, summary
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
@@ -37,6 +39,8 @@ def campaign(
     checks.positive("--workers", count)
     console = wide_console()
     prepared = interruptible(lambda: prepare(path))
+    for sentence in prepared.advice:
+        typer.echo(f"Advice: {sentence}", err=True)
     first = Path("runs") / path.stem
     folder = out or (first if resume else next_free(first))
     _claim(folder, resume, overwrite)
@@ -44,7 +48,8 @@ def campaign(
         try:
             interruptible(lambda: conduct(prepared, folder, engine, watch))
         except (KeyboardInterrupt, OSError):
-            typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
+            if (folder / STORE).exists():
+                typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
             raise
     return _conclude(console, prepared, folder)
 
@@ -52,7 +57,7 @@ def campaign(
 def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
     """Write page, summary and the scenarios of the worst trials; show the short of it."""
     results = load(folder)
-    found = summary(results)
+    found = summary(results, prepared.trials)
     (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
     _write_worst(prepared, found["worst"], folder / "worst")
     title = prepared.trials.campaign.description or "A campaign"
@@ -64,8 +69,22 @@ def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
     return DONE if set(found["status"]) <= {"ok"} else RUN_FAILED
 
 
-def status(folder: Path) -> int:
-    """How far the campaign in a folder is."""
+def refuse_second(argument: Path) -> NoReturn:
+    """A second argument, which only `status` has."""
+    raise BadInput(
+        "DIR", "follow the word `status`", str(argument), hint=f"Results go to a folder by `--out {argument}`"
+    )
+
+
+def status(folder: Path, options: Sequence[str]) -> int:
+    """How far the campaign in a folder is.
+
+    Args:
+        folder: of the campaign.
+        options: that were given, though there are none.
+    """
+    if options:
+        raise BadInput(options[0], "be left out with `status`", "given", hint="undertow campaign status DIR")
     try:
         results = load(folder)
     except FileNotFoundError:
@@ -82,12 +101,15 @@ def _sentences(found: dict) -> list[str]:
     """Endings and verdicts in words."""
     ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
     said = [f"{found['done']} trials: {ended}."]
+    said += [f"Refused, {one['trials']} as here: {one['why']}." for one in found["refused"]]
     for one in found["combinations"]:
         of = "".join(f", {key} {value}" for key, value in one["values"].items())
         for wanted in one["requirements"]:
             low, high = wanted["interval"]
-            asked = f"{wanted['metric']} < {wanted['below']:g} in {wanted['share']:.0%} of the trials{of}"
-            said.append(f"{asked}: {wanted['verdict']}; {wanted['kept']:.1%} did [{low:.1%}, {high:.1%}].")
+            asked = f"{wanted['metric']} < {wanted['below']:g} in {100 * wanted['share']:g} % of the trials{of}"
+            said.append(
+                f"{asked}: {wanted['verdict']}; {100 * wanted['kept']:.1f} % did [{100 * low:.1f}, {100 * high:.1f}]."
+            )
     return said
 
 

@@ -158,7 +158,10 @@ def campaign(
     from undertow.cli import campaign as command
 
     if str(campaign) == "status":
-        return command.status(folder or Path())
+        told = {"--out": out, "--resume": resume, "--workers": workers, "--cluster": cluster, "--overwrite": overwrite}
+        return command.status(folder or Path(), [name for name, value in told.items() if value])
+    if folder is not None:
+        command.refuse_second(folder)
     return command.campaign(campaign, out, resume, workers, cluster, overwrite)
 
 

@@ -19,6 +19,7 @@ from undertow.scenario.execute import Executed, execute, save
 from undertow.scenario.labelling import certificate_of, metrics_text
 from undertow.scenario.reading import dump, read
 from undertow.scenario.repetition import Repetition, compare
+from undertow.scenario.vehicle_findings import vehicle_doubts
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
@@ -50,7 +51,7 @@ def _run(path: Path, stages: Stages, prediction: bool) -> tuple[Executed, Foresi
         text = read(path)
     with stages("building"):
         built = build(text)
-    for sentence in built.advice():
+    for sentence in (*built.advice(), *vehicle_doubts(built)):
         typer.echo(f"Advice: {sentence}", err=True)
     with stages("compiling, running and predicting" if prediction else "compiling and running"):
         return interruptible(lambda: beside(lambda: execute(built), built, prediction))

@@ -34,9 +34,9 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant, controller: AbstractContr
     """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `input` (numbers from 1)."""
     units = np.array(plant.output_units)
     variables = {}
-    for name, (dimension, meaning, rate) in _MEANINGS.items():
+    for name, (_, meaning, rate) in _MEANINGS.items():
         values = np.asarray(getattr(outcome.samples, name))
-        dims = {None: ("time",), "rule": ("time", "axis", "rule")}.get(dimension, ("time", dimension))
+        dims = dimensions(name)
         rates = ", ".join(f"{u}{rate}" for u in dict.fromkeys(units))
         shown = rates if "axis" in dims else rate or plant.input_unit
         variables[name] = series(dims, values, meaning, shown)
@@ -58,7 +58,13 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant, controller: AbstractContr
     )
 
 
-def series(dimensions: tuple[str, ...], values: np.ndarray, meaning: str, unit: str | None = None) -> xr.Variable:
+def dimensions(name: str) -> tuple[str, ...]:
+    """Names of the dimensions of a signal."""
+    along = _MEANINGS[name][0]
+    return {None: ("time",), "rule": ("time", "axis", "rule")}.get(along, ("time", along))
+
+
+def series(dims: tuple[str, ...], values: np.ndarray, meaning: str, unit: str | None = None) -> xr.Variable:
     """One variable of a dataset; as a plain array, without xarray asking (and importing) dask whether it is one."""
     units = {} if unit is None else {"units": unit}
-    return xr.Variable(dimensions, values, {"long_name": meaning, **units}, fastpath=True)
+    return xr.Variable(dims, values, {"long_name": meaning, **units}, fastpath=True)

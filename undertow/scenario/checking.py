@@ -17,8 +17,8 @@ from undertow.scenario import parts
 from undertow.scenario.build import build
 from undertow.scenario.reading import Text, key_path, read
 from undertow.scenario.schema import Scenario
-from undertow.scenario.vehicle_data import parse
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
+from undertow.scenario.vehicle_findings import vehicle_facts
 from undertow.scenario.vehicle_keys import KEYS
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
@@ -108,9 +108,8 @@ def _of_scenario(text: Text) -> list[Report]:
     loop = built.closed_loop
     said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
     reports = [_report(said, title="scenario")]
-    vehicle = getattr(loop.plant, "vehicle", None)
-    if isinstance(vehicle, Vehicle):
-        reports.append(_of_vehicle(*_facts(text, built.resolved["plant"], vehicle)))
+    if (facts := vehicle_facts(built)) is not None:
+        reports.append(_of_vehicle(facts, lambda key: text.where(("plant", "vehicle"))))
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
         reports.append(_of_thruster(thruster, "thruster"))
     if any(report.errors for report in reports):
@@ -123,14 +122,6 @@ def _of_scenario(text: Text) -> list[Report]:
             for part in (loop.reference, loop.disturbance, loop.sensor, loop.controller)
         ]
     return reports
-
-
-def _facts(text: Text, plant: Mapping[str, Any], vehicle: Vehicle) -> tuple[Facts, Callable[[str], str]]:
-    """What is known of the vehicle of a scenario, and where its keys stand."""
-    description = plant.get("vehicle", {})
-    if "contents" not in description:
-        return facts_of(vehicle), lambda key: text.where(("plant", "vehicle"))
-    return parse(description["contents"]).facts(), lambda key: text.where(("plant", "vehicle"))
 
 
 def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any]:

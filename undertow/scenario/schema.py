@@ -151,6 +151,9 @@ def validate(text: Text) -> Scenario:
     Raises:
         BadInput: unknown key, wrong type, value out of range; names key, place and nearest known word.
     """
+    if "scenario" in text.data:
+        hint = "`undertow campaign` flies campaigns"
+        raise BadInput("scenario", "be a key of campaigns only", hint=hint, where=text.where(("scenario",)))
     try:
         return Scenario.model_validate(text.data)
     except ValidationError as errors:
@@ -185,9 +188,18 @@ def _must(error: Any) -> str:
 
 def _keys_beside(path: tuple, model: Any) -> list[str]:
     for key in path[:-1]:
+        if typing.get_origin(model) is dict:
+            model = typing.get_args(model)[1]
+            continue
         field = model.model_fields.get(key) if hasattr(model, "model_fields") else None
-        model = field.annotation if field is not None else None
+        model = _beside_none(field.annotation) if field is not None else None
     return list(model.model_fields) if hasattr(model, "model_fields") else []
+
+
+def _beside_none(annotation: Any) -> Any:
+    """What an optional value is when it is there."""
+    members = [one for one in typing.get_args(annotation) if one is not type(None)]
+    return members[0] if len(members) == 1 else annotation
 
 
 class Key(NamedTuple):

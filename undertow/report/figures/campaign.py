@@ -11,7 +11,16 @@ from undertow.report.figures import style
 
 # The metrics that are drawn, where they are there.
 _SHOWN = ("tracking_rms", "tracking_max", "estimation_rms", "voltage_rms", "voltage_variation", "saturated_fraction")
-_LOOKS = (style.SOLID, style.DASHED, style.Look("#00785a", "-", 1.3, 4), style.Look("#b0476f", (0, (1, 1)), 1.1, 5))
+_LOOKS = (
+    style.SOLID,
+    style.DASHED,
+    style.Look("#00785a", "-", 1.7, 4),
+    style.Look("#b0476f", (0, (1, 1)), 1.1, 5),
+    style.Look("#333333", (0, (6, 1.5, 1, 1.5)), 1.1, 6),
+    style.Look("#56a4d4", (0, (2, 1)), 1.6, 7),
+    style.Look("#a0840a", "-", 0.7, 8),
+    style.Look("#7a5195", (0, (8, 2)), 1.3, 9),
+)
 _COLUMNS = 3
 _WIDE = 100.0  # ratio of largest and smallest from which on an axis is logarithmic
 _DARK = 0.6  # correlations beyond this stand on dark ground
@@ -21,20 +30,24 @@ def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]]) -> Figu
     """Share of trials below each value of a metric: the empirical distribution function.
 
     Args:
-        values: metric -> name of the combination -> finite values, in any order.
+        values: metric -> name of the combination -> finite values, in any order; the first eight are drawn.
     """
     shown = [name for name in _SHOWN if name in values]
     rows = -(-len(shown) // _COLUMNS)
-    figure = style.blank(9.6, 0.35 + 2.25 * rows)
     names = list(dict.fromkeys(name for each in values.values() for name in each))
-    looks = {name: _LOOKS[i % len(_LOOKS)] for i, name in enumerate(names)}
-    style.head(figure, "Share of the trials below", looks if len(names) > 1 else {})
+    looks = dict(zip(names, _LOOKS, strict=False))
+    beside = max(1, int(9.4 / (0.8 + 0.065 * max(map(len, looks)))))  # entries of the key in a line
+    key = 0.2 * -(-len(looks) // beside) if len(looks) > 1 else 0.0
+    figure = style.blank(9.6, 0.35 + key + 2.25 * rows)
+    style.head(figure, "Share of the trials below", {})
+    if key:
+        style.key(figure, looks, 0.3, beside)
     for i, metric in enumerate(shown):
         row, column = divmod(i, _COLUMNS)
-        panel = style.place(figure, 0.6 + 3.1 * column, 0.65 + 2.25 * row, 2.35, 1.45)
-        for name, found in values[metric].items():
-            ordered = np.sort(found)
-            share, look = np.arange(1, len(ordered) + 1) / len(ordered), looks[name]
+        panel = style.place(figure, 0.6 + 3.1 * column, 0.65 + key + 2.25 * row, 2.35, 1.45)
+        for name, look in looks.items():
+            ordered = np.sort(values[metric].get(name, np.zeros(0)))
+            share = np.arange(1, len(ordered) + 1) / max(1, len(ordered))
             panel.step(ordered, share, where="post", color=look.colour, linestyle=look.dashes, linewidth=look.width)
         everything = np.concatenate(list(values[metric].values()))
         if everything.min() > 0 and everything.max() > _WIDE * everything.min():
@@ -42,6 +55,7 @@ def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]]) -> Figu
             panel.xaxis.set_minor_formatter(NullFormatter())  # their numbers would run into one another
         panel.set_ylim(0, 1)
         style.label(panel, metric.replace("_", " "))
+        panel.xaxis.set_label_coords(0.5, -0.19)  # clear of powers of ten
     return figure
 
 

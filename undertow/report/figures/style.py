@@ -72,19 +72,29 @@ def head(figure: Figure, title: str, keys: dict[str, Look]) -> None:
     """Title at the upper left, key of line styles at the upper right."""
     _, height = figure.get_size_inches()
     figure.text(0.012, 1 - 0.09 / height, title, fontsize=TEXT + 1.5, fontweight="bold", color=INK, va="top")
-    lines = [Line2D([], [], color=k.colour, linestyle=k.dashes, linewidth=1.6, label=name) for name, k in keys.items()]
-    if lines:
-        figure.legend(
-            handles=lines,
-            loc="upper right",
-            bbox_to_anchor=(0.995, 1.0 - 0.02 / height),
-            ncols=len(lines),
-            fontsize=TEXT,
-            frameon=False,
-            handlelength=3.0,
-            columnspacing=1.4,
-            borderaxespad=0.2,
-        )
+    if keys:
+        _legend(figure, keys, len(keys), loc="upper right", bbox_to_anchor=(0.995, 1.0 - 0.02 / height))
+
+
+def key(figure: Figure, keys: dict[str, Look], top: float, columns: int) -> None:
+    """Key of line styles at the left, so far below the upper edge (inches): for names too long to stand in the head."""
+    _, height = figure.get_size_inches()
+    _legend(figure, keys, columns, loc="upper left", bbox_to_anchor=(0.005, 1.0 - top / height))
+
+
+def _legend(figure: Figure, keys: dict[str, Look], columns: int, **place) -> None:
+    figure.legend(
+        handles=[
+            Line2D([], [], color=k.colour, linestyle=k.dashes, linewidth=1.6, label=name) for name, k in keys.items()
+        ],
+        ncols=columns,
+        fontsize=TEXT,
+        frameon=False,
+        handlelength=3.0,
+        columnspacing=1.4,
+        borderaxespad=0.2,
+        **place,
+    )
 
 
 def power(unit: str) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,12 +10,15 @@ from undertow.analysis.metrics import OVERALL
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.loop.closed_loop import Sample
+from undertow.scenario.build import Built
 from undertow.scenario.fitting import whole_steps
 from undertow.scenario.provenance import text_hash, versions
 from undertow.scenario.schema import Loop
+from undertow.scenario.vehicle_findings import vehicle_doubts
 from undertow.studies.campaign import task as tasks
+from undertow.studies.campaign.columns import coordinates, labels
 from undertow.studies.campaign.engines import Columns, Work
-from undertow.studies.campaign.reading import read_campaign, whole
+from undertow.studies.campaign.reading import decisive, read_campaign, whole
 from undertow.studies.campaign.schema import Campaign
 from undertow.studies.campaign.store import Store
 from undertow.studies.campaign.trials import Trials, trials
@@ -32,22 +35,40 @@ class Prepared(NamedTuple):
     trials: Trials
     text: str
     folder: Path
+    first: Built  # a trial
+    advice: tuple[str, ...]  # what is odd about the first trials
 
 
 def prepare(path: Path) -> Prepared:
-    """Read a campaign, and build the first trial of every combination, so that mistakes are told before anything runs.
+    """Read a campaign, and build the first trials of every combination, so that mistakes are told before anything runs.
 
     Raises:
-        BadInput: anything wrong with the campaign or its scenario.
+        BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
     """
-    campaign, folder = read_campaign(path)
-    several = trials(campaign, folder)
-    text = whole(campaign, several.scenario.data)
-    prepared = Prepared(several, text, several.scenario.folder)
-    workshop = tasks.site(text, str(prepared.folder)).workshop
-    for combination in range(len(several.combinations)):
-        _check(campaign, tasks.build_trial(several, workshop, combination * campaign.trials).scenario.loop)
-    return prepared
+    campaign, source = read_campaign(path)
+    several = trials(campaign, source)
+    text, folder = whole(campaign, several.scenario.data), several.scenario.folder
+    here = tasks.site(text, str(folder))
+    firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]
+    advice: dict[str, str] = {}
+    for row, built in firsts:
+        _check(campaign, built.scenario.loop)
+        for sentence in (*built.advice(), *vehicle_doubts(built)):
+            advice.setdefault(sentence, f"trial {row}: {sentence}")
+    return Prepared(several, text, folder, firsts[0][1], tuple(advice.values()))
+
+
+def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Built]:
+    """A trial of a combination that can be built.
+
+    Raises:
+        BadInput: none of the first can; what is wrong with the very first.
+    """
+    rows = tasks.first_rows(several, combination)
+    for row in rows:
+        if row in here.probes():
+            return row, here.probes()[row]
+    return rows.start, tasks.build_trial(several, here.workshop, rows.start)
 
 
 def _check(campaign: Campaign, loop: Loop) -> None:
@@ -84,25 +105,26 @@ def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None
         BadInput: the folder holds another campaign.
         OSError: the disk is full, or the cluster is gone; what was done is kept.
     """
-    several, text, folder = prepared
-    attributes = {"campaign": text, "campaign_hash": text_hash(text), **versions()}
-    store = Store(out / STORE, several.number, several.campaign.chunk, attributes)
+    several, text, folder = prepared.trials, prepared.text, prepared.folder
+    identity = {"campaign_hash": text_hash(decisive(several.campaign, several.scenario.data)), **versions()}
+    store = Store(
+        out / STORE,
+        several.number,
+        several.campaign.chunk,
+        identity,
+        {"campaign": text},
+        labels(several),
+        coordinates(several, prepared.first),
+    )
     try:
         missing = store.missing()
         todo = sum(len(store.rows(number)) for number in missing)
         done, failed = several.number - todo, 0
         watch(done, several.number, failed)
         work = [(text, str(folder), store.rows(number)) for number in missing]
-        notes = _notes(several)
         for i, columns in engine(tasks.fly, work):
-            store.write(missing[i], columns, notes)
+            store.write(missing[i], columns)
             done, failed = done + len(work[i][2]), failed + int(np.count_nonzero(columns["status"]))
             watch(done, several.number, failed)
     finally:
         store.close()
-
-
-def _notes(several: Trials) -> dict[str, dict[str, Any]]:
-    """What the numbers of a choice stand for."""
-    named = {key: entries for key, entries in several.columns() if entries is not None}
-    return {f"vary:{key}": {"choices": list(entries)} for key, entries in named.items()}

@@ -2,26 +2,32 @@
 
 from pathlib import Path
 
-from undertow.scenario.reading import dump, parse, read
+from undertow.scenario.reading import Text, dump, parse, read
 from undertow.studies.campaign.schema import Campaign, validate
 
 
-def read_campaign(path: Path) -> tuple[Campaign, Path]:
-    """A campaign from its file, and the folder where paths in it start.
+def read_campaign(path: Path) -> tuple[Campaign, Text]:
+    """A campaign from its file, and the text that it stands in.
 
     Raises:
         BadInput: anything wrong with it.
     """
     text = read(path, "CAMPAIGN")
-    return validate(text), text.folder
+    return validate(text), text
 
 
-def read_text(text: str) -> Campaign:
-    """A campaign from the text of `whole`."""
-    return validate(parse(text, "campaign.yaml", Path(), "CAMPAIGN"))
+def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
+    """A campaign from the text of `whole`; relative paths in it start at `folder`."""
+    parsed = parse(text, "", folder, "CAMPAIGN")
+    return validate(parsed), parsed
 
 
 def whole(campaign: Campaign, scenario: dict) -> str:
-    """YAML with everything that decides about the results; `chunk` and free text do not."""
+    """YAML with everything that is asked; `chunk` and free text say nothing about the results."""
     data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"})
     return dump(data | {"scenario": scenario})
+
+
+def decisive(campaign: Campaign, scenario: dict) -> str:
+    """What decides about the rows: the same, but for what is required of them."""
+    return whole(campaign.model_copy(update={"requirements": {}}), scenario)

@@ -7,7 +7,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import Text
-from undertow.scenario.schema import Strict, complaint
+from undertow.scenario.schema import Scenario, Strict, complaint
 
 _PATH = re.compile(r"[\w-]+(\.[\w-]+|\[\d+\])*")
 
@@ -97,6 +97,9 @@ def validate(text: Text) -> Campaign:
     Raises:
         BadInput: unknown key, wrong type, value out of range.
     """
+    if "scenario" not in text.data and set(text.data) & set(Scenario.model_fields) - set(Campaign.model_fields):
+        hint = f"`undertow simulate` runs it; a campaign has it under `scenario: {text.name or '...'}`"
+        raise BadInput("CAMPAIGN", "be a campaign", "a scenario", hint=hint, where=text.name)
     try:
         found = Campaign.model_validate(text.data)
     except ValidationError as errors:

@@ -5,7 +5,6 @@ results = xr.open_zarr("runs/my-campaign/trials.zarr", consolidated=False)
 """
 
 import fcntl
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from undertow.analysis.meanings import MEANINGS
 from undertow.core.errors import BadInput
+from undertow.studies.campaign.columns import Label
 
 try:
     import zarr
@@ -35,24 +34,44 @@ class Store:
         path: folder of the store; made when missing.
         trials: number of rows.
         chunk: rows per task; a store that is there already keeps its own.
-        attributes: of the store; plain data.
+        identity: attributes that are the same in a store that may be gone on with; plain data.
+        further: other attributes, those of whoever wrote last.
+        labels: of columns by name.
+        coordinates: values along other dimensions than that of trials, with their attributes, by name.
 
     Raises:
         BadInput: the folder belongs to another campaign, or another process is writing to it.
     """
 
-    def __init__(self, path: Path, trials: int, chunk: int, attributes: Mapping[str, Any]):
-        self._trials, self._chunk = trials, chunk
+    def __init__(
+        self,
+        path: Path,
+        trials: int,
+        chunk: int,
+        identity: Mapping[str, Any],
+        further: Mapping[str, Any],
+        labels: Mapping[str, Label],
+        coordinates: Mapping[str, tuple[np.ndarray, Mapping[str, Any]]],
+    ):
+        self._trials, self._chunk, self._labels = trials, chunk, labels
         path.mkdir(parents=True, exist_ok=True)
         self._lock = _locked(path)
         for left in path.rglob("*.partial"):  # by a process that was killed while zarr wrote a file
             left.unlink()
         self._group = zarr.open_group(path, mode="a")
         if _DONE in self._group:
-            self._chunk = _same(dict(self._group.attrs), dict(attributes), path.parent)
+            self._chunk = _same(dict(self._group.attrs), identity, path.parent)
+            if any(self._group.attrs[key] != value for key, value in further.items()):
+                self._group.attrs.update(further)
         else:
-            self._group.attrs.update({**attributes, "chunk": chunk})
-            self._array(_DONE, np.uint8, (self.tasks,), (1,), ("task",), 0, {})
+            self._group.attrs.update({**identity, **further, "chunk": chunk})
+            for name, (values, attributes) in coordinates.items():
+                self._array(name, values.dtype, values.shape, values.shape, Label((name,), dict(attributes)))[:] = (
+                    values
+                )
+            self._array(
+                _DONE, np.dtype(np.uint8), (self.tasks,), (1,), Label(("task",), {"long_name": "1 for what is written"})
+            )
 
     @property
     def tasks(self) -> int:
@@ -68,13 +87,12 @@ class Store:
         done = np.asarray(self._group[_DONE][:])
         return [task for task in range(self.tasks) if not (done[task] and self._whole(task))]
 
-    def write(self, task: int, columns: Mapping[str, np.ndarray], notes: Mapping[str, Mapping[str, Any]]) -> None:
+    def write(self, task: int, columns: Mapping[str, np.ndarray]) -> None:
         """All rows of a task.
 
         Args:
             task: its number.
             columns: by name, one entry per row.
-            notes: attributes of columns by name; used when a column is new.
 
         Raises:
             OSError: the disk is full, for example; the task then counts as not done.
@@ -83,10 +101,7 @@ class Store:
         for name, values in columns.items():
             if name not in self._group:
                 shape, chunks = (self._trials, *values.shape[1:]), (self._chunk, *values.shape[1:])
-                dimensions = ("trial", *(f"{name}_{i}" for i in range(1, values.ndim)))
-                empty = np.nan if values.dtype.kind == "f" else 0
-                told = {**notes.get(name, {}), **_meaning(name)}
-                self._array(name, values.dtype, shape, chunks, dimensions, empty, told)
+                self._array(name, values.dtype, shape, chunks, self._labels[name])
             self._group[name][first:last] = values
         self._group[_DONE][task] = 1
 
@@ -104,39 +119,29 @@ class Store:
             return False
         return True
 
-    def _array(
-        self, name: str, dtype: Any, shape: tuple, chunks: tuple, dimensions: tuple, empty: Any, told: dict[str, Any]
-    ) -> Any:
+    def _array(self, name: str, dtype: np.dtype, shape: tuple, chunks: tuple, label: Label) -> Any:
         # With its attributes at once: killed between the two, an array would stay without them.
         return self._group.create_array(
             name,
             shape=shape,
             chunks=chunks,
-            dtype=dtype,
-            fill_value=empty,
-            dimension_names=dimensions,
+            dtype=str if dtype.kind == "U" else dtype,
+            fill_value={"f": np.nan, "U": ""}.get(dtype.kind, 0),
+            dimension_names=label.dimensions,
             compressors=[_CODEC],
-            attributes=told,
+            attributes=label.attributes,
             config={"write_empty_chunks": True},
         )
 
 
-def _same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> int:
+def _same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> int:
     """Rows per task of a store that may be gone on with."""
-    chunk = found.pop("chunk")
-    if found != json.loads(json.dumps(wanted)):
-        other = [key for key in wanted if found.get(key) != wanted[key]]
-        got, hint = (
-            f"{folder}, where {', '.join(other)} differ",
-            "Choose another folder, or begin anew with --overwrite",
-        )
+    other = [key for key in wanted if found.get(key) != wanted[key]]
+    if other:
+        got = f"{folder}, with another {', '.join(key.removesuffix('_hash') for key in other)}"
+        hint = "Choose another folder, or begin anew with --overwrite"
         raise BadInput("--out", "hold the same campaign, by the same versions", got, hint=hint)
-    return int(chunk)
-
-
-def _meaning(name: str) -> dict[str, str]:
-    meaning = MEANINGS.get(name)
-    return {"long_name": meaning.meaning, "units": meaning.unit or "1"} if meaning else {}
+    return int(found["chunk"])
 
 
 def _locked(path: Path) -> int:

@@ -2,7 +2,7 @@
 
 import contextlib
 import functools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from undertow.studies.campaign.flying import Hangar
 from undertow.studies.campaign.reading import read_text
 from undertow.studies.campaign.trials import Trials, trials
 
-# Trials of each combination that tell which numbers differ.
+# Trials of each combination that tell whether it can be flown, and which numbers differ.
 _PROBES = 4
 
 # Status of a trial whose scenario cannot be built, beside those of `undertow.core.status`.
@@ -30,6 +30,7 @@ class Site(NamedTuple):
     trials: Trials
     workshop: Workshop
     hangar: Hangar
+    probes: Callable[[], dict[int, Built]]  # of the first trials of every combination those that can be built
 
 
 @functools.lru_cache(maxsize=2)
@@ -40,8 +41,16 @@ def site(text: str, folder: str) -> Site:
         text: of the campaign file.
         folder: where relative paths in it start.
     """
-    several, workshop = trials(read_text(text), Path(folder)), Workshop()
-    return Site(several, workshop, Hangar(lambda: _probes(several, workshop)))
+    several, workshop = trials(*read_text(text, Path(folder))), Workshop()
+    rows = [row for one in range(len(several.combinations)) for row in first_rows(several, one)]
+    probes = functools.cache(lambda: _built(several, workshop, rows))
+    return Site(several, workshop, Hangar(lambda: list(probes().values())), probes)
+
+
+def first_rows(several: Trials, combination: int) -> range:
+    """The trials of a combination that are looked at before any is flown."""
+    draws = several.campaign.trials
+    return range(combination * draws, combination * draws + min(_PROBES, draws))
 
 
 def fly(text: str, folder: str, rows: range) -> dict[str, np.ndarray]:
@@ -75,7 +84,8 @@ def build_trial(several: Trials, workshop: Workshop, row: int) -> Built:
     try:
         return build(Text(several.data(row), scenario.name, scenario.folder, scenario.lines), workshop)
     except BadInput as error:
-        raise error.at(where=f"trial {row}") from error.__cause__
+        place = several.place(error.name) or error.where
+        raise error.at(where=f"{place}, trial {row}" if place else f"trial {row}") from error.__cause__
 
 
 def _built(several: Trials, workshop: Workshop, rows: Iterable[int]) -> dict[int, Built]:
@@ -85,13 +95,6 @@ def _built(several: Trials, workshop: Workshop, rows: Iterable[int]) -> dict[int
         with contextlib.suppress(BadInput):
             found[row] = build_trial(several, workshop, row)
     return found
-
-
-def _probes(several: Trials, workshop: Workshop) -> list[Built]:
-    """The first trials of every combination."""
-    draws = several.campaign.trials
-    rows = [first + i for first in range(0, several.number, draws) for i in range(min(_PROBES, draws))]
-    return list(_built(several, workshop, rows).values())
 
 
 def _columns(several: Trials, rows: range) -> Iterable[tuple[str, np.ndarray]]:

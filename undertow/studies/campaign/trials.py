@@ -4,13 +4,12 @@ import copy
 import itertools
 import math
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from undertow.core.errors import BadInput
-from undertow.scenario.reading import Text, from_data, key_path, read
+from undertow.scenario.reading import Text, key_path, read
 from undertow.studies.campaign.points import points, seeds, value
 from undertow.studies.campaign.schema import Campaign
 
@@ -20,6 +19,7 @@ class Trials(NamedTuple):
 
     Attributes:
         campaign: what was asked for.
+        text: of the campaign file.
         scenario: what it varies, and where relative paths in it start.
         points: one row per draw, in [0, 1); columns as in `vary`.
         seeds: one per draw.
@@ -27,6 +27,7 @@ class Trials(NamedTuple):
     """
 
     campaign: Campaign
+    text: Text
     scenario: Text
     points: np.ndarray
     seeds: np.ndarray
@@ -55,6 +56,14 @@ class Trials(NamedTuple):
             _put(data, key, copy.deepcopy(put))
         return data | {"seed": self.seed(trial)}
 
+    def place(self, name: str) -> str:
+        """Line of the campaign that decides about a key of the scenario; nothing where the scenario does."""
+        for section, keys in (("vary", self.campaign.vary), ("cross", self.campaign.cross)):
+            for key in keys:
+                if name == key or name.startswith((f"{key}.", f"{key}[")):
+                    return self.text.where((section, key))
+        return ""
+
     def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
         """Key paths that differ between trials, with the values by name where those are not numbers."""
         for key, entries in self.campaign.cross.items():
@@ -64,26 +73,32 @@ class Trials(NamedTuple):
             yield key, {str(entry): entry for entry in spread.choice or []} if named else None
 
 
-def trials(campaign: Campaign, folder: Path) -> Trials:
+def trials(campaign: Campaign, text: Text) -> Trials:
     """The trials of a campaign.
 
     Args:
         campaign: what is asked for.
-        folder: where the path of its scenario starts.
+        text: that says so.
 
     Raises:
-        BadInput: no such scenario, or a key path that leads nowhere.
+        BadInput: no such scenario, or too many trials.
     """
-    given = campaign.scenario
-    if isinstance(given, str):
-        scenario = read(folder / given, "scenario")
-    else:
-        scenario = from_data(given)._replace(folder=folder)
     combinations = tuple(itertools.product(*(entries.values() for entries in campaign.cross.values())))
     whole = math.prod(len(entries) for entries in campaign.cross.values()) * campaign.trials
     if whole >= 2**31:
         raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", whole)
-    return Trials(campaign, scenario, points(campaign), seeds(campaign), combinations)
+    return Trials(campaign, text, _scenario(campaign, text), points(campaign), seeds(campaign), combinations)
+
+
+def _scenario(campaign: Campaign, text: Text) -> Text:
+    given = campaign.scenario
+    if isinstance(given, str):
+        try:
+            return read(text.folder / given, "scenario")
+        except BadInput as error:
+            raise error.at(where=error.where or text.where(("scenario",))) from error.__cause__
+    lines = {path[1:]: line for path, line in text.lines.items() if path[0] == "scenario"}
+    return Text(given, text.name, text.folder, lines)
 
 
 def _numbers(entries: Iterable[Any]) -> bool:

@@ -1,0 +1,109 @@
+"""Tables of the page of a campaign."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from undertow.analysis.meanings import MEANINGS
+from undertow.report.formats import chip, number, prose, unit
+from undertow.report.page import Html, join, table, tag
+from undertow.studies.campaign.results import Results
+from undertow.studies.campaign.schema import Spread
+
+_DIGITS = 4
+_BY_CHOICE = ("tracking_rms", "voltage_rms")
+
+
+def named(combination: Mapping[str, Any]) -> str:
+    """A combination of `cross` in words."""
+    return ", ".join(str(value) for value in combination["values"].values()) or "all trials"
+
+
+def requirements(found: Mapping[str, Any]) -> Html:
+    """What was required, and whether it holds; nothing where nothing was."""
+    rows = []
+    for one in found["combinations"]:
+        for wanted in one["requirements"]:
+            low, high = wanted["interval"]
+            words = f"{_metric(wanted['metric'])} < {wanted['below']:g} in {100 * wanted['share']:g} % of the trials"
+            share = f"{100 * wanted['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
+            rows.append((words, named(one), chip(wanted["verdict"]), share))
+    head = ("required", "of", "verdict", "share that does")
+    return table(head, rows) if rows else Html("")
+
+
+def distributions(found: Mapping[str, Any]) -> Html:
+    """Quantiles of every metric, side by side for the combinations."""
+    several = found["combinations"]
+    names = dict.fromkeys(name for one in several for name in one["metrics"])
+    rows = []
+    for name in names:
+        cells = (_spread(one["metrics"].get(name)) for one in several)
+        rows.append((join(_metric(name), " ", unit(MEANINGS[name].unit)), *cells))
+    head = ("median [5 %, 95 %]", *map(named, several))
+    return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 1)
+
+
+def by_choice(found: Mapping[str, Any]) -> list[Html]:
+    """What is drawn from words or parts: a table of median and 5 to 95 % for each."""
+    tables = []
+    for key, entries in found["choices"].items():
+        rows = []
+        for word, one in entries.items():
+            cells = (_spread(one["metrics"].get(name)) for name in _BY_CHOICE)
+            rows.append((word, str(one["trials"]), str(one["failed"]), *cells))
+        head = (prose(f"`{key}`"), "trials", "failed", *map(_metric, _BY_CHOICE))
+        tables.append(table(head, rows, numeric=(1, 2, 3, 4)))
+    return tables
+
+
+def worst(results: Results, found: Mapping[str, Any]) -> Html:
+    """The worst trials with what was drawn for them."""
+    rows = []
+    for trial in found["worst"]:
+        row, crossed = results.rows.sel(trial=trial), results.named(trial // results.campaign.trials)
+        drawn = [number(one, _DIGITS) if isinstance(one, float) else one for one in results.drawn(trial).values()]
+        ended = [number(float(row[name]), _DIGITS) for name in ("tracking_rms", "ended")]
+        rows.append((str(trial), *ended, *crossed, *drawn))
+    keys = [prose(f"`{key}`") for key in (*results.campaign.cross, *results.campaign.vary)]
+    return table(("trial", "tracking rms", "ended, s", *keys), rows, numeric=(1, 2), wide=len(keys) > 1)
+
+
+def asked(results: Results) -> list[Html]:
+    """What was flown: how it was drawn, by which versions, and the campaign file."""
+    campaign, attributes = results.campaign, results.rows.attrs
+    rows = [(prose(f"`{key}`"), prose(_words(spread))) for key, spread in campaign.vary.items()]
+    rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.cross.items()]
+    drawn = f"{campaign.trials} draws ({campaign.design}), seed {campaign.seed}"
+    drawn += ", each for every combination below." if campaign.cross else "."
+    versions = ", ".join(
+        f"{key.removeprefix('version_')} {value}" for key, value in attributes.items() if key.startswith("version_")
+    )
+    file = tag("details", tag("summary", "The whole campaign, as a file"), tag("pre", attributes["campaign"]))
+    return [
+        tag("p", drawn),
+        *([table(("key", "values"), rows)] if rows else []),
+        tag("p", f"{versions}; {attributes['machine']}", class_="small"),
+        file,
+    ]
+
+
+def _metric(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _words(spread: Spread) -> str:
+    """A distribution in words."""
+    if spread.choice is not None:
+        return "one of " + ", ".join(map(str, spread.choice))
+    if spread.normal is not None:
+        return "normal, mean {:g}, standard deviation {:g}".format(*spread.normal)
+    if spread.uniform is not None:
+        return "uniform, {:g} to {:g}".format(*spread.uniform)
+    return "log-uniform, {:g} to {:g}".format(*(spread.log_uniform or ()))
+
+
+def _spread(quantiles: Mapping[str, float] | None) -> Html:
+    if quantiles is None:
+        return number(None)
+    low, middle, high = (number(value) for value in quantiles.values())
+    return join(middle, " [", low, ", ", high, "]")
