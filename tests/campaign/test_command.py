@@ -343,6 +343,23 @@ def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
     assert contents(tmp_path / "cluster") == contents(tmp_path / "whole")
 
 
+def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):
+    """As a terminal sends it: to the process, the scheduler and the workers at once."""
+    path, out = campaign_file(trials=20_000, chunk=5), tmp_path / "out"
+    process = typed(path, out, "--cluster", "local", start_new_session=True, stderr=subprocess.PIPE)
+    while process.poll() is None and len(list(out.rglob("c/*"))) < 20:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    complaint = process.communicate(timeout=60)[1].decode()
+    assert process.returncode == 130
+    assert complaint == f"Stopped. `undertow campaign {path} --out {out} --resume` goes on.\n"
+    waited = time.monotonic() + 60
+    with pytest.raises(ProcessLookupError):  # soon nobody is left
+        while time.monotonic() < waited:
+            os.killpg(process.pid, 0)
+            time.sleep(0.1)
+
+
 def test_a_dead_scheduler_loses_nothing(campaign_file, tmp_path):
     """A scheduler in a process of its own is killed after the first results; the rest is flown without it."""
     path, out, file = campaign_file(trials=200, chunk=20), tmp_path / "cluster", tmp_path / "scheduler.json"
