@@ -12,6 +12,7 @@ from undertow.core.contracts import AbstractDisturbance
 from undertow.core.status import Status
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.outcome import health
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 from undertow.sensors.perfect import perfect
@@ -88,6 +89,15 @@ def test_continuous_loop_ends_when_nothing_is_finite():
     assert Status(int(outcome.status)) in (Status.NOT_FINITE, Status.STEPS_EXHAUSTED)
     assert float(outcome.ended) == pytest.approx(BREAK, abs=1e-6)
     assert np.isfinite(np.asarray(outcome.samples.position)).all()
+
+
+@pytest.mark.parametrize("kind, most", [(jnp.float64, 1.34e154), (jnp.float32, 1.84e19)])
+@pytest.mark.parametrize("share, code", [(0.99, Status.OK), (1.01, Status.NOT_FINITE), (-1.01, Status.NOT_FINITE)])
+def test_a_state_whose_square_overflows_is_not_finite(kind, most, share, code):
+    """sqrt(1.798e308) and sqrt(3.403e38): a controller that grows to there in silence gives metrics that are infinite."""
+    loop = loop_with(0.5)
+    x, _ = loop.draw(jax.random.PRNGKey(0)).start(*loop.outputs_at_start(None, None))
+    assert int(health(loop, x, (jnp.zeros(2, dtype=kind), jnp.asarray([0.0, share * most], dtype=kind)))) == int(code)
 
 
 def test_neighbours_are_not_hurt(batch):

@@ -71,6 +71,16 @@ def test_limits_do_not_wind_up():
     assert overshoot < 0.5 * furthest, (overshoot, furthest)
 
 
+def test_an_integral_faster_than_the_sampling_stays_bounded():
+    """At its limit the integral is at most what takes the other terms back: k_p e + k_d e_dot, and the limit itself."""
+    plant, dt, frequency, limit = double_integrator(1, limit=1.5), 1e-2, 2617.0, 1.5
+    law = pid(plant.model(), sampling_time=dt, frequency=frequency, reference_frequency=0.0)
+    found = run(plant, law, [5.0], duration=10.0, dt=dt)
+    error, rate = (float(np.abs(one).max()) for one in (found.samples.error, found.samples.velocity))
+    k_p, k_d, k_i = frequency**2, 2 * frequency, 0.1 * frequency**3
+    assert np.abs(found.samples.estimate).max() <= (k_p + dt * k_i) * error + k_d * rate + limit
+
+
 def test_steady_curve_holds_a_force_and_limits_of_an_endless_supply_are_endless():
     plant = hybrid_vehicle(bluerov2_heavy(), t200(dead_zone=0.0))
     drive = plant.model().own_axes().drive().steady()

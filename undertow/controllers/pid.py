@@ -89,12 +89,12 @@ class PID(AbstractController):
     def advance(self, z: PIDState, y: Measurement, r: Target, u_applied, dt) -> PIDState:
         """What limits take away is taken from the integral, too: back-calculation, Astrom and Murray (2008), 10.4.
 
-        Its time constant is the geometric mean of those of integral and derivative.
+        Its time constant is the geometric mean of those of integral and derivative, or one tick where that is longer.
         """
         plan, drive, effect = self._plan(z, y, r), self._drive(), self.model.effect(y)
         heading = lambda u: drive.aim(plan.drive, u, self.actuator_rate)
         asked, going = heading(drive.command(plan.drive, plan.forces, self.actuator_rate)), heading(u_applied)
-        back = jnp.sqrt(self.integral / self.derivative) * matvec(effect, going - asked)
+        back = jnp.minimum(jnp.sqrt(self.integral / self.derivative), 1 / dt) * matvec(effect, going - asked)
         share = attained(effect, asked, going)
         return PIDState(
             integral=z.integral + dt * (self.integral * plan.error + back),

@@ -27,7 +27,7 @@ class Status(enum.IntEnum):
 _SENTENCES = {
     Status.OK: "The run reached its end.",
     Status.DIVERGED: "A position or velocity left every sensible envelope: the loop is unstable.",
-    Status.NOT_FINITE: "A state became infinite or undefined; the last finite state was kept.",
+    Status.NOT_FINITE: "A state became infinite, undefined, or too large to be squared; the last sound one was kept.",
     Status.PITCH_SINGULAR: "Pitch came within 0.06 degrees of +-90, where Euler angles, and so Eq. (1), are undefined.",
     Status.STEPS_EXHAUSTED: "The adaptive integrator could go no further: too stiff a loop, or an undefined rate.",
     Status.OUT_OF_RANGE: "An output left the range in which the plant can be held: a ball touched its magnet, "

@@ -17,8 +17,8 @@ _FIRST_STEP = 1e-4  # s; the integrator finds its own from there
 
 
 @eqx.filter_jit
-def solve(loop, key, start, times, jumps, rtol, atol) -> Outcome:
-    """Integrate from `start` over `times` (s, records); arguments as in `continuous.simulate`."""
+def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
+    """Integrate from `start` to `until` (s) with records at `times` (s); arguments as in `continuous.simulate`."""
     drawn = loop.draw(key)
     # One flat vector: the integrator's own arithmetic is then compiled once, not once per piece of state.
     flat, unravel = ravel_pytree(drawn.start(*start))
@@ -33,7 +33,7 @@ def solve(loop, key, start, times, jumps, rtol, atol) -> Outcome:
         diffrax.ODETerm(flat_flow),
         diffrax.Tsit5(),
         t0=0.0,
-        t1=times[-1],
+        t1=until,
         dt0=_FIRST_STEP,
         y0=flat,
         args=drawn,

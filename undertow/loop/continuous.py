@@ -1,5 +1,6 @@
 """The continuous loop: plant and law as one ODE, the paper's own setting."""
 
+import math
 from typing import Any, cast
 
 import equinox as eqx
@@ -33,7 +34,7 @@ def simulate(
 
     Args:
         loop: the five roles; the controller must be written in continuous time.
-        duration: s; rounded to whole records.
+        duration: s; with fixed steps rounded to whole ones.
         record_step: time between records, s; with fixed steps a multiple of dt.
         key: for everything random; None for key 0.
         position, velocity: outputs at t = 0; None for zero.
@@ -47,7 +48,8 @@ def simulate(
         BadInput: duration, record_step or dt not positive, or as `check`.
     """
     check(loop)
-    records = round(duration / record_step) if 0 < duration < float("inf") and record_step > 0 else 0
+    # As many records as fit; what a division of whole multiples leaves over does not count.
+    records = math.floor(duration / record_step * (1 + 1e-9)) if 0 < duration < math.inf and record_step > 0 else 0
     if records < 1:
         raise BadInput("duration", f"be at least one record ({record_step:g} s)", f"{duration:g} s")
     key = jax.random.PRNGKey(0) if key is None else key
@@ -56,12 +58,14 @@ def simulate(
         from undertow.loop.adaptive import solve
 
         times = jnp.asarray(np.arange(records + 1) * record_step, dtype=float)
+        until = jnp.maximum(times[-1], duration)
         jumps = jnp.asarray([0.0, *loop.disturbance.jumps(duration)])
-        return solve(loop, key, start, times, jumps, *tolerances)
+        return solve(loop, key, start, times, until, jumps, *tolerances)
     if not 0 < dt <= record_step * (1 + 1e-9):
         raise BadInput("dt", f"be positive and at most one record ({record_step:g} s)", f"{dt:g} s")
     every = round(record_step / dt)
-    return _run(loop, key, start, jnp.asarray(record_step / every, dtype=float), (records * every, every))
+    dt = record_step / every
+    return _run(loop, key, start, jnp.asarray(dt, dtype=float), (round(duration / dt), every))
 
 
 def check(loop: ClosedLoop) -> None:
@@ -91,4 +95,4 @@ def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, in
 
     carry = (drawn.start(*start), jnp.asarray(int(Status.OK)), jnp.zeros(()))
     (final, status, ended), (time, samples) = record(drawn, tick, carry, dt, ticks, every)
-    return Outcome(time, samples, (), final, status, jnp.where(status == int(Status.OK), time[-1], ended))
+    return Outcome(time, samples, (), final, status, jnp.where(status == int(Status.OK), instant(ticks, dt), ended))

@@ -23,9 +23,15 @@ class Outcome(NamedTuple):
 
 def health(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
     """Status code of an instant; what the controller's model can bear is no failure."""
-    leaves = [jnp.isfinite(leaf).all() for leaf in jax.tree.leaves((x, z))]
-    finite = jnp.stack(leaves).all()
+    finite = jnp.stack([_finite(leaf).all() for leaf in jax.tree.leaves((x, z))]).all()
     code = loop.plant.health(x)
     for borne in loop.controller.model.bears():
         code = jnp.where(code == int(borne), int(Status.OK), code)
     return jnp.where(finite, code, int(Status.NOT_FINITE))
+
+
+def _finite(leaf: Array) -> Array:
+    """Which numbers have a square, as metrics need it; a filter may grow for long before it overflows."""
+    if not jnp.issubdtype(leaf.dtype, jnp.floating):
+        return jnp.isfinite(leaf)
+    return jnp.abs(leaf) < jnp.sqrt(jnp.finfo(leaf.dtype).max)

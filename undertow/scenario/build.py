@@ -40,7 +40,7 @@ class Built(NamedTuple):
 
 
 def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) -> Built:
-    """Objects described by a scenario.
+    """Objects described by a scenario, made on the processor: the same bits whether or not there is a GPU.
 
     Args:
         source: a scenario as read from a file, or as Python data.
@@ -49,7 +49,11 @@ def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) ->
     Raises:
         BadInput: anything wrong with it, with key path and place.
     """
-    text = source if isinstance(source, Text) else from_data(source)
+    with runtime.on_processor():
+        return _build(source if isinstance(source, Text) else from_data(source), workshop or Workshop())
+
+
+def _build(text: Text, workshop: Workshop) -> Built:
     scenario = validate(text)
     if scenario.precision == "float32":
         runtime.use_single_precision()
@@ -63,8 +67,6 @@ def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) ->
     def make(key: str, given: tuple = ()) -> Any:
         part, resolved[key] = one(key, key, getattr(scenario, key), given)
         return part
-
-    workshop = workshop or Workshop()
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
         told = {"part": part.model_dump(), "circumstances": circumstances}

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.metrics import Metrics
+from undertow.core import runtime
 from undertow.core.status import Status
 from undertow.lanes.errors import Unsupported
 from undertow.loop import continuous, in_lanes, sampled
@@ -35,7 +36,7 @@ class Executed(NamedTuple):
 
 
 def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
-    """Run a scenario.
+    """Run a scenario, on the processor: one run has nothing that a GPU could do beside it.
 
     Args:
         source: a scenario, read, as data or built.
@@ -43,7 +44,11 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
     Raises:
         BadInput: anything wrong with it.
     """
-    built = source if isinstance(source, Built) else build(source)
+    with runtime.on_processor():
+        return _execute(source if isinstance(source, Built) else build(source))
+
+
+def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
     gathered = (Metrics(*built.window()),) if scenario.steady.every_tick else ()
     outcome = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)

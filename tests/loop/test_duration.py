@@ -1,0 +1,30 @@
+"""A continuous run lasts as long as it is told, whether or not it ends at a record."""
+
+import jax
+import numpy as np
+import pytest
+
+from undertow.controllers.rcaf import rcaf
+from undertow.disturbances.sinusoid import sinusoid
+from undertow.loop import continuous
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.double_integrator import double_integrator
+from undertow.references.setpoint import setpoint
+from undertow.sensors.perfect import perfect
+
+
+@pytest.mark.parametrize("tolerances", [None, (1e-10, 1e-12)], ids=["fixed", "adaptive"])
+def test_the_end_does_not_depend_on_the_records(tolerances):
+    plant = double_integrator(1)
+    loop = ClosedLoop(plant, rcaf(plant.model(), sets=3), setpoint(np.ones(1)), sinusoid(1.0, 2.0), perfect())
+    often, seldom = (
+        continuous.simulate(loop, duration=0.29, record_step=step, dt=1e-3, tolerances=tolerances)
+        for step in (0.01, 0.1)
+    )
+    assert float(often.ended) == float(seldom.ended) == pytest.approx(0.29, abs=1e-15)
+    np.testing.assert_allclose(seldom.time, [0.0, 0.1, 0.2], atol=1e-15)
+    np.testing.assert_allclose(often.time[-1], 0.29, atol=1e-15)
+    for one, other in zip(*(jax.tree.leaves(run.final) for run in (often, seldom)), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(often.samples.position[-1], seldom.final[0].position, rtol=1e-7)
+    assert abs(float(often.samples.position[-1, 0] - often.samples.position[-10, 0])) > 1e-3  # it moves meanwhile
