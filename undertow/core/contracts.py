@@ -11,6 +11,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
+from undertow.core.arrays import as_array
 from undertow.core.drive import AbstractDrive, DirectDrive
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
@@ -301,4 +302,4 @@ class AbstractSensor(eqx.Module):
 
         One number or one per output, m/s and rad/s; zero where nothing is known.
         """
-        return jnp.zeros(())
+        return as_array(0.0)

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
+
+from undertow.core.arrays import as_array
 
 
 class Parameter(NamedTuple):
@@ -42,7 +42,7 @@ def param(
     """
     metadata = {"unit": unit, "meaning": meaning, "symbol": symbol, "source": source}
     extra = {} if default is dataclasses.MISSING else {"default": default}
-    return eqx.field(converter=_to_array, metadata=metadata, **extra)
+    return eqx.field(converter=as_array, metadata=metadata, **extra)
 
 
 def sources_field() -> Any:
@@ -70,13 +70,6 @@ def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]
             for i, member in enumerate(value):
                 if isinstance(member, eqx.Module):
                     yield from parameters(member, f"{name}[{i}].")
-
-
-def _to_array(value: Any) -> Any:
-    if isinstance(value, jax.Array):
-        return value
-    made_of_arrays = any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value))
-    return jnp.asarray(value if made_of_arrays else np.asarray(value, dtype=float), dtype=float)  # numpy: no XLA
 
 
 def _freeze(sources: Mapping[str, str] | tuple) -> tuple:

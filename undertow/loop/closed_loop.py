@@ -4,8 +4,10 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
+from undertow.core.arrays import as_array
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
@@ -68,11 +70,9 @@ class ClosedLoop(eqx.Module):
 
     def outputs_at_start(self, position: Any, velocity: Any) -> tuple[Outputs, Outputs]:
         """Outputs at t = 0 as arrays, zero where None: one compiled program serves every start."""
-        zero = jnp.zeros(len(self.plant.outputs))
-        return (
-            zero if position is None else jnp.asarray(position, dtype=float),
-            zero if velocity is None else jnp.asarray(velocity, dtype=float),
-        )
+        zero = np.zeros(len(self.plant.outputs))
+        made = lambda given: as_array(zero if given is None else given)
+        return made(position), made(velocity)
 
     def draw(self, key: PRNGKeyArray) -> "Drawn":
         """Draw everything random once."""
