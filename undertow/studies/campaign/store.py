@@ -69,9 +69,9 @@ class Store:
                 self._array(name, values.dtype, values.shape, values.shape, Label((name,), dict(attributes)))[:] = (
                     values
                 )
-            self._array(
-                _DONE, np.dtype(np.uint8), (self.tasks,), (1,), Label(("task",), {"long_name": "1 for what is written"})
-            )
+            label = Label(("task",), {"long_name": "1 for what is written"})
+            self._array(_DONE, np.dtype(np.uint8), (self.tasks,), (1,), label)
+        self._arrays = dict(self._group.arrays())  # asking zarr for one takes as long as writing it
 
     @property
     def tasks(self) -> int:
@@ -84,7 +84,7 @@ class Store:
 
     def missing(self) -> list[int]:
         """Tasks to be done; those whose rows cannot be read are among them."""
-        done = np.asarray(self._group[_DONE][:])
+        done = np.asarray(self._arrays[_DONE][:])
         return [task for task in range(self.tasks) if not (done[task] and self._whole(task))]
 
     def write(self, task: int, columns: Mapping[str, np.ndarray]) -> None:
@@ -99,11 +99,11 @@ class Store:
         """
         first, last = self.rows(task).start, self.rows(task).stop
         for name, values in columns.items():
-            if name not in self._group:
+            if name not in self._arrays:
                 shape, chunks = (self._trials, *values.shape[1:]), (self._chunk, *values.shape[1:])
-                self._array(name, values.dtype, shape, chunks, self._labels[name])
-            self._group[name][first:last] = values
-        self._group[_DONE][task] = 1
+                self._arrays[name] = self._array(name, values.dtype, shape, chunks, self._labels[name])
+            self._arrays[name][first:last] = values
+        self._arrays[_DONE][task] = 1
 
     def close(self) -> None:
         """Let others write."""
@@ -112,7 +112,7 @@ class Store:
     def _whole(self, task: int) -> bool:
         first, last = self.rows(task).start, self.rows(task).stop
         try:
-            for _, array in self._group.arrays():
+            for array in self._arrays.values():
                 if array.shape[0] == self._trials:
                     array[first:last]
         except Exception:  # whatever a codec says of a torn chunk
