@@ -1,19 +1,26 @@
-"""What a campaign costs: python benchmarks/campaign_scale.py [memory|dask] [--trials N]
+"""What a campaign costs: python benchmarks/campaign_scale.py [memory|dask|pieces] [--trials N]
 
 memory: 100 000 trials of workload W1, 1 s each, in this process. Memory after the first tenth of the tasks and at the
 end, its peak, bytes of the store and time per trial.
 dask: 1 000 trials of W1, 20 s each, by one worker and by two of a local cluster: the ratio of the times once the
-workers have compiled, and whether the stores are the same to the byte.
+workers have compiled, the shortest of five each, and whether the stores are the same to the byte.
+pieces: milliseconds of building a trial where start and gain differ, or the mass of the vehicle; of writing a task of
+256 trials, or of 65 536; in one thread.
 
 Prints JSON.
 """
 
 import argparse
+import contextlib
 import json
 import resource
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from undertow import process
 
@@ -21,8 +28,10 @@ process.prepare()
 
 from undertow.scenario.reading import dump
 from undertow.studies.campaign import task
+from undertow.studies.campaign.columns import labels
 from undertow.studies.campaign.conduct import STORE, conduct, prepare
 from undertow.studies.campaign.engines import by_dask, cluster, in_threads
+from undertow.studies.campaign.store import Store
 from undertow.studies.paper.setup import scenario
 
 VARY = {
@@ -31,14 +40,17 @@ VARY = {
 }
 
 
-def prepared(folder: Path, trials: int, duration: float, chunk: int):
+HEAVIER = {"plant.vehicle.mass": {"normal": [125.0, 3.0]}}
+
+
+def prepared(folder: Path, trials: int, duration: float, chunk: int, vary: dict = VARY):
     loop = {"kind": "sampled", "duration": duration}
     whole = scenario("W1", rung="electromechanical", composite=20.0, loop=loop) | {
         "initial": {"position": [0.0] * 6},
         "steady": {"start": duration / 2},
     }
     path = folder / "campaign.yaml"
-    path.write_text(dump({"scenario": whole, "trials": trials, "chunk": chunk, "vary": VARY, "seed": 1}))
+    path.write_text(dump({"scenario": whole, "trials": trials, "chunk": chunk, "vary": vary, "seed": 1}))
     return prepare(path)
 
 
@@ -63,6 +75,37 @@ def memory(trials: int) -> dict:
     }
 
 
+def pieces(trials: int) -> dict:
+    """One thread: building a trial, and writing a task of few or many; the shortest of three."""
+    found = {}
+    with tempfile.TemporaryDirectory() as name:
+        for what, vary in (("build_start_and_gain_ms", VARY), ("build_mass_ms", HEAVIER)):
+            campaign = prepared(Path(name), 4 * trials, 1.0, 256, vary)
+            here = task.site(campaign.text, str(campaign.folder))
+            build = lambda i, here=here: [
+                task.build_trial(here.trials, here.workshop, row) for row in range(i * trials, (i + 1) * trials)
+            ]
+            found[what] = 1e3 * _shortest(build) / trials
+            columns = task.fly(campaign.text, str(campaign.folder), range(8))
+        for rows in (256, 65_536):
+            store = Store(Path(name) / f"{rows}.zarr", 4 * rows, rows, {}, {}, labels(campaign.trials), {})
+            chance = np.random.default_rng(0)  # numbers that cannot be told shorter than they are
+            many = {key: chance.normal(size=rows).astype(values.dtype) for key, values in columns.items()}
+            found[f"write_{rows}_ms"] = 1e3 * _shortest(lambda i, s=store, m=many: s.write(i, m))
+            store.close()
+    return found
+
+
+def _shortest(work: Callable[[int], Any]) -> float:
+    """Seconds of the shortest of three, after one that does not count."""
+    times = []
+    for i in range(4):
+        start = time.perf_counter()
+        work(i)
+        times.append(time.perf_counter() - start)
+    return min(times[1:])
+
+
 def _resident() -> float:
     """MiB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
@@ -70,34 +113,42 @@ def _resident() -> float:
 
 
 def dask(trials: int) -> dict:
-    """One worker and two; each flies a task first, so that compiling is not counted."""
-    times, stores = [], []
-    with tempfile.TemporaryDirectory() as name:
-        for workers in (1, 2):
-            folder = Path(name) / str(workers)
-            folder.mkdir()
-            campaign = prepared(folder, trials, 20.0, 25)
-            with cluster("local", workers) as client:
-                client.wait_for_workers(workers)
+    """One worker and two, in turn; the shortest of five times each. All fly some first: compiling is not counted."""
+    times: dict[int, list[float]] = {1: [], 2: []}
+    stores = []
+    with contextlib.ExitStack() as stack:
+        name = stack.enter_context(tempfile.TemporaryDirectory())
+        clients = {workers: stack.enter_context(cluster("local", workers)) for workers in times}
+        for workers, client in clients.items():
+            client.wait_for_workers(workers)
+        for number in range(5):
+            for workers, client in clients.items():
+                folder = Path(name) / f"{workers}-{number}"
+                folder.mkdir()
+                campaign = prepared(folder, trials, 20.0, 256)
                 client.run(task.fly, campaign.text, str(campaign.folder), range(8))
                 start = time.perf_counter()
                 conduct(campaign, folder, lambda f, work, c=client: by_dask(f, work, c), lambda *_: None)
-                times.append(time.perf_counter() - start)
-            files = sorted(file for file in (folder / STORE).rglob("*") if file.is_file())
-            stores.append({str(file.relative_to(folder)): file.read_bytes() for file in files})
+                times[workers].append(time.perf_counter() - start)
+                files = sorted(file for file in (folder / STORE).rglob("*") if file.is_file())
+                stores.append({str(file.relative_to(folder)): file.read_bytes() for file in files})
+    one, two = map(min, times.values())
     return {
         "trials": trials,
-        "one_worker_s": times[0],
-        "two_workers_s": times[1],
-        "times_faster": times[0] / times[1],
-        "same_bytes": stores[0] == stores[1],
+        "one_worker_s": one,
+        "two_workers_s": two,
+        "times_faster": one / two,
+        "same_bytes": all(store == stores[0] for store in stores),
     }
 
 
+MEASURED = {"memory": (memory, 100_000), "dask": (dask, 1_000), "pieces": (pieces, 500)}  # and trials unless given
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("what", choices=["memory", "dask"])
+    parser.add_argument("what", choices=list(MEASURED))
     parser.add_argument("--trials", type=int)
     asked = parser.parse_args()
-    measured = memory(asked.trials or 100_000) if asked.what == "memory" else dask(asked.trials or 1_000)
+    measure, usual = MEASURED[asked.what]
+    measured = measure(asked.trials or usual)
     print(json.dumps({key: round(value, 3) if isinstance(value, float) else value for key, value in measured.items()}))

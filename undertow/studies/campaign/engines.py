@@ -121,7 +121,7 @@ def _started(kind: str, workers: int) -> Any:
 
         from undertow.studies.campaign import local_worker
 
-        quiet = {"dashboard_address": None, "silence_logs": logging.ERROR}
+        quiet = {"dashboard_address": ":0", "silence_logs": logging.ERROR}
         return LocalCluster(n_workers=workers, threads_per_worker=1, preload=[local_worker.__name__], **quiet)
     if kind == "ssh":
         return _over_ssh(os.environ.get("UNDERTOW_HOSTS", ""), workers)
