@@ -82,12 +82,12 @@ def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (11, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(11, *start[0].shape))
     many = many._replace(start=(places, many.start[1]))
-    varies = [leaf is start[0] for leaf in leaves]
-    fleet = in_lanes.Fleet(run, plan, [not one for one in varies])
+    same = jax.tree.leaves(jax.tree.map(lambda leaf: True, numbers)._replace(start=(False, True)))
+    fleet = in_lanes.Fleet(run, plan, same)
     found = fleet.fly(many)
     backwards = fleet.fly(jax.tree.map(lambda leaf: leaf[::-1], many))
     general = in_lanes.Fleet(run, plan, [False] * len(leaves)).fly(many)
-    alone = in_lanes.Fleet(run, plan, [not one for one in varies], lanes=1)
+    alone = in_lanes.Fleet(run, plan, same, lanes=1)
     for i in range(11):
         single = alone.fly(jax.tree.map(lambda leaf, i=i: leaf[i : i + 1], many))
         same = lambda a, b, i=i: np.testing.assert_array_equal(a[0], b[i])

@@ -29,7 +29,7 @@ def several(name, ticks, runs, every=0):
     numbers = eqx.filter(run, eqx.is_array)
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (runs, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(runs, *run.start[0].shape))
-    same = [leaf is not run.start[0] for leaf in jax.tree.leaves(numbers)]
+    same = jax.tree.leaves(jax.tree.map(lambda leaf: True, numbers)._replace(start=(False, True)))
     return run, plan, same, many._replace(start=(places, many.start[1]))
 
 
