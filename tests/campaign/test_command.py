@@ -23,6 +23,11 @@ from undertow.studies.campaign.conduct import STORE, conduct, prepare
 from undertow.studies.campaign.engines import by_dask
 
 TYPED = (sys.executable, "-W", "ignore", "-m", "undertow.cli.main")
+VEHICLE = {
+    "controller": {"kind": "pid"},
+    "reference": {"kind": "setpoint", "position": [0.0] * 6},
+    "loop": {"duration": 0.1, "dt": 0.01, "record": 0.1},
+}
 CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant.limit": [1e30]}
 
 
@@ -137,6 +142,15 @@ def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_
         (
             {"vary": {}, "scenario": {"reference": "setpont"}},
             r"`reference.kind` .* \(small.yaml, line 1, trial 0\). Did you mean `setpoint`",
+        ),
+        (
+            {
+                "series": {"every": 0.1},
+                "cross": {"plant.vehicle": ["odin", "bluerov2"]},
+                "vary": {},
+                "scenario": VEHICLE,
+            },
+            r"`series` must be of plants with the same outputs and inputs, but is of several",
         ),
         ({"series": {"every": 0.03}}, r"`series.every` must be a whole number of sampling times \(0.02 s\)"),
     ],
@@ -259,12 +273,7 @@ def test_what_is_drawn_from_words_is_told_apart(campaign_file, tmp_path):
 
 def test_a_mass_without_its_weight_is_told(campaign_file, tmp_path, capsys):
     """Both by a run and by a campaign, before they begin."""
-    scenario = {
-        "plant": {"vehicle": {"kind": "odin", "mass": 200.0}},
-        "controller": {"kind": "pid", "frequency": 1.0},
-        "reference": {"kind": "setpoint", "position": [0.0] * 6},
-        "loop": {"duration": 0.1, "dt": 0.01, "record": 0.1},
-    }
+    scenario = VEHICLE | {"plant": {"vehicle": {"kind": "odin", "mass": 200.0}}}
     said = r"`weight` must be the weight of the mass, 1962 N, but is .*"
     path = campaign_file(scenario=scenario, vary={}, trials=1, requirements={})
     assert run(["campaign", str(path), "--out", str(tmp_path / "campaign")]) == 0

@@ -99,6 +99,15 @@ def test_a_chunk_that_was_torn_is_flown_again(small, tmp_path):
     assert counted == [24, 40]
 
 
+@pytest.mark.parametrize("name", ["tracking_rms", "status"])  # zeros, too
+def test_a_chunk_that_is_gone_is_flown_again(small, tmp_path, name):
+    path, whole = small
+    (tmp_path / "whole" / STORE / name / "c" / "2").unlink()
+    counted = []
+    assert flown(path, tmp_path / "whole", watch=lambda done, total, failed: counted.append(done)) == whole
+    assert counted == [32, 40]
+
+
 @pytest.mark.parametrize("at", [0, 3, 11, 30])
 def test_a_full_disk_loses_nothing(small, tmp_path, monkeypatch, at):
     """Writing fails at some array of some task; what was done before stays, and the rest is flown later."""

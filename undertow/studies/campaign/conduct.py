@@ -1,6 +1,6 @@
 """A campaign from its file to its results: what is missing is flown, whoever flies it."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -50,6 +50,7 @@ def prepare(path: Path) -> Prepared:
     text, folder = whole(campaign, several.scenario.data), several.scenario.folder
     here = tasks.site(text, str(folder))
     firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]
+    _check_shapes(campaign, here.probes().values())
     advice: dict[str, str] = {}
     for row, built in firsts:
         _check(campaign, built.scenario.loop)
@@ -90,6 +91,14 @@ def _check(campaign: Campaign, loop: Loop) -> None:
         raise BadInput("series.every", must, f"{campaign.series.every:g} s")
     if campaign.series.every > loop.duration:
         raise BadInput("series.every", f"be at most the duration ({loop.duration:g} s)", f"{campaign.series.every:g} s")
+
+
+def _check_shapes(campaign: Campaign, several: Iterable[Built]) -> None:
+    """That series have the same shape in all trials, as one array holds them."""
+    plants = [built.closed_loop.plant for built in several]
+    if campaign.series and len({(plant.outputs, plant.inputs()) for plant in plants}) > 1:
+        hint = "Leave `series` out, or make a campaign for each of them"
+        raise BadInput("series", "be of plants with the same outputs and inputs", "of several", hint=hint)
 
 
 def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None:

@@ -26,6 +26,9 @@ _DONE = "done"
 # Its checksum tells a chunk that was torn apart.
 _CODEC = ZstdCodec(level=3, checksum=True)
 
+# A chunk of nothing but zeros is a file, too: one that is gone is noticed.
+_CONFIG: Any = {"write_empty_chunks": True}
+
 
 class Store:
     """Rows of trials, written by tasks in any order.
@@ -53,7 +56,7 @@ class Store:
         labels: Mapping[str, Label],
         coordinates: Mapping[str, tuple[np.ndarray, Mapping[str, Any]]],
     ):
-        self._trials, self._chunk, self._labels = trials, chunk, labels
+        self._path, self._trials, self._chunk, self._labels = path, trials, chunk, labels
         path.mkdir(parents=True, exist_ok=True)
         self._lock = _locked(path)
         for left in path.rglob("*.partial"):  # by a process that was killed while zarr wrote a file
@@ -66,12 +69,12 @@ class Store:
         else:
             self._group.attrs.update({**identity, **further, "chunk": chunk})
             for name, (values, attributes) in coordinates.items():
-                self._array(name, values.dtype, values.shape, values.shape, Label((name,), dict(attributes)))[:] = (
-                    values
-                )
+                label = Label((name,), dict(attributes))
+                self._array(name, values.dtype, values.shape, values.shape, label)[:] = values
             label = Label(("task",), {"long_name": "1 for what is written"})
             self._array(_DONE, np.dtype(np.uint8), (self.tasks,), (1,), label)
-        self._arrays = dict(self._group.arrays())  # asking zarr for one takes as long as writing it
+        # Asking zarr for an array takes as long as writing it.
+        self._arrays = {name: array.with_config(_CONFIG) for name, array in self._group.arrays()}
 
     @property
     def tasks(self) -> int:
@@ -112,15 +115,17 @@ class Store:
     def _whole(self, task: int) -> bool:
         first, last = self.rows(task).start, self.rows(task).stop
         try:
-            for array in self._arrays.values():
-                if array.shape[0] == self._trials:
+            for name, array in self._arrays.items():
+                if name in self._labels:
                     array[first:last]
-        except Exception:  # whatever a codec says of a torn chunk
+                    self._path.joinpath(name, "c", str(task), *["0"] * (array.ndim - 1)).stat()
+        except Exception:  # whatever a codec says of a torn chunk; for one that is gone zarr has zeros
             return False
         return True
 
     def _array(self, name: str, dtype: np.dtype, shape: tuple, chunks: tuple, label: Label) -> Any:
-        # With its attributes at once: killed between the two, an array would stay without them.
+        # With its attributes at once: killed between the two, an array would stay without them. What a killed process
+        # left of it is overwritten.
         return self._group.create_array(
             name,
             shape=shape,
@@ -130,7 +135,8 @@ class Store:
             dimension_names=label.dimensions,
             compressors=[_CODEC],
             attributes=label.attributes,
-            config={"write_empty_chunks": True},
+            overwrite=True,
+            config=_CONFIG,
         )
 
 
