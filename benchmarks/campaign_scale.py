@@ -28,9 +28,10 @@ process.prepare()
 
 from undertow.scenario.reading import dump
 from undertow.studies.campaign import task
+from undertow.studies.campaign.clusters import cluster
 from undertow.studies.campaign.columns import labels
 from undertow.studies.campaign.conduct import STORE, conduct, prepare
-from undertow.studies.campaign.engines import by_dask, cluster, in_threads
+from undertow.studies.campaign.engines import by_dask, in_threads
 from undertow.studies.campaign.store import Store
 from undertow.studies.paper.setup import scenario
 

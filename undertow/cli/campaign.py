@@ -23,8 +23,9 @@ from undertow.core.errors import BadInput
 from undertow.report.campaign_page import write_campaign
 from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import dump
+from undertow.studies.campaign.clusters import cluster
 from undertow.studies.campaign.conduct import STORE, Engine, Prepared, Watch, conduct, prepare
-from undertow.studies.campaign.engines import by_dask, cluster, in_threads
+from undertow.studies.campaign.engines import by_dask, in_threads
 from undertow.studies.campaign.results import Results, load
 from undertow.studies.campaign.summary import endings, summary
 
