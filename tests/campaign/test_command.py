@@ -19,8 +19,10 @@ from distributed import Client, LocalCluster
 from undertow.analysis.metrics import OVERALL
 from undertow.cli.main import run
 from undertow.scenario.reading import dump
+from undertow.studies.campaign import store as stores
 from undertow.studies.campaign.conduct import STORE, conduct, prepare
 from undertow.studies.campaign.engines import by_dask
+from undertow.studies.campaign.task import site
 
 TYPED = (sys.executable, "-W", "ignore", "-m", "undertow.cli.main")
 VEHICLE = {
@@ -151,6 +153,11 @@ def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_
                 "scenario": VEHICLE,
             },
             r"`series` must be of plants with the same outputs and inputs, but is of several",
+        ),
+        ({"cross": {"seed": [1, 2]}}, r"`cross.seed` must be left out \(small.yaml, line \d+\). Every trial has one"),
+        (
+            {"vary": {"sensor.velocity": {"uniform": [0.0, 1.0]}, "sensor": {"choice": ["perfect"]}}},
+            r"`sensor.velocity` must not be beside sensor, which it is a part of",
         ),
         ({"series": {"every": 0.03}}, r"`series.every` must be a whole number of sampling times \(0.02 s\)"),
     ],
@@ -441,3 +448,33 @@ def started(*words):
     finally:
         process.kill()
         process.wait()
+
+
+def test_a_refused_overwrite_leaves_a_campaign_that_is_flying(campaign_file, tmp_path, capsys):
+    """As another process would find it: the store is locked."""
+    path, out = campaign_file(trials=4), tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    before, held = contents(out), stores._locked(out / STORE)
+    assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 2
+    os.close(held)
+    assert "must be a folder that nothing else writes to" in capsys.readouterr().err
+    assert contents(out) == before
+
+
+def test_a_file_that_the_scenario_names_belongs_to_the_campaign(campaign, campaign_file, tmp_path, capsys):
+    """Its worst trials stand alone, and another content of it makes another campaign."""
+    rows = "t,d1\n0,0.5\n1,{}\n2,0.5\n"
+    (tmp_path / "d.csv").write_text(rows.format(1.0))
+    scenario = campaign()["scenario"] | {"disturbance": {"kind": "table", "file": "d.csv"}}
+    vary = {"controller.frequency": {"uniform": [1.5, 2.5]}}
+    path, out = campaign_file(scenario=scenario, vary=vary, trials=6, requirements={}), tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    worst = sorted((out / "worst").iterdir())[0]
+    trial = int(worst.stem.split("-")[1])
+    assert run(["simulate", str(worst), "--no-prediction", "--out", str(tmp_path / "again")]) == 0
+    found = json.loads((tmp_path / "again" / "metrics.json").read_text())["steady"]["tracking_rms"]
+    assert found == float(xr.open_zarr(out / STORE, consolidated=False)["tracking_rms"][trial])
+    (tmp_path / "d.csv").write_text(rows.format(2.0))
+    site.cache_clear()  # as in a process that begins
+    assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
+    assert "with another scenario" in capsys.readouterr().err

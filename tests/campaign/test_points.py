@@ -9,7 +9,7 @@ from undertow.scenario.reading import from_data
 from undertow.studies.campaign.points import points, seeds, value
 from undertow.studies.campaign.schema import Spread, validate
 
-TWO = {"loop.duration": {"uniform": [1, 2]}, "seed": {"uniform": [0, 1]}}
+TWO = {"loop.duration": {"uniform": [1, 2]}, "plant.limit": {"uniform": [0, 1]}}
 
 
 @pytest.mark.parametrize(

@@ -23,11 +23,14 @@ from undertow.core.errors import BadInput
 from undertow.report.campaign_page import write_campaign
 from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import dump
+from undertow.scenario.workshop import Workshop
 from undertow.studies.campaign.clusters import cluster
 from undertow.studies.campaign.conduct import STORE, Engine, Prepared, Watch, conduct, prepare
 from undertow.studies.campaign.engines import by_dask, in_threads
 from undertow.studies.campaign.results import Results, load
+from undertow.studies.campaign.store import check_free
 from undertow.studies.campaign.summary import endings, summary
+from undertow.studies.campaign.task import build_trial
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
@@ -126,6 +129,8 @@ def _claim(folder: Path, resume: bool, overwrite: bool) -> None:
         return
     hint = "Add --resume to go on with it, or --overwrite to begin anew"
     check_folder(folder, _WRITTEN, STORE, overwrite, hint)
+    if (folder / STORE).exists():
+        check_free(folder / STORE)
     for name in _WRITTEN:
         target = folder / name
         shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
@@ -159,9 +164,10 @@ def _live(console: Console) -> Iterator[Watch]:
 def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
+    workshop = Workshop()
     for trial in trials:
-        data = prepared.trials.data(trial)
-        data["steady"] = (data.get("steady") or {}) | {"every_tick": True}
+        data = build_trial(prepared.trials, workshop, trial).resolved  # with the contents of files that it names
+        data = data | {"steady": data["steady"] | {"every_tick": True}}
         text = f"# Trial {trial}: its steady metrics are those of the campaign.\n{dump(data)}"
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
 

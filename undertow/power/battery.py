@@ -5,6 +5,7 @@ from collections.abc import Callable
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
@@ -37,7 +38,8 @@ class Battery(eqx.Module):
         for name in ("full_voltage", "empty_voltage", "capacity"):
             checks.positive(name, getattr(self, name))
         checks.not_negative("resistance", self.resistance, "ohm")
-        if not isinstance(self.full_voltage, Tracer) and (self.full_voltage < self.empty_voltage).any():
+        traced = any(isinstance(voltage, Tracer) for voltage in (self.full_voltage, self.empty_voltage))
+        if not traced and (np.asarray(self.full_voltage) < np.asarray(self.empty_voltage)).any():
             must = f"be at most the full voltage ({float(self.full_voltage):g} V)"
             raise BadInput("empty_voltage", must, f"{float(self.empty_voltage):g} V")
 

@@ -14,7 +14,8 @@ from undertow.report.page import Html, bullets, document, figure, section, table
 from undertow.studies.campaign.results import Results
 
 _CAPTIONS = {
-    "distributions": "Every trial that lasted, one step each. The further left, the better.",
+    "distributions": "Every trial that lasted, one step each. The further left, the better. Metrics are of the steady "
+    "window: the second half of a run, unless `steady` of the scenario says otherwise.",
     "sensitivity": "Spearman's rank correlation over the trials that lasted, mean over the combinations: +1 where a "
     "metric grows with a parameter, -1 where it falls, 0 where one says nothing about the other.",
 }
@@ -82,7 +83,7 @@ def _drawn(results: Results, found: Mapping[str, Any], folder: Path) -> dict[str
     for name, one in figures.items():
         if one is not None:
             vector, _ = save(one, folder / "figures", name)
-            drawn[name] = figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], _CAPTIONS[name])
+            drawn[name] = figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
     return drawn
 
 

@@ -13,6 +13,7 @@ from undertow.loop.closed_loop import Sample
 from undertow.scenario.build import Built
 from undertow.scenario.fitting import whole_steps
 from undertow.scenario.provenance import text_hash, versions
+from undertow.scenario.reading import dump
 from undertow.scenario.schema import Loop
 from undertow.scenario.vehicle_findings import vehicle_doubts
 from undertow.studies.campaign import task as tasks
@@ -95,10 +96,15 @@ def _check(campaign: Campaign, loop: Loop) -> None:
 
 def _check_shapes(campaign: Campaign, several: Iterable[Built]) -> None:
     """That series have the same shape in all trials, as one array holds them."""
-    plants = [built.closed_loop.plant for built in several]
-    if campaign.series and len({(plant.outputs, plant.inputs()) for plant in plants}) > 1:
-        hint = "Leave `series` out, or make a campaign for each of them"
+    if campaign.series is None:
+        return
+    hint = "Leave it out, or make a campaign for each of them"
+    loops = [built.closed_loop for built in several]
+    if len({(loop.plant.outputs, loop.plant.inputs()) for loop in loops}) > 1:
         raise BadInput("series", "be of plants with the same outputs and inputs", "of several", hint=hint)
+    rules = {getattr(getattr(loop.controller, "fuzzy", None), "rules", 0) for loop in loops}
+    if "weights" in campaign.series.signals and len(rules) > 1:
+        raise BadInput("series.signals", "be without weights where laws have different rules", "with", hint=hint)
 
 
 def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None:
@@ -115,7 +121,9 @@ def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None
         OSError: the disk is full, or the cluster is gone; what was done is kept.
     """
     several, text, folder = prepared.trials, prepared.text, prepared.folder
-    identity = {"campaign_hash": text_hash(decisive(several.campaign, several.scenario.data)), **versions()}
+    # The scenario as it is built has the contents of files that it names: they may change, too.
+    hashes = {"campaign": decisive(several.campaign, several.scenario.data), "scenario": dump(prepared.first.resolved)}
+    identity = {f"{name}_hash": text_hash(one) for name, one in hashes.items()} | versions()
     store = Store(
         out / STORE,
         several.number,

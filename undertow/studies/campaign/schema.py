@@ -109,6 +109,15 @@ def validate(text: Text) -> Campaign:
             if not _PATH.fullmatch(key):
                 must = "be a key path such as plant.vehicle.mass or initial.position[0]"
                 raise BadInput(section, must, repr(key), where=text.where((section, key)))
+    every = [(section, key) for section, keys in (("vary", found.vary), ("cross", found.cross)) for key in keys]
+    for section, key in every:
+        if key == "seed":
+            hint = "Every trial has one of its own; `seed` of the campaign decides which"
+            raise BadInput(f"{section}.seed", "be left out", hint=hint, where=text.where((section, key)))
+        for _, other in every:
+            if other.startswith((f"{key}.", f"{key}[")):
+                must = f"not be beside {key}, which it is a part of"
+                raise BadInput(other, must, where=text.where((section, key)))
     for key in found.cross:
         if not found.cross[key]:
             raise BadInput(f"cross.{key}", "have an entry", where=text.where(("cross", key)))

@@ -140,6 +140,15 @@ class Store:
         )
 
 
+def check_free(path: Path) -> None:
+    """That no process is writing to a store.
+
+    Raises:
+        BadInput: one is.
+    """
+    os.close(_locked(path))
+
+
 def _same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> int:
     """Rows per task of a store that may be gone on with."""
     other = [key for key in wanted if found.get(key) != wanted[key]]
