@@ -11,6 +11,7 @@ from undertow.analysis.metrics import Metrics, overall
 from undertow.loop import in_lanes, sampled
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
+from undertow.studies.speed.workload import constant
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 QUICK = ("inverted_pendulum", "recorded_disturbance")
@@ -82,7 +83,7 @@ def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (11, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(11, *start[0].shape))
     many = many._replace(start=(places, many.start[1]))
-    same = jax.tree.leaves(jax.tree.map(lambda leaf: True, numbers)._replace(start=(False, True)))
+    same = constant(run)
     fleet = in_lanes.Fleet(run, plan, same)
     found = fleet.fly(many)
     backwards = fleet.fly(jax.tree.map(lambda leaf: leaf[::-1], many))

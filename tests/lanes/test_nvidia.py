@@ -13,6 +13,7 @@ from undertow.lanes import nvidia
 from undertow.lanes.cuda import Driver
 from undertow.lanes.errors import Unsupported
 from undertow.loop.in_lanes import Fleet, Plan, Run
+from undertow.studies.speed.workload import constant
 
 
 @pytest.fixture
@@ -29,7 +30,7 @@ def several(name, ticks, runs, every=0):
     numbers = eqx.filter(run, eqx.is_array)
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (runs, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(runs, *run.start[0].shape))
-    same = jax.tree.leaves(jax.tree.map(lambda leaf: True, numbers)._replace(start=(False, True)))
+    same = constant(run)
     return run, plan, same, many._replace(start=(places, many.start[1]))
 
 

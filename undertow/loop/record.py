@@ -45,17 +45,22 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant, controller: AbstractContr
         meaning, unit = columns[name]
         variables[name] = series(("time",), np.asarray(values), meaning, unit)
     status = Status(int(outcome.status))
-    axis = series(("axis",), np.array(plant.outputs), "output")
-    axis.attrs["unit_of_each"] = ", ".join(units)
     return xr.Dataset(
         variables,
-        coords={
-            "time": series(("time",), np.asarray(outcome.time), "time", "s"),
-            "axis": axis,
-            "input": series(("input",), np.arange(1, plant.inputs() + 1), "input"),
-        },
+        coords=coordinates(np.asarray(outcome.time), plant),
         attrs={"status": status.word, "status_sentence": status.sentence, "ended": float(outcome.ended)},
     )
+
+
+def coordinates(time: np.ndarray, plant: AbstractPlant) -> dict[str, xr.Variable]:
+    """What stands along the dimensions `time` (s), `axis` (names of the outputs) and `input` (numbers from 1)."""
+    axis = series(("axis",), np.array(plant.outputs), "output")
+    axis.attrs["unit_of_each"] = ", ".join(plant.output_units)
+    return {
+        "time": series(("time",), time, "time", "s"),
+        "axis": axis,
+        "input": series(("input",), np.arange(1, plant.inputs() + 1), "input"),
+    }
 
 
 def dimensions(name: str) -> tuple[str, ...]:

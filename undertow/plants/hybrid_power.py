@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
@@ -131,4 +132,4 @@ def has_motor(thruster: AbstractThruster) -> bool:
 
 
 def _finite(value: Any) -> bool:
-    return isinstance(value, Tracer) or bool(jnp.isfinite(value).all())
+    return isinstance(value, Tracer) or bool(np.isfinite(np.asarray(value)).all())

@@ -3,13 +3,17 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from undertow.analysis.meanings import MEANINGS
 from undertow.core.status import Status
-from undertow.loop.record import dimensions
+from undertow.loop import record
 from undertow.scenario.build import Built
 from undertow.studies.campaign.task import REFUSED
 from undertow.studies.campaign.trials import Trials
+
+# Codes of the column `status` and their words.
+ENDINGS = {REFUSED: "refused"} | {int(status): status.word for status in Status}
 
 
 class Label(NamedTuple):
@@ -28,27 +32,23 @@ def labels(several: Trials) -> dict[str, Label]:
     of_trials |= {name: {"long_name": one.meaning, "units": one.unit or "1"} for name, one in MEANINGS.items()}
     found = {name: Label(("trial",), attributes) for name, attributes in of_trials.items()}
     for name in several.campaign.series.signals if several.campaign.series else ():
-        found[f"series:{name}"] = Label(("trial", *dimensions(name)), {"long_name": name.replace("_", " ")})
+        found[f"series:{name}"] = Label(("trial", *record.dimensions(name)), {"long_name": name.replace("_", " ")})
     return found
 
 
-def coordinates(several: Trials, built: Built) -> dict[str, tuple[np.ndarray, dict[str, Any]]]:
-    """Values and attributes along the dimensions of series; none without series.
+def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
+    """What stands along the dimensions of series; nothing without series.
 
     Args:
         several: the trials.
         built: one of them.
     """
-    asked, loop, plant = several.campaign.series, built.scenario.loop, built.closed_loop.plant
+    asked, loop = several.campaign.series, built.scenario.loop
     if asked is None:
         return {}
     every = round(asked.every / loop.dt)
     time = every * np.arange(round(loop.duration / loop.dt) // every + 1) * loop.dt
-    return {
-        "time": (time, {"long_name": "time", "units": "s"}),
-        "axis": (np.array(plant.outputs), {"long_name": "output", "unit_of_each": ", ".join(plant.output_units)}),
-        "input": (np.arange(1, plant.inputs() + 1), {"long_name": "input"}),
-    }
+    return record.coordinates(time, built.closed_loop.plant)
 
 
 def _varied(key: str, entries: dict[str, Any] | None) -> dict[str, Any]:
@@ -59,9 +59,8 @@ def _varied(key: str, entries: dict[str, Any] | None) -> dict[str, Any]:
 
 def _codes() -> dict[str, Any]:
     """Codes and their words as the CF conventions have them."""
-    words = {REFUSED: "refused"} | {int(status): status.word for status in Status}
     return {
         "long_name": "how the run ended",
-        "flag_values": list(words),
-        "flag_meanings": " ".join(words.values()),
+        "flag_values": list(ENDINGS),
+        "flag_meanings": " ".join(ENDINGS.values()),
     }

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from undertow.core.errors import BadInput
 from undertow.studies.campaign.columns import Label
@@ -40,7 +41,7 @@ class Store:
         identity: attributes that are the same in a store that may be gone on with; plain data.
         further: other attributes, those of whoever wrote last.
         labels: of columns by name.
-        coordinates: values along other dimensions than that of trials, with their attributes, by name.
+        coordinates: along other dimensions than that of trials, by name.
 
     Raises:
         BadInput: the folder belongs to another campaign, or another process is writing to it.
@@ -54,7 +55,7 @@ class Store:
         identity: Mapping[str, Any],
         further: Mapping[str, Any],
         labels: Mapping[str, Label],
-        coordinates: Mapping[str, tuple[np.ndarray, Mapping[str, Any]]],
+        coordinates: Mapping[str, xr.Variable],
     ):
         self._path, self._trials, self._chunk, self._labels = path, trials, chunk, labels
         path.mkdir(parents=True, exist_ok=True)
@@ -68,9 +69,8 @@ class Store:
                 self._group.attrs.update(further)
         else:
             self._group.attrs.update({**identity, **further, "chunk": chunk})
-            for name, (values, attributes) in coordinates.items():
-                label = Label((name,), dict(attributes))
-                self._array(name, values.dtype, values.shape, values.shape, label)[:] = values
+            for name, one in coordinates.items():
+                self._array(name, one.dtype, one.shape, one.shape, Label((name,), one.attrs))[:] = one.values
             label = Label(("task",), {"long_name": "1 for what is written"})
             self._array(_DONE, np.dtype(np.uint8), (self.tasks,), (1,), label)
         # Asking zarr for an array takes as long as writing it.

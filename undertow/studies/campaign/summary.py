@@ -6,11 +6,10 @@ import numpy as np
 import xarray as xr
 from scipy.stats import binomtest
 
-from undertow.core.status import Status
+from undertow.studies.campaign.columns import ENDINGS
 from undertow.studies.campaign.dependence import by_choice, correlations, quantiles
 from undertow.studies.campaign.refusals import refusals
 from undertow.studies.campaign.results import Results
-from undertow.studies.campaign.task import REFUSED
 from undertow.studies.campaign.trials import Trials
 
 _WORST = 5
@@ -43,11 +42,7 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
 def endings(results: Results) -> dict[str, int]:
     """How many trials ended how; empty before the first is done."""
     codes = results.rows["status"].values if "status" in results.rows else np.zeros(0)
-    return {_word(code): int((codes == code).sum()) for code in np.unique(codes)}
-
-
-def _word(code: int) -> str:
-    return "refused" if code == REFUSED else Status(int(code)).word
+    return {ENDINGS[int(code)]: int((codes == code).sum()) for code in np.unique(codes)}
 
 
 def _combination(results: Results, number: int) -> dict[str, Any]:
