@@ -3,6 +3,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from PIL import Image
 
 from undertow.report.figures import (
@@ -129,6 +130,21 @@ def test_the_fullest_figures_stay_small(make_run):
         run["estimate"] = run["estimate"] * np.cos(20 * run["time"])
     for figure in (uncertainty("Fig. 7", runs), effort("Fig. 9", runs)):
         assert len(svg(figure)) < 400_000
+
+
+def test_a_figure_made_while_another_thread_writes_is_the_same(make_run, monkeypatch):
+    run = make_run(axes=1, inputs=1)
+    alone, made = svg(run_figures(run)["tracking"]), []
+
+    def write_meanwhile(canvas, *written, **how):
+        made.append(run_figures(run)["tracking"])  # the settings for writing are held now
+        return print_svg(canvas, *written, **how)
+
+    print_svg = FigureCanvasSVG.print_svg
+    with monkeypatch.context() as patch:
+        patch.setattr(FigureCanvasSVG, "print_svg", write_meanwhile)
+        svg(run_figures(run)["error"])
+    assert [svg(figure) for figure in made] == [alone]
 
 
 def test_drawing_in_two_threads_changes_nothing(make_run):

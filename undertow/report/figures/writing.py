@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 150
 
-# Names inside an SVG are salted at random unless a setting of matplotlib says otherwise; it is held while writing.
-_SETTINGS = {"svg.hashsalt": "undertow", "svg.fonttype": "path", "path.simplify": True, "path.simplify_threshold": 0.2}
+# Names inside an SVG are salted at random unless a setting of matplotlib says otherwise; it is held while writing. Only
+# settings that are read while writing may stand here: another thread may be making a figure, and would read them too.
+_SETTINGS = {"svg.hashsalt": "undertow", "svg.fonttype": "path"}
 _WRITING = threading.Lock()
 
 _PATH = re.compile(r'( d=")([^"]+)(")')
