@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from undertow.numerics.box_quadratic import box_minimum, solve_symmetric
+from undertow.numerics.box_quadratic import box_minimum
+from undertow.numerics.elimination import inverse_symmetric, solve_symmetric
 
 RNG = np.random.default_rng(11)
 solve = jax.jit(box_minimum)
@@ -80,3 +81,4 @@ def test_symmetric_systems():
     a = RNG.normal(size=(8, 8))
     h, b = a @ a.T + np.eye(8), RNG.normal(size=8)
     np.testing.assert_allclose(solve_symmetric(jnp.asarray(h), jnp.asarray(b)), np.linalg.solve(h, b), rtol=1e-11)
+    np.testing.assert_allclose(inverse_symmetric(jnp.asarray(h)) @ h, np.eye(len(h)), atol=1e-10)

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from undertow.numerics.elimination import inverse_symmetric, solve_symmetric
 from undertow.numerics.linear import matvec
 
 Vector = Float[Array, " n"]
@@ -54,25 +55,8 @@ def _derivative(primals, tangents):
     free = (x > low) & (x < high)
     held_dot = jnp.where(free, 0.0, jnp.where(x >= high, high_dot, low_dot))
     right = linear_dot - matvec(matrix_dot, x) - matvec(matrix, held_dot)
-    inverse = _eliminated(_among(free, matrix), jnp.eye(x.shape[0]))
+    inverse = inverse_symmetric(_among(free, matrix))
     return x, jnp.where(free, matvec(inverse, jnp.where(free, right, 0.0)), held_dot)
-
-
-def solve_symmetric(matrix: Float[Array, "n n"], right: Vector) -> Vector:
-    """Solution of a symmetric positive definite system."""
-    return _eliminated(matrix, right[:, None])[:, 0]
-
-
-def _eliminated(matrix: Float[Array, "n n"], right: Float[Array, "n k"]) -> Float[Array, "n k"]:
-    """Solutions of symmetric positive definite systems by Gauss-Jordan elimination."""
-
-    def eliminate(k, rows):
-        pivot = rows[k] / rows[k, k]
-        column = rows[:, k].at[k].set(0.0)
-        return (rows - column[:, None] * pivot).at[k].set(pivot)
-
-    n = matrix.shape[0]
-    return jax.lax.fori_loop(0, n, eliminate, jnp.concatenate([matrix, right], axis=1))[:, n:]
 
 
 def _among(free: Bool[Array, " n"], matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:

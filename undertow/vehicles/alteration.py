@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import Factors, Payload
+from undertow.numerics.elimination import inverse_symmetric
 from undertow.vehicles.body import Body, rigid_body_mass
 
 
@@ -58,7 +59,7 @@ def _carrying(body: Body, payload: Payload) -> Body:
         body,
         (
             mass_matrix,
-            jnp.linalg.inv(mass_matrix),
+            inverse_symmetric(mass_matrix),
             weight,
             buoyancy,
             (body.weight * body.r_g + in_air * payload.point) / weight,
