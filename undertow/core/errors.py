@@ -41,8 +41,13 @@ class BadInput(ValueError):
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Sentence naming the nearest known word, or all of them when none is near."""
     known = sorted(known)
-    near = difflib.get_close_matches(str(word), known, n=1, cutoff=0.6)
-    return f"Did you mean `{near[0]}`?" if near else f"Known: {', '.join(known)}"
+    return nearest(word, known) or f"Known: {', '.join(known)}"
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Sentence naming the nearest known word; nothing when none is near."""
+    near = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.6)
+    return f"Did you mean `{near[0]}`?" if near else ""
 
 
 def _one_line(value: object) -> str:

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import PRNGKeyArray
+from jaxtyping import Float, PRNGKeyArray
 
 from undertow.core.contracts import Outputs
 from undertow.core.status import Status
@@ -48,6 +48,10 @@ class Plan(NamedTuple):
     signals: tuple[str, ...]
     method: str
     substeps: int
+
+    def times(self) -> Float[np.ndarray, " records"]:
+        """Of the records, s."""
+        return np.arange(0, self.ticks + 1, self.every) * self.dt
 
 
 class Ended(NamedTuple):

@@ -32,18 +32,13 @@ _MEANINGS = {
 
 def to_dataset(outcome: Outcome, plant: AbstractPlant, controller: AbstractController) -> xr.Dataset:
     """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `input` (numbers from 1)."""
-    units = np.array(plant.output_units)
-    variables = {}
-    for name, (_, meaning, rate) in _MEANINGS.items():
-        values = np.asarray(getattr(outcome.samples, name))
-        dims = dimensions(name)
-        rates = ", ".join(f"{u}{rate}" for u in dict.fromkeys(units))
-        shown = rates if "axis" in dims else rate or plant.input_unit
-        variables[name] = series(dims, values, meaning, shown)
+    variables = {
+        name: series(dimensions(name), np.asarray(getattr(outcome.samples, name)), *meaning(name, plant))
+        for name in _MEANINGS
+    }
     columns = plant.columns() | controller.columns()
     for name, values in outcome.samples.books.items():
-        meaning, unit = columns[name]
-        variables[name] = series(("time",), np.asarray(values), meaning, unit)
+        variables[name] = series(("time",), np.asarray(values), *columns[name])
     status = Status(int(outcome.status))
     return xr.Dataset(
         variables,
@@ -67,6 +62,14 @@ def dimensions(name: str) -> tuple[str, ...]:
     """Names of the dimensions of a signal."""
     along = _MEANINGS[name][0]
     return {None: ("time",), "rule": ("time", "axis", "rule")}.get(along, ("time", along))
+
+
+def meaning(name: str, plant: AbstractPlant) -> tuple[str, str]:
+    """What a signal is, and its unit; the units of all axes where they differ."""
+    _, words, rate = _MEANINGS[name]
+    if "axis" in dimensions(name):
+        return words, ", ".join(f"{unit}{rate}" for unit in dict.fromkeys(plant.output_units))
+    return words, rate or plant.input_unit
 
 
 def series(dims: tuple[str, ...], values: np.ndarray, meaning: str, unit: str | None = None) -> xr.Variable:

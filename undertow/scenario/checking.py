@@ -61,6 +61,9 @@ def check(thing: str, options: Mapping[str, Any]) -> Report:
 
 def _check_file(path: Path, options: Mapping[str, Any]) -> Report:
     text = read(path, "THING")
+    if "scenario" in text.data:
+        hint = "`undertow campaign` checks one before it flies it; check its scenario in a file of its own"
+        raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, a campaign", hint=hint)
     own, scenario = (sum(key in known for key in text.data) for known in (KEYS, Scenario.model_fields))
     if not own and not scenario:
         hint = did_you_mean(next(iter(text.data), ""), {*KEYS, *Scenario.model_fields})

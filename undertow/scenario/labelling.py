@@ -37,10 +37,11 @@ def label(
         dt: sampling time, s.
         attributes: of the dataset, beside status, metrics, versions and content hash.
     """
-    status, ended, rules = Status(int(outcome.status)), float(outcome.ended), _rules(loop)
+    status, ended = Status(int(outcome.status)), float(outcome.ended)
+    counted = {} if rules(loop) is None else {"rules": rules(loop)}
     covered = status is Status.OK and window[0] < ended
     dataset = to_dataset(outcome, loop.plant, loop.controller)
-    over = lambda start, stop: measure(outcome, start, stop) | closure(dataset, start, stop) | rules
+    over = lambda start, stop: measure(outcome, start, stop) | closure(dataset, start, stop) | counted
     steady, whole = over(*window) if covered else None, over(0.0, ended)
     if steady is not None and outcome.accumulated:
         steady |= results(outcome.accumulated[0])
@@ -51,6 +52,12 @@ def label(
     dataset.attrs |= attributes | versions()
     dataset.attrs |= {"metrics": to_json({"steady": steady, "whole": whole}), "content_hash": content_hash(dataset)}
     return Labelled(status, steady, whole, dataset)
+
+
+def rules(loop: ClosedLoop) -> int | None:
+    """Rules of the law's fuzzy system per axis; None for a law without one."""
+    fuzzy = getattr(loop.controller, "fuzzy", None)
+    return None if fuzzy is None else fuzzy.rules
 
 
 def metrics_text(dataset: xr.Dataset, further: dict[str, Any] | None = None) -> str:
@@ -77,8 +84,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _rules(loop: ClosedLoop) -> dict[str, int]:
-    fuzzy = getattr(loop.controller, "fuzzy", None)
-    return {} if fuzzy is None else {"rules": fuzzy.rules}

@@ -22,5 +22,13 @@ def vehicle_doubts(built: Built) -> tuple[str, ...]:
     """
     facts = vehicle_facts(built)
     findings = () if facts is None else lint(facts)
-    shown = (finding for finding in findings if finding.level == "error" or finding.rule == "gravity")
+    shown = [finding for finding in findings if finding.level == "error" or finding.rule == "gravity"]
+    if _mass_alone(built):
+        stays = "With `mass` alone changed, weight and buoyancy stay: give `weight` and `buoyancy`, too"
+        shown = [finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in shown]
     return tuple(f"{finding.says}. {finding.hint}".rstrip(". ") for finding in shown)
+
+
+def _mass_alone(built: Built) -> bool:
+    description = built.resolved["plant"].get("vehicle", {})
+    return "mass" in description and "weight" not in description
