@@ -5,7 +5,7 @@ end, its peak, bytes of the store and time per trial.
 dask: 1 000 trials of W1, 20 s each, by one worker and by two of a local cluster: the ratio of the times once the
 workers have compiled, the shortest of five each, and whether the stores are the same to the byte.
 pieces: milliseconds of building a trial where start and gain differ, or the mass of the vehicle; of writing a task of
-256 trials, or of 65 536; in one thread.
+256 trials, or of 65 536; in one thread. And what memory a trial of a task takes while the task is flown.
 
 Prints JSON.
 """
@@ -30,8 +30,10 @@ from undertow.scenario.reading import dump
 from undertow.studies.campaign import task
 from undertow.studies.campaign.clusters import cluster
 from undertow.studies.campaign.columns import labels
-from undertow.studies.campaign.conduct import STORE, conduct, prepare
+from undertow.studies.campaign.conduct import STORE, conduct
 from undertow.studies.campaign.engines import by_dask, in_threads
+from undertow.studies.campaign.identity import Identity
+from undertow.studies.campaign.prepare import prepare
 from undertow.studies.campaign.store import Store
 from undertow.studies.paper.setup import scenario
 
@@ -39,9 +41,9 @@ VARY = {
     "initial.position[0]": {"normal": [0.0, 0.1]},
     "controller.composite": {"uniform": [10.0, 30.0]},
 }
-
-
 HEAVIER = {"plant.vehicle.mass": {"normal": [125.0, 3.0]}}
+
+_LARGE = 8192  # trials of a task whose memory is looked at
 
 
 def prepared(folder: Path, trials: int, duration: float, chunk: int, vary: dict = VARY):
@@ -61,7 +63,7 @@ def memory(trials: int) -> dict:
     with tempfile.TemporaryDirectory() as name:
         campaign = prepared(Path(name), trials, 1.0, 256)
         engine = lambda function, work: in_threads(function, work, 2)
-        conduct(campaign, Path(name), engine, lambda done, total, failed: held.append((done, _resident())))
+        conduct(campaign, Path(name), engine, lambda tally: held.append((tally.done, _resident())))
         taken = time.perf_counter() - began
         size = sum(file.stat().st_size for file in (Path(name) / STORE).rglob("*") if file.is_file())
     tenth = next(mebibytes for done, mebibytes in held if done >= trials / 10)
@@ -70,7 +72,7 @@ def memory(trials: int) -> dict:
         "after_first_tenth_MiB": tenth,
         "at_the_end_MiB": held[-1][1],
         "growth_percent": 100 * (max(mebibytes for done, mebibytes in held if done >= trials / 10) / tenth - 1),
-        "peak_MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak_MiB": _peak(),
         "store_bytes_per_trial": size / trials,
         "ms_per_trial": 1e3 * taken / trials,
     }
@@ -81,15 +83,19 @@ def pieces(trials: int) -> dict:
     found = {}
     with tempfile.TemporaryDirectory() as name:
         for what, vary in (("build_start_and_gain_ms", VARY), ("build_mass_ms", HEAVIER)):
-            campaign = prepared(Path(name), 4 * trials, 1.0, 256, vary)
+            campaign = prepared(Path(name), _LARGE, 1.0, 256, vary)
             here = task.site(campaign.text, str(campaign.folder))
             build = lambda i, here=here: [
                 task.build_trial(here.trials, here.workshop, row) for row in range(i * trials, (i + 1) * trials)
             ]
             found[what] = 1e3 * _shortest(build) / trials
-            columns = task.fly(campaign.text, str(campaign.folder), range(8))
+        columns = task.fly(campaign.text, str(campaign.folder), range(256))
+        before = _peak()
+        task.fly(campaign.text, str(campaign.folder), range(_LARGE))
+        found["task_KiB_per_trial"] = 1024 * (_peak() - before) / _LARGE
         for rows in (256, 65_536):
-            store = Store(Path(name) / f"{rows}.zarr", 4 * rows, rows, {}, {}, labels(campaign.trials), {})
+            named = labels(campaign.trials, campaign.first)
+            store = Store(Path(name) / f"{rows}.zarr", 4 * rows, rows, Identity("", {}), named, {})
             chance = np.random.default_rng(0)  # numbers that cannot be told shorter than they are
             many = {key: chance.normal(size=rows).astype(values.dtype) for key, values in columns.items()}
             found[f"write_{rows}_ms"] = 1e3 * _shortest(lambda i, s=store, m=many: s.write(i, m))
@@ -105,6 +111,11 @@ def _shortest(work: Callable[[int], Any]) -> float:
         work(i)
         times.append(time.perf_counter() - start)
     return min(times[1:])
+
+
+def _peak() -> float:
+    """MiB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _resident() -> float:

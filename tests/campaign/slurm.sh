@@ -51,6 +51,10 @@ END
 
 stop() {
     scancel --partition=main || true
+    for _ in $(seq 60); do # slurmd outlives its end while steps are left
+        pgrep -x slurmstepd >/dev/null || break
+        sleep 0.5
+    done
     for daemon in slurmd slurmctld munged; do
         [ -f "$folder/$daemon.pid" ] && kill "$(cat "$folder/$daemon.pid")" || true
     done

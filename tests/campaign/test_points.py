@@ -6,10 +6,17 @@ from scipy import stats
 
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign.points import points, seeds, value
+from undertow.studies.campaign.points import Draws, value
 from undertow.studies.campaign.schema import Spread, validate
 
 TWO = {"loop.duration": {"uniform": [1, 2]}, "plant.limit": {"uniform": [0, 1]}}
+
+
+def points(data, rows=None):
+    """Of a campaign, one row each; all of them unless told which."""
+    asked = validate(from_data(data))
+    draws = Draws(asked)
+    return np.array([draws.point(row) for row in rows or range(asked.trials)])
 
 
 @pytest.mark.parametrize(
@@ -33,27 +40,50 @@ def test_choices_are_equally_likely():
 
 
 def test_latin_hypercubes_have_one_point_per_stratum(campaign):
-    found = points(validate(from_data(campaign(design="latin", trials=50, vary=TWO))))
+    found = points(campaign(design="latin", trials=50, vary=TWO))
     for column in np.floor(50 * found).T:
         assert sorted(column) == list(range(50))
 
 
-def test_sobol_points_are_a_net(campaign):
-    """Every quarter of the square has a quarter of them."""
-    found = points(validate(from_data(campaign(design="sobol", trials=64, vary=TWO))))
-    _, counts = np.unique(np.floor(2 * found), axis=0, return_counts=True)
-    assert counts.tolist() == [16, 16, 16, 16]
+@pytest.mark.parametrize("trials, cells", [(64, 4), (8192, 64)])  # within a block, and of two
+def test_sobol_points_are_a_net(campaign, trials, cells):
+    """Every square of a chessboard has as many of them."""
+    found = points(campaign(design="sobol", trials=trials, vary=TWO))
+    _, counts = np.unique(np.floor(cells * found), axis=0, return_counts=True)
+    assert counts.tolist() == [trials // cells**2] * cells**2
+
+
+@pytest.mark.parametrize("design", ["random", "sobol"])
+def test_draws_do_not_depend_on_how_many_there_are(campaign, design):
+    """Nor on the order in which they are asked for; the last of very many is at hand without the others."""
+    few, many = (campaign(design=design, trials=trials, vary=TWO) for trials in (5000, 50_000_000))
+    rows = [4096, 3, 4999, 4095]
+    np.testing.assert_array_equal(points(many, rows), points(few)[rows])
+    assert len(np.unique(points(many, [0, 4096, 49_999_999]))) == 6
+
+
+def test_random_points_fill_the_cube_evenly(campaign):
+    """Both coordinates by Kolmogorov and Smirnov, over several blocks."""
+    found = points(campaign(trials=20_000, vary=TWO))
+    assert all(stats.kstest(column, "uniform").pvalue > 0.01 for column in found.T)
+    assert abs(np.corrcoef(found.T)[0, 1]) < 0.02
+
+
+def test_a_latin_hypercube_has_a_limit(campaign):
+    with pytest.raises(BadInput, match="`trials` must be at most 10000000 with `design: latin`, but is 10000001"):
+        points(campaign(design="latin", trials=10_000_001))
 
 
 @pytest.mark.parametrize("design", ["random", "latin", "sobol"])
 def test_draws_are_a_matter_of_the_seed(campaign, design):
-    draw = lambda seed: points(validate(from_data(campaign(design=design, seed=seed))))
+    draw = lambda seed: points(campaign(design=design, seed=seed))
     np.testing.assert_array_equal(draw(1), draw(1))
     assert (draw(1) != draw(2)).all()
 
 
 def test_no_two_trials_share_a_seed(campaign):
-    assert len(set(seeds(validate(from_data(campaign(trials=10_000)))))) > 9990
+    draws = Draws(validate(from_data(campaign(trials=10_000))))
+    assert len({draws.seed(row) for row in range(10_000)}) > 9990
 
 
 @pytest.mark.parametrize(

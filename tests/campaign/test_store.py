@@ -1,30 +1,32 @@
 """The store: what is flown once is kept, what is torn is flown again, and two do not write at once."""
 
 import errno
+import shutil
 from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
+from command import contents
 
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
+from undertow.scenario.reading import from_data
 from undertow.studies.campaign import store as stores
-from undertow.studies.campaign.conduct import STORE, conduct, prepare
+from undertow.studies.campaign.conduct import STORE, conduct
 from undertow.studies.campaign.engines import in_threads
+from undertow.studies.campaign.identity import difference
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.reading import plain, whole
+from undertow.studies.campaign.schema import validate
 
-quiet = lambda done, total, failed: None
+quiet = lambda tally: None
 threads = partial(in_threads, threads=2)
 
 
 def flown(path, out, engine=threads, watch=quiet):
     conduct(prepare(path), out, engine, watch)
-    return contents(out / STORE)
-
-
-def contents(folder):
-    """Bytes of every file."""
-    return {str(file.relative_to(folder)): file.read_bytes() for file in sorted(folder.rglob("*")) if file.is_file()}
+    return contents(out)
 
 
 def backwards(function, work):
@@ -95,7 +97,7 @@ def test_a_chunk_that_was_torn_is_flown_again(small, tmp_path):
     torn = tmp_path / "whole" / STORE / "tracking_rms" / "c" / "1"
     torn.write_bytes(torn.read_bytes()[:-7])
     counted = []
-    assert flown(path, tmp_path / "whole", watch=lambda done, total, failed: counted.append(done)) == whole
+    assert flown(path, tmp_path / "whole", watch=lambda tally: counted.append(tally.done)) == whole
     assert counted == [24, 40]
 
 
@@ -104,8 +106,33 @@ def test_a_chunk_that_is_gone_is_flown_again(small, tmp_path, name):
     path, whole = small
     (tmp_path / "whole" / STORE / name / "c" / "2").unlink()
     counted = []
-    assert flown(path, tmp_path / "whole", watch=lambda done, total, failed: counted.append(done)) == whole
+    assert flown(path, tmp_path / "whole", watch=lambda tally: counted.append(tally.done)) == whole
     assert counted == [32, 40]
+
+
+@pytest.mark.parametrize("harm", ["column", "its metadata", "flags", "coordinate"])
+def test_what_is_missing_of_a_store_is_made_again(campaign_file, tmp_path, harm):
+    path = campaign_file(series={"signals": ["position"], "every": 0.5})
+    whole, store = flown(path, tmp_path / "out"), tmp_path / "out" / STORE
+    if harm == "its metadata":
+        (store / "ended" / "zarr.json").write_text("")
+    else:
+        shutil.rmtree(store / {"column": "series:position", "flags": "done", "coordinate": "time"}[harm])
+    assert flown(path, tmp_path / "out") == whole
+
+
+def test_a_task_of_which_nothing_can_be_flown_is_done_once(campaign_file, tmp_path):
+    """With series, too: their shape is that of the others."""
+    vary = {"controller.frequency": {"choice": [-1.0, 2.0]}}
+    asked = {"trials": 12, "seed": 5, "requirements": {}, "series": {"signals": ["position"], "every": 0.5}}
+    path = campaign_file(chunk=1, vary=vary, **asked)
+    whole, counted = flown(path, tmp_path / "out"), []
+    assert flown(path, tmp_path / "out", watch=lambda tally: counted.append(tally.done)) == whole
+    assert counted == [12]
+    rows = xr.open_zarr(tmp_path / "out" / STORE, consolidated=False).load()
+    refused = rows["status"].values == -1
+    assert 0 < refused.sum() < 12
+    assert (np.isnan(rows["series:position"].values).all(axis=(1, 2)) == refused).all()
 
 
 @pytest.mark.parametrize("at", [0, 3, 11, 30])
@@ -130,8 +157,25 @@ def test_a_full_disk_loses_nothing(small, tmp_path, monkeypatch, at):
 
 def test_another_campaign_is_refused(small, tmp_path, campaign_file):
     other = campaign_file("other", seed=8)
-    with pytest.raises(BadInput, match=r"by the same versions, but is .*, with another campaign"):
+    with pytest.raises(BadInput, match=r"by the same versions, but is another one's: `seed` was 7, is 8 \("):
         flown(other, tmp_path / "whole")
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ({"trials": 41}, "`trials` was 40, is 41"),
+        (
+            {"vary": {"disturbance.amplitude": {"uniform": [0.5, 3.0]}}},
+            "`vary.disturbance.amplitude.uniform[1]` was 2.0, is 3.0",
+        ),
+        ({"series": {}}, "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}"),
+        ({"requirements": {}, "design": "sobol"}, "`design` was random, is sobol"),
+    ],
+)
+def test_what_differs_is_named(campaign, changes, said):
+    asked = lambda **changes: plain(whole(validate(from_data(campaign(**changes))), campaign()["scenario"]))
+    assert difference(asked(), asked(**changes)) == said
 
 
 def test_the_size_of_tasks_may_change_on_the_way(small, tmp_path, campaign_file):

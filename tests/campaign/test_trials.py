@@ -43,11 +43,11 @@ def test_every_combination_flies_the_same_draws_and_seeds(campaign):
 
 
 def test_parts_have_names(campaign):
-    parts = [{"kind": "rcaf", "preset": "robust"}, "pid", "pid"]
+    parts = [{"kind": "rcaf", "preset": "robust"}, "pid", {"kind": "pid", "frequency": 3.0}]
     assert list(validate(from_data(campaign(cross={"controller": parts}))).cross["controller"]) == [
         "rcaf robust",
-        "pid 2",
-        "pid 3",
+        "pid",
+        "pid frequency=3.0",
     ]
 
 

@@ -11,12 +11,12 @@ from typing import NoReturn
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
+from undertow.cli.campaign_short import sentences, table
 from undertow.cli.exit_codes import DONE, RUN_FAILED
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import check_folder, next_free
-from undertow.cli.stages import shares
+from undertow.cli.stages import Stages, shares
 from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
@@ -25,10 +25,11 @@ from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import dump
 from undertow.scenario.workshop import Workshop
 from undertow.studies.campaign.clusters import cluster
-from undertow.studies.campaign.conduct import STORE, Engine, Prepared, Watch, conduct, prepare
+from undertow.studies.campaign.conduct import STORE, Engine, Tally, Watch, conduct
 from undertow.studies.campaign.engines import by_dask, in_threads
-from undertow.studies.campaign.results import Results, load
-from undertow.studies.campaign.store import check_free
+from undertow.studies.campaign.lock import check_free
+from undertow.studies.campaign.prepare import Prepared, prepare
+from undertow.studies.campaign.results import load
 from undertow.studies.campaign.summary import endings, summary
 from undertow.studies.campaign.task import build_trial
 
@@ -42,7 +43,9 @@ def campaign(
     count = os.cpu_count() or 1 if workers is None else workers
     checks.positive("--workers", count)
     console = wide_console()
-    prepared = interruptible(lambda: prepare(path))
+    stages = Stages(console)
+    with stages("building first trials"):
+        prepared = interruptible(lambda: prepare(path))
     for sentence in prepared.advice:
         typer.echo(f"Advice: {sentence}", err=True)
     first = Path("runs") / path.stem
@@ -52,22 +55,23 @@ def campaign(
         try:
             interruptible(lambda: conduct(prepared, folder, engine, watch))
         except (KeyboardInterrupt, OSError):
-            if (folder / STORE).exists():
+            if (folder / STORE).is_dir():
                 typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
             raise
-    return _conclude(console, prepared, folder)
+    return _conclude(console, stages, prepared, folder)
 
 
-def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
+def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path) -> int:
     """Write page, summary and the scenarios of the worst trials; show the short of it."""
-    results = load(folder)
-    found = summary(results, prepared.trials)
-    (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
-    _write_worst(prepared, found["worst"], folder / "worst")
-    title = prepared.trials.campaign.description or "A campaign"
-    page = write_campaign(title, results, found, folder)
-    console.print(_table(results, found))
-    for sentence in _sentences(found):
+    with stages("summary and page"):
+        results = load(folder)
+        found = summary(results, prepared.trials)
+        (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
+        _write_worst(prepared, found["worst"], folder / "worst")
+        title = prepared.trials.campaign.description or f"Campaign {prepared.trials.text.name}"
+        page = write_campaign(title, results, found, folder)
+    console.print(table(results, found))
+    for sentence in sentences(found):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
     return DONE if set(found["status"]) <= {"ok"} else RUN_FAILED
@@ -93,28 +97,12 @@ def status(folder: Path, options: Sequence[str]) -> int:
         results = load(folder)
     except FileNotFoundError:
         raise BadInput("DIR", "be the folder of a campaign", str(folder)) from None
-    ended = endings(results)
+    ended = endings(results.rows)
     console = wide_console()
-    console.print(f"{sum(ended.values())} of {results.total} trials done", highlight=False)
+    console.print(f"{results.rows.sizes['trial']} of {results.total} trials done", highlight=False)
     for word, number in ended.items():
         console.print(f"  {word}: {number}", highlight=False)
     return DONE
-
-
-def _sentences(found: dict) -> list[str]:
-    """Endings and verdicts in words."""
-    ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
-    said = [f"{found['done']} trials: {ended}."]
-    said += [f"Refused, {one['trials']} as here: {one['why']}." for one in found["refused"]]
-    for one in found["combinations"]:
-        of = "".join(f", {key} {value}" for key, value in one["values"].items())
-        for wanted in one["requirements"]:
-            low, high = wanted["interval"]
-            asked = f"{wanted['metric']} < {wanted['below']:g} in {100 * wanted['share']:g} % of the trials{of}"
-            said.append(
-                f"{asked}: {wanted['verdict']}; {100 * wanted['kept']:.1f} % did [{100 * low:.1f}, {100 * high:.1f}]."
-            )
-    return said
 
 
 def _claim(folder: Path, resume: bool, overwrite: bool) -> None:
@@ -123,6 +111,8 @@ def _claim(folder: Path, resume: bool, overwrite: bool) -> None:
     Raises:
         BadInput: it may not.
     """
+    if resume and overwrite:
+        raise BadInput("--resume", "be without --overwrite", "beside it", hint="One goes on, the other begins anew")
     if resume:
         if not (folder / STORE).exists():
             raise BadInput("--resume", "find a campaign to go on with", f"none in {folder}")
@@ -151,12 +141,14 @@ def _live(console: Console) -> Iterator[Watch]:
     begun, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
 
-        def watch(done: int, total: int, failed: int) -> None:
+        def watch(tally: Tally) -> None:
             nonlocal first
-            first = done if first is None else first
-            rate = (done - first) / max(time.perf_counter() - begun, 1e-9)
-            said = f"{rate:.3g} per second, {failed} failed" if done > first else "compiling"
-            progress(f"{done} of {total} trials, {said}", done / total)
+            first = tally.done if first is None else first
+            rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
+            refused = f", {tally.refused} refused" if tally.refused else ""
+            waiting = "compiling" if tally.done < tally.trials else "nothing is missing"
+            said = f"{rate:.3g} per second, {tally.failed} failed{refused}" if tally.done > first else waiting
+            progress(f"{tally.done} of {tally.trials} trials, {said}", tally.done / tally.trials)
 
         yield watch
 
@@ -168,23 +160,5 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     for trial in trials:
         data = build_trial(prepared.trials, workshop, trial).resolved  # with the contents of files that it names
         data = data | {"steady": data["steady"] | {"every_tick": True}}
-        text = f"# Trial {trial}: its steady metrics are those of the campaign.\n{dump(data)}"
+        text = f"# Trial {trial} of the campaign.\n{dump(data)}"
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
-
-
-def _table(results: Results, found: dict) -> Table:
-    table = Table(title="Median [5 %, 95 %] of the trials that lasted", title_justify="left", title_style="bold")
-    crossed = list(results.campaign.cross)
-    for column in (*crossed, "trials", "failed", "tracking rms", "voltage rms"):
-        table.add_column(column)
-    for one in found["combinations"]:
-        cells = [_spread(one["metrics"].get(name)) for name in ("tracking_rms", "voltage_rms")]
-        table.add_row(*(one["values"][key] for key in crossed), str(one["trials"]), str(one["failed"]), *cells)
-    return table
-
-
-def _spread(quantiles: dict | None) -> str:
-    if quantiles is None:
-        return "-"
-    low, middle, high = quantiles.values()
-    return f"{middle:.3g} [{low:.3g}, {high:.3g}]"

@@ -6,16 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from undertow.report.campaign_tables import asked, by_choice, distributions, named, requirements, worst
+from undertow.report.campaign_tables import asked, by_choice, by_xla, distributions, endings, named, requirements, worst
 from undertow.report.figures.campaign import distributions_figure, sensitivity_figure
 from undertow.report.figures.writing import save
 from undertow.report.formats import prose
-from undertow.report.page import Html, bullets, document, figure, section, table, tag
+from undertow.report.page import Html, bullets, document, figure, section, tag
 from undertow.studies.campaign.results import Results
 
 _CAPTIONS = {
-    "distributions": "Every trial that lasted, one step each. The further left, the better. Metrics are of the steady "
-    "window: the second half of a run, unless `steady` of the scenario says otherwise.",
+    "distributions": "Every trial that was flown, one step each; a curve that ends below 1 lacks those that failed. "
+    "The further left, the better. Metrics are of the steady window: the second half of a run, unless `steady` of the "
+    "scenario says otherwise.",
     "sensitivity": "Spearman's rank correlation over the trials that lasted, mean over the combinations: +1 where a "
     "metric grows with a parameter, -1 where it falls, 0 where one says nothing about the other.",
 }
@@ -46,8 +47,8 @@ def write_campaign(title: str, results: Results, found: Mapping[str, Any], folde
         section("endings", "How they ended", *_endings(found)),
         *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(found)),
         section("metrics", "Distributions", drawn["distributions"], distributions(found)),
-        *_optional("dependence", "What they depend on", drawn["sensitivity"], *by_choice(found)),
-        section("worst", "The worst trials", _how(), worst(results, found)),
+        *_optional("dependence", "What they depend on", drawn["sensitivity"], *_choices(found)),
+        section("worst", "The worst trials", _how(found), worst(results, found)),
         section("asked", "What was flown", *asked(results)),
     )
     path = folder / "campaign.html"
@@ -56,11 +57,17 @@ def write_campaign(title: str, results: Results, found: Mapping[str, Any], folde
 
 
 def _endings(found: Mapping[str, Any]) -> list[Html]:
-    ended = table(("", "trials"), list(found["status"].items()), numeric=(1,))
+    ended = endings(found)
     if not found["refused"]:
         return [ended]
     said = [prose(f"{one['trials']} as here: {one['why']}") for one in found["refused"]]
     return [ended, tag("p", "Refused, and so not flown:"), bullets(said)]
+
+
+def _choices(found: Mapping[str, Any]) -> list[Html]:
+    tables = by_choice(found)
+    said = "By choice: median [5 %, 95 %] of the trials that lasted, all combinations together."
+    return [tag("p", prose(said)), *tables] if tables else []
 
 
 def _optional(identity: str, title: str, *content: Html) -> list[Html]:
@@ -68,15 +75,17 @@ def _optional(identity: str, title: str, *content: Html) -> list[Html]:
     return [section(identity, title, *content)] if any(content[-1:]) else []
 
 
-def _how() -> Html:
-    return tag("p", prose("To fly one again, in the folder of this page: `undertow simulate worst/trial-NUMBER.yaml`."))
+def _how(found: Mapping[str, Any]) -> Html:
+    order = "Those that failed, the earliest first, then those with the largest tracking rms."
+    again = "To fly one again, in the folder of this page: `undertow simulate worst/trial-NUMBER.yaml`."
+    return tag("p", prose(f"{order} {again} {by_xla(found)}".rstrip()))
 
 
 def _drawn(results: Results, found: Mapping[str, Any], folder: Path) -> dict[str, Html]:
     """Figures by name; nothing where there is nothing to draw."""
     values = _values(results, found)
     figures = {
-        "distributions": distributions_figure(values) if values else None,
+        "distributions": distributions_figure(values, _flown(found)) if values else None,
         "sensitivity": sensitivity_figure(found["sensitivity"]) if found["sensitivity"] else None,
     }
     drawn = dict.fromkeys(figures, Html(""))
@@ -85,6 +94,10 @@ def _drawn(results: Results, found: Mapping[str, Any], folder: Path) -> dict[str
             vector, _ = save(one, folder / "figures", name)
             drawn[name] = figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
     return drawn
+
+
+def _flown(found: Mapping[str, Any]) -> dict[str, int]:
+    return {named(one): one["trials"] - one["refused"] for one in found["combinations"]}
 
 
 def _values(results: Results, found: Mapping[str, Any]) -> dict[str, dict[str, np.ndarray]]:

@@ -4,8 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from undertow.analysis.meanings import MEANINGS
-from undertow.report.formats import chip, number, prose, unit
+from undertow.core.status import Status
+from undertow.report.formats import chip, ending, number, prose, unit
 from undertow.report.page import Html, join, table, tag
+from undertow.studies.campaign.columns import ENDINGS
+from undertow.studies.campaign.naming import words
 from undertow.studies.campaign.results import Results
 from undertow.studies.campaign.schema import Spread
 
@@ -14,8 +17,27 @@ _BY_CHOICE = ("tracking_rms", "voltage_rms")
 
 
 def named(combination: Mapping[str, Any]) -> str:
-    """A combination of `cross` in words."""
-    return ", ".join(str(value) for value in combination["values"].values()) or "all trials"
+    """A combination of `cross` in words; numbers with what they are."""
+    said = (
+        f"{key.split('.')[-1]} {value}" if _numeric(value) else value for key, value in combination["values"].items()
+    )
+    return ", ".join(said) or "all trials"
+
+
+def endings(found: Mapping[str, Any]) -> Html:
+    """How many trials ended how, side by side for the combinations."""
+    several = found["combinations"]
+    rows = [(word, *(str(one["status"].get(word, 0)) for one in several)) for word in found["status"]]
+    head = ("trials", *map(named, several))
+    return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 3)
+
+
+def by_xla(found: Mapping[str, Any]) -> str:
+    """That XLA flew some of the trials; nothing where it flew none."""
+    if not found["by_xla"]:
+        return ""
+    said = "slower than in lanes (docs/lanes.md says for what), and alone one is repeated to rounding, not to the bit"
+    return f"{found['by_xla']} trials were flown by XLA: {said}."
 
 
 def requirements(found: Mapping[str, Any]) -> Html:
@@ -62,10 +84,12 @@ def worst(results: Results, found: Mapping[str, Any]) -> Html:
     for trial in found["worst"]:
         row, crossed = results.rows.sel(trial=trial), results.named(trial // results.campaign.trials)
         drawn = [number(one, _DIGITS) if isinstance(one, float) else one for one in results.drawn(trial).values()]
-        ended = [number(float(row[name]), _DIGITS) for name in ("tracking_rms", "ended")]
-        rows.append((str(trial), *ended, *crossed, *drawn))
+        lasted = int(row["status"]) == int(Status.OK)
+        how = ending({"status": ENDINGS[int(row["status"])], "diverged_at": None if lasted else float(row["ended"])})
+        error = number(float(row["tracking_rms"]) if lasted else None, _DIGITS)
+        rows.append((str(trial), how, error, *crossed, *drawn))
     keys = [prose(f"`{key}`") for key in (*results.campaign.cross, *results.campaign.vary)]
-    return table(("trial", "tracking rms", "ended, s", *keys), rows, numeric=(1, 2), wide=len(keys) > 1)
+    return table(("trial", "ended", "tracking rms", *keys), rows, numeric=(2,), wide=len(keys) > 1)
 
 
 def asked(results: Results) -> list[Html]:
@@ -87,6 +111,14 @@ def asked(results: Results) -> list[Html]:
     ]
 
 
+def _numeric(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
 def _metric(name: str) -> str:
     return name.replace("_", " ")
 
@@ -94,7 +126,7 @@ def _metric(name: str) -> str:
 def _words(spread: Spread) -> str:
     """A distribution in words."""
     if spread.choice is not None:
-        return "one of " + ", ".join(map(str, spread.choice))
+        return "one of " + ", ".join(map(words, spread.choice))
     if spread.normal is not None:
         return "normal, mean {:g}, standard deviation {:g}".format(*spread.normal)
     if spread.uniform is not None:

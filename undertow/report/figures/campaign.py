@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from undertow.analysis.meanings import MEANINGS
 from undertow.report.figures import style
 
 # The metrics that are drawn, where they are there.
@@ -26,11 +27,12 @@ _WIDE = 100.0  # ratio of largest and smallest from which on an axis is logarith
 _DARK = 0.6  # correlations beyond this stand on dark ground
 
 
-def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]]) -> Figure:
-    """Share of trials below each value of a metric: the empirical distribution function.
+def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]], flown: Mapping[str, int]) -> Figure:
+    """Share of trials below each value of a metric: the empirical distribution function; a failure is below none.
 
     Args:
         values: metric -> name of the combination -> finite values, in any order; the first eight are drawn.
+        flown: name of the combination -> its trials, with those that failed.
     """
     shown = [name for name in _SHOWN if name in values]
     rows = -(-len(shown) // _COLUMNS)
@@ -47,14 +49,15 @@ def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]]) -> Figu
         panel = style.place(figure, 0.6 + 3.1 * column, 0.65 + key + 2.25 * row, 2.35, 1.45)
         for name, look in looks.items():
             ordered = np.sort(values[metric].get(name, np.zeros(0)))
-            share = np.arange(1, len(ordered) + 1) / max(1, len(ordered))
+            share = np.arange(1, len(ordered) + 1) / max(1, flown[name])
             panel.step(ordered, share, where="post", color=look.colour, linestyle=look.dashes, linewidth=look.width)
         everything = np.concatenate(list(values[metric].values()))
         if everything.min() > 0 and everything.max() > _WIDE * everything.min():
             panel.set_xscale("log")
             panel.xaxis.set_minor_formatter(NullFormatter())  # their numbers would run into one another
         panel.set_ylim(0, 1)
-        style.label(panel, metric.replace("_", " "))
+        units = [style.power(unit) for unit in MEANINGS[metric].unit.split(", ") if unit]
+        style.label(panel, ", ".join([metric.replace("_", " "), *units]))
         panel.xaxis.set_label_coords(0.5, -0.19)  # clear of powers of ten
     return figure
 

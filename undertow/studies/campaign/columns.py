@@ -2,18 +2,41 @@
 
 from typing import Any, NamedTuple
 
-import numpy as np
 import xarray as xr
 
 from undertow.analysis.meanings import MEANINGS
+from undertow.analysis.metrics import OVERALL
 from undertow.core.status import Status
 from undertow.loop import record
 from undertow.scenario.build import Built
+from undertow.studies.campaign.flying import LANES, XLA
+from undertow.studies.campaign.runs import planned
 from undertow.studies.campaign.task import REFUSED
 from undertow.studies.campaign.trials import Trials
 
-# Codes of the column `status` and their words.
-ENDINGS = {REFUSED: "refused"} | {int(status): status.word for status in Status}
+# Codes of the columns `status` and `engine`, and their words.
+ENDINGS = {int(status): status.word for status in Status} | {REFUSED: "refused"}
+ENGINES = {LANES: "lanes", XLA: "xla", REFUSED: "none"}
+
+_AFTER = "a run that failed stays where it was: see `ended`"
+
+
+def _said(meaning: str, unit: str) -> dict[str, Any]:
+    return {"long_name": meaning, "units": unit or "1"}
+
+
+def _codes(name: str, words: dict[int, str]) -> dict[str, Any]:
+    """Codes and their words as the CF conventions have them."""
+    return {"long_name": name, "flag_values": list(words), "flag_meanings": " ".join(words.values())}
+
+
+# Columns of every campaign, with their attributes.
+ALWAYS = {
+    "seed": {"long_name": "seed of everything random"},
+    "status": _codes("how the run ended", ENDINGS),
+    "engine": _codes("what flew it", ENGINES),
+    "ended": {"long_name": "when the run ended", "units": "s"},
+} | {name: _said(*MEANINGS[name]) for name in OVERALL}
 
 
 class Label(NamedTuple):
@@ -23,16 +46,18 @@ class Label(NamedTuple):
     attributes: dict[str, Any]
 
 
-def labels(several: Trials) -> dict[str, Label]:
-    """Labels of all columns, by name."""
-    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in several.columns()}
-    of_trials["seed"] = {"long_name": "seed of everything random"}
-    of_trials["status"] = _codes()
-    of_trials["ended"] = {"long_name": "when the run ended", "units": "s"}
-    of_trials |= {name: {"long_name": one.meaning, "units": one.unit or "1"} for name, one in MEANINGS.items()}
+def labels(several: Trials, built: Built) -> dict[str, Label]:
+    """Labels of all columns, by name.
+
+    Args:
+        several: the trials.
+        built: one of them.
+    """
+    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in several.columns()} | ALWAYS
     found = {name: Label(("trial",), attributes) for name, attributes in of_trials.items()}
     for name in several.campaign.series.signals if several.campaign.series else ():
-        found[f"series:{name}"] = Label(("trial", *record.dimensions(name)), {"long_name": name.replace("_", " ")})
+        said = _said(*record.meaning(name, built.closed_loop.plant)) | {"comment": _AFTER}
+        found[f"series:{name}"] = Label(("trial", *record.dimensions(name)), said)
     return found
 
 
@@ -43,24 +68,13 @@ def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
         several: the trials.
         built: one of them.
     """
-    asked, loop = several.campaign.series, built.scenario.loop
-    if asked is None:
+    if several.campaign.series is None:
         return {}
-    every = round(asked.every / loop.dt)
-    time = every * np.arange(round(loop.duration / loop.dt) // every + 1) * loop.dt
-    return record.coordinates(time, built.closed_loop.plant)
+    plan = planned(built, several.campaign.series)
+    return record.coordinates(plan.times(), built.closed_loop.plant)
 
 
 def _varied(key: str, entries: dict[str, Any] | None) -> dict[str, Any]:
     """Of what differs between trials; numbers that stand for a choice say which."""
     said = {"long_name": key}
     return said if entries is None else said | {"choices": list(entries)}
-
-
-def _codes() -> dict[str, Any]:
-    """Codes and their words as the CF conventions have them."""
-    return {
-        "long_name": "how the run ended",
-        "flag_values": list(ENDINGS),
-        "flag_meanings": " ".join(ENDINGS.values()),
-    }

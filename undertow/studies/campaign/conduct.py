@@ -1,110 +1,39 @@
 """A campaign from its file to its results: what is missing is flown, whoever flies it."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from undertow.analysis.metrics import OVERALL
-from undertow.core import checks
-from undertow.core.errors import BadInput, did_you_mean
-from undertow.loop.closed_loop import Sample
-from undertow.scenario.build import Built
-from undertow.scenario.fitting import whole_steps
-from undertow.scenario.provenance import text_hash, versions
-from undertow.scenario.reading import dump
-from undertow.scenario.schema import Loop
-from undertow.scenario.vehicle_findings import vehicle_doubts
 from undertow.studies.campaign import task as tasks
 from undertow.studies.campaign.columns import coordinates, labels
 from undertow.studies.campaign.engines import Columns, Work
-from undertow.studies.campaign.reading import decisive, read_campaign, whole
-from undertow.studies.campaign.schema import Campaign
+from undertow.studies.campaign.identity import identity
+from undertow.studies.campaign.prepare import Prepared
 from undertow.studies.campaign.store import Store
-from undertow.studies.campaign.trials import Trials, trials
 
 STORE = "trials.zarr"
 
 Engine = Callable[[Callable[..., Columns], Sequence[Work]], Iterator[tuple[int, Columns]]]
-Watch = Callable[[int, int, int], None]  # trials done, all of them, and how many of those done failed
 
 
-class Prepared(NamedTuple):
-    """A campaign that could be flown."""
+class Tally(NamedTuple):
+    """How far a campaign is; what was done before it was gone on with counts as done only."""
 
-    trials: Trials
-    text: str
-    folder: Path
-    first: Built  # a trial
-    advice: tuple[str, ...]  # what is odd about the first trials
+    trials: int
+    done: int
+    failed: int
+    refused: int
 
-
-def prepare(path: Path) -> Prepared:
-    """Read a campaign, and build the first trials of every combination, so that mistakes are told before anything runs.
-
-    Raises:
-        BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
-    """
-    campaign, source = read_campaign(path)
-    several = trials(campaign, source)
-    text, folder = whole(campaign, several.scenario.data), several.scenario.folder
-    here = tasks.site(text, str(folder))
-    firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]
-    _check_shapes(campaign, here.probes().values())
-    advice: dict[str, str] = {}
-    for row, built in firsts:
-        _check(campaign, built.scenario.loop)
-        for sentence in (*built.advice(), *vehicle_doubts(built)):
-            advice.setdefault(sentence, f"trial {row}: {sentence}")
-    return Prepared(several, text, folder, firsts[0][1], tuple(advice.values()))
+    def after(self, status: np.ndarray) -> "Tally":
+        """Once a task more is done."""
+        refused = int(np.count_nonzero(status == tasks.REFUSED))
+        failed = int(np.count_nonzero(status)) - refused
+        return Tally(self.trials, self.done + len(status), self.failed + failed, self.refused + refused)
 
 
-def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Built]:
-    """A trial of a combination that can be built.
-
-    Raises:
-        BadInput: none of the first can; what is wrong with the very first.
-    """
-    rows = tasks.first_rows(several, combination)
-    for row in rows:
-        if row in here.probes():
-            return row, here.probes()[row]
-    return rows.start, tasks.build_trial(several, here.workshop, rows.start)
-
-
-def _check(campaign: Campaign, loop: Loop) -> None:
-    """What a campaign asks of its runs."""
-    if loop.kind != "sampled":
-        raise BadInput("scenario.loop.kind", "be sampled in a campaign", loop.kind)
-    for name in campaign.requirements:
-        if name not in OVERALL:
-            raise BadInput(f"requirements.{name}", "be a metric", "unknown", hint=did_you_mean(name, OVERALL))
-    if campaign.series is None:
-        return
-    for key in (*campaign.vary, *campaign.cross):
-        if key.startswith("loop"):
-            raise BadInput("series", "be of runs of one length and sampling time", f"beside {key}, which differs")
-    for i, name in enumerate(campaign.series.signals):
-        checks.choice(f"series.signals[{i}]", name, [field for field in Sample._fields if field != "books"])
-    if not whole_steps(campaign.series.every, loop.dt):
-        must = f"be a whole number of sampling times ({loop.dt:g} s)"
-        raise BadInput("series.every", must, f"{campaign.series.every:g} s")
-    if campaign.series.every > loop.duration:
-        raise BadInput("series.every", f"be at most the duration ({loop.duration:g} s)", f"{campaign.series.every:g} s")
-
-
-def _check_shapes(campaign: Campaign, several: Iterable[Built]) -> None:
-    """That series have the same shape in all trials, as one array holds them."""
-    if campaign.series is None:
-        return
-    hint = "Leave it out, or make a campaign for each of them"
-    loops = [built.closed_loop for built in several]
-    if len({(loop.plant.outputs, loop.plant.inputs()) for loop in loops}) > 1:
-        raise BadInput("series", "be of plants with the same outputs and inputs", "of several", hint=hint)
-    rules = {getattr(getattr(loop.controller, "fuzzy", None), "rules", 0) for loop in loops}
-    if "weights" in campaign.series.signals and len(rules) > 1:
-        raise BadInput("series.signals", "be without weights where laws have different rules", "with", hint=hint)
+Watch = Callable[[Tally], None]
 
 
 def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None:
@@ -121,27 +50,22 @@ def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None
         OSError: the disk is full, or the cluster is gone; what was done is kept.
     """
     several, text, folder = prepared.trials, prepared.text, prepared.folder
-    # The scenario as it is built has the contents of files that it names: they may change, too.
-    hashes = {"campaign": decisive(several.campaign, several.scenario.data), "scenario": dump(prepared.first.resolved)}
-    identity = {f"{name}_hash": text_hash(one) for name, one in hashes.items()} | versions()
     store = Store(
         out / STORE,
         several.number,
         several.campaign.chunk,
-        identity,
-        {"campaign": text},
-        labels(several),
+        identity(several, text, prepared.first),
+        labels(several, prepared.first),
         coordinates(several, prepared.first),
     )
     try:
         missing = store.missing()
-        todo = sum(len(store.rows(number)) for number in missing)
-        done, failed = several.number - todo, 0
-        watch(done, several.number, failed)
+        tally = Tally(several.number, several.number - sum(len(store.rows(number)) for number in missing), 0, 0)
+        watch(tally)
         work = [(text, str(folder), store.rows(number)) for number in missing]
         for i, columns in engine(tasks.fly, work):
             store.write(missing[i], columns)
-            done, failed = done + len(work[i][2]), failed + int(np.count_nonzero(columns["status"]))
-            watch(done, several.number, failed)
+            tally = tally.after(columns["status"])
+            watch(tally)
     finally:
         store.close()

@@ -2,14 +2,14 @@
 
 import contextlib
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import numpy as np
 
-from undertow.analysis.metrics import OVERALL, Metrics, overall
+from undertow.analysis.metrics import overall
 from undertow.core.status import Status
 from undertow.lanes import nvidia
 from undertow.lanes.errors import Unsupported
@@ -17,8 +17,11 @@ from undertow.loop import in_lanes, vmapped
 from undertow.loop.in_lanes import Plan, Run
 from undertow.scenario.build import Built
 from undertow.scenario.workshop import structure
+from undertow.studies.campaign.runs import leaves, planned, run_of, shared_numbers
+from undertow.studies.campaign.schema import Series
 
-_STARTS = ("position", "velocity")
+# What flies a trial. By XLA it takes longer, and alone it is repeated to rounding only.
+LANES, XLA = 0, 1
 
 
 class Flown(NamedTuple):
@@ -27,6 +30,7 @@ class Flown(NamedTuple):
     metrics: dict[str, np.ndarray]  # over the steady window; NaN where a run did not last
     status: np.ndarray
     ended: np.ndarray  # s
+    engine: np.ndarray  # LANES or XLA
     series: dict[str, np.ndarray]  # (trials, records, ...)
 
 
@@ -39,6 +43,14 @@ class _Kind(NamedTuple):
     engine: str
 
 
+class _Crew(NamedTuple):
+    """Trials of one kind in a task."""
+
+    first: Run
+    members: list[int]  # their places in the task
+    numbers: list[list[np.ndarray]]  # of each what is not the same in all
+
+
 class Hangar:
     """Programs that were compiled, for any number of threads.
 
@@ -49,70 +61,68 @@ class Hangar:
 
     def __init__(self, probes: Callable[[], Sequence[Built]]):
         self._probes = probes
-        self._common: dict[Any, list[np.ndarray | None]] | None = None
+        self._shared: dict[Any, list[np.ndarray | None]] | None = None
         self._programs: dict[_Kind, Any] = {}
         self._lock = threading.Lock()
 
-    def fly(self, built: Sequence[Built], signals: tuple[str, ...] = (), every: float = 0.0) -> Flown:
+    def fly(self, built: Iterable[Built], asked: Series | None = None) -> Flown:
         """Run trials; those of one kind together.
 
         Args:
-            built: the trials, sampled loops.
-            signals: of which series are kept.
-            every: time between their records, s.
+            built: the trials, sampled loops; only numbers that differ are kept of each.
+            asked: series that are kept.
         """
-        if not built:
-            return Flown(dict.fromkeys(OVERALL, np.zeros(0)), np.zeros(0, dtype=np.int8), np.zeros(0), {})
-        runs = [_run(one) for one in built]
-        kinds: dict[_Kind, list[int]] = {}
-        for i, (one, run) in enumerate(zip(built, runs, strict=True)):
-            kinds.setdefault(self._kind(run, _plan(one, signals, every), one.scenario.loop.engine), []).append(i)
-        pieces = [self._together(kind, [runs[i] for i in members]) for kind, members in kinds.items()]
-        back = np.argsort([i for members in kinds.values() for i in members])
+        crews: dict[_Kind, _Crew] = {}
+        for i, one in enumerate(built):
+            run = run_of(one)
+            numbers = leaves(run)
+            kind = self._kind(run, numbers, planned(one, asked), one.scenario.loop.engine)
+            crew = crews.setdefault(kind, _Crew(run, [], []))
+            crew.members.append(i)
+            pairs = zip(numbers, self._common(kind, len(numbers)), strict=True)
+            # Copies: views would keep JAX's arrays, and those ten times the memory.
+            crew.numbers.append([np.array(leaf) for leaf, shared in pairs if shared is None])
+        if not crews:  # none of them, as one would be
+            return jax.tree.map(lambda kept: kept[:0], self.fly(self._probes()[:1], asked))
+        pieces = [self._together(kind, crew) for kind, crew in crews.items()]
+        back = np.argsort([i for crew in crews.values() for i in crew.members])
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
-    def _together(self, kind: _Kind, runs: list[Run]) -> Flown:
+    def _together(self, kind: _Kind, crew: _Crew) -> Flown:
+        common = self._common(kind, len(leaves(crew.first)))
         with self._lock:
-            common = (kind.usual and self._commons().get(kind.structure)) or [None] * len(_leaves(runs[0]))
             if kind not in self._programs:
-                self._programs[kind] = _program(runs[0], kind, [shared is not None for shared in common])
-        columns = zip(common, *map(_leaves, runs), strict=True)
-        stacked = jax.tree.unflatten(
-            jax.tree.structure(eqx.filter(runs[0], eqx.is_array)),
-            [
-                np.stack(column) if shared is None else np.broadcast_to(shared, (len(runs), *np.shape(shared)))
-                for shared, *column in columns
-            ],
-        )
-        flown = self._programs[kind].fly(stacked)
+                self._programs[kind] = _program(crew.first, kind, [shared is not None for shared in common])
+        count, own = len(crew.members), map(np.stack, zip(*crew.numbers, strict=True))
+        repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
+        numbers = [next(own) if shared is None else repeated(shared) for shared in common]
+        tree = jax.tree.structure(eqx.filter(crew.first, eqx.is_array))
+        flown = self._programs[kind].fly(jax.tree.unflatten(tree, numbers))
         lasted = flown.status == int(Status.OK)
         metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(flown.accumulated[0]).items()}
-        return Flown(metrics, flown.status.astype(np.int8), flown.ended, flown.series)
+        engine = np.full(count, LANES if isinstance(self._programs[kind], in_lanes.Fleet) else XLA, dtype=np.int8)
+        return Flown(metrics, flown.status.astype(np.int8), flown.ended, engine, flown.series)
 
-    def _kind(self, run: Run, plan: Plan, engine: str) -> _Kind:
+    def _common(self, kind: _Kind, count: int) -> list[np.ndarray | None]:
+        """Numbers that are built into the program of a kind, in the order of the leaves of its runs; None elsewhere."""
+        found = self._commons().get(kind.structure) if kind.usual else None
+        return [None] * count if found is None else found
+
+    def _kind(self, run: Run, numbers: list[Any], plan: Plan, engine: str) -> _Kind:
         form = structure(run)
-        with self._lock:
-            common = self._commons().get(form)
+        common = self._commons().get(form)
         usual = common is not None and all(
             shared is None or leaf is shared or np.array_equal(leaf, shared)
-            for leaf, shared in zip(_leaves(run), common, strict=True)
+            for leaf, shared in zip(numbers, common, strict=True)
         )
         return _Kind(form, plan, usual, engine)
 
     def _commons(self) -> dict[Any, list[np.ndarray | None]]:
         """Numbers that all probes of a structure share, by structure: None for those that differ."""
-        if self._common is None:
-            probes: dict[Any, list[list[Any]]] = {}
-            for built in self._probes():
-                run = _run(built)
-                probes.setdefault(structure(run), []).append(_leaves(run))
-            same = lambda column: all(np.array_equal(column[0], other) for other in column[1:])
-            self._common = {
-                form: [column[0] if same(column) else None for column in zip(*several, strict=True)]
-                for form, several in probes.items()
-                if len(several) > 1
-            }
-        return self._common
+        with self._lock:
+            if self._shared is None:
+                self._shared = shared_numbers(self._probes())
+            return self._shared
 
 
 def _program(run: Run, kind: _Kind, constant: list[bool]) -> in_lanes.Fleet | vmapped.Fleet:
@@ -121,19 +131,3 @@ def _program(run: Run, kind: _Kind, constant: list[bool]) -> in_lanes.Fleet | vm
             with contextlib.suppress(Unsupported):
                 return in_lanes.Fleet(run, kind.plan, constant, driver=driver)
     return vmapped.Fleet(run, kind.plan)
-
-
-def _leaves(run: Run) -> list[Any]:
-    return [leaf for leaf in jax.tree.leaves(run) if eqx.is_array(leaf)]
-
-
-def _run(built: Built) -> Run:
-    scenario = built.scenario
-    start = built.closed_loop.outputs_at_start(*(getattr(scenario.initial, name) for name in _STARTS))
-    return Run(built.closed_loop, (Metrics(*built.window()),), start, jax.random.PRNGKey(scenario.seed))
-
-
-def _plan(built: Built, signals: tuple[str, ...], every: float) -> Plan:
-    loop = built.scenario.loop
-    record = round(every / loop.dt) if signals else 0
-    return Plan(round(loop.duration / loop.dt), loop.dt, record, signals, loop.method, loop.substeps)

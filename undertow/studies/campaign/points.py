@@ -1,6 +1,6 @@
 """Where the draws of a campaign lie: points of the unit cube, and what they stand for."""
 
-import math
+import functools
 from typing import Any
 
 import numpy as np
@@ -8,32 +8,67 @@ from jaxtyping import Float
 from scipy.special import ndtri
 from scipy.stats import qmc
 
+from undertow.core.errors import BadInput
 from undertow.studies.campaign.schema import Campaign, Spread
 
 # Of the seed: what else is drawn from it.
 _POINTS, _SEEDS = 0, 1
 
+# Draws that are made at once, and how many such blocks are kept. A power of two, as Sobol's sequence likes it.
+_BLOCK, _KEPT = 4096, 8
+_MOST_LATIN = 10_000_000
+
 # The quantiles of a normal distribution are infinite at 0 and 1.
 _EDGE = 2.0**-53
 
 
-def points(campaign: Campaign) -> Float[np.ndarray, "trials k"]:
-    """One point per draw, in the order of the draws; the same for every machine and every way of running."""
-    count, dimensions = campaign.trials, len(campaign.vary)
-    if not dimensions:
-        return np.zeros((count, 0))
-    chance = np.random.default_rng([campaign.seed, _POINTS])
-    if campaign.design == "latin":
-        return qmc.LatinHypercube(dimensions, rng=chance).random(count)
-    if campaign.design == "sobol":
-        whole = qmc.Sobol(dimensions, rng=chance).random_base2(math.ceil(math.log2(count)) if count > 1 else 0)
-        return whole[:count]
-    return chance.random((count, dimensions))
+class Draws:
+    """Points of the unit cube and seeds: the same for every machine and every way of running.
 
+    A block of them is made when it is asked for: a billion draws take no memory. Only a Latin hypercube is made whole.
 
-def seeds(campaign: Campaign) -> np.ndarray:
-    """Seed of each draw."""
-    return np.random.default_rng([campaign.seed, _SEEDS]).integers(0, 2**32, campaign.trials, dtype=np.uint32)
+    Args:
+        campaign: how many, how, and from which seed.
+
+    Raises:
+        BadInput: too many for a Latin hypercube.
+    """
+
+    def __init__(self, campaign: Campaign):
+        if campaign.design == "latin" and campaign.trials > _MOST_LATIN:
+            hint = "`random` and `sobol` have no such limit"
+            raise BadInput("trials", f"be at most {_MOST_LATIN} with `design: latin`", campaign.trials, hint=hint)
+        self._campaign = campaign
+        self._block = campaign.trials if campaign.design == "latin" else _BLOCK
+        self._points = functools.lru_cache(_KEPT)(self._made)
+        self._seeds = functools.lru_cache(_KEPT)(self._sown)
+
+    def point(self, draw: int) -> Float[np.ndarray, " k"]:
+        """Of a draw: in [0, 1), in the order of `vary`."""
+        block, row = divmod(draw, self._block)
+        return self._points(block)[row]
+
+    def seed(self, draw: int) -> int:
+        """Of everything random in it."""
+        block, row = divmod(draw, _BLOCK)
+        return int(self._seeds(block)[row])
+
+    def _made(self, block: int) -> Float[np.ndarray, "rows k"]:
+        seed, dimensions = self._campaign.seed, len(self._campaign.vary)
+        if not dimensions:
+            return np.zeros((self._block, 0))
+        if self._campaign.design == "random":
+            return np.random.default_rng([seed, _POINTS, block]).random((self._block, dimensions))
+        chance = np.random.default_rng([seed, _POINTS])
+        if self._campaign.design == "latin":
+            return qmc.LatinHypercube(dimensions, rng=chance).random(self._block)
+        sequence = qmc.Sobol(dimensions, rng=chance)
+        if block:  # SciPy cannot go forward by nothing
+            sequence.fast_forward(block * self._block)
+        return sequence.random(self._block)
+
+    def _sown(self, block: int) -> np.ndarray:
+        return np.random.default_rng([self._campaign.seed, _SEEDS, block]).integers(0, 2**32, _BLOCK, dtype=np.uint32)
 
 
 def value(spread: Spread, share: float) -> Any:

@@ -1,6 +1,7 @@
 """Reading campaign files, and writing them down whole: with the scenario inside, so that a store stands alone."""
 
 from pathlib import Path
+from typing import Any
 
 from undertow.scenario.reading import Text, dump, parse, read
 from undertow.studies.campaign.schema import Campaign, validate
@@ -20,6 +21,11 @@ def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
     """A campaign from the text of `whole`; relative paths in it start at `folder`."""
     parsed = parse(text, "", folder, "CAMPAIGN")
     return validate(parsed), parsed
+
+
+def plain(text: str) -> dict[str, Any]:
+    """The text of `whole` as data."""
+    return parse(text, "", Path(), "CAMPAIGN").data
 
 
 def whole(campaign: Campaign, scenario: dict) -> str:

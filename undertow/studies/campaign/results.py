@@ -9,9 +9,11 @@ import xarray as xr
 
 from undertow.analysis.meanings import MEANINGS
 from undertow.core.status import Status
+from undertow.studies.campaign.columns import ALWAYS
 from undertow.studies.campaign.conduct import STORE
 from undertow.studies.campaign.reading import read_text
 from undertow.studies.campaign.schema import Campaign
+from undertow.studies.campaign.store import chunk_file
 from undertow.studies.campaign.task import REFUSED
 
 
@@ -20,7 +22,11 @@ class Results(NamedTuple):
 
     campaign: Campaign
     rows: xr.Dataset  # of the tasks that are done
-    total: int
+
+    @property
+    def total(self) -> int:
+        """Trials that were asked for."""
+        return self.campaign.number
 
     @property
     def metrics(self) -> list[str]:
@@ -64,14 +70,26 @@ def load(folder: Path) -> Results:
         FileNotFoundError: there are none.
         OSError: they are damaged.
     """
-    whole = xr.open_zarr(folder / STORE, consolidated=False, chunks=None)
-    whole = whole.drop_vars([name for name in whole if str(name).startswith("series:")])
-    done, chunk = whole["done"].values.astype(bool), int(whole.attrs["chunk"])
-    total = whole.sizes.get("trial", 0)
-    rows = whole.drop_vars("done").assign_coords(trial=np.arange(total)).isel(trial=np.repeat(done, chunk)[:total])
+    path = folder / STORE
     try:
-        rows = rows.load()
-    except RuntimeError as error:  # zarr's word for a chunk that is not what was written
-        raise OSError(f"{folder / STORE} is damaged ({error}); `undertow campaign --resume` flies it again") from error
-    campaign, _ = read_text(whole.attrs["campaign"], Path())
-    return Results(campaign, rows, total)
+        whole = xr.open_zarr(path, consolidated=False, chunks=None)
+        if "campaign" not in whole.attrs:
+            raise FileNotFoundError(path)  # of a process that was killed before anything stood there
+        campaign, _ = read_text(whole.attrs["campaign"], Path())
+        return Results(campaign, _done(whole, campaign, path).load())
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # zarr's and xarray's words for what is not as it was written
+        raise OSError(f"{path} is damaged ({error}); `undertow campaign --resume` mends what can be mended") from error
+
+
+def _done(whole: xr.Dataset, campaign: Campaign, path: Path) -> xr.Dataset:
+    """Rows of the tasks that are done, without series."""
+    flags = whole["done"].values.astype(bool) if "done" in whole else np.zeros(0, dtype=bool)
+    own = [f"vary:{key}" for key in (*campaign.cross, *campaign.vary)] + list(ALWAYS)
+    flags = [flag and all(chunk_file(path, name, task).exists() for name in own) for task, flag in enumerate(flags)]
+    done = np.zeros(campaign.number, dtype=bool)
+    written = np.repeat(np.array(flags, dtype=bool), whole.attrs["chunk"])[: campaign.number]
+    done[: len(written)] = written
+    known = whole[[name for name in own if name in whole]]
+    return known.assign_coords(trial=np.arange(campaign.number)).isel(trial=done)

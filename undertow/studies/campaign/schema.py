@@ -1,5 +1,6 @@
 """What a campaign file may say."""
 
+import math
 import re
 from typing import Annotated, Any, Literal
 
@@ -8,8 +9,10 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import Text
 from undertow.scenario.schema import Scenario, Strict, complaint
+from undertow.studies.campaign.naming import by_name
 
-_PATH = re.compile(r"[\w-]+(\.[\w-]+|\[\d+\])*")
+# Entries of lists in brackets only: each key has one spelling, so that two that name it are noticed.
+_PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
@@ -41,7 +44,14 @@ class Requirement(Strict):
     """What a metric must keep to in a share of all trials."""
 
     below: float = Field(description="the metric must be smaller")
-    share: float = Field(0.95, gt=0, le=1, description="in this share of the trials at least")
+    share: float = Field(0.95, gt=0, description="in this share of the trials at least")
+
+    @field_validator("share")
+    @classmethod
+    def _provable(cls, given: float) -> float:
+        if given >= 1:
+            raise ValueError("be less than 1, as no number of trials shows that all keep to it; 0.99, for example")
+        return given
 
 
 class Series(Strict):
@@ -69,26 +79,24 @@ class Campaign(Strict):
     seed: int = Field(0, ge=0, le=2**32 - 1, description="of all draws and of the seeds of the trials")
     chunk: int = Field(256, ge=1, le=100_000, description="trials per task; no result depends on it")
 
+    @field_validator("scenario", mode="before")
+    @classmethod
+    def _file_or_mapping(cls, given: Any) -> Any:
+        if not isinstance(given, str | dict):
+            raise ValueError("be the name of a file, or a mapping of keys to values")
+        return given
+
     @field_validator("cross", mode="before")
     @classmethod
     def _named(cls, given: Any) -> Any:
         if not isinstance(given, dict):
             return given
-        return {key: _by_name(values) if isinstance(values, list) else values for key, values in given.items()}
+        return {key: by_name(values) if isinstance(values, list) else values for key, values in given.items()}
 
-
-def _by_name(values: list[Any]) -> dict[str, Any]:
-    """Values under names of their own: a part's kind and preset, else the value itself."""
-    names = [_name(value) for value in values]
-    alone = lambda name: names.count(name) == 1
-    unique = [name if alone(name) else f"{name} {i + 1}" for i, name in enumerate(names)]
-    return dict(zip(unique, values, strict=True))
-
-
-def _name(value: Any) -> str:
-    if isinstance(value, dict) and "kind" in value:
-        return " ".join(str(value[key]) for key in ("kind", "preset") if key in value)
-    return str(value)
+    @property
+    def number(self) -> int:
+        """Trials all told: the draws, for every combination of `cross`."""
+        return math.prod(len(entries) for entries in self.cross.values()) * self.trials
 
 
 def validate(text: Text) -> Campaign:
@@ -104,23 +112,41 @@ def validate(text: Text) -> Campaign:
         found = Campaign.model_validate(text.data)
     except ValidationError as errors:
         raise complaint(errors, text, Campaign) from None
-    for section, keys in (("vary", found.vary), ("cross", found.cross)):
-        for key in keys:
-            if not _PATH.fullmatch(key):
-                must = "be a key path such as plant.vehicle.mass or initial.position[0]"
-                raise BadInput(section, must, repr(key), where=text.where((section, key)))
-    every = [(section, key) for section, keys in (("vary", found.vary), ("cross", found.cross)) for key in keys]
-    for section, key in every:
-        if key == "seed":
-            hint = "Every trial has one of its own; `seed` of the campaign decides which"
-            raise BadInput(f"{section}.seed", "be left out", hint=hint, where=text.where((section, key)))
-        for _, other in every:
-            if other.startswith((f"{key}.", f"{key}[")):
-                must = f"not be beside {key}, which it is a part of"
-                raise BadInput(other, must, where=text.where((section, key)))
-    for key in found.cross:
-        if not found.cross[key]:
-            raise BadInput(f"cross.{key}", "have an entry", where=text.where(("cross", key)))
-        if key in found.vary:
-            raise BadInput(f"cross.{key}", "not be in `vary`, too", where=text.where(("cross", key)))
+    pairs = [(section, key) for section in ("vary", "cross") for key in getattr(found, section)]
+    for section, key in pairs:
+        _check_key(section, key, [other for _, other in pairs], text.where((section, key)))
+    for key, entries in found.cross.items():
+        _check_entries(key, entries, text.where(("cross", key)))
     return found
+
+
+def _check_key(section: str, key: str, every: list[str], where: str) -> None:
+    """A key path of `vary` or `cross`."""
+    if not _PATH.fullmatch(key):
+        must = "be a key path such as plant.vehicle.mass or initial.position[0]"
+        raise BadInput(section, must, repr(key), where=where)
+    if key.startswith("scenario."):
+        raise BadInput(key, "start inside the scenario", hint=f"Write `{key.removeprefix('scenario.')}`", where=where)
+    if key == "seed":
+        hint = "Every trial has one of its own; `seed` of the campaign decides which"
+        raise BadInput(f"{section}.seed", "be left out", hint=hint, where=where)
+    if every.count(key) > 1:
+        raise BadInput(f"cross.{key}", "not be in `vary`, too", where=where)
+    for other in every:
+        if other.startswith((f"{key}.", f"{key}[")):
+            raise BadInput(other, f"not be beside {key}, which it is a part of", where=where)
+
+
+def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
+    """The values of one key of `cross`."""
+    name = f"cross.{key}"
+    if not entries:
+        raise BadInput(name, "have an entry", where=where)
+    if set(entries) <= set(Spread.model_fields):
+        hint = f"`vary` draws; here, write `{key}: [first, second]`, or names and values"
+        raise BadInput(name, "be a list, or values by names", f"{next(iter(entries))} alone", hint=hint, where=where)
+    known: dict[str, str] = {}
+    for word, entry in entries.items():
+        same = known.setdefault(repr(float(entry) if isinstance(entry, int) else entry), word)
+        if same != word:
+            raise BadInput(name, "have entries that differ", f"{same} and {word}, which are the same", where=where)

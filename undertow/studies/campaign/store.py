@@ -4,7 +4,7 @@ import xarray as xr
 results = xr.open_zarr("runs/my-campaign/trials.zarr", consolidated=False)
 """
 
-import fcntl
+import contextlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +15,8 @@ import xarray as xr
 
 from undertow.core.errors import BadInput
 from undertow.studies.campaign.columns import Label
+from undertow.studies.campaign.identity import Identity
+from undertow.studies.campaign.lock import locked
 
 try:
     import zarr
@@ -38,8 +40,7 @@ class Store:
         path: folder of the store; made when missing.
         trials: number of rows.
         chunk: rows per task; a store that is there already keeps its own.
-        identity: attributes that are the same in a store that may be gone on with; plain data.
-        further: other attributes, those of whoever wrote last.
+        identity: of the campaign; a store that is there must be of the same.
         labels: of columns by name.
         coordinates: along other dimensions than that of trials, by name.
 
@@ -52,29 +53,37 @@ class Store:
         path: Path,
         trials: int,
         chunk: int,
-        identity: Mapping[str, Any],
-        further: Mapping[str, Any],
+        identity: Identity,
         labels: Mapping[str, Label],
         coordinates: Mapping[str, xr.Variable],
     ):
         self._path, self._trials, self._chunk, self._labels = path, trials, chunk, labels
         path.mkdir(parents=True, exist_ok=True)
-        self._lock = _locked(path)
-        for left in path.rglob("*.partial"):  # by a process that was killed while zarr wrote a file
+        with contextlib.ExitStack() as held:
+            held.callback(os.close, locked(path))
+            self._open(identity, coordinates)
+            self._held = held.pop_all()
+
+    def _open(self, identity: Identity, coordinates: Mapping[str, xr.Variable]) -> None:
+        """What is there of an earlier process, and what is not there yet."""
+        for left in self._path.rglob("*.partial"):  # by a process that was killed while zarr wrote a file
             left.unlink()
-        self._group = zarr.open_group(path, mode="a")
-        if _DONE in self._group:
-            self._chunk = _same(dict(self._group.attrs), identity, path.parent)
-            if any(self._group.attrs[key] != value for key, value in further.items()):
-                self._group.attrs.update(further)
-        else:
-            self._group.attrs.update({**identity, **further, "chunk": chunk})
-            for name, one in coordinates.items():
-                self._array(name, one.dtype, one.shape, one.shape, Label((name,), one.attrs))[:] = one.values
-            label = Label(("task",), {"long_name": "1 for what is written"})
-            self._array(_DONE, np.dtype(np.uint8), (self.tasks,), (1,), label)
+        self._group = _opened(self._path)
+        known = dict(self._group.attrs)
+        if known:
+            identity.check_same(known, self._path.parent)
+            self._chunk = int(known["chunk"])
+        if known.get("campaign") != identity.asked:
+            # All at once, as no process can be killed between two of them.
+            self._group.update_attributes({**identity.attributes, "campaign": identity.asked, "chunk": self._chunk})
         # Asking zarr for an array takes as long as writing it.
-        self._arrays = {name: array.with_config(_CONFIG) for name, array in self._group.arrays()}
+        found = {name: self._found(name) for name in (_DONE, *self._labels)}
+        self._arrays = {name: array for name, array in found.items() if array is not None}
+        for name, one in coordinates.items():  # always: a process may have been killed before their values stood there
+            self._array(name, one.dtype, one.shape, one.shape, Label((name,), one.attrs))[:] = one.values
+        if _DONE not in self._arrays:
+            label = Label(("task",), {"long_name": "1 for what is written"})
+            self._arrays[_DONE] = self._array(_DONE, np.dtype(np.uint8), (self.tasks,), (1,), label)
 
     @property
     def tasks(self) -> int:
@@ -110,18 +119,25 @@ class Store:
 
     def close(self) -> None:
         """Let others write."""
-        os.close(self._lock)
+        self._held.close()
 
     def _whole(self, task: int) -> bool:
         first, last = self.rows(task).start, self.rows(task).stop
         try:
-            for name, array in self._arrays.items():
-                if name in self._labels:
-                    array[first:last]
-                    self._path.joinpath(name, "c", str(task), *["0"] * (array.ndim - 1)).stat()
+            for name in self._labels:
+                array = self._arrays[name]
+                array[first:last]
+                chunk_file(self._path, name, task, array.ndim).stat()
         except Exception:  # whatever a codec says of a torn chunk; for one that is gone zarr has zeros
             return False
         return True
+
+    def _found(self, name: str) -> Any:
+        """An array of an earlier process; nothing where it is gone or cannot be read: it is made anew."""
+        try:
+            return self._group[name].with_config(_CONFIG)
+        except (KeyError, ValueError):
+            return None
 
     def _array(self, name: str, dtype: np.dtype, shape: tuple, chunks: tuple, label: Label) -> Any:
         # With its attributes at once: killed between the two, an array would stay without them. What a killed process
@@ -140,31 +156,19 @@ class Store:
         )
 
 
-def check_free(path: Path) -> None:
-    """That no process is writing to a store.
+def chunk_file(path: Path, name: str, task: int, dimensions: int = 1) -> Path:
+    """Where zarr keeps the rows of a task in an array; of one that is gone it says that it is full of zeros."""
+    return path.joinpath(name, "c", str(task), *["0"] * (dimensions - 1))
+
+
+def _opened(path: Path) -> Any:
+    """The group of a store.
 
     Raises:
-        BadInput: one is.
+        BadInput: what is there is none.
     """
-    os.close(_locked(path))
-
-
-def _same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> int:
-    """Rows per task of a store that may be gone on with."""
-    other = [key for key in wanted if found.get(key) != wanted[key]]
-    if other:
-        got = f"{folder}, with another {', '.join(key.removesuffix('_hash') for key in other)}"
-        hint = "Choose another folder, or begin anew with --overwrite"
-        raise BadInput("--out", "hold the same campaign, by the same versions", got, hint=hint)
-    return int(found["chunk"])
-
-
-def _locked(path: Path) -> int:
-    """A lock that goes with the process, however it ends."""
-    handle = os.open(path.with_name(f".{path.name}.lock"), os.O_CREAT | os.O_RDWR)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(handle)
-        raise BadInput("--out", "be a folder that nothing else writes to", str(path.parent)) from None
-    return handle
+        return zarr.open_group(path, mode="a")
+    except Exception as error:  # whatever zarr says of metadata that is no JSON, or not of a group
+        got, hint = f"{path.parent}: zarr.json is damaged ({error})", "--overwrite begins anew"
+        raise BadInput("--out", "hold a store that can be read", got, hint=hint) from error

@@ -4,16 +4,16 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import binomtest
 
 from undertow.studies.campaign.columns import ENDINGS
 from undertow.studies.campaign.dependence import by_choice, correlations, quantiles
+from undertow.studies.campaign.flying import XLA
 from undertow.studies.campaign.refusals import refusals
+from undertow.studies.campaign.requirements import verdict
 from undertow.studies.campaign.results import Results
 from undertow.studies.campaign.trials import Trials
 
 _WORST = 5
-_CONFIDENCE = 0.95
 
 # Trials are ranked by this; those that failed come first.
 _RANKED_BY = "tracking_rms"
@@ -30,7 +30,8 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
     return {
         "trials": results.total,
         "done": results.rows.sizes["trial"],
-        "status": endings(results),
+        "status": endings(results.rows),
+        "by_xla": int((results.rows["engine"].values == XLA).sum()),
         "refused": [one._asdict() for one in refusals(several, refused)],
         "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
         "sensitivity": correlations(results),
@@ -39,10 +40,10 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
     }
 
 
-def endings(results: Results) -> dict[str, int]:
+def endings(rows: xr.Dataset) -> dict[str, int]:
     """How many trials ended how; empty before the first is done."""
-    codes = results.rows["status"].values if "status" in results.rows else np.zeros(0)
-    return {ENDINGS[int(code)]: int((codes == code).sum()) for code in np.unique(codes)}
+    codes = rows["status"].values if "status" in rows else np.zeros(0)
+    return {word: int((codes == code).sum()) for code, word in ENDINGS.items() if (codes == code).any()}
 
 
 def _combination(results: Results, number: int) -> dict[str, Any]:
@@ -52,30 +53,13 @@ def _combination(results: Results, number: int) -> dict[str, Any]:
     return {
         "values": dict(zip(results.campaign.cross, results.named(number), strict=True)),
         "trials": int(lasted.size),
+        "status": endings(rows),
         "failed": int((flown & ~lasted).sum()),
         "refused": int((~flown).sum()),
         "metrics": {name: quantiles(rows[name].values[lasted]) for name in results.metrics} if lasted.any() else {},
         "requirements": [
-            _requirement(rows.isel(trial=flown), name, one) for name, one in results.campaign.requirements.items()
+            verdict(rows.isel(trial=flown), name, wanted) for name, wanted in results.campaign.requirements.items()
         ],
-    }
-
-
-def _requirement(rows: xr.Dataset, name: str, wanted: Any) -> dict[str, Any]:
-    """Whether enough trials keep to it, with the interval of Clopper and Pearson (1934), exact for random draws.
-
-    Trials that failed do not keep to it.
-    """
-    kept, count = int((rows[name].values < wanted.below).sum()), max(1, rows.sizes["trial"])
-    interval = binomtest(kept, count).proportion_ci(_CONFIDENCE, method="exact")
-    verdict = "holds" if interval.low >= wanted.share else "fails" if interval.high < wanted.share else "open"
-    return {
-        "metric": name,
-        "below": wanted.below,
-        "share": wanted.share,
-        "kept": kept / count,
-        "interval": [float(interval.low), float(interval.high)],
-        "verdict": verdict,
     }
 
 

@@ -2,7 +2,7 @@
 
 import contextlib
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -42,8 +42,7 @@ def site(text: str, folder: str) -> Site:
         folder: where relative paths in it start.
     """
     several, workshop = trials(*read_text(text, Path(folder))), Workshop()
-    rows = [row for one in range(len(several.combinations)) for row in first_rows(several, one)]
-    probes = functools.cache(lambda: _built(several, workshop, rows))
+    probes = functools.cache(lambda: dict(_built(several, workshop, probed(several))))
     return Site(several, workshop, Hangar(lambda: list(probes().values())), probes)
 
 
@@ -53,6 +52,11 @@ def first_rows(several: Trials, combination: int) -> range:
     return range(combination * draws, combination * draws + min(_PROBES, draws))
 
 
+def probed(several: Trials) -> list[int]:
+    """Those of all combinations."""
+    return [row for one in range(len(several.combinations)) for row in first_rows(several, one)]
+
+
 def fly(text: str, folder: str, rows: range) -> dict[str, np.ndarray]:
     """Columns of some trials: what differs between them, how they ended, and their metrics."""
     with runtime.on_processor():
@@ -60,16 +64,20 @@ def fly(text: str, folder: str, rows: range) -> dict[str, np.ndarray]:
 
 
 def _flown(here: Site, rows: range) -> dict[str, np.ndarray]:
-    asked = here.trials.campaign.series
-    built = _built(here.trials, here.workshop, rows)
     columns = {f"vary:{key}": column for key, column in _columns(here.trials, rows)}
     columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
-    kept = (tuple(asked.signals), asked.every) if asked else ()
-    flown = here.hangar.fly(list(built.values()), *kept)
-    where = np.array([row - rows.start for row in built], dtype=int)
+    where: list[int] = []
+
+    def flying() -> Iterator[Built]:
+        for row, built in _built(here.trials, here.workshop, rows):
+            where.append(row - rows.start)
+            yield built
+
+    flown = here.hangar.fly(flying(), here.trials.campaign.series)
     spread = functools.partial(_spread, len(rows), where)
     columns["status"] = spread(flown.status, REFUSED)
     columns["ended"] = spread(flown.ended, np.nan)
+    columns["engine"] = spread(flown.engine, REFUSED)
     columns |= {name: spread(values, np.nan) for name, values in flown.metrics.items()}
     return columns | {f"series:{name}": spread(values, np.nan) for name, values in flown.series.items()}
 
@@ -88,13 +96,11 @@ def build_trial(several: Trials, workshop: Workshop, row: int) -> Built:
         raise error.at(where=f"{place}, trial {row}" if place else f"trial {row}") from error.__cause__
 
 
-def _built(several: Trials, workshop: Workshop, rows: Iterable[int]) -> dict[int, Built]:
-    """Those trials that can be built."""
-    found = {}
+def _built(several: Trials, workshop: Workshop, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
+    """Those trials that can be built, one after another: a task of many does not hold them all."""
     for row in rows:
         with contextlib.suppress(BadInput):
-            found[row] = build_trial(several, workshop, row)
-    return found
+            yield row, build_trial(several, workshop, row)
 
 
 def _columns(several: Trials, rows: range) -> Iterable[tuple[str, np.ndarray]]:
@@ -105,7 +111,7 @@ def _columns(several: Trials, rows: range) -> Iterable[tuple[str, np.ndarray]]:
         yield key, np.array([pick(one[key]) for one in values], dtype=float)
 
 
-def _spread(count: int, where: np.ndarray, values: np.ndarray, empty: Any) -> np.ndarray:
+def _spread(count: int, where: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
     """Values at their rows, `empty` elsewhere."""
     whole = np.full((count, *values.shape[1:]), empty, dtype=values.dtype)
     whole[where] = values

@@ -2,15 +2,13 @@
 
 import copy
 import itertools
-import math
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, nearest
 from undertow.scenario.reading import Text, key_path, read
-from undertow.studies.campaign.points import points, seeds, value
+from undertow.studies.campaign.naming import words
+from undertow.studies.campaign.points import Draws, value
 from undertow.studies.campaign.schema import Campaign
 
 
@@ -21,33 +19,31 @@ class Trials(NamedTuple):
         campaign: what was asked for.
         text: of the campaign file.
         scenario: what it varies, and where relative paths in it start.
-        points: one row per draw, in [0, 1); columns as in `vary`.
-        seeds: one per draw.
+        draws: points of the unit cube, for `vary`, and seeds.
         combinations: values of `cross`, one tuple per combination.
     """
 
     campaign: Campaign
     text: Text
     scenario: Text
-    points: np.ndarray
-    seeds: np.ndarray
+    draws: Draws
     combinations: tuple[tuple[Any, ...], ...]
 
     @property
     def number(self) -> int:
         """How many trials there are."""
-        return len(self.combinations) * self.campaign.trials
+        return self.campaign.number
 
     def values(self, trial: int) -> dict[str, Any]:
         """What this trial puts into the scenario, by key path."""
         combination, draw = divmod(trial, self.campaign.trials)
         crossed = dict(zip(self.campaign.cross, self.combinations[combination], strict=True))
-        drawn = zip(self.campaign.vary.items(), self.points[draw], strict=True)
+        drawn = zip(self.campaign.vary.items(), self.draws.point(draw), strict=True)
         return crossed | {key: value(spread, float(share)) for (key, spread), share in drawn}
 
     def seed(self, trial: int) -> int:
         """Of everything random in this trial."""
-        return int(self.seeds[trial % self.campaign.trials])
+        return self.draws.seed(trial % self.campaign.trials)
 
     def data(self, trial: int) -> dict[str, Any]:
         """The scenario of this trial."""
@@ -70,7 +66,7 @@ class Trials(NamedTuple):
             yield key, None if _numbers(entries.values()) else entries
         for key, spread in self.campaign.vary.items():
             named = spread.choice is not None and not _numbers(spread.choice)
-            yield key, {str(entry): entry for entry in spread.choice or []} if named else None
+            yield key, {words(entry): entry for entry in spread.choice or []} if named else None
 
 
 def trials(campaign: Campaign, text: Text) -> Trials:
@@ -83,20 +79,23 @@ def trials(campaign: Campaign, text: Text) -> Trials:
     Raises:
         BadInput: no such scenario, or too many trials.
     """
+    if campaign.number >= 2**31:
+        raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", campaign.number)
     combinations = tuple(itertools.product(*(entries.values() for entries in campaign.cross.values())))
-    whole = math.prod(len(entries) for entries in campaign.cross.values()) * campaign.trials
-    if whole >= 2**31:
-        raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", whole)
-    return Trials(campaign, text, _scenario(campaign, text), points(campaign), seeds(campaign), combinations)
+    return Trials(campaign, text, _scenario(campaign, text), Draws(campaign), combinations)
 
 
 def _scenario(campaign: Campaign, text: Text) -> Text:
     given = campaign.scenario
     if isinstance(given, str):
         try:
-            return read(text.folder / given, "scenario")
+            found = read(text.folder / given, "scenario")
         except BadInput as error:
             raise error.at(where=error.where or text.where(("scenario",))) from error.__cause__
+        if "scenario" in found.data:
+            where = text.where(("scenario",))
+            raise BadInput("scenario", "be the file of a scenario", f"{given}, a campaign", where=where)
+        return found
     lines = {path[1:]: line for path, line in text.lines.items() if path[0] == "scenario"}
     return Text(given, text.name, text.folder, lines)
 
@@ -107,18 +106,26 @@ def _numbers(entries: Iterable[Any]) -> bool:
 
 def _put(data: dict[str, Any], key: str, put: Any) -> None:
     """Set the value at a key path; a part given by its name alone becomes a mapping."""
-    *way, last = key_path(key)
+    path = key_path(key)
     node: Any = data
-    for step in way:
+    for step, following in itertools.pairwise(path):
         inner = _entry(node, step, key)
         if isinstance(inner, str):
             inner = {"kind": inner}
+        elif inner is None and isinstance(following, int):
+            raise _no_list(node, step, key)
         elif inner is None:
             inner = {}
         node[step] = inner
         node = inner
-    _entry(node, last, key)
-    node[last] = put
+    _entry(node, path[-1], key)
+    node[path[-1]] = put
+
+
+def _no_list(node: Any, step: str | int, key: str) -> BadInput:
+    """That a key path names an entry of what the scenario does not have."""
+    hint = nearest(str(step), node) or f"Give `{step}` in the scenario, with all its entries"
+    return BadInput(key, "name an entry of a list of the scenario", f"of `{step}`, which it does not have", hint=hint)
 
 
 def _entry(node: Any, step: str | int, key: str) -> Any:

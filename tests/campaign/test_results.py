@@ -1,0 +1,145 @@
+"""What a campaign leaves: rows, page, summary and scenarios of the worst trials."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+from command import contents
+
+from undertow.analysis.metrics import OVERALL
+from undertow.cli.main import run
+from undertow.studies.campaign.conduct import STORE
+from undertow.studies.campaign.task import site
+
+CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant.limit": [1e30]}
+
+
+def test_what_it_leaves(campaign_file, tmp_path, capsys):
+    path, out = campaign_file(trials=20, cross=CROSS, description="Two PIDs"), tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 1  # some failed
+    said = capsys.readouterr()
+    assert "40 of 40 trials" in said.out and "diverged 20" in said.out and said.err == ""
+    found = json.loads((out / "summary.json").read_text())
+    calm, wild = found["combinations"]
+    assert found["status"] == {"ok": 20, "diverged": 20}
+    assert (calm["failed"], wild["failed"]) == (0, 20)
+    assert calm["values"]["controller.frequency"] == "calm"
+    assert calm["requirements"][0]["verdict"] != "fails" and wild["requirements"][0]["verdict"] == "fails"
+    assert found["sensitivity"]["disturbance.amplitude"]["tracking_rms"] > 0.99
+    page = re.sub(r"<[^>]+>", " ", (out / "campaign.html").read_text())
+    assert "seed 7" in page and "uniform, 0.5 to 2" in page
+    for words in ("Two PIDs", "How they ended", "Requirements", "The worst trials", "0.0 % [0.0"):
+        assert words in page
+    assert {file.name for file in (out / "figures").glob("*.svg")} == {"distributions.svg", "sensitivity.svg"}
+    worst = sorted((out / "worst").iterdir())
+    assert len(worst) == 5 and all(int(file.stem.split("-")[1]) >= 20 for file in worst)
+    assert run(["simulate", str(worst[0]), "--no-prediction", "--out", str(tmp_path / "again")]) == 1
+    assert "diverged" in capsys.readouterr().out.lower()
+    assert run(["campaign", "status", str(out)]) == 0
+    assert "40 of 40 trials done" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("duration", [2.0, 2.06])  # ends at a record, and between two
+def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_path, duration):
+    """Metrics and series of a scenario file from `worst/`, run alone, are those of the lane that it flew in."""
+    out, scenario = tmp_path / "out", campaign()["scenario"]
+    scenario["loop"]["duration"] = duration
+    path = campaign_file(scenario=scenario, series={"signals": ["position", "voltage"], "every": 0.1})
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    rows = xr.open_zarr(out / "trials.zarr", consolidated=False).load()
+    for file in sorted((out / "worst").iterdir())[:2]:
+        trial, again = int(file.stem.split("-")[1]), tmp_path / file.stem
+        assert run(["simulate", str(file), "--no-prediction", "--out", str(again)]) == 0
+        found = json.loads((again / "metrics.json").read_text())
+        steady = found["steady"]
+        assert found["ended"] == float(rows["ended"][trial]) == duration
+        for name in OVERALL:
+            assert steady[name] == float(rows[name][trial]), name
+        series = xr.open_dataset(again / "run.nc")
+        for name in ("position", "voltage"):
+            np.testing.assert_array_equal(series[name].values, rows[f"series:{name}"][trial].values)
+            assert rows[f"series:{name}"].dims[1:] == series[name].dims
+        for name in ("time", "axis", "input"):
+            np.testing.assert_array_equal(rows[name].values, series[name].values)
+
+
+def test_trials_that_cannot_be_built_are_neither_worst_nor_a_failure_of_the_law(campaign_file, tmp_path, capsys):
+    """A frequency below zero is no controller: trials with one are counted apart."""
+    path, out = (
+        campaign_file(trials=12, vary={"controller.frequency": {"uniform": [-1.0, 2.0]}}, seed=5),
+        tmp_path / "out",
+    )
+    assert run(["campaign", str(path), "--out", str(out)]) == 1
+    found = json.loads((out / "summary.json").read_text())
+    rows = xr.open_zarr(out / STORE, consolidated=False).load()
+    flown = rows["status"].values == 0
+    assert 0 < found["status"]["refused"] == (~flown).sum() < 7
+    assert flown[found["worst"]].all() and len(found["worst"]) == 5
+    share = (rows["tracking_rms"].values[flown] < 0.2).mean()
+    assert found["combinations"][0]["requirements"][0]["kept"] == pytest.approx(share)
+    first = int(np.argmin(flown))
+    (refused,) = found["refused"]
+    assert refused["trials"] == (~flown).sum()
+    assert re.fullmatch(rf"`controller.frequency` must be positive, .*, line 13, trial {first}\)", refused["why"])
+    assert refused["why"] in capsys.readouterr().out
+
+
+def test_other_requirements_need_no_flight(campaign_file, tmp_path, capsys):
+    """The rows stay as they are, and the summary says what is required now."""
+    out = tmp_path / "out"
+    verdict = lambda: json.loads((out / "summary.json").read_text())["combinations"][0]["requirements"][0]["verdict"]
+    assert run(["campaign", str(campaign_file()), "--out", str(out)]) == 0
+    before = contents(out)
+    stricter = campaign_file("stricter", requirements={"tracking_rms": {"below": 1e-6, "share": 0.5}})
+    assert run(["campaign", str(stricter), "--out", str(out), "--resume"]) == 0
+    after = contents(out)
+    assert verdict() == "fails"
+    assert {name for name in after if before.get(name) != after[name]} == {"zarr.json"}
+    assert run(["campaign", str(campaign_file()), "--out", str(out), "--resume"]) == 0
+    assert verdict() == "holds" and contents(out) == before
+
+
+def test_what_is_drawn_from_words_is_told_apart(campaign_file, tmp_path):
+    """By choice: as many trials as drew it, and the quantiles of those."""
+    path = campaign_file(vary={"sensor": {"choice": ["perfect", {"kind": "white_noise", "velocity": 0.5}]}}, seed=3)
+    out = tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    found = json.loads((out / "summary.json").read_text())["choices"]["sensor"]
+    rows = xr.open_zarr(out / STORE, consolidated=False).load()
+    for number, one in enumerate(found.values()):
+        chosen = rows["tracking_rms"].values[rows["vary:sensor"].values == number]
+        assert one["trials"] == len(chosen) > 5
+        assert one["metrics"]["tracking_rms"]["0.5"] == np.median(chosen)
+    assert list(found) == rows["vary:sensor"].attrs["choices"]
+
+
+def test_a_file_that_the_scenario_names_belongs_to_the_campaign(campaign, campaign_file, tmp_path, capsys):
+    """Its worst trials stand alone, and another content of it makes another campaign."""
+    rows = "t,d1\n0,0.5\n1,{}\n2,0.5\n"
+    (tmp_path / "d.csv").write_text(rows.format(1.0))
+    scenario = campaign()["scenario"] | {"disturbance": {"kind": "table", "file": "d.csv"}}
+    vary = {"controller.frequency": {"uniform": [1.5, 2.5]}}
+    path, out = campaign_file(scenario=scenario, vary=vary, trials=6, requirements={}), tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    worst = sorted((out / "worst").iterdir())[0]
+    trial = int(worst.stem.split("-")[1])
+    assert run(["simulate", str(worst), "--no-prediction", "--out", str(tmp_path / "again")]) == 0
+    found = json.loads((tmp_path / "again" / "metrics.json").read_text())["steady"]["tracking_rms"]
+    assert found == float(xr.open_zarr(out / STORE, consolidated=False)["tracking_rms"][trial])
+    (tmp_path / "d.csv").write_text(rows.format(2.0))
+    site.cache_clear()  # as in a process that begins
+    assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
+    assert "a file that the scenario names had other contents" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("engine, number", [("lanes", 0), ("xla", 4)])
+def test_what_flew_is_told(campaign, campaign_file, tmp_path, capsys, engine, number):
+    scenario, out = campaign()["scenario"], tmp_path / "out"
+    scenario["loop"]["engine"] = engine
+    assert run(["campaign", str(campaign_file(scenario=scenario, trials=4, requirements={})), "--out", str(out)]) == 0
+    sentence = f"{number} trials were flown by XLA: slower than in lanes"
+    assert (sentence in capsys.readouterr().out) == (sentence in (out / "campaign.html").read_text()) == bool(number)
+    column = xr.open_zarr(out / STORE, consolidated=False)["engine"]
+    assert column.attrs["flag_meanings"].split()[int(column[0])] == engine

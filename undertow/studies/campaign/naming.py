@@ -1,0 +1,27 @@
+"""Values of a scenario in words: names of what is crossed or chosen."""
+
+from typing import Any
+
+
+def by_name(values: list[Any]) -> dict[str, Any]:
+    """Values under names of their own: a part's kind and preset where those tell it from the others, else all of it."""
+    short = [_short(value) for value in values]
+    names = [name if short.count(name) == 1 else words(value) for name, value in zip(short, values, strict=True)]
+    unique = [name if names.count(name) == 1 else f"{name} {i + 1}" for i, name in enumerate(names)]
+    return dict(zip(unique, values, strict=True))
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, dict) and "kind" in value:
+        return " ".join(str(value[key]) for key in ("kind", "preset") if key in value)
+    return words(value)
+
+
+def words(value: Any) -> str:
+    """A value of a scenario in a line: parts by their kind and what else is said of them."""
+    if isinstance(value, dict):
+        kind = [str(value["kind"])] if "kind" in value else []
+        return " ".join(kind + [f"{key}={words(one)}" for key, one in value.items() if key != "kind"])
+    if isinstance(value, list):
+        return f"[{', '.join(map(words, value))}]"
+    return str(value)
