@@ -33,6 +33,7 @@ from undertow.studies.campaign.columns import labels
 from undertow.studies.campaign.conduct import STORE, conduct
 from undertow.studies.campaign.engines import by_dask, in_threads
 from undertow.studies.campaign.identity import Identity
+from undertow.studies.campaign.layout import Layout
 from undertow.studies.campaign.prepare import prepare
 from undertow.studies.campaign.store import Store
 from undertow.studies.paper.setup import scenario
@@ -95,7 +96,8 @@ def pieces(trials: int) -> dict:
         found["task_KiB_per_trial"] = 1024 * (_peak() - before) / _LARGE
         for rows in (256, 65_536):
             named = labels(campaign.trials, campaign.first)
-            store = Store(Path(name) / f"{rows}.zarr", 4 * rows, rows, Identity("", {}), named, {})
+            where = Path(name) / f"{rows}.zarr"
+            store = Store(where, Layout((), 4 * rows, (rows,)), Identity("", {}), named, {})
             chance = np.random.default_rng(0)  # numbers that cannot be told shorter than they are
             many = {key: chance.normal(size=rows).astype(values.dtype) for key, values in columns.items()}
             found[f"write_{rows}_ms"] = 1e3 * _shortest(lambda i, s=store, m=many: s.write(i, m))

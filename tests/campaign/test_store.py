@@ -1,24 +1,22 @@
 """The store: what is flown once is kept, what is torn is flown again, and two do not write at once."""
 
 import errno
+import re
 import shutil
 from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
+import zarr
 from command import contents
 
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.scenario.reading import from_data
-from undertow.studies.campaign import store as stores
 from undertow.studies.campaign.conduct import STORE, conduct
 from undertow.studies.campaign.engines import in_threads
-from undertow.studies.campaign.identity import difference
+from undertow.studies.campaign.identity import identity
 from undertow.studies.campaign.prepare import prepare
-from undertow.studies.campaign.reading import plain, whole
-from undertow.studies.campaign.schema import validate
 
 quiet = lambda tally: None
 threads = partial(in_threads, threads=2)
@@ -27,6 +25,11 @@ threads = partial(in_threads, threads=2)
 def flown(path, out, engine=threads, watch=quiet):
     conduct(prepare(path), out, engine, watch)
     return contents(out)
+
+
+def nothing(function, work):
+    """An engine that flies nothing."""
+    return iter(())
 
 
 def backwards(function, work):
@@ -44,7 +47,7 @@ def small(campaign_file, tmp_path):
 
 def test_two_lines_of_xarray_open_it(small, tmp_path):
     results = xr.open_zarr(tmp_path / "whole" / STORE, consolidated=False)
-    assert results["tracking_rms"].sizes == {"trial": 40}
+    assert results["tracking_rms"].sizes == {"draw": 40}
     assert results["tracking_rms"].attrs["units"] == "m, rad"
     assert (results["status"] == 0).all() and results["done"].all()
     words = dict(
@@ -140,18 +143,18 @@ def test_a_full_disk_loses_nothing(small, tmp_path, monkeypatch, at):
     """Writing fails at some array of some task; what was done before stays, and the rest is flown later."""
     path, whole = small
     writes = iter(range(10**6))
-    real = stores.zarr.Array.__setitem__
+    real = zarr.Array.__setitem__
 
     def full(array, key, value):
         if next(writes) == at:
             raise OSError(errno.ENOSPC, "No space left on device")
         real(array, key, value)
 
-    monkeypatch.setattr(stores.zarr.Array, "__setitem__", full)
+    monkeypatch.setattr(zarr.Array, "__setitem__", full)
     with pytest.raises(OSError, match="No space left"):
         flown(path, tmp_path / "full")
     monkeypatch.undo()
-    assert stores.zarr.Array.__setitem__ is real
+    assert zarr.Array.__setitem__ is real
     assert flown(path, tmp_path / "full") == whole
 
 
@@ -162,20 +165,70 @@ def test_another_campaign_is_refused(small, tmp_path, campaign_file):
 
 
 @pytest.mark.parametrize(
-    "changes, said",
+    "before, now, said",
     [
-        ({"trials": 41}, "`trials` was 40, is 41"),
         (
+            {},
             {"vary": {"disturbance.amplitude": {"uniform": [0.5, 3.0]}}},
             "`vary.disturbance.amplitude.uniform[1]` was 2.0, is 3.0",
         ),
-        ({"series": {}}, "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}"),
-        ({"requirements": {}, "design": "sobol"}, "`design` was random, is sobol"),
+        ({}, {"series": {}}, "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}"),
+        ({}, {"trials": 80, "requirements": {}, "design": "latin"}, "`design` was random, is latin"),
+        ({}, {"trials": 39}, "`trials` was 40, is 39"),
+        ({"design": "latin"}, {"design": "latin", "trials": 41}, "`trials` was 40, is 41"),
+        ({"trials": 2}, {"trials": 41}, "`trials` was 2, is at least 4"),
     ],
 )
-def test_what_differs_is_named(campaign, changes, said):
-    asked = lambda **changes: plain(whole(validate(from_data(campaign(**changes))), campaign()["scenario"]))
-    assert difference(asked(), asked(**changes)) == said
+def test_what_differs_is_named(campaign_file, tmp_path, before, now, said):
+    """Of a Latin hypercube every point depends on how many there are; what so few have in common, others may not."""
+    one, other = (
+        identity(asked.text, asked.first) for asked in (prepare(campaign_file(**each)) for each in (before, now))
+    )
+    with pytest.raises(BadInput, match=re.escape(f"another one's: {said} (")):
+        other.check_same({**one.attributes, "campaign": one.asked}, tmp_path)
+
+
+GROWING = {"cross": {"controller.frequency": [2.0, 3.0]}, "series": {"signals": ["position"], "every": 0.5}}
+
+
+@pytest.mark.parametrize("design", ["random", "sobol"])
+@pytest.mark.parametrize("changes", [{}, GROWING])
+def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp_path, design, changes):
+    """The store is the same to the byte as if all had been asked for at first; only their tasks are flown."""
+    asked = lambda trials: campaign_file(trials=trials, design=design, **changes)
+    combinations, counted = 2 if changes else 1, []
+    flown(asked(40), tmp_path / "out")
+    grown = flown(asked(70), tmp_path / "out", watch=lambda tally: counted.append(tally.done))
+    assert counted[0] == 32 * combinations and counted[-1] == 70 * combinations
+    assert grown == flown(asked(70), tmp_path / "at once")
+
+
+@pytest.mark.parametrize(
+    "kind, name, at",
+    [
+        (zarr.Array, "__setitem__", 0),
+        (zarr.Array, "__setitem__", 1),
+        (zarr.Array, "resize", 0),
+        (zarr.Array, "resize", 9),
+        (zarr.Group, "update_attributes", 0),
+    ],
+)
+def test_a_growth_that_is_cut_short_loses_nothing(campaign_file, tmp_path, monkeypatch, kind, name, at):
+    """Among the flags of tasks that get more trials, among the arrays, before it is said that there are more trials."""
+    path, more, out = campaign_file(**GROWING), campaign_file("more", trials=70, **GROWING), tmp_path / "out"
+    whole, real, steps = flown(path, out), getattr(kind, name), iter(range(at))
+
+    def cut(*given):
+        if next(steps, None) is None:
+            raise KeyboardInterrupt
+        return real(*given)
+
+    monkeypatch.setattr(kind, name, cut)
+    with pytest.raises(KeyboardInterrupt):
+        flown(more, out, nothing)
+    monkeypatch.undo()
+    assert flown(path, out) == whole  # nobody has been told of more
+    assert flown(more, out) == flown(more, tmp_path / "at once")
 
 
 def test_the_size_of_tasks_may_change_on_the_way(small, tmp_path, campaign_file):

@@ -142,7 +142,9 @@ def campaign(
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME, or the next free one."),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Fly what is missing of a campaign in DIR.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Fly what is missing of a campaign in DIR, or further trials.")
+    ] = False,
     workers: Annotated[int | None, typer.Option(metavar="N", help="Threads or workers. Default: all cores.")] = None,
     cluster: Annotated[
         str | None, typer.Option(metavar="WHERE", help="Dask: local, slurm, ssh, or the address of a scheduler.")

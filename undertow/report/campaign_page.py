@@ -23,7 +23,8 @@ _CAPTIONS = {
 _INTERVALS = (
     "Share of the trials that keep to it, with the interval of 95 % of Clopper and Pearson: exact for random draws; "
     "Latin and Sobol draws are more even than that, and the interval on the safe side. A trial that failed does not "
-    "keep to it, one whose scenario cannot be built is not counted; `open`: more trials are needed."
+    "keep to it, one whose scenario cannot be built is not counted; `open`: more trials are needed, which larger "
+    "`trials` and `--resume` add. The interval is meant for a number of trials that was fixed before anybody looked."
 )
 
 

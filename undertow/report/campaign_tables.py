@@ -82,7 +82,7 @@ def worst(results: Results, found: Mapping[str, Any]) -> Html:
     """The worst trials with what was drawn for them."""
     rows = []
     for trial in found["worst"]:
-        row, crossed = results.rows.sel(trial=trial), results.named(trial // results.campaign.trials)
+        row, crossed = results.rows.sel(trial=trial), results.crossed(trial)
         drawn = [number(one, _DIGITS) if isinstance(one, float) else one for one in results.drawn(trial).values()]
         lasted = int(row["status"]) == int(Status.OK)
         how = ending({"status": ENDINGS[int(row["status"])], "diverged_at": None if lasted else float(row["ended"])})

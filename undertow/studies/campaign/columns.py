@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
 import xarray as xr
 
 from undertow.analysis.meanings import MEANINGS
@@ -10,6 +11,8 @@ from undertow.core.status import Status
 from undertow.loop import record
 from undertow.scenario.build import Built
 from undertow.studies.campaign.flying import LANES, XLA
+from undertow.studies.campaign.layout import DRAWS
+from undertow.studies.campaign.naming import is_number, words
 from undertow.studies.campaign.runs import planned
 from undertow.studies.campaign.task import REFUSED
 from undertow.studies.campaign.trials import Trials
@@ -32,6 +35,7 @@ def _codes(name: str, words: dict[int, str]) -> dict[str, Any]:
 
 # Columns of every campaign, with their attributes.
 ALWAYS = {
+    "trial": {"long_name": "number, as in the names of files of the worst"},
     "seed": {"long_name": "seed of everything random"},
     "status": _codes("how the run ended", ENDINGS),
     "engine": _codes("what flew it", ENGINES),
@@ -54,27 +58,36 @@ def labels(several: Trials, built: Built) -> dict[str, Label]:
         built: one of them.
     """
     of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in several.columns()} | ALWAYS
-    found = {name: Label(("trial",), attributes) for name, attributes in of_trials.items()}
+    along = (*several.campaign.cross, DRAWS)
+    found = {name: Label(along, attributes) for name, attributes in of_trials.items()}
     for name in several.campaign.series.signals if several.campaign.series else ():
         said = _said(*record.meaning(name, built.closed_loop.plant)) | {"comment": _AFTER}
-        found[f"series:{name}"] = Label(("trial", *record.dimensions(name)), said)
+        found[f"series:{name}"] = Label((*along, *record.dimensions(name)), said)
     return found
 
 
 def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
-    """What stands along the dimensions of series; nothing without series.
+    """What stands along dimensions: values of `cross`, or their names; and what series need.
 
     Args:
         several: the trials.
         built: one of them.
     """
+    cross = several.campaign.cross
+    found = {key: xr.Variable((key,), _crossed(entries), {"long_name": key}) for key, entries in cross.items()}
     if several.campaign.series is None:
-        return {}
+        return found
     plan = planned(built, several.campaign.series)
-    return record.coordinates(plan.times(), built.closed_loop.plant)
+    return found | record.coordinates(plan.times(), built.closed_loop.plant)
+
+
+def _crossed(entries: dict[str, Any]) -> np.ndarray:
+    """Numbers where no other names were given to them."""
+    numbers = all(is_number(value) and name == words(value) for name, value in entries.items())
+    return np.array(list(entries.values()), dtype=float) if numbers else np.array(list(entries))
 
 
 def _varied(key: str, entries: dict[str, Any] | None) -> dict[str, Any]:
-    """Of what differs between trials; numbers that stand for a choice say which."""
+    """Of what is drawn; numbers that stand for a choice say which."""
     said = {"long_name": key}
     return said if entries is None else said | {"choices": list(entries)}

@@ -10,6 +10,7 @@ from undertow.studies.campaign import task as tasks
 from undertow.studies.campaign.columns import coordinates, labels
 from undertow.studies.campaign.engines import Columns, Work
 from undertow.studies.campaign.identity import identity
+from undertow.studies.campaign.layout import layout
 from undertow.studies.campaign.prepare import Prepared
 from undertow.studies.campaign.store import Store
 
@@ -52,18 +53,17 @@ def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None
     several, text, folder = prepared.trials, prepared.text, prepared.folder
     store = Store(
         out / STORE,
-        several.number,
-        several.campaign.chunk,
-        identity(several, text, prepared.first),
+        layout(several.campaign),
+        identity(text, prepared.first),
         labels(several, prepared.first),
         coordinates(several, prepared.first),
     )
     try:
         missing = store.missing()
-        tally = Tally(several.number, several.number - sum(len(store.rows(number)) for number in missing), 0, 0)
+        tally = Tally(several.number, several.number - sum(map(store.layout.count, missing)), 0, 0)
         watch(tally)
-        work = [(text, str(folder), store.rows(number)) for number in missing]
-        for i, columns in engine(tasks.fly, work):
+        work = [(text, str(folder), store.layout, number) for number in missing]
+        for i, columns in engine(tasks.fly_block, work):
             store.write(missing[i], columns)
             tally = tally.after(columns["status"])
             watch(tally)

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 from undertow.core.errors import BadInput
 from undertow.scenario.build import Built
 from undertow.scenario.provenance import text_hash, versions
-from undertow.scenario.reading import dump
-from undertow.studies.campaign.reading import decisive, plain
-from undertow.studies.campaign.trials import Trials
+from undertow.scenario.reading import dump, parse
+from undertow.studies.campaign.trials import PROBES
 
 
 class Identity(NamedTuple):
@@ -24,7 +23,7 @@ class Identity(NamedTuple):
     attributes: dict[str, str]
 
     def check_same(self, found: Mapping[str, Any], folder: Path) -> None:
-        """That a store is of this campaign.
+        """That a store is of this campaign, or of this one with fewer draws.
 
         Args:
             found: attributes of the store.
@@ -34,38 +33,63 @@ class Identity(NamedTuple):
             BadInput: it is of another one.
         """
         other = [key for key, value in self.attributes.items() if found.get(key) != value]
-        if not other:
-            return
-        got = f"another one's: {self._why(other[0], found)} ({folder})"
-        hint = "Choose another folder, or begin anew with --overwrite"
-        raise BadInput("--out", "be the folder of the same campaign, by the same versions", got, hint=hint)
+        why = self._why(other[0], found) if other else self._fewer(found)
+        if why:
+            hint = "Choose another folder, or begin anew with --overwrite"
+            must = "be the folder of the same campaign, by the same versions"
+            raise BadInput("--out", must, f"another one's: {why} ({folder})", hint=hint)
 
     def _why(self, key: str, found: Mapping[str, Any]) -> str:
         """What differs, of which this attribute tells that it does."""
         if key == "campaign_hash":
-            return difference(plain(found["campaign"]), plain(self.asked))
+            return difference(_decisive(found["campaign"]), _decisive(self.asked))
         if key == "scenario_hash":
             return "a file that the scenario names had other contents"
         return f"`{key}` was {found.get(key)}, is {self.attributes[key]}"
 
+    def _fewer(self, found: Mapping[str, Any]) -> str:
+        """That there would be fewer draws than there were; nothing where there would not."""
+        before, now = draws(found["campaign"]), draws(self.asked)
+        return f"`trials` was {before}, is {now}" if now < before else ""
 
-def identity(several: Trials, asked: str, first: Built) -> Identity:
+
+def identity(asked: str, first: Built) -> Identity:
     """Of a campaign.
 
     Args:
-        several: its trials.
         asked: the whole of it as a file.
         first: one of its trials; it has the contents of files that the scenario names, which may change, too.
     """
-    texts = {"campaign": decisive(several.campaign, several.scenario.data), "scenario": dump(first.resolved)}
+    texts = {"campaign": dump(_decisive(asked)), "scenario": dump(first.resolved)}
     return Identity(asked, {f"{name}_hash": text_hash(text) for name, text in texts.items()} | versions())
 
 
+def draws(asked: str) -> int:
+    """How many draws a campaign asks for."""
+    return _plain(asked)["trials"]
+
+
+def _decisive(asked: str) -> dict[str, Any]:
+    """What decides about the rows: not what is required of them, and how many there are only where others depend on it.
+
+    Every point of a Latin hypercube depends on how many there are; and on the first few trials, which numbers are built
+    into programs.
+    """
+    data = _plain(asked) | {"requirements": {}}
+    trials = data.pop("trials")
+    free = data["design"] != "latin" and trials >= PROBES
+    return data | {"trials": f"at least {PROBES}" if free else trials}
+
+
+def _plain(asked: str) -> dict[str, Any]:
+    return parse(asked, "", Path(), "CAMPAIGN").data
+
+
 def difference(before: Any, now: Any, path: str = "") -> str:
-    """The first key in which two campaigns differ, in words; requirements do not count."""
+    """The first key in which two campaigns differ, in words."""
     if isinstance(before, dict) and isinstance(now, dict):
         for key in dict.fromkeys([*before, *now]):
-            if before.get(key) != now.get(key) and (path or key != "requirements"):
+            if before.get(key) != now.get(key):
                 return difference(before.get(key), now.get(key), f"{path}.{key}".lstrip("."))
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
         for i, (one, other) in enumerate(zip(before, now, strict=True)):

@@ -11,6 +11,11 @@ def by_name(values: list[Any]) -> dict[str, Any]:
     return dict(zip(unique, values, strict=True))
 
 
+def is_number(value: Any) -> bool:
+    """Whether a value of a scenario is one; true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def _short(value: Any) -> str:
     if isinstance(value, dict) and "kind" in value:
         return " ".join(str(value[key]) for key in ("kind", "preset") if key in value)

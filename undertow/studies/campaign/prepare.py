@@ -55,7 +55,7 @@ def prepare(path: Path) -> Prepared:
 
 def _refused(several: Trials, here: tasks.Site) -> tuple[str, ...]:
     """Why some of the first trials cannot be built: rather now than after a night."""
-    rows = tasks.probed(several)
+    rows = several.probes()
     found = refusals(several, [row for row in rows if row not in here.probes()])
     return tuple(f"{one.trials} of the first {len(rows)} trials are refused: {one.why}" for one in found)
 
@@ -66,11 +66,11 @@ def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Bu
     Raises:
         BadInput: none of the first can; what is wrong with the very first.
     """
-    rows = tasks.first_rows(several, combination)
+    rows = several.first(combination)
     for row in rows:
         if row in here.probes():
             return row, here.probes()[row]
-    return rows.start, tasks.build_trial(several, here.workshop, rows.start)
+    return rows[0], tasks.build_trial(several, here.workshop, rows[0])
 
 
 def _check(campaign: Campaign, loop: Loop) -> None:

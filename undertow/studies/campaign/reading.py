@@ -1,7 +1,6 @@
 """Reading campaign files, and writing them down whole: with the scenario inside, so that a store stands alone."""
 
 from pathlib import Path
-from typing import Any
 
 from undertow.scenario.reading import Text, dump, parse, read
 from undertow.studies.campaign.schema import Campaign, validate
@@ -23,17 +22,7 @@ def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
     return validate(parsed), parsed
 
 
-def plain(text: str) -> dict[str, Any]:
-    """The text of `whole` as data."""
-    return parse(text, "", Path(), "CAMPAIGN").data
-
-
 def whole(campaign: Campaign, scenario: dict) -> str:
     """YAML with everything that is asked; `chunk` and free text say nothing about the results."""
     data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"})
     return dump(data | {"scenario": scenario})
-
-
-def decisive(campaign: Campaign, scenario: dict) -> str:
-    """What decides about the rows: the same, but for what is required of them."""
-    return whole(campaign.model_copy(update={"requirements": {}}), scenario)

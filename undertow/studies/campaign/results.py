@@ -9,11 +9,12 @@ import xarray as xr
 
 from undertow.analysis.meanings import MEANINGS
 from undertow.core.status import Status
+from undertow.studies.campaign.arrays import chunk_file
 from undertow.studies.campaign.columns import ALWAYS
 from undertow.studies.campaign.conduct import STORE
+from undertow.studies.campaign.layout import DRAWS, layout
 from undertow.studies.campaign.reading import read_text
 from undertow.studies.campaign.schema import Campaign
-from undertow.studies.campaign.store import chunk_file
 from undertow.studies.campaign.task import REFUSED
 
 
@@ -36,7 +37,7 @@ class Results(NamedTuple):
     @property
     def combinations(self) -> np.ndarray:
         """Which combination of `cross` each row belongs to."""
-        return self.rows["trial"].values // self.campaign.trials
+        return self._combination(self.rows["trial"].values)
 
     @property
     def lasted(self) -> np.ndarray:
@@ -48,9 +49,17 @@ class Results(NamedTuple):
         """Which rows are of runs that began: their scenario could be built."""
         return self.rows["status"].values != REFUSED
 
+    def crossed(self, trial: int) -> tuple[str, ...]:
+        """Names of the values of `cross` in a trial."""
+        return self.named(self._combination(trial))
+
     def named(self, combination: int) -> tuple[str, ...]:
-        """Names of the values of `cross` in a combination."""
+        """Those in a combination."""
         return list(itertools.product(*self.campaign.cross.values()))[combination]
+
+    def _combination(self, trial: Any) -> Any:
+        """Of one trial or several, as `Trials` numbers them."""
+        return trial % (self.campaign.number // self.campaign.trials)
 
     def drawn(self, trial: int) -> dict[str, Any]:
         """What is drawn for a trial, by key path: numbers, or words for choices that are none."""
@@ -84,12 +93,16 @@ def load(folder: Path) -> Results:
 
 
 def _done(whole: xr.Dataset, campaign: Campaign, path: Path) -> xr.Dataset:
-    """Rows of the tasks that are done, without series."""
-    flags = whole["done"].values.astype(bool) if "done" in whole else np.zeros(0, dtype=bool)
-    own = [f"vary:{key}" for key in (*campaign.cross, *campaign.vary)] + list(ALWAYS)
-    flags = [flag and all(chunk_file(path, name, task).exists() for name in own) for task, flag in enumerate(flags)]
+    """Rows of the tasks that are done, by trial, without series."""
+    own, stored = [*(f"vary:{key}" for key in campaign.vary), *ALWAYS], layout(campaign)
+    stored = stored._replace(chunk=tuple(whole.attrs["chunk"]))
+    here = lambda task: all(chunk_file(path, name, stored.block(task), len(stored.shape)).exists() for name in own)
+    flags = whole["done"].values if "done" in whole else ()
     done = np.zeros(campaign.number, dtype=bool)
-    written = np.repeat(np.array(flags, dtype=bool), whole.attrs["chunk"])[: campaign.number]
-    done[: len(written)] = written
-    known = whole[[name for name in own if name in whole]]
+    for task, flag in enumerate(flags):
+        if flag and here(task):
+            done[stored.trials(task)] = True
+    known = whole[[name for name in own if name in whole]].drop_vars(["trial", *campaign.cross], errors="ignore")
+    if known.data_vars:
+        known = known.stack({"trial": (DRAWS, *campaign.cross)}, create_index=False)  # as they are numbered
     return known.assign_coords(trial=np.arange(campaign.number)).isel(trial=done)

@@ -2,7 +2,7 @@
 
 import contextlib
 import functools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,11 +14,9 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.reading import Text
 from undertow.scenario.workshop import Workshop
 from undertow.studies.campaign.flying import Hangar
+from undertow.studies.campaign.layout import Layout
 from undertow.studies.campaign.reading import read_text
 from undertow.studies.campaign.trials import Trials, trials
-
-# Trials of each combination that tell whether it can be flown, and which numbers differ.
-_PROBES = 4
 
 # Status of a trial whose scenario cannot be built, beside those of `undertow.core.status`.
 REFUSED = -1
@@ -42,35 +40,37 @@ def site(text: str, folder: str) -> Site:
         folder: where relative paths in it start.
     """
     several, workshop = trials(*read_text(text, Path(folder))), Workshop()
-    probes = functools.cache(lambda: dict(_built(several, workshop, probed(several))))
+    rows = several.probes()
+    probes = functools.cache(lambda: {rows[place]: built for place, built in _built(several, workshop, rows)})
     return Site(several, workshop, Hangar(lambda: list(probes().values())), probes)
 
 
-def first_rows(several: Trials, combination: int) -> range:
-    """The trials of a combination that are looked at before any is flown."""
-    draws = several.campaign.trials
-    return range(combination * draws, combination * draws + min(_PROBES, draws))
+def fly_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
+    """Columns of the trials of a task."""
+    return fly(text, folder, layout.trials(task).tolist())
 
 
-def probed(several: Trials) -> list[int]:
-    """Those of all combinations."""
-    return [row for one in range(len(several.combinations)) for row in first_rows(several, one)]
+def fly(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndarray]:
+    """Columns of some trials: what is drawn for them, how they ended, and their metrics.
 
-
-def fly(text: str, folder: str, rows: range) -> dict[str, np.ndarray]:
-    """Columns of some trials: what differs between them, how they ended, and their metrics."""
+    Args:
+        text: of the campaign file.
+        folder: where relative paths in it start.
+        rows: numbers of the trials.
+    """
     with runtime.on_processor():
         return _flown(site(text, folder), rows)
 
 
-def _flown(here: Site, rows: range) -> dict[str, np.ndarray]:
+def _flown(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns = {f"vary:{key}": column for key, column in _columns(here.trials, rows)}
+    columns["trial"] = np.array(rows, dtype=np.uint32)
     columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
     where: list[int] = []
 
     def flying() -> Iterator[Built]:
-        for row, built in _built(here.trials, here.workshop, rows):
-            where.append(row - rows.start)
+        for place, built in _built(here.trials, here.workshop, rows):
+            where.append(place)
             yield built
 
     flown = here.hangar.fly(flying(), here.trials.campaign.series)
@@ -97,14 +97,14 @@ def build_trial(several: Trials, workshop: Workshop, row: int) -> Built:
 
 
 def _built(several: Trials, workshop: Workshop, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
-    """Those trials that can be built, one after another: a task of many does not hold them all."""
-    for row in rows:
+    """Place among the rows, and trial, of those that can be built; a task of many does not hold them all."""
+    for place, row in enumerate(rows):
         with contextlib.suppress(BadInput):
-            yield row, build_trial(several, workshop, row)
+            yield place, build_trial(several, workshop, row)
 
 
-def _columns(several: Trials, rows: range) -> Iterable[tuple[str, np.ndarray]]:
-    """Values of what differs; the number of the choice where they are not numbers."""
+def _columns(several: Trials, rows: Sequence[int]) -> Iterable[tuple[str, np.ndarray]]:
+    """Values of what is drawn; the number of the choice where they are not numbers."""
     values = [several.values(row) for row in rows]
     for key, entries in several.columns():
         pick: Any = float if entries is None else list(entries.values()).index

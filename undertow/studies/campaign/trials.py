@@ -2,18 +2,21 @@
 
 import copy
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput, nearest
 from undertow.scenario.reading import Text, key_path, read
-from undertow.studies.campaign.naming import words
+from undertow.studies.campaign.naming import is_number, words
 from undertow.studies.campaign.points import Draws, value
 from undertow.studies.campaign.schema import Campaign
 
+# Of each combination so many trials tell whether it can be flown, and which numbers differ.
+PROBES = 4
+
 
 class Trials(NamedTuple):
-    """All trials: draws one after another, for every combination of `cross` in turn.
+    """All trials, by number: every combination of `cross` with the first draw, then with the next one, and so on.
 
     Attributes:
         campaign: what was asked for.
@@ -36,14 +39,22 @@ class Trials(NamedTuple):
 
     def values(self, trial: int) -> dict[str, Any]:
         """What this trial puts into the scenario, by key path."""
-        combination, draw = divmod(trial, self.campaign.trials)
+        draw, combination = divmod(trial, len(self.combinations))
         crossed = dict(zip(self.campaign.cross, self.combinations[combination], strict=True))
         drawn = zip(self.campaign.vary.items(), self.draws.point(draw), strict=True)
         return crossed | {key: value(spread, float(share)) for (key, spread), share in drawn}
 
     def seed(self, trial: int) -> int:
         """Of everything random in this trial."""
-        return self.draws.seed(trial % self.campaign.trials)
+        return self.draws.seed(trial // len(self.combinations))
+
+    def first(self, combination: int) -> list[int]:
+        """The trials of a combination that are looked at before any is flown."""
+        return [draw * len(self.combinations) + combination for draw in range(min(PROBES, self.campaign.trials))]
+
+    def probes(self) -> list[int]:
+        """Those of all combinations."""
+        return [trial for combination in range(len(self.combinations)) for trial in self.first(combination)]
 
     def data(self, trial: int) -> dict[str, Any]:
         """The scenario of this trial."""
@@ -61,11 +72,9 @@ class Trials(NamedTuple):
         return ""
 
     def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
-        """Key paths that differ between trials, with the values by name where those are not numbers."""
-        for key, entries in self.campaign.cross.items():
-            yield key, None if _numbers(entries.values()) else entries
+        """Key paths that are drawn, with the values by name where those are not numbers."""
         for key, spread in self.campaign.vary.items():
-            named = spread.choice is not None and not _numbers(spread.choice)
+            named = spread.choice is not None and not all(map(is_number, spread.choice))
             yield key, {words(entry): entry for entry in spread.choice or []} if named else None
 
 
@@ -98,10 +107,6 @@ def _scenario(campaign: Campaign, text: Text) -> Text:
         return found
     lines = {path[1:]: line for path, line in text.lines.items() if path[0] == "scenario"}
     return Text(given, text.name, text.folder, lines)
-
-
-def _numbers(entries: Iterable[Any]) -> bool:
-    return all(isinstance(entry, int | float) and not isinstance(entry, bool) for entry in entries)
 
 
 def _put(data: dict[str, Any], key: str, put: Any) -> None:
