@@ -75,7 +75,7 @@ def _decisive(asked: str) -> dict[str, Any]:
     Every point of a Latin hypercube depends on how many there are; and on the first few trials, which numbers are built
     into programs.
     """
-    data = _plain(asked) | {"requirements": {}}
+    data: dict[str, Any] = {**_plain(asked), "requirements": {}}
     trials = data.pop("trials")
     free = data["design"] != "latin" and trials >= PROBES
     return data | {"trials": f"at least {PROBES}" if free else trials}
