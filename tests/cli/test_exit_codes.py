@@ -123,16 +123,24 @@ def test_bad_input_as_a_process(tmp_path):
     assert os.listdir(tmp_path) == ["s.yaml"]
 
 
-def test_an_interrupt_that_was_swallowed_ends_the_next_wait():
-    """As compiled code does when it calls back into Python: the exception gets no further than the callback."""
-    code = """
-import signal, time
-from undertow.cli.interruptible import interruptible, remember_interrupts
-remember_interrupts()
+SWALLOWED = """
 try:
     signal.raise_signal(signal.SIGINT)
 except KeyboardInterrupt:
     pass
+"""
+
+
+@pytest.mark.parametrize("interrupted", [SWALLOWED, "import interrupted; assert interrupted.whole"])
+def test_an_interrupt_that_was_not_heard_ends_the_next_wait(tmp_path, interrupted):
+    """Swallowed by compiled code that calls back into Python, or put off as it came while a module was imported."""
+    (tmp_path / "interrupted.py").write_text("import signal; signal.raise_signal(signal.SIGINT); whole = 'whole'")
+    code = f"""
+import signal, sys, time
+from undertow.cli.interruptible import interruptible, remember_interrupts
+sys.path.insert(0, {str(tmp_path)!r})
+remember_interrupts()
+{interrupted}
 try:
     interruptible(lambda: time.sleep(30))
 except KeyboardInterrupt:

@@ -12,13 +12,23 @@ _asked = threading.Event()
 
 
 def remember_interrupts() -> None:
-    """From now on a Ctrl-C that compiled code swallows on its way up ends the next wait all the same."""
+    """From now on a Ctrl-C that compiled code swallows on its way up ends the next wait all the same.
+
+    While modules are imported it waits for that: an exception leaves half of them, and compiled ones crash then.
+    """
 
     def handler(number: int, frame: FrameType | None) -> None:
         _asked.set()
-        signal.default_int_handler(number, frame)
+        if not _importing(frame):
+            signal.default_int_handler(number, frame)
 
     signal.signal(signal.SIGINT, handler)
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        frame = frame.f_back
+    return frame is not None
 
 
 def interruptible(work: Callable[[], Result]) -> Result:
