@@ -160,6 +160,30 @@ def test_a_file_that_the_scenario_names_belongs_to_the_campaign(campaign, campai
     assert "a file that the scenario names had other contents" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("section", ["cross", "vary"])
+def test_every_file_that_trials_name_belongs_to_the_campaign(campaign_file, tmp_path, capsys, section):
+    """Also one that the first trials do not use."""
+    tables, rows = [f"{name}.csv" for name in "abcdef"], "t,d1\n0,{0}\n2,{0}\n"
+    for name in tables:
+        (tmp_path / name).write_text(rows.format(1.0))
+    parts = [{"kind": "table", "file": name} for name in tables]
+    differing = (
+        {"vary": {}, "cross": {"disturbance": parts}}
+        if section == "cross"
+        else {"vary": {"disturbance": {"choice": parts}}}
+    )
+    path, out = campaign_file(trials=2, **differing), tmp_path / "out"
+    assert run(["campaign", str(path), "--out", str(out)]) == 0
+    for name in tables:
+        (tmp_path / name).write_text(rows.format(2.0))
+        site.cache_clear()  # as in a process that begins
+        assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
+        assert "a file that the scenario names had other contents" in capsys.readouterr().err
+        (tmp_path / name).write_text(rows.format(1.0))
+    site.cache_clear()
+    assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
+
+
 @pytest.mark.parametrize("engine, number", [("lanes", 0), ("xla", 4)])
 def test_what_flew_is_told(campaign, campaign_file, tmp_path, capsys, engine, number):
     scenario, out = campaign()["scenario"], tmp_path / "out"

@@ -170,22 +170,35 @@ def test_another_campaign_is_refused(small, tmp_path, campaign_file):
         (
             {},
             {"vary": {"disturbance.amplitude": {"uniform": [0.5, 3.0]}}},
-            "`vary.disturbance.amplitude.uniform[1]` was 2.0, is 3.0",
+            "`vary.disturbance.amplitude.uniform[1]` was 2, is 3",
         ),
         ({}, {"series": {}}, "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}"),
         ({}, {"trials": 80, "requirements": {}, "design": "latin"}, "`design` was random, is latin"),
         ({}, {"trials": 39}, "`trials` was 40, is 39"),
         ({"design": "latin"}, {"design": "latin", "trials": 41}, "`trials` was 40, is 41"),
-        ({"trials": 2}, {"trials": 41}, "`trials` was 2, is at least 4"),
+        (
+            {"cross": {"controller.frequency": [1.0, 2.0]}},
+            {"cross": {"controller.frequency": [2.0, 1.0]}},
+            "`order of cross.controller.frequency` was 1.0, 2.0, is 2.0, 1.0",
+        ),
     ],
 )
 def test_what_differs_is_named(campaign_file, tmp_path, before, now, said):
-    """Of a Latin hypercube every point depends on how many there are; what so few have in common, others may not."""
+    """Of a Latin hypercube every point depends on how many there are, and the numbers of trials on some orders."""
     one, other = (
-        identity(asked.text, asked.first) for asked in (prepare(campaign_file(**each)) for each in (before, now))
+        identity(asked.text, asked.named) for asked in (prepare(campaign_file(**each)) for each in (before, now))
     )
     with pytest.raises(BadInput, match=re.escape(f"another one's: {said} (")):
         other.check_same({**one.attributes, "campaign": one.asked}, tmp_path)
+
+
+def test_spelling_makes_no_other_campaign(campaign, campaign_file, tmp_path):
+    """Neither 2 for 2.0 nor the order of the scenario's keys."""
+    scenario = campaign()["scenario"]
+    scenario["controller"]["frequency"] = 2
+    other = campaign_file("other", scenario=dict(reversed(scenario.items())), trials=44)
+    flown(campaign_file(), tmp_path / "out")
+    assert flown(other, tmp_path / "out") == flown(other, tmp_path / "at once")
 
 
 GROWING = {"cross": {"controller.frequency": [2.0, 3.0]}, "series": {"signals": ["position"], "every": 0.5}}
@@ -193,13 +206,14 @@ GROWING = {"cross": {"controller.frequency": [2.0, 3.0]}, "series": {"signals": 
 
 @pytest.mark.parametrize("design", ["random", "sobol"])
 @pytest.mark.parametrize("changes", [{}, GROWING])
-def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp_path, design, changes):
+@pytest.mark.parametrize("before", [1, 40])  # also where not even the first few draws are there
+def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp_path, design, changes, before):
     """The store is the same to the byte as if all had been asked for at first; only their tasks are flown."""
-    asked = lambda trials: campaign_file(trials=trials, design=design, **changes)
+    asked = lambda trials: campaign_file(trials=trials, design=design, chunk=16 if before > 1 else 1, **changes)
     combinations, counted = 2 if changes else 1, []
-    flown(asked(40), tmp_path / "out")
+    flown(asked(before), tmp_path / "out")
     grown = flown(asked(70), tmp_path / "out", watch=lambda tally: counted.append(tally.done))
-    assert counted[0] == 32 * combinations and counted[-1] == 70 * combinations
+    assert counted[0] == {1: 1, 40: 32}[before] * combinations and counted[-1] == 70 * combinations
     assert grown == flown(asked(70), tmp_path / "at once")
 
 

@@ -54,7 +54,7 @@ def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None
     store = Store(
         out / STORE,
         layout(several.campaign),
-        identity(text, prepared.first),
+        identity(text, prepared.named),
         labels(several, prepared.first),
         coordinates(several, prepared.first),
     )

@@ -1,14 +1,14 @@
 """What makes a campaign the same one: only as it began may it be gone on with."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput
-from undertow.scenario.build import Built
 from undertow.scenario.provenance import text_hash, versions
-from undertow.scenario.reading import dump, parse
-from undertow.studies.campaign.trials import PROBES
+from undertow.scenario.reading import parse
+from undertow.studies.campaign.naming import is_number
 
 
 class Identity(NamedTuple):
@@ -53,15 +53,16 @@ class Identity(NamedTuple):
         return f"`trials` was {before}, is {now}" if now < before else ""
 
 
-def identity(asked: str, first: Built) -> Identity:
+def identity(asked: str, named: Sequence[Mapping[str, Any]]) -> Identity:
     """Of a campaign.
 
     Args:
         asked: the whole of it as a file.
-        first: one of its trials; it has the contents of files that the scenario names, which may change, too.
+        named: scenarios in which all files that it names stand with their contents, which may change, too.
     """
-    texts = {"campaign": dump(_decisive(asked)), "scenario": dump(first.resolved)}
-    return Identity(asked, {f"{name}_hash": text_hash(text) for name, text in texts.items()} | versions())
+    deciding = {"campaign": _decisive(asked), "scenario": _as_floats(list(named))}
+    hashes = {f"{name}_hash": text_hash(json.dumps(data, sort_keys=True)) for name, data in deciding.items()}
+    return Identity(asked, hashes | versions())
 
 
 def draws(asked: str) -> int:
@@ -70,15 +71,25 @@ def draws(asked: str) -> int:
 
 
 def _decisive(asked: str) -> dict[str, Any]:
-    """What decides about the rows: not what is required of them, and how many there are only where others depend on it.
+    """What decides about the rows; not what is required of them, and how 2 and 2.0 are told apart.
 
-    Every point of a Latin hypercube depends on how many there are; and on the first few trials, which numbers are built
-    into programs.
+    How many there are does only in a Latin hypercube, where every point depends on it; the order of keys does where
+    trials are numbered by it.
     """
     data: dict[str, Any] = {**_plain(asked), "requirements": {}}
+    orders = {"vary": data["vary"], "cross": data["cross"]}
+    orders |= {f"cross.{key}": entries for key, entries in data["cross"].items()}
+    data |= {f"order of {name}": ", ".join(entries) for name, entries in orders.items()}
     trials = data.pop("trials")
-    free = data["design"] != "latin" and trials >= PROBES
-    return data | {"trials": f"at least {PROBES}" if free else trials}
+    return _as_floats(data | ({"trials": trials} if data["design"] == "latin" else {}))
+
+
+def _as_floats(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _as_floats(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_as_floats(one) for one in value]
+    return float(value) if is_number(value) else value
 
 
 def _plain(asked: str) -> dict[str, Any]:
@@ -95,5 +106,10 @@ def difference(before: Any, now: Any, path: str = "") -> str:
         for i, (one, other) in enumerate(zip(before, now, strict=True)):
             if one != other:
                 return difference(one, other, f"{path}[{i}]")
-    word = lambda value: "not given" if value is None else value
-    return f"`{path}` was {word(before)}, is {word(now)}"
+    return f"`{path}` was {_word(before)}, is {_word(now)}"
+
+
+def _word(value: Any) -> Any:
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
+    return "not given" if value is None else value

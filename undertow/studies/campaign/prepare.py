@@ -1,8 +1,9 @@
 """A campaign from its file, with the first trials built: mistakes are told before anything is flown."""
 
-from collections.abc import Iterable
+import contextlib
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from undertow.analysis.metrics import OVERALL
 from undertow.core import checks
@@ -28,6 +29,7 @@ class Prepared(NamedTuple):
     text: str
     folder: Path
     first: Built  # a trial
+    named: tuple[dict[str, Any], ...]  # scenarios in which all files that trials name stand with their contents
     advice: tuple[str, ...]  # what is odd about it, or about the first trials
 
 
@@ -48,9 +50,16 @@ def prepare(path: Path) -> Prepared:
         _check(campaign, built.scenario.loop)
         for sentence in (*built.advice(), *vehicle_doubts(built)):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
-    return Prepared(
-        several, text, folder, firsts[0][1], (*too_few(campaign), *_refused(several, here), *advice.values())
-    )
+    told = (*too_few(campaign), *_refused(several, here), *advice.values())
+    named = (*(built.resolved for _, built in firsts), *_chosen(several, here))
+    return Prepared(several, text, folder, firsts[0][1], named, told)
+
+
+def _chosen(several: Trials, here: tasks.Site) -> Iterator[dict[str, Any]]:
+    """The first trial with each entry of what is chosen, where it can be built: it may name another file."""
+    for data in several.alternatives():
+        with contextlib.suppress(BadInput):
+            yield tasks.build_data(several, here.workshop, data).resolved
 
 
 def _refused(several: Trials, here: tasks.Site) -> tuple[str, ...]:

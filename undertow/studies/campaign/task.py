@@ -88,12 +88,21 @@ def build_trial(several: Trials, workshop: Workshop, row: int) -> Built:
     Raises:
         BadInput: its scenario cannot be built.
     """
-    scenario = several.scenario
     try:
-        return build(Text(several.data(row), scenario.name, scenario.folder, scenario.lines), workshop)
+        return build_data(several, workshop, several.data(row))
     except BadInput as error:
         place = several.place(error.name) or error.where
         raise error.at(where=f"{place}, trial {row}" if place else f"trial {row}") from error.__cause__
+
+
+def build_data(several: Trials, workshop: Workshop, data: dict[str, Any]) -> Built:
+    """A scenario that stands where that of the trials does.
+
+    Raises:
+        BadInput: it cannot be built.
+    """
+    scenario = several.scenario
+    return build(Text(data, scenario.name, scenario.folder, scenario.lines), workshop)
 
 
 def _built(several: Trials, workshop: Workshop, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:

@@ -63,6 +63,14 @@ class Trials(NamedTuple):
             _put(data, key, copy.deepcopy(put))
         return data | {"seed": self.seed(trial)}
 
+    def alternatives(self) -> Iterator[dict[str, Any]]:
+        """The scenario of the first trial, with each entry of what is chosen among others than numbers."""
+        for key, entries in self.columns():
+            for entry in (entries or {}).values():
+                data = self.data(0)
+                _put(data, key, copy.deepcopy(entry))
+                yield data
+
     def place(self, name: str) -> str:
         """Line of the campaign that decides about a key of the scenario; nothing where the scenario does."""
         for section, keys in (("vary", self.campaign.vary), ("cross", self.campaign.cross)):
