@@ -92,7 +92,7 @@ from undertow.studies.campaign.prepare import prepare
         ),
         (
             {"cross": {"loop.dt": [0.02, 0.02]}},
-            r"`cross.loop.dt` must have entries that differ, but is 0.02 1 and 0.02 2",
+            r"`cross.loop.dt` must have entries that differ, but is twice 0.02",
         ),
         (
             {"cross": {"loop.dt": {"choice": [0.02, 0.04]}}},
@@ -118,7 +118,9 @@ from undertow.studies.campaign.prepare import prepare
             {"scenario": "small.yaml"},
             r"`scenario` must be the file of a scenario, but is small.yaml, a campaign \(small",
         ),
-        ({"cross": {"loop.dt": [1, 1.0]}}, r"`cross.loop.dt` must have entries that differ, but is 1 and 1.0"),
+        ({"cross": {"loop.dt": [1, 1.0]}}, r"`cross.loop.dt` must have entries that differ, but is twice 1.0"),
+        ({"cross": {"loop.dt": 0.02}}, r"`cross` must have a list of values for `loop.dt`, or values by names, but is"),
+        ({"series": {"signals": ["error", "error"]}}, r"`series.signals` must name every signal once, but is"),
         ({"scenario": 3}, r"`scenario` must be the name of a file, or a mapping of keys to values, but is 3"),
         ({"series": {"every": 0.03}}, r"`series.every` must be a whole number of sampling times \(0.02 s\)"),
     ],

@@ -44,17 +44,19 @@ def test_what_it_leaves(campaign_file, tmp_path, capsys):
 
 def test_rows_stand_by_what_is_crossed_and_drawn(campaign_file, tmp_path):
     """By names where there are such, by numbers elsewhere; `trial` is the number that its own scenario file has."""
-    cross = {"plant.limit": [10.0, 20.0, 30.0], "controller.frequency": {"calm": 1.0, "brisk": 2.0}}
+    cross = {"plant.limit": [10.0, 20.0], "controller.frequency": {"calm": 1.0, "brisk": 2.0}}
+    cross |= {"controller.feedforward": [True, False]}
     path, out = campaign_file(cross=cross, trials=5), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     rows = xr.open_zarr(out / STORE, consolidated=False).load()
-    assert rows["tracking_rms"].sizes == {"plant.limit": 3, "controller.frequency": 2, "draw": 5}
+    assert rows["tracking_rms"].sizes == {key: 2 for key in cross} | {"draw": 5}
     several = prepare(path).trials
     for number in rows["trial"].values.flat:
         (place,) = np.argwhere(rows["trial"].values == number)
         row = rows.isel(dict(zip(rows["trial"].dims, place, strict=True)))
         values = several.values(int(number))
-        assert float(row["plant.limit"]) == values["plant.limit"]
+        for key in ("plant.limit", "controller.feedforward"):
+            assert row[key] == values[key]
         assert cross["controller.frequency"][str(row["controller.frequency"].values)] == values["controller.frequency"]
         assert float(row["vary:disturbance.amplitude"]) == values["disturbance.amplitude"]
         assert int(row["seed"]) == several.seed(int(number))
@@ -62,8 +64,9 @@ def test_rows_stand_by_what_is_crossed_and_drawn(campaign_file, tmp_path):
     assert (errors.diff("controller.frequency") < 0).all()  # pair by pair, as both meet the same draws
     found = json.loads((out / "summary.json").read_text())["combinations"]
     for one in found:
-        own = errors.sel({"plant.limit": float(one["values"]["plant.limit"])})
-        middle = own.sel({"controller.frequency": one["values"]["controller.frequency"]}).median("draw")
+        limit, frequency, feedforward = one["values"].values()
+        own = errors.sel({"plant.limit": float(limit), "controller.feedforward": feedforward == "True"})
+        middle = own.sel({"controller.frequency": frequency}).median("draw")
         assert one["metrics"]["tracking_rms"]["0.5"] == float(middle)
 
 

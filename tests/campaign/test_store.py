@@ -17,6 +17,7 @@ from undertow.studies.campaign.conduct import STORE, conduct
 from undertow.studies.campaign.engines import in_threads
 from undertow.studies.campaign.identity import identity
 from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.results import load
 
 quiet = lambda tally: None
 threads = partial(in_threads, threads=2)
@@ -241,6 +242,9 @@ def test_a_growth_that_is_cut_short_loses_nothing(campaign_file, tmp_path, monke
     with pytest.raises(KeyboardInterrupt):
         flown(more, out, nothing)
     monkeypatch.undo()
+    results = load(out)
+    assert results.total == 80 and 64 <= results.rows.sizes["trial"] <= 80
+    assert np.isfinite(results.rows["tracking_rms"]).all()
     assert flown(path, out) == whole  # nobody has been told of more
     assert flown(more, out) == flown(more, tmp_path / "at once")
 

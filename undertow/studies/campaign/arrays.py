@@ -34,6 +34,15 @@ def opened(path: Path) -> Any:
         raise BadInput("--out", "hold a store that can be read", got, hint=hint) from error
 
 
+def to_be_read(path: Path) -> Any:
+    """The group of a store that another process may be writing to.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    return zarr.open_group(path, mode="r")
+
+
 def found_array(group: Any, name: str) -> Any:
     """An array of an earlier process; nothing where it is gone or cannot be read: it is made anew."""
     try:

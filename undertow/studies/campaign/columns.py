@@ -82,9 +82,11 @@ def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
 
 
 def _crossed(entries: dict[str, Any]) -> np.ndarray:
-    """Numbers where no other names were given to them."""
-    numbers = all(is_number(value) and name == words(value) for name, value in entries.items())
-    return np.array(list(entries.values()), dtype=float) if numbers else np.array(list(entries))
+    """Values where they are numbers, or true and false, and have no other names; else these."""
+    values, named = list(entries.values()), any(name != words(value) for name, value in entries.items())
+    if not named and all(isinstance(value, bool) for value in values):
+        return np.array(values)
+    return np.array(values, dtype=float) if not named and all(map(is_number, values)) else np.array(list(entries))
 
 
 def _varied(key: str, entries: dict[str, Any] | None) -> dict[str, Any]:

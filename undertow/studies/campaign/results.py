@@ -9,10 +9,10 @@ import xarray as xr
 
 from undertow.analysis.meanings import MEANINGS
 from undertow.core.status import Status
-from undertow.studies.campaign.arrays import chunk_file
+from undertow.studies.campaign.arrays import chunk_file, to_be_read
 from undertow.studies.campaign.columns import ALWAYS
 from undertow.studies.campaign.conduct import STORE
-from undertow.studies.campaign.layout import DRAWS, layout
+from undertow.studies.campaign.layout import DRAWS, Layout, layout
 from undertow.studies.campaign.reading import read_text
 from undertow.studies.campaign.schema import Campaign
 from undertow.studies.campaign.task import REFUSED
@@ -81,28 +81,38 @@ def load(folder: Path) -> Results:
     """
     path = folder / STORE
     try:
-        whole = xr.open_zarr(path, consolidated=False, chunks=None)
-        if "campaign" not in whole.attrs:
+        group = to_be_read(path)
+        if "campaign" not in group.attrs:
             raise FileNotFoundError(path)  # of a process that was killed before anything stood there
-        campaign, _ = read_text(whole.attrs["campaign"], Path())
-        return Results(campaign, _done(whole, campaign, path).load())
+        campaign, _ = read_text(str(group.attrs["campaign"]), Path())
+        stored = layout(campaign)._replace(chunk=tuple(group.attrs["chunk"]))
+        return Results(campaign, _rows(group, campaign, stored).isel(trial=_done(group, campaign, stored, path)))
     except FileNotFoundError:
         raise
-    except Exception as error:  # zarr's and xarray's words for what is not as it was written
+    except Exception as error:  # zarr's words for what is not as it was written
         raise OSError(f"{path} is damaged ({error}); `undertow campaign --resume` mends what can be mended") from error
 
 
-def _done(whole: xr.Dataset, campaign: Campaign, path: Path) -> xr.Dataset:
-    """Rows of the tasks that are done, by trial, without series."""
-    own, stored = [*(f"vary:{key}" for key in campaign.vary), *ALWAYS], layout(campaign)
-    stored = stored._replace(chunk=tuple(whole.attrs["chunk"]))
-    here = lambda task: all(chunk_file(path, name, stored.block(task), len(stored.shape)).exists() for name in own)
-    flags = whole["done"].values if "done" in whole else ()
-    done = np.zeros(campaign.number, dtype=bool)
+def _columns(campaign: Campaign) -> list[str]:
+    return [*(f"vary:{key}" for key in campaign.vary), *ALWAYS]
+
+
+def _rows(group: Any, campaign: Campaign, stored: Layout) -> xr.Dataset:
+    """All of the store by trial, without series. While room for further draws is made, arrays may be longer."""
+    axes, region = (*campaign.cross, DRAWS), tuple(slice(0, size) for size in stored.shape)
+    arrays = {name: group[name] for name in _columns(campaign) if name in group and name != "trial"}
+    rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})
+    if arrays:
+        rows = rows.stack({"trial": (DRAWS, *campaign.cross)}, create_index=False)  # as they are numbered
+    return rows.assign_coords(trial=np.arange(campaign.number)).assign_attrs(group.attrs)
+
+
+def _done(group: Any, campaign: Campaign, stored: Layout, path: Path) -> np.ndarray:
+    """Which trials are of tasks that are done."""
+    done, dimensions = np.zeros(campaign.number, dtype=bool), len(stored.shape)
+    flags = group["done"][: stored.tasks] if "done" in group else ()
     for task, flag in enumerate(flags):
-        if flag and here(task):
+        files = (chunk_file(path, name, stored.block(task), dimensions) for name in _columns(campaign))
+        if flag and all(file.exists() for file in files):
             done[stored.trials(task)] = True
-    known = whole[[name for name in own if name in whole]].drop_vars(["trial", *campaign.cross], errors="ignore")
-    if known.data_vars:
-        known = known.stack({"trial": (DRAWS, *campaign.cross)}, create_index=False)  # as they are numbered
-    return known.assign_coords(trial=np.arange(campaign.number)).isel(trial=done)
+    return done

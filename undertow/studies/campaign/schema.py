@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import Text
 from undertow.scenario.schema import Scenario, Strict, complaint
-from undertow.studies.campaign.naming import by_name
+from undertow.studies.campaign.naming import by_name, words
 
 # Entries of lists in brackets only: each key has one spelling, so that two that name it are noticed.
 _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
@@ -62,6 +62,13 @@ class Series(Strict):
     )
     every: float = Field(1.0, gt=0, description="time between records, s")
 
+    @field_validator("signals")
+    @classmethod
+    def _once(cls, given: list[str]) -> list[str]:
+        if len(set(given)) < len(given):
+            raise ValueError("name every signal once")
+        return given
+
 
 class Campaign(Strict):
     """One campaign: a scenario, and what varies from trial to trial."""
@@ -91,6 +98,9 @@ class Campaign(Strict):
     def _named(cls, given: Any) -> Any:
         if not isinstance(given, dict):
             return given
+        for key, values in given.items():
+            if not isinstance(values, list | dict):
+                raise ValueError(f"have a list of values for `{key}`, or values by names")
         return {key: by_name(values) if isinstance(values, list) else values for key, values in given.items()}
 
     @property
@@ -149,4 +159,4 @@ def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
     for word, entry in entries.items():
         same = known.setdefault(repr(float(entry) if isinstance(entry, int) else entry), word)
         if same != word:
-            raise BadInput(name, "have entries that differ", f"{same} and {word}, which are the same", where=where)
+            raise BadInput(name, "have entries that differ", f"twice {words(entry)}", where=where)
