@@ -169,7 +169,8 @@ def test_a_mistake_on_the_command_line(campaign, campaign_file, tmp_path, capsys
     [
         ("slurm", r"`--cluster` must find a SLURM that answers, but is sinfo: no configuration"),
         ("ssh", r"`UNDERTOW_HOSTS` must name the hosts, separated by commas, but is not set"),
-        ("pbs", r"`--cluster` must be one of local, slurm, ssh, or an address, but is pbs"),
+        ("pbs", r"`--cluster` must be one of local, slurm, ssh, or an address such as tcp://10.0.0.1:8786, but is pbs"),
+        ("Local", r"but is Local. Did you mean `local`\?"),
     ],
 )
 def test_a_cluster_that_is_not_there_is_told(campaign_file, tmp_path, capsys, monkeypatch, cluster, said):

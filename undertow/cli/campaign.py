@@ -12,10 +12,11 @@ from typing import NoReturn
 import typer
 from rich.console import Console
 
+from undertow.cli.campaign_folder import check_folder, clear_folder
 from undertow.cli.campaign_short import sentences, table
 from undertow.cli.exit_codes import DONE, RUN_FAILED
 from undertow.cli.interruptible import interruptible
-from undertow.cli.results_folder import check_folder, next_free
+from undertow.cli.results_folder import next_free
 from undertow.cli.stages import Stages, shares
 from undertow.cli.tables import wide_console
 from undertow.core import checks
@@ -24,16 +25,13 @@ from undertow.report.campaign_page import write_campaign
 from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import dump
 from undertow.scenario.workshop import Workshop
-from undertow.studies.campaign.clusters import cluster
+from undertow.studies.campaign.clusters import check_cluster, cluster
 from undertow.studies.campaign.conduct import STORE, Engine, Tally, Watch, conduct
 from undertow.studies.campaign.engines import by_dask, in_threads
-from undertow.studies.campaign.lock import check_free
 from undertow.studies.campaign.prepare import Prepared, prepare
 from undertow.studies.campaign.results import load
 from undertow.studies.campaign.summary import endings, summary
 from undertow.studies.campaign.task import build_trial
-
-_WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
 
 def campaign(
@@ -42,15 +40,19 @@ def campaign(
     """Exit code of a campaign whose results went to `out`, or to a folder under runs/ that was free."""
     count = os.cpu_count() or 1 if workers is None else workers
     checks.positive("--workers", count)
+    if where is not None:
+        check_cluster(where)
+    first = Path("runs") / path.stem
+    folder = out or (first if resume else next_free(first))
+    check_folder(folder, resume, overwrite)
     console = wide_console()
     stages = Stages(console)
     with stages("building first trials"):
         prepared = interruptible(lambda: prepare(path))
     for sentence in prepared.advice:
         typer.echo(f"Advice: {sentence}", err=True)
-    first = Path("runs") / path.stem
-    folder = out or (first if resume else next_free(first))
-    _claim(folder, resume, overwrite)
+    if not resume:
+        clear_folder(folder)
     with _engine(where, count) as engine, _live(console) as watch:
         try:
             interruptible(lambda: conduct(prepared, folder, engine, watch))
@@ -103,27 +105,6 @@ def status(folder: Path, options: Sequence[str]) -> int:
     for word, number in ended.items():
         console.print(f"  {word}: {number}", highlight=False)
     return DONE
-
-
-def _claim(folder: Path, resume: bool, overwrite: bool) -> None:
-    """Make sure that the folder may be written to, and that nothing is left in it of a campaign that is replaced.
-
-    Raises:
-        BadInput: it may not.
-    """
-    if resume and overwrite:
-        raise BadInput("--resume", "be without --overwrite", "beside it", hint="One goes on, the other begins anew")
-    if resume:
-        if not (folder / STORE).exists():
-            raise BadInput("--resume", "find a campaign to go on with", f"none in {folder}")
-        return
-    hint = "Add --resume to go on with it, or --overwrite to begin anew"
-    check_folder(folder, _WRITTEN, STORE, overwrite, hint)
-    if (folder / STORE).exists():
-        check_free(folder / STORE)
-    for name in _WRITTEN:
-        target = folder / name
-        shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

@@ -7,11 +7,22 @@ import subprocess
 from collections.abc import Iterator
 from typing import Any
 
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, nearest
 
 CLUSTERS = ("local", "slurm", "ssh")
 
 _INSTALL = "pip install 'undertow[campaign]'"
+
+
+def check_cluster(kind: str) -> None:
+    """That there is such a kind of cluster, or that it is an address.
+
+    Raises:
+        BadInput: neither.
+    """
+    if "://" not in kind and kind not in CLUSTERS:
+        must = f"be one of {', '.join(CLUSTERS)}, or an address such as tcp://10.0.0.1:8786"
+        raise BadInput("--cluster", must, kind, hint=nearest(kind.lower(), CLUSTERS))
 
 
 @contextlib.contextmanager
@@ -26,6 +37,7 @@ def cluster(kind: str, workers: int) -> Iterator[Any]:
     Raises:
         BadInput: Dask is not installed, or no such cluster can be reached.
     """
+    check_cluster(kind)
     try:
         from dask import config
         from distributed import Client
@@ -54,9 +66,7 @@ def _started(kind: str, workers: int) -> Any:
         return LocalCluster(n_workers=workers, threads_per_worker=1, preload=[local_worker.__name__], **quiet)
     if kind == "ssh":
         return _over_ssh(os.environ.get("UNDERTOW_HOSTS", ""), workers)
-    if kind == "slurm":
-        return _in_slurm(workers)
-    raise BadInput("--cluster", f"be one of {', '.join(CLUSTERS)}, or an address", kind)
+    return _in_slurm(workers)
 
 
 def _over_ssh(names: str, workers: int) -> Any:
