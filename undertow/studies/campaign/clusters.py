@@ -11,6 +11,14 @@ from undertow.core.errors import BadInput, nearest
 
 CLUSTERS = ("local", "slurm", "ssh")
 
+# A worker may die often; and what Dask notes of itself fifty times a second takes 3 % of a core in every process.
+_DASK = {
+    "distributed.scheduler.allowed-failures": 100,
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.system-monitor.interval": "2s",
+}
+
 _INSTALL = "pip install 'undertow[campaign]'"
 
 
@@ -43,7 +51,7 @@ def cluster(kind: str, workers: int) -> Iterator[Any]:
         from distributed import Client
     except ImportError:
         raise BadInput("--cluster", "have Dask installed", "not", hint=_INSTALL) from None
-    with config.set({"distributed.scheduler.allowed-failures": 100}), contextlib.ExitStack() as stack:
+    with config.set(_DASK), contextlib.ExitStack() as stack:
         try:
             where = kind if "://" in kind else stack.enter_context(_started(kind, workers))
         except ModuleNotFoundError as error:
