@@ -1,5 +1,6 @@
 """What makes a campaign the same one: only as it began may it be gone on with."""
 
+import functools
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -92,6 +93,9 @@ def _as_floats(value: Any) -> Any:
     return float(value) if is_number(value) else value
 
 
+@functools.lru_cache(
+    maxsize=2
+)  # what stands in a store, and what is asked now: parsing takes long where much is crossed
 def _plain(asked: str) -> dict[str, Any]:
     return parse(asked, "", Path(), "CAMPAIGN").data
 

@@ -109,10 +109,10 @@ def _rows(group: Any, campaign: Campaign, stored: Layout) -> xr.Dataset:
 
 def _done(group: Any, campaign: Campaign, stored: Layout, path: Path) -> np.ndarray:
     """Which trials are of tasks that are done."""
-    done, dimensions = np.zeros(campaign.number, dtype=bool), len(stored.shape)
+    done, names = np.zeros(campaign.number, dtype=bool), _columns(campaign)
     flags = group["done"][: stored.tasks] if "done" in group else ()
-    for task, flag in enumerate(flags):
-        files = (chunk_file(path, name, stored.block(task), dimensions) for name in _columns(campaign))
-        if flag and all(file.exists() for file in files):
+    for task in np.flatnonzero(flags):
+        block = stored.block(task)
+        if all(chunk_file(path, name, block, len(block)).exists() for name in names):
             done[stored.trials(task)] = True
     return done

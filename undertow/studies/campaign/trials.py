@@ -12,7 +12,7 @@ from undertow.studies.campaign.points import Draws, value
 from undertow.studies.campaign.schema import Campaign
 
 # Of each combination so many trials tell whether it can be flown, and which numbers differ.
-PROBES = 4
+_PROBES = 4
 
 
 class Trials(NamedTuple):
@@ -50,7 +50,7 @@ class Trials(NamedTuple):
 
     def first(self, combination: int) -> list[int]:
         """The trials of a combination that are looked at before any is flown."""
-        return [draw * len(self.combinations) + combination for draw in range(min(PROBES, self.campaign.trials))]
+        return [draw * len(self.combinations) + combination for draw in range(min(_PROBES, self.campaign.trials))]
 
     def probes(self) -> list[int]:
         """Those of all combinations."""
