@@ -93,9 +93,8 @@ def _as_floats(value: Any) -> Any:
     return float(value) if is_number(value) else value
 
 
-@functools.lru_cache(
-    maxsize=2
-)  # what stands in a store, and what is asked now: parsing takes long where much is crossed
+# What stands in a store, and what is asked now: parsing takes long where much is crossed.
+@functools.lru_cache(maxsize=2)
 def _plain(asked: str) -> dict[str, Any]:
     return parse(asked, "", Path(), "CAMPAIGN").data
 
