@@ -8,6 +8,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
 from undertow.core import checks
@@ -130,7 +131,10 @@ def pid(
     model: AbstractModel,
     *,
     sampling_time: float = 1e-3,
-    frequency=1.0,
+    velocity_noise=0.0,
+    load_rate=1.0,
+    delay: float = 0.0,
+    frequency=None,
     damping=1.0,
     integral_share=0.1,
     gains=None,
@@ -145,7 +149,13 @@ def pid(
     Args:
         model: what the controller may know, from `plant.model()`.
         sampling_time: of the loop, s; a scenario gives it.
-        frequency: natural frequency w of the closed loop without its integral, rad/s; one number or one per axis.
+        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
+            or one per axis; a scenario's sensor gives it.
+        load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s).
+        delay: of measurement and input together, s.
+        frequency: natural frequency w of the closed loop without its integral, rad/s; one number or one per axis. None:
+            by the rule of preset `robust`, the one of least predicted cost that keeps the margins of
+            `controllers/bandwidths.py`.
         damping: its damping ratio.
         integral_share: k_i = share w k_p with k_p = w^2; a tenth is Fossen's. 0 for PD.
         gains: (k_p, k_i, k_d) instead of these three, 1/s^2, 1/s^3 and 1/s; one triple or one per axis.
@@ -160,7 +170,11 @@ def pid(
         BadInput: a value is out of its range.
     """
     checks.positive("sampling_time", sampling_time, "s")
+    model = model.own_axes()
     if gains is None:
+        if frequency is None:
+            axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+            frequency = alike([pid_frequency(axis) for axis in axes])
         for name, value in (("frequency", frequency), ("damping", damping)):
             checks.positive(name, value)
         checks.not_negative("integral_share", integral_share)
@@ -173,7 +187,7 @@ def pid(
         reference_frequency = jnp.minimum(jnp.sqrt(proportional) / 2, 2.0)
     unfiltered = not isinstance(reference_frequency, Tracer) and not np.any(np.asarray(reference_frequency))
     return PID(
-        model=model.own_axes(),
+        model=model,
         filter=None if unfiltered else ReferenceFilter(reference_frequency),
         proportional=proportional,
         integral=integral,

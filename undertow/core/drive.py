@@ -10,10 +10,6 @@ Inputs = Float[Array, " m"]
 Forces = Float[Array, " m"]
 
 
-# Share of what sampling allows, for actuators of which nobody knows how fast they are.
-_UNKNOWN = 0.43
-
-
 class AbstractDrive(eqx.Module):
     """From input to force and back, with what the controller remembers of it (propeller speeds, for instance)."""
 
@@ -22,8 +18,8 @@ class AbstractDrive(eqx.Module):
         """Rate, 1/s, at which it can be made to follow where sampling allows `sampled` (1/s)."""
 
     @abc.abstractmethod
-    def lag(self, rate: Float[Array, ""]) -> Float[Array, ""]:
-        """Time constant of the force, s, where actuators are made to follow at a rate (1/s)."""
+    def time_constant(self) -> Float[Array, "..."] | None:
+        """Nominal lag of the force behind the input, s: 0 where it follows at once, None where nobody knows."""
 
     @abc.abstractmethod
     def init(self) -> PyTree:
@@ -64,13 +60,13 @@ class DirectDrive(AbstractDrive):
     gain: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
     low: Inputs = eqx.field(converter=jnp.asarray, default=-jnp.inf)
     high: Inputs = eqx.field(converter=jnp.asarray, default=jnp.inf)
-    time_constant: Float[Array, ""] | None = None  # s, of a lag that the drive itself leaves out; None: not known
+    at_once: bool = eqx.field(static=True, default=True)  # whether the force is known to follow the input at once
 
     def quickest(self, sampled):
-        return _UNKNOWN * sampled if self.time_constant is None else sampled
+        return sampled
 
-    def lag(self, rate):
-        return 1 / rate if self.time_constant is None else jnp.asarray(self.time_constant, dtype=float)
+    def time_constant(self):
+        return jnp.zeros(()) if self.at_once else None
 
     def init(self) -> tuple[()]:
         return ()
@@ -92,3 +88,50 @@ class DirectDrive(AbstractDrive):
 
     def advance(self, state, u, dt) -> tuple[()]:
         return ()
+
+
+class LaggedDrive(AbstractDrive):
+    """Actuators whose force follows that of a steady curve with a first-order lag: tau f_dot + f = f_steady(u).
+
+    The force is that of the same equation, driven by the input that was applied.
+    """
+
+    curve: AbstractDrive  # without memory
+    tau: Float[Array, ""] = eqx.field(converter=jnp.asarray)  # s
+    count: int = eqx.field(static=True)
+
+    def quickest(self, sampled):
+        return jnp.maximum(sampled, 1 / self.tau)  # no faster than it is by itself costs nothing
+
+    def time_constant(self):
+        return self.tau
+
+    def init(self) -> Forces:
+        return jnp.zeros(self.count)
+
+    def heard(self, state, report) -> Forces:
+        return state
+
+    def range(self, state, rate):
+        """Forces towards which the limits of the input drive the force within 1 / rate."""
+        low, high = (jnp.broadcast_to(limit, (self.count,)) for limit in self.curve.range((), rate))
+        lead = self.tau * rate
+        limited = jnp.isfinite(low) & jnp.isfinite(high)
+        towards = lambda limit: state + (jnp.where(limited, limit, 0.0) - state) / lead
+        return jnp.where(limited, towards(low), -jnp.inf), jnp.where(limited, towards(high), jnp.inf)
+
+    def force(self, state, u):
+        return state
+
+    def command(self, state, force, rate):
+        return self.curve.command((), state + self.tau * rate * (force - state), rate)
+
+    def aim(self, state, u, rate):
+        return state + (self.curve.force((), u) - state) / (self.tau * rate)
+
+    def advance(self, state, u, dt):
+        """Exactly, for an input that is held."""
+        return state + (self.curve.force((), u) - state) * -jnp.expm1(-dt / self.tau)
+
+    def steady(self) -> AbstractDrive:
+        return self.curve

@@ -87,7 +87,7 @@ class DoubleIntegrator(AbstractPlant):
     def model(self) -> DoubleIntegratorModel:
         """The exact model."""
         return DoubleIntegratorModel(
-            actuator=DirectDrive(low=-self.limit, high=self.limit, time_constant=0.0), angles=(False,) * self.inputs()
+            actuator=DirectDrive(low=-self.limit, high=self.limit), angles=(False,) * self.inputs()
         )
 
 

@@ -151,6 +151,7 @@ class HybridVehicle(AbstractPlant):
         rate_term: bool = False,
         regularisation: float | None = None,
         vehicle: Vehicle | None = None,
+        thruster: AbstractThruster | None = None,
     ) -> HybridModel:
         """What a controller may know of this plant.
 
@@ -158,25 +159,27 @@ class HybridVehicle(AbstractPlant):
             speed_sensor: whether phi of Eq. (15) is known from propeller-speed sensors (Example 1) or left in d.
             rate_term: whether J_dot nu is in F; the paper leaves it in d (Remark 2).
             regularisation: delta of Definition 2; None for the exact inverse.
-            vehicle: what the controller takes it for, such as another published parameter set; None for the truth.
+            vehicle: nominal vehicle of the controller, such as another published parameter set; None for the true one.
+            thruster: nominal thruster of the controller, such as one with another lag; None for the true one.
 
         Raises:
             BadInput: speed_sensor for thrusters that have no measurable speed, regularisation not positive, or a
                 vehicle with another number of thrusters.
         """
-        told = self if vehicle is None else HybridVehicle(vehicle, self.thruster)
+        nominal = self.thruster if thruster is None else thruster
+        told = self if vehicle is None else HybridVehicle(vehicle, nominal)
         if told.inputs() != self.inputs():
             raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{told.inputs()}")
         if regularisation is not None:
             checks.positive("regularisation", regularisation)
         if speed_sensor:
-            still = self.thruster.report(self.thruster.initial_state(self.inputs()))
+            still = nominal.report(nominal.initial_state(self.inputs()))
             if still is None:  # thrusters without a speed to measure complain here, not in the loop
-                self.thruster.speed_term(still)
-        gain, allocation = _static(told.body.inverse_mass_matrix, told.thruster_matrix, self.thruster.voltage_gain())
+                nominal.speed_term(still)
+        gain, allocation = _static(told.body.inverse_mass_matrix, told.thruster_matrix, nominal.voltage_gain())
         return HybridModel(
             body=told.body,
-            thruster=self.thruster,
+            thruster=nominal,
             thruster_matrix=told.thruster_matrix,
             body_gain=gain,
             allocation=allocation,

@@ -141,9 +141,7 @@ class InvertedPendulum(AbstractPlant):
             half_length: half the length of the pole, m.
         """
         told = as_told(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
-        return InvertedPendulumModel(
-            cart_pole=told, actuator=DirectDrive(low=-self.limit, high=self.limit, time_constant=0.0)
-        )
+        return InvertedPendulumModel(cart_pole=told, actuator=DirectDrive(low=-self.limit, high=self.limit))
 
 
 def inverted_pendulum(

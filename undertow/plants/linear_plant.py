@@ -139,7 +139,7 @@ class LinearPlant(AbstractPlant):
         return LinearModel(
             system=told,
             allocation=pseudo_inverse(told.gain),
-            actuator=DirectDrive(low=-self.limit, high=self.limit, time_constant=0.0),
+            actuator=DirectDrive(low=-self.limit, high=self.limit),
             angles=(False,) * len(self.outputs),
         )
 

@@ -125,7 +125,7 @@ class MagneticLevitation(AbstractPlant):
         """
         changed = {"inductance": inductance, "inductance_reach": inductance_reach}
         told = as_told(self.rig, mass=mass, force_factor=force_factor, **changed)
-        limits = DirectDrive(low=self.rig.smallest_current**2, high=self.rig.largest_current**2)
+        limits = DirectDrive(low=self.rig.smallest_current**2, high=self.rig.largest_current**2, at_once=False)
         return MagneticLevitationModel(rig=told, actuator=limits)
 
 

@@ -98,7 +98,7 @@ class TwoLinkArm(AbstractPlant):
             outer_offset: by how far that centre lags behind the link, rad.
         """
         told = as_told(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
-        return TwoLinkArmModel(links=told, actuator=DirectDrive(low=-self.limit, high=self.limit, time_constant=0.0))
+        return TwoLinkArmModel(links=told, actuator=DirectDrive(low=-self.limit, high=self.limit))
 
 
 def two_link_arm(

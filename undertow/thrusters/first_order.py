@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.drive import DirectDrive
+from undertow.core.drive import DirectDrive, LaggedDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motorless import AbstractMotorlessThruster
@@ -67,8 +67,8 @@ class FirstOrderThruster(AbstractMotorlessThruster):
         hint = "This thruster has no propeller speed. Describe its motor (DCMotor), or leave its lag to the estimator"
         raise BadInput("speed_sensor", "be false with thruster first_order", "true", hint=hint)
 
-    def drive(self, count: int, measured: bool) -> DirectDrive:
-        return DirectDrive(self.voltage_gain(), -self.supply, self.supply, self.time_constant)
+    def drive(self, count: int, measured: bool) -> LaggedDrive:
+        return LaggedDrive(DirectDrive(self.voltage_gain(), -self.supply, self.supply), self.time_constant, count)
 
     def advice(self):
         return ()

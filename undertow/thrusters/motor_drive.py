@@ -52,10 +52,15 @@ class MotorDrive(AbstractDrive):
     def quickest(self, sampled):
         motor = self.thruster.motor
         winding = jnp.min(motor.resistance / jnp.maximum(motor.inductance, 1e-12))
-        return jnp.where(winding > _CURRENT_FASTER * sampled, 1.0, _DRIVEN) * sampled
+        driven = jnp.where(winding > _CURRENT_FASTER * sampled, 1.0, _DRIVEN) * sampled
+        return jnp.maximum(driven, 1 / jnp.max(self.time_constant()))  # what it does by itself costs nothing
 
-    def lag(self, rate):
-        return 1 / rate
+    def time_constant(self):
+        """k_1 / (k_2 + 2 k_3 c_q |Om|) at half of the largest speed; at rest, where it is largest, without a limit."""
+        motor, supply = self.thruster.motor, jnp.asarray(self.thruster.supply)
+        limited = jnp.isfinite(supply)
+        fastest = motor.steady_speed(jnp.where(limited, supply, 0.0))
+        return motor.k1 / (motor.k2 + motor.k3 * motor.torque_coefficient * jnp.abs(fastest))
 
     def init(self) -> MotorState:
         return MotorState(jnp.zeros(self.count), jnp.zeros(self.count))

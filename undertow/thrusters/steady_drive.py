@@ -30,7 +30,7 @@ class SteadyDrive(AbstractDrive):
     def quickest(self, sampled):
         return sampled
 
-    def lag(self, rate):
+    def time_constant(self):
         return jnp.zeros(())
 
     def init(self) -> tuple[()]:

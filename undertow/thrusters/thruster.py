@@ -80,7 +80,7 @@ class AbstractThruster(eqx.Module):
             count: N.
             measured: whether propeller speeds are reported.
         """
-        return DirectDrive(self.voltage_gain(), -self.supply, self.supply)
+        return DirectDrive(self.voltage_gain(), -self.supply, self.supply, at_once=False)
 
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:

@@ -4,14 +4,19 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from undertow.controllers.bandwidths import Axis, Bandwidths, alike, axes_of, robust_bandwidths
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.law import RobustRCAF
 from undertow.controllers.robust.reference_filter import ReferenceFilter
 from undertow.controllers.robust.sets import widened
-from undertow.controllers.robust.speeds import speeds
+from undertow.core import checks
 from undertow.core.contracts import AbstractModel
 from undertow.core.errors import BadInput
 from undertow.fuzzy.tsk import gaussian_sets
+
+
+# Beside a bandwidth that is given: the range of tracking bandwidths as shares of it, and the rate of the actuators.
+_TRACKING_SHARES, _ACTUATORS_FASTER = (0.25, 0.5), 3.0
 
 
 def robust(
@@ -49,11 +54,12 @@ def robust(
             per axis; a scenario's sensor gives it.
         load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s); counts where there is noise only.
         delay: of measurement and input together that nothing makes up for, s.
-        bandwidth: natural frequency of the estimator, rad/s; None: as fast as sampling, noise and delay allow.
+        bandwidth: natural frequency of the estimator, rad/s; None: the one of least predicted cost among those that
+            keep the margins of `controllers/bandwidths.py` to lag and delay that the law does not know of.
         damping: its damping ratio.
         tracking_share: mu, share of the filtered tracking error in the adaptation; 0 for a pure observer.
-        tracking: natural frequency of the tracking error, critically damped, rad/s; None: 0.4 of the
-            bandwidth, 0.2 where actuators lag.
+        tracking: natural frequency of the tracking error, critically damped, rad/s; None: chosen with the bandwidth,
+            and beside one that is given half of it at most, a quarter at least.
         feedback: K = (k1, k2) instead of `tracking`, 1/s^2 and 1/s; one pair or one per axis.
         weight: Q of Eq. (21).
         pole: alpha_F, with `adaptation` and `composite` instead of `bandwidth`, `damping` and `tracking_share`, 1/s.
@@ -64,8 +70,8 @@ def robust(
         weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that can be estimated.
         reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of
             `tracking`, 2 at most; 0 for no filter.
-        actuator_rate: how fast motors are made to follow, 1/s; None: as fast as sampling allows, at most three times
-            the bandwidth.
+        actuator_rate: how fast motors are made to follow, 1/s; None: chosen with the bandwidth, and beside one that
+            is given three times as fast, if sampling allows.
         direction: what departing from the wanted direction costs, where limits bind, beside losing size.
         sets: fuzzy sets; any number from 1.
         reach: outermost centres, m/s and rad/s; None: so far that weights anywhere in their box add at most a tenth
@@ -80,28 +86,47 @@ def robust(
     if any(value is not None for value in letters.values()):
         bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.gathering()), bandwidth)
     model = model.own_axes()
-    fast = speeds(sampling_time, bandwidth, tracking, actuator_rate, velocity_noise, load_rate, delay, model.drive())
-    if reach is None:
-        fuzzy = widened(fuzzy, fast.bandwidth, damping, weights_bound)
-    if feedback is None:
-        feedback = jnp.stack([fast.tracking**2, 2 * fast.tracking], -1)
-    elif tracking is not None:
+    if feedback is not None and tracking is not None:
         raise BadInput("tracking", "be left out when there is `feedback`", tracking)
+    if any(rate is None for rate in (bandwidth, tracking, actuator_rate)):
+        axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+        bandwidth, tracking, actuator_rate = _bandwidths(axes, bandwidth, tracking, actuator_rate)
+    for name, value, unit in (("bandwidth", bandwidth, "rad/s"), ("tracking", tracking, "rad/s")):
+        checks.positive(name, value, unit)
+    if reach is None:
+        fuzzy = widened(fuzzy, bandwidth, damping, weights_bound)
+    tracking = jnp.asarray(tracking, dtype=float)
+    if feedback is None:
+        feedback = jnp.stack([tracking**2, 2 * tracking], -1)
     if reference_frequency is None:
-        reference_frequency = jnp.minimum(fast.tracking / 2, 2.0)
+        reference_frequency = jnp.minimum(tracking / 2, 2.0)
     jumps = isinstance(reference_frequency, Tracer) or bool(np.any(np.asarray(reference_frequency) != 0))
     return RobustRCAF(
         model=model,
-        estimator=Estimator(fuzzy, fast.bandwidth, damping, weights_bound),
+        estimator=Estimator(fuzzy, bandwidth, damping, weights_bound),
         filter=ReferenceFilter(reference_frequency) if jumps else None,
         feedback=feedback,
         weight=weight,
         tracking_share=tracking_share,
         robust_gain=robust_gain,
         layer=layer,
-        actuator_rate=fast.actuators,
+        actuator_rate=actuator_rate,
         direction=direction,
     )
+
+
+def _bandwidths(axes: list[Axis], bandwidth, tracking, actuator_rate):
+    """What is not given of bandwidth and tracking (one entry per axis) and of the actuators' rate, rad/s and 1/s."""
+    best = [robust_bandwidths(axis) for axis in axes]
+    chosen = Bandwidths(max(each.actuators for each in best), *(alike(list(of)) for of in list(zip(*best))[1:]))
+    if bandwidth is None:
+        rate, bandwidth, beside = chosen
+    else:
+        given = jnp.asarray(bandwidth, dtype=float)
+        slowest, fastest = _TRACKING_SHARES
+        beside = jnp.clip(chosen.tracking, slowest * given, fastest * given)
+        rate = jnp.minimum(axes[0].quickest, _ACTUATORS_FASTER * jnp.max(given))
+    return bandwidth, beside if tracking is None else tracking, rate if actuator_rate is None else actuator_rate
 
 
 def _from_letters(letters: dict, gathering: float, bandwidth):

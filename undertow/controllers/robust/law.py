@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.bandwidths import largest_forces
 from undertow.controllers.books import COLUMNS, share_at_bound, tracking_books
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
@@ -25,7 +26,6 @@ _WHOLE = 0.999
 # Times what the actuators can do for an axis over its position gain: from up to 16 of these, full force on both sides
 # of the way home does not overshoot. From further away the target comes to meet the vehicle.
 _FAR = 4.0
-_UNLIMITED = 1e9  # N, or whatever unit a force has
 
 
 class RobustState(NamedTuple):
@@ -124,10 +124,7 @@ class RobustRCAF(AbstractController):
 
     def _room(self, y: Measurement, off: Tracking) -> Room:
         """What the actuators can do for each output, and what of the error is out of their reach."""
-        held = self.model.drive().steady()
-        low, high = held.range(held.init(), self.actuator_rate)
-        force = jnp.minimum(jnp.maximum(-low, high), _UNLIMITED)
-        effect = self.model.effect(y)
+        force, effect = largest_forces(self.model.drive()), self.model.effect(y)
         reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
         away = jnp.abs(off.error) > reach
         outward = lambda motion: self.model.outward(y, motion)

@@ -1,0 +1,226 @@
+"""How fast a law may be: bandwidths that track best within stated stability margins, at a price on chattering.
+
+One axis, x_ddot = f + d with f behind a first-order actuator, sampled, with noise on the measured velocity. A law is
+two transfer functions from position and velocity to its input. The rule tries a grid of bandwidths and takes the one
+of least cost E = rms(e) / 0.05 + 0.05 (variation of the input per second, as a share of its limit), the cost that
+`undertow tune` minimises, among those that keep every margin of `MARGINS`. Masses cancel, so the same table of
+bandwidths holds for any vehicle. Frequencies are those of the sampled loop; the actuator is taken as continuous.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractModel, Measurement
+from undertow.core.drive import AbstractDrive, Forces
+from undertow.numerics.linear import matvec
+
+# Largest sensitivity |1 / (1 + L)| that is allowed with a lag that is so many times the nominal one, an actuator that
+# is slower than the model by so many sampling times, and so many sampling times of delay that the law does not know.
+MARGINS = (
+    # lag factor, added lag / T, added delay / T, largest sensitivity
+    (1.0, 0.0, 0.0, 2.5),
+    (2.0, 0.0, 3.0, 5.0),
+    (1 / 3, 0.0, 0.0, 5.0),
+    (3.0, 0.0, 0.0, 10.0),
+    (1.0, 0.0, 4.0, 5.0),
+    (1.0, 2.0, 3.0, 5.0),
+)
+UNKNOWN_LAG = 6.0  # sampling times, of an actuator of which nothing is known: it must not matter
+
+# What one metre or radian of error costs against the variation of the input: the scales of `undertow tune`.
+_ERROR_SCALE, _VARIATION_PRICE = 0.05, 0.05
+
+_FASTEST = 0.35  # share of the sampling rate: what is faster is shaped by sampling
+_TRACKING_SHARES = (0.25, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the estimator's bandwidth, for the tracking error
+_ACTUATOR_SHARES = (0.0, 1.5, 3.0)  # times these two, for actuators that are made faster than they are
+_SLOWEST, _CANDIDATES, _FREQUENCIES = 0.02, 32, 100
+_SWELL = 1.0  # rad/s
+_AT_ONCE = 32  # candidates whose margins are looked at together
+_UNLIMITED = 1e9  # N, or whatever unit a force has
+_INTEGRATORS = 3  # of L: two of the plant, one of the estimator or the integral
+
+
+class Axis(NamedTuple):
+    """What a rule knows of one axis.
+
+    Attributes:
+        sampling_time: s.
+        lag: nominal time constant of the actuators, s; None where nothing is known of them.
+        quickest: rate, 1/s, at which they can be made to follow.
+        delay: that the law knows of and nothing makes up for, s.
+        velocity_noise: standard deviation at each sampling time, m/s or rad/s.
+        load_rate: how fast loads wander, m/s^2 per sqrt(s) or rad/s^2 per sqrt(s).
+        authority: largest acceleration of the actuators, m/s^2 or rad/s^2; infinite without a limit.
+    """
+
+    sampling_time: float
+    lag: float | None
+    quickest: float
+    delay: float
+    velocity_noise: float
+    load_rate: float
+    authority: float
+
+
+class Bandwidths(NamedTuple):
+    """Rates in rad/s and 1/s, the inner loop first."""
+
+    actuators: float
+    bandwidth: float
+    tracking: float
+
+
+class Law(NamedTuple):
+    """From position and velocity to the input, at given frequencies: arrays (candidates, frequencies)."""
+
+    of_position: np.ndarray
+    of_velocity: np.ndarray
+
+
+def axes_of(
+    model: AbstractModel,
+    sampling_time: float,
+    delay: float,
+    velocity_noise,
+    load_rate,
+) -> list[Axis]:
+    """What the rule knows of each axis of a model.
+
+    Args:
+        model: of the controller, in the coordinates of the law.
+        sampling_time: s.
+        delay: that the law knows of and nothing makes up for, s.
+        velocity_noise: one number or one per axis, m/s and rad/s.
+        load_rate: one number or one per axis, m/s^2 per sqrt(s) and rad/s^2 per sqrt(s).
+
+    Raises:
+        BadInput: a value is out of its range.
+    """
+    checks.positive("sampling_time", sampling_time, "s")
+    checks.not_negative("delay", delay, "s")
+    checks.not_negative("velocity_noise", velocity_noise, "m/s, rad/s")
+    checks.positive("load_rate", load_rate)
+    axes = len(model.angles)
+    with jax.ensure_compile_time_eval():  # a law may be made inside a compiled function; its bandwidths are numbers
+        drive, still = model.drive(), jnp.zeros(axes)
+        lag = drive.time_constant()
+        quickest = float(drive.quickest(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
+        reached = matvec(jnp.abs(model.effect(Measurement(still, still))), largest_forces(drive))
+    authority = np.where(np.isfinite(reached) & (np.asarray(reached) > 0), reached, np.inf)
+    per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
+    rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
+    common = (float(sampling_time), None if lag is None else float(jnp.max(lag)), quickest, float(delay))
+    return [Axis(*common, *row) for row in rows]
+
+
+def alike(values: list[float]):
+    """One number for all axes where they have the same."""
+    return values[0] if len(set(values)) == 1 else jnp.asarray(values)
+
+
+def largest_forces(drive: AbstractDrive) -> Forces:
+    """Force that each actuator can hold in its better direction; a very large number where there is no limit."""
+    held = drive.steady()
+    low, high = held.range(held.init(), jnp.ones(()))
+    return jnp.minimum(jnp.maximum(-low, high), _UNLIMITED)
+
+
+@functools.lru_cache(maxsize=4096)
+def robust_bandwidths(axis: Axis) -> Bandwidths:
+    """Bandwidths of preset `robust`: an estimator of order two, state feedback, actuators that are driven."""
+    bandwidth, share, faster = (grid.ravel()[:, None] for grid in np.meshgrid(*_robust_grid(axis), indexing="ij"))
+    tracking = share * bandwidth
+    natural = 1 / axis.lag if axis.lag else 0.0
+    actuators = np.minimum(np.maximum(faster * np.maximum(bandwidth, tracking), natural), axis.quickest)
+    best = _best(axis, lambda s: _robust(axis, s, actuators, bandwidth, tracking), bandwidth)
+    return Bandwidths(*(float(rate[best, 0]) for rate in (actuators, bandwidth, tracking)))
+
+
+@functools.lru_cache(maxsize=4096)
+def pid_frequency(axis: Axis) -> float:
+    """Natural frequency w of a PID with k_p = w^2, k_d = 2 w and k_i = w^3 / 10, rad/s: Fossen (2021), ch. 15."""
+    frequency = _bandwidth_grid(axis)[:, None]
+    law = lambda s: Law(frequency**2 + 0.1 * frequency**3 / s, 2 * frequency + 0 * s)
+    return float(frequency[_best(axis, law, frequency), 0])
+
+
+def _bandwidth_grid(axis: Axis) -> np.ndarray:
+    slow = axis.sampling_time + axis.delay + (axis.lag or 0.0)
+    return np.geomspace(_SLOWEST / slow, _FASTEST / axis.sampling_time, _CANDIDATES)
+
+
+def _robust_grid(axis: Axis) -> tuple[np.ndarray, ...]:
+    return _bandwidth_grid(axis), np.array(_TRACKING_SHARES), np.array(_ACTUATOR_SHARES if axis.lag else (3.0,))
+
+
+def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking) -> Law:
+    """The law of `controllers/robust` from y to u: sampled estimator (`estimator.py`), actuators as in `LagDrive`."""
+    dt, z = axis.sampling_time, np.exp(s * axis.sampling_time)
+    decay = np.exp(-bandwidth * dt)
+    of_rates, of_estimate = 2 - 2 * decay, (1 - decay) ** 2 / dt
+    poles = (z - 1) ** 2 + of_rates * (z - 1) + dt * of_estimate
+    by_velocity, by_force = of_estimate * (z - 1) / poles, -dt * of_estimate / poles  # d_hat
+    if axis.lag:
+        kept, lead = np.exp(-dt / axis.lag), axis.lag * actuators
+        force = (1 - kept) * lead / (z - kept - (1 - kept) * (1 - lead))  # per force that is asked for
+        given = (1 - lead) * force + lead
+    else:
+        force = given = np.ones_like(z)
+    asked = given / (1 + by_force * force)
+    return Law(tracking**2 * asked, (2 * tracking + by_velocity) * asked)
+
+
+def _best(axis: Axis, law: Callable[[np.ndarray], Law], rates: np.ndarray) -> int:
+    """Index of the candidate of least cost among those with all margins; the slowest where none has them."""
+    dt = axis.sampling_time
+    frequency = np.geomspace(1e-4, np.pi, _FREQUENCIES) / dt
+    s = 1j * frequency
+    from_y = law(s)
+    held = (1 - np.exp(-s * dt)) / (s * dt) * np.exp(-s * axis.delay)
+    open_loop = held * (from_y.of_position / s**2 + from_y.of_velocity / s)
+    order = np.argsort(_cost(axis, frequency, from_y, held, open_loop), kind="stable")
+    for start in range(0, len(order), _AT_ONCE):
+        some = order[start : start + _AT_ONCE]
+        allowed = np.ones(len(some), dtype=bool)
+        for factor, added, delay, largest in MARGINS:
+            slower = UNKNOWN_LAG if added and axis.lag is None else added
+            behind = np.exp(-s * delay * dt) / ((1 + s * factor * (axis.lag or 0.0)) * (1 + s * slower * dt))
+            allowed &= _keeps(open_loop[some] * behind, largest)
+        if allowed.any():
+            return int(some[allowed.argmax()])
+    return int(rates.argmin())
+
+
+def _cost(axis: Axis, frequency: np.ndarray, from_y: Law, held: np.ndarray, open_loop: np.ndarray) -> np.ndarray:
+    """Predicted cost of each candidate, with actuators as the law takes them."""
+    s, dt = 1j * frequency, axis.sampling_time
+    actuator = 1 / (1 + s * (axis.lag or 0.0))
+    sensitivity = 1 / (1 + open_loop * actuator)
+    rms = lambda transfer: np.sqrt(np.trapezoid(np.abs(transfer) ** 2, frequency, axis=-1) / np.pi)
+    # A random walk, and a swell as large as what the walk covers in one of its periods.
+    swell = np.abs(sensitivity / s**2) @ _weights_at(frequency, _SWELL) * np.sqrt(2 * np.pi / _SWELL)
+    by_load = axis.load_rate * np.hypot(rms(sensitivity / s**3), swell)
+    noise = axis.velocity_noise * np.sqrt(dt)
+    by_noise = noise * rms(from_y.of_velocity * held * actuator * sensitivity / s**2)
+    # Mean size of a normal step from one sampling time to the next: sqrt(2 / pi) of its deviation.
+    variation = np.sqrt(2 / np.pi) / dt * noise * rms((1 - np.exp(-s * dt)) * from_y.of_velocity * sensitivity)
+    return np.hypot(by_load, by_noise) / _ERROR_SCALE + _VARIATION_PRICE * variation / axis.authority
+
+
+def _weights_at(frequency: np.ndarray, wanted: float) -> np.ndarray:
+    """Weights of a linear interpolation in log frequency."""
+    return np.array([np.interp(np.log(wanted), np.log(frequency), row) for row in np.eye(len(frequency))])
+
+
+def _keeps(open_loop: np.ndarray, largest: float) -> np.ndarray:
+    """Whether the closed loop is stable (Nyquist) with no sensitivity above `largest`."""
+    difference = 1 + open_loop
+    turned = np.diff(np.unwrap(np.angle(difference), axis=-1)[..., [0, -1]], axis=-1)[..., 0]
+    encircled = np.abs(turned - _INTEGRATORS * np.pi / 2) > np.pi / 2
+    return ~encircled & (np.abs(difference).min(axis=-1) > 1 / largest)
