@@ -19,6 +19,7 @@ from undertow.sensors.white_noise import white_noise
 
 CONSTANTS = np.array([3.0, -20.0, 45.0, 0.5])
 RISE = 1e-10  # of V(0)
+FAST = {"preset": "robust", "sets": 1}
 
 
 def flown(d, law=None, axes=1, limit=np.inf, goal=2.0, dt=1e-3, duration=2.0, sensor=None, loop="sampled"):
@@ -84,16 +85,16 @@ def test_its_rate_is_the_one_of_the_proof():
 @pytest.mark.parametrize("dt", [1e-3, 1e-2, 0.1])
 def test_discrete_function_of_the_robust_law_falls_at_any_sampling_time(dt):
     """One rule: by exactly l_1 eps^2 per tick, limits of the input or not (X4); the error ends at rounding."""
-    run = flown(constant(CONSTANTS), {"preset": "robust", "sets": 1}, axes=4, limit=30.0, dt=dt, duration=300 * dt)
+    run = flown(constant(CONSTANTS), FAST | {"bandwidth": 0.35 / dt}, axes=4, limit=30.0, dt=dt, duration=300 * dt)
     assert hypothesis(run, "limits")["whole"] < 1
     v, eps = run.dataset["lyapunov"].values, run.dataset["modelling_error"].values
-    fall = 1 - transition(run_estimator(1, dt), dt, 1)[0, 0, 0]
+    fall = 1 - transition(run_estimator(dt), dt, 1)[0, 0, 0]
     np.testing.assert_allclose(np.diff(v), -fall * (eps[:-1] ** 2).sum(-1), atol=1e-12 * v[0])
     assert not rising(run).any() and v[-1] < 1e-20 * v[0]
 
 
-def run_estimator(sets, dt):
-    return rcaf(double_integrator(1).model(), preset="robust", sets=sets, sampling_time=dt).estimator
+def run_estimator(dt):
+    return rcaf(double_integrator(1).model(), **FAST, bandwidth=0.35 / dt, sampling_time=dt).estimator
 
 
 def test_robust_law_with_five_rules_and_the_box():

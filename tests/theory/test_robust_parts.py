@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.linalg import expm, solve_continuous_are
+from scipy.linalg import expm
 from scipy.optimize import linprog
 
 from undertow.analysis.drift import gain_bound
@@ -12,14 +12,13 @@ from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.reference_filter import ReferenceFilter
-from undertow.controllers.robust.speeds import kalman
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
 from undertow.fuzzy.tsk import gaussian_sets
 from undertow.numerics.integrators import rk4
 from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.thrusters import first_order, linear_voltage, paper_table3, quadratic_voltage, t200
-from undertow.vehicles import bluerov2_heavy, odin
+from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage, t200
+from undertow.vehicles import bluerov2_heavy
 
 RNG = np.random.default_rng(4)
 
@@ -71,39 +70,6 @@ def test_letters_of_table_1_mean_the_same_estimator():
     np.testing.assert_allclose(law.estimator.bandwidth, 142.3, rtol=1e-3)
     np.testing.assert_allclose(law.estimator.damping, 0.528, rtol=1e-3)
     np.testing.assert_allclose(law.tracking_share, 1 / 500.0)
-
-
-def test_defaults_follow_the_sampling_time():
-    slow, fast = (robust(double_integrator(1).model(), sampling_time=dt) for dt in (1e-2, 1e-3))
-    np.testing.assert_allclose(fast.estimator.bandwidth, 10 * slow.estimator.bandwidth)
-    np.testing.assert_allclose(fast.estimator.bandwidth, 350.0)  # 0.35 / T
-    np.testing.assert_allclose(fast.feedback, [140.0**2, 280.0])
-
-
-def test_motors_noise_and_delay_slow_the_estimator():
-    """Sections 3.1 and 3.12: 1 / lag; (q^2 / (sigma^2 T))^(1/4); 0.35 over the delay. The smallest counts."""
-    axis = double_integrator(1).model()
-    vehicle = hybrid_vehicle(odin(), paper_table3("shaft", supply=24.0)).model()
-    slow = hybrid_vehicle(odin(), first_order(time_constant=0.2)).model()
-    assert float(robust(vehicle).estimator.bandwidth) == pytest.approx(0.43 * 350)  # its winding is slow: L / R 8 ms
-    quick = hybrid_vehicle(bluerov2_heavy(), t200()).model()
-    assert float(robust(quick).estimator.bandwidth) == pytest.approx(350.0)  # 0.4 ms
-    assert float(robust(slow).estimator.bandwidth) == pytest.approx(5.0)
-    assert float(robust(axis, delay=0.01).estimator.bandwidth) == pytest.approx(35.0)
-    noisy = robust(axis, velocity_noise=0.01, load_rate=0.5)
-    assert float(noisy.estimator.bandwidth) == pytest.approx((0.5**2 / (0.01**2 * 1e-3)) ** 0.25)
-    assert float(robust(vehicle, bandwidth=10.0).actuator_rate) == pytest.approx(30.0)
-
-
-def test_kalman_is_the_steady_filter_of_a_wandering_load():
-    """v_dot = d, d_dot white of density q^2, v read with noise: the Riccati equation has poles of that frequency."""
-    noise, q, dt = 0.02, 0.7, 1e-3
-    a, c = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[1.0, 0.0]])
-    density = np.array([[noise**2 * dt]])
-    p = solve_continuous_are(a.T, c.T, np.diag([0.0, q**2]), density)
-    gain = (p @ c.T / density).ravel()
-    assert float(kalman(dt, noise, q)) == pytest.approx(np.sqrt(gain[1]), rel=1e-9)
-    assert gain[0] == pytest.approx(np.sqrt(2) * float(kalman(dt, noise, q)), rel=1e-9)
 
 
 @pytest.mark.parametrize("bandwidth", [5.0, 20.0, 150.0])

@@ -8,7 +8,7 @@ bandwidths holds for any vehicle. Frequencies are those of the sampled loop; the
 """
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -109,19 +109,20 @@ def axes_of(
     axes = len(model.angles)
     with jax.ensure_compile_time_eval():  # a law may be made inside a compiled function; its bandwidths are numbers
         drive, still = model.drive(), jnp.zeros(axes)
-        lag = drive.time_constant()
+        known = drive.time_constant()
+        lag = None if known is None else float(jnp.max(known))
         quickest = float(drive.quickest(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
-        reached = matvec(jnp.abs(model.effect(Measurement(still, still))), largest_forces(drive))
-    authority = np.where(np.isfinite(reached) & (np.asarray(reached) > 0), reached, np.inf)
+        reached = np.asarray(matvec(jnp.abs(model.effect(Measurement(still, still))), largest_forces(drive)))
+    authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
     rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
-    common = (float(sampling_time), None if lag is None else float(jnp.max(lag)), quickest, float(delay))
+    common = (float(sampling_time), lag, quickest, float(delay))
     return [Axis(*common, *row) for row in rows]
 
 
-def alike(values: list[float]):
+def alike(values: Sequence[float]):
     """One number for all axes where they have the same."""
-    return values[0] if len(set(values)) == 1 else jnp.asarray(values)
+    return values[0] if len(set(values)) == 1 else jnp.asarray(values, dtype=float)
 
 
 def largest_forces(drive: AbstractDrive) -> Forces:
@@ -135,7 +136,11 @@ def largest_forces(drive: AbstractDrive) -> Forces:
 def robust_bandwidths(axis: Axis) -> Bandwidths:
     """Bandwidths of preset `robust`: an estimator of order two, state feedback, actuators that are driven."""
     bandwidth, share, faster = (grid.ravel()[:, None] for grid in np.meshgrid(*_robust_grid(axis), indexing="ij"))
-    tracking = share * bandwidth
+    # Actuators at their limits follow with their own lag, whatever is asked of them: the damping, which looks ahead by
+    # 2 / tracking, must look beyond it.
+    slow = axis.sampling_time + axis.delay + (axis.lag or 0.0)
+    tracking = np.minimum(share * bandwidth, 1 / slow if np.isfinite(axis.authority) else np.inf)
+    bandwidth = np.minimum(bandwidth, tracking / _TRACKING_SHARES[0])
     natural = 1 / axis.lag if axis.lag else 0.0
     actuators = np.minimum(np.maximum(faster * np.maximum(bandwidth, tracking), natural), axis.quickest)
     best = _best(axis, lambda s: _robust(axis, s, actuators, bandwidth, tracking), bandwidth)

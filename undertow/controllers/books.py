@@ -13,6 +13,7 @@ COLUMNS = {
     "lyapunov_tracking": ("tracking part of the Lyapunov function, 1/2 E^T P E", "m^2/s^2, rad^2/s^2"),
     "lyapunov_decay": ("rate at which feedback takes from it, 1/2 E^T Q E", "m^2/s^3, rad^2/s^3"),
     "weights_at_bound": ("share of the weights at +-theta_max: projection active", "1"),
+    "weights_spread": ("largest difference between weights of one axis: drift shows here", "m/s^2, rad/s^2"),
     "attained_share": ("share of the wanted acceleration that the command can give", "1"),
 }
 
@@ -24,9 +25,13 @@ def tracking_books(
     return {"lyapunov_tracking": _half(off, lyapunov), "lyapunov_decay": _half(off, weight)}
 
 
-def share_at_bound(weights: Float[Array, "n rules"], bound: Float[Array, "..."]) -> Scalar:
-    """Share of the weights that stand at +-bound; `bound` is one number or one per axis."""
-    return (jnp.abs(weights) >= jnp.broadcast_to(bound, weights.shape[:1])[:, None]).mean(dtype=float)
+def weight_books(weights: Float[Array, "n rules"], bound: Float[Array, "..."]) -> dict[str, Scalar]:
+    """Share of the weights that stand at +-bound (one number or one per axis), and how far they have come apart."""
+    at_bound = jnp.abs(weights) >= jnp.broadcast_to(bound, weights.shape[:1])[:, None]
+    return {
+        "weights_at_bound": at_bound.mean(dtype=float),
+        "weights_spread": (weights.max(-1) - weights.min(-1)).max(),
+    }
 
 
 def share_given(wanted: PerAxis, given: PerAxis) -> Scalar:

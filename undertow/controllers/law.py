@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.books import COLUMNS, share_at_bound, share_given, tracking_books
+from undertow.controllers.books import COLUMNS, share_given, tracking_books, weight_books
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
@@ -108,10 +108,8 @@ class RCAF(AbstractContinuousController):
             predicted_velocity=z.predicted_velocity,
             weights=z.weights,
             books=tracking_books(off, self.lyapunov(), self.weight)
-            | {
-                "weights_at_bound": share_at_bound(z.weights, self.weights_bound),
-                "attained_share": share_given(wanted, matvec(self.model.gain(y), u)),
-            },
+            | weight_books(z.weights, self.weights_bound)
+            | {"attained_share": share_given(wanted, matvec(self.model.gain(y), u))},
         )
         return u, telemetry
 

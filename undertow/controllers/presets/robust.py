@@ -14,7 +14,6 @@ from undertow.core.contracts import AbstractModel
 from undertow.core.errors import BadInput
 from undertow.fuzzy.tsk import gaussian_sets
 
-
 # Beside a bandwidth that is given: the range of tracking bandwidths as shares of it, and the rate of the actuators.
 _TRACKING_SHARES, _ACTUATORS_FASTER = (0.25, 0.5), 3.0
 
@@ -38,6 +37,7 @@ def robust(
     robust_gain=0.0,
     layer=0.5,
     weights_bound=50.0,
+    leakage=0.01,
     reference_frequency=None,
     actuator_rate=None,
     direction=1.0,
@@ -68,6 +68,7 @@ def robust(
         robust_gain: w_bar, m/s^2 and rad/s^2.
         layer: boundary layer of the robust term.
         weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that can be estimated.
+        leakage: rate at which the differences between the weights of an axis leak away, 1/s; 0 for none.
         reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of
             `tracking`, 2 at most; 0 for no filter.
         actuator_rate: how fast motors are made to follow, 1/s; None: chosen with the bandwidth, and beside one that
@@ -103,7 +104,7 @@ def robust(
     jumps = isinstance(reference_frequency, Tracer) or bool(np.any(np.asarray(reference_frequency) != 0))
     return RobustRCAF(
         model=model,
-        estimator=Estimator(fuzzy, bandwidth, damping, weights_bound),
+        estimator=Estimator(fuzzy, bandwidth, damping, weights_bound, leakage),
         filter=ReferenceFilter(reference_frequency) if jumps else None,
         feedback=feedback,
         weight=weight,
@@ -117,8 +118,8 @@ def robust(
 
 def _bandwidths(axes: list[Axis], bandwidth, tracking, actuator_rate):
     """What is not given of bandwidth and tracking (one entry per axis) and of the actuators' rate, rad/s and 1/s."""
-    best = [robust_bandwidths(axis) for axis in axes]
-    chosen = Bandwidths(max(each.actuators for each in best), *(alike(list(of)) for of in list(zip(*best))[1:]))
+    rates, *of_axes = zip(*(robust_bandwidths(axis) for axis in axes), strict=True)
+    chosen = Bandwidths(max(rates), *(alike(values) for values in of_axes))
     if bandwidth is None:
         rate, bandwidth, beside = chosen
     else:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import largest_forces
-from undertow.controllers.books import COLUMNS, share_at_bound, tracking_books
+from undertow.controllers.books import COLUMNS, tracking_books, weight_books
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter, Room
@@ -82,7 +82,7 @@ class RobustRCAF(AbstractController):
         for name in ("layer", "actuator_rate", "direction"):
             checks.positive(name, getattr(self, name))
         own = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
-        estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound")}
+        estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound", "leakage")}
         check_gains(self.feedback, self.weight, own | estimators, len(self.model.angles))
 
     def init(self, y: Measurement, r: Target) -> RobustState:
@@ -102,10 +102,8 @@ class RobustRCAF(AbstractController):
             predicted_velocity=z.estimator.rates,
             weights=z.estimator.weights,
             books=tracking_books(plan.off, self.lyapunov(), self.weight)
-            | {
-                "weights_at_bound": share_at_bound(z.estimator.weights, self.estimator.bound),
-                "attained_share": attained(effect, plan.forces, forces),
-            },
+            | weight_books(z.estimator.weights, self.estimator.bound)
+            | {"attained_share": attained(effect, plan.forces, forces)},
         )
         return u, telemetry
 
