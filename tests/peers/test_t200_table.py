@@ -51,6 +51,6 @@ def test_time_constant_about_half_speed_is_a_tenth_of_a_second(part):
     """k_1 / (k_2 + 2 k_3 c_q Om) at half of the full speed."""
     thruster = part("shaft")
     motor = thruster.motor
-    half = float(motor.steady_speed(thruster.supply)) / 2
+    half = float(motor.steady_speed(thruster.terminal(thruster.supply))) / 2
     constant = motor.k1 / (motor.k2 + 2 * motor.k3 * motor.torque_coefficient * half)
     np.testing.assert_allclose(constant, 0.1, rtol=2e-3)

@@ -3,8 +3,10 @@
 from typing import Protocol
 
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 from undertow.core.drive import AbstractDrive
+from undertow.core.param import param
 from undertow.thrusters.thruster import PerThruster
 
 
@@ -23,15 +25,16 @@ class Invertible(Protocol):
 
 
 class SteadyDrive(AbstractDrive):
-    """Thrust at once, by the curve that the thruster itself has."""
+    """Thrust at once, by the curve that the thruster itself has, or but for a lag that the drive leaves out."""
 
     thruster: Invertible
+    time_constant: Float[Array, ""] = param("s", "of the lag that is left out", default=0.0)
 
     def quickest(self, sampled):
         return sampled
 
     def lag(self, rate):
-        return jnp.zeros(())
+        return self.time_constant
 
     def init(self) -> tuple[()]:
         return ()
