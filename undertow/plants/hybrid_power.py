@@ -61,7 +61,7 @@ class HybridPower(eqx.Module):
 
     def dynamics(self, thruster: AbstractThruster, state: Any, rates: Any, power: PowerState, u) -> PowerState:
         """Rates of the electrical state, with those of the thrusters given."""
-        taken = thruster.power(state, u).sum()
+        taken = thruster.electrical_power(state, u).sum()
         current = loss = None
         if self.battery is not None:
             current, loss = self.battery.current(power.drawn, taken), self.battery.loss(power.drawn, taken)
@@ -78,7 +78,7 @@ class HybridPower(eqx.Module):
         wanted, limited = jnp.clip(u, *thruster.limits()), False
         if self.battery is not None:
             within = lambda voltage: jnp.clip(wanted, -voltage, voltage)
-            taken = lambda voltage: thruster.power(state, within(voltage)).sum()
+            taken = lambda voltage: thruster.electrical_power(state, within(voltage)).sum()
             most = self.battery.limit(power.drawn, taken, jnp.abs(wanted).max())
             wanted, limited = within(most), most < jnp.abs(wanted).max()
         if self.esc is not None:
@@ -93,14 +93,14 @@ class HybridPower(eqx.Module):
         if self.battery is None:
             return limited
         top, more = jnp.abs(u).max(), (1 + _AT_LIMIT) * u
-        spare = self.battery.allows(power.drawn, jnp.abs(more).max(), thruster.power(state, more).sum())
+        spare = self.battery.allows(power.drawn, jnp.abs(more).max(), thruster.electrical_power(state, more).sum())
         return limited | ((jnp.abs(u) >= (1 - _AT_LIMIT) * top) & ~spare)
 
     def bus_voltage(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> Scalar:
         """Voltage of the bus, V, while the thrusters get u."""
         if self.battery is None:
             return thruster.supply
-        return self.battery.bus_voltage(power.drawn, thruster.power(state, u).sum())
+        return self.battery.bus_voltage(power.drawn, thruster.electrical_power(state, u).sum())
 
     def books(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> dict[str, Scalar]:
         """What is worth recording, by name."""

@@ -121,7 +121,7 @@ class HybridVehicle(AbstractPlant):
 
     def effort(self, x: VehicleState, u) -> Effort:
         limited = self.power.saturated(self.thruster, x.thrusters, x.power, u)
-        return Effort(self.thruster.power(x.thrusters, u), limited.astype(u.dtype))
+        return Effort(self.thruster.electrical_power(x.thrusters, u), limited.astype(u.dtype))
 
     def books(self, x: VehicleState, u):
         return self.power.books(self.thruster, x.thrusters, x.power, u)

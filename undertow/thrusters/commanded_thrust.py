@@ -70,10 +70,10 @@ class CommandedThrust(AbstractMotorlessThruster):
         return state.thrust
 
     def current(self, state, voltage) -> PerThruster:
-        """Zero: what is commanded in newtons has no voltage, so only its `power` means something."""
+        """Zero: what is commanded in newtons has no voltage, so only its `electrical_power` means something."""
         return jnp.zeros_like(state.thrust)
 
-    def power(self, state, voltage) -> PerThruster:
+    def electrical_power(self, state, voltage) -> PerThruster:
         return self.power_per_thrust * jnp.abs(voltage)
 
     def speed_term(self, report):

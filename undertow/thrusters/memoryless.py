@@ -11,6 +11,8 @@ from undertow.thrusters.motorless import AbstractMotorlessThruster
 from undertow.thrusters.steady_drive import SteadyDrive
 from undertow.thrusters.thruster import PerThruster
 
+_LEAST = 1e-30  # stands for 0, where a power has no slope
+
 
 class MemorylessThruster(AbstractMotorlessThruster):
     """Thrust c |V|^(p-1) V, less by a share in reverse, with no motor behind it; current proportional to thrust.
@@ -42,7 +44,7 @@ class MemorylessThruster(AbstractMotorlessThruster):
 
     def thrust(self, state, voltage) -> PerThruster:
         volts = self.terminal(voltage)
-        return self._coefficient(volts) * jnp.sign(volts) * jnp.abs(volts) ** self.power
+        return self._coefficient(volts) * _signed_power(volts, self.power)
 
     def current(self, state, voltage) -> PerThruster:
         return self.current_per_thrust * self.thrust(state, voltage)
@@ -52,8 +54,7 @@ class MemorylessThruster(AbstractMotorlessThruster):
 
     def voltage_for(self, thrust: PerThruster) -> PerThruster:
         """V, V, that gives a thrust in N."""
-        size = (jnp.abs(thrust) / self._coefficient(thrust)) ** (1 / self.power)
-        return self.commanded(jnp.sign(thrust) * size)
+        return self.commanded(_signed_power(thrust / self._coefficient(thrust), 1 / self.power))
 
     def drive(self, count: int, measured: bool) -> SteadyDrive:
         return SteadyDrive(self)
@@ -63,3 +64,9 @@ class MemorylessThruster(AbstractMotorlessThruster):
 
     def _coefficient(self, direction: PerThruster) -> PerThruster:
         return jnp.where(direction < 0, self.reverse_share, 1.0) * self.thrust_per_volt
+
+
+def _signed_power(x: PerThruster, power: PerThruster) -> PerThruster:
+    """|x|^(p-1) x, whose slope at 0 is that of its neighbours: 1 where p is 1."""
+    size = jnp.abs(x)
+    return x * jnp.where(size > 0, size, _LEAST) ** (power - 1)

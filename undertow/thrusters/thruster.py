@@ -100,7 +100,7 @@ class AbstractThruster(eqx.Module):
         """Smallest and largest command that the drive can carry out, V."""
         return -self.supply, self.supply
 
-    def power(self, state: Any, voltage: PerThruster) -> PerThruster:
+    def electrical_power(self, state: Any, voltage: PerThruster) -> PerThruster:
         """Electrical power, W: no voltage, no power, though a spinning motor may carry a current."""
         return self.terminal(voltage) * self.current(state, voltage)
 
@@ -111,9 +111,10 @@ class AbstractThruster(eqx.Module):
         loses no power with what it subtracts.
         """
         size = jnp.abs(voltage)
+        inside = (size <= self.dead_zone) & (self.dead_zone > 0)  # without a zone, 0 V has the slope of its neighbours
         if self.dead_zone_kind == "subtract":
-            return jnp.where(size < self.dead_zone, 0.0, voltage - jnp.sign(voltage) * self.dead_zone)
-        return jnp.where(size <= self.dead_zone, 0.0, voltage)
+            return jnp.where(inside, 0.0, voltage - jnp.sign(voltage) * self.dead_zone)
+        return jnp.where(inside, 0.0, voltage)
 
     def commanded(self, terminal: PerThruster) -> PerThruster:
         """Command, V, for a voltage that is to turn the motor: `terminal` solved.
