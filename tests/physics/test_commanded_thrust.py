@@ -184,7 +184,7 @@ def test_a_vehicle_comes_to_its_place_within_both_limits(law):
 
 @pytest.mark.parametrize("law", [pytest.param("robust", marks=pytest.mark.slow), "pid"])
 def test_batches_and_xla_agree(law):
-    plant = hybrid_vehicle(bluerov2_heavy(), commanded_thrust(40.0, 4.0, time_constant=0.05, thrust_rate_max=60.0))
+    plant = hybrid_vehicle(bluerov2_heavy(), commanded_thrust(40.0, 0.5, time_constant=0.05, thrust_rate_max=60.0))
     controller = LAWS[law](plant.model(), sampling_time=0.02)
     loop = ClosedLoop(plant, controller, setpoint([3.0, 0.0, 1.0, 0.0, 0.0, 0.0]), none(), perfect())
     how = dict(duration=0.6, dt=0.02, record_every=5)
