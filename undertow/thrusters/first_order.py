@@ -100,6 +100,8 @@ def first_order(
 ) -> FirstOrderThruster:
     """Thrust that follows T = c V (or c V|V|) with a first-order lag, for those who know no more of a thruster.
 
+    For limits in newtons, which may differ forward and in reverse, take `commanded_thrust`.
+
     Default gain and current are those of the paper's motor at 10 V; the time constant is a guess, as it is for most
     thrusters: published ones of small vehicles go from 0.05 s (RexROV, LAUV) to 0.2 s.
 
