@@ -38,17 +38,17 @@ class CommandedThrust(AbstractMotorlessThruster):
         checks.not_negative("power_per_thrust", self.power_per_thrust, "W/N")
 
     @property
-    def supply(self):
+    def supply(self):  # pyright: ignore[reportIncompatibleVariableOverride]
         """Largest command either way, N."""
         return jnp.maximum(self.thrust_forward_max, self.thrust_reverse_max)
 
     @property
-    def dead_zone(self):
+    def dead_zone(self):  # pyright: ignore[reportIncompatibleVariableOverride]
         """None, N."""
         return jnp.zeros(())
 
     @property
-    def linear_gain(self):
+    def linear_gain(self):  # pyright: ignore[reportIncompatibleVariableOverride]
         """N per N."""
         return jnp.ones(())
 
