@@ -53,9 +53,10 @@ def test_flights_repeat_bit_for_bit(parts):
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 
 
-def test_propellers_turn_as_undertows_do():
+@pytest.mark.parametrize("kind", ["pass", "subtract"])
+def test_propellers_turn_as_undertows_do(kind):
     """Both directions, reversal, dead zone, supply: 0.4 s at one voltage, then 0.4 s at another."""
-    thruster = ut.thrusters.t200(supply=16.0)
+    thruster = ut.thrusters.t200(supply=16.0, dead_zone_kind=kind)
     voltages = np.array([[16.0, -16, 8, -8, 1, 0, 12, 20], [-16.0, 5, 10, -0.5, 1.3, 3, 0, -20]])
     ours, state = Propellers(thruster, 8), thruster.initial_state(8)
     for asked in voltages:

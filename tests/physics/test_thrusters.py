@@ -13,6 +13,7 @@ from undertow.numerics.integrators import METHODS
 from undertow.thrusters import (
     DCMotor,
     axial_flow,
+    commanded_thrust,
     first_order,
     linear_voltage,
     paper_table3,
@@ -148,7 +149,9 @@ def test_dead_zone_of_real_thrusters(make, rung):
     assert outside[0] < 0 < outside[1]
 
 
-@pytest.mark.parametrize("thruster", [t200("static"), linear_voltage(), first_order(), axial_flow()])
+@pytest.mark.parametrize(
+    "thruster", [t200("static"), linear_voltage(), first_order(), axial_flow(), commanded_thrust()]
+)
 def test_a_speed_sensor_is_refused_where_there_is_no_speed(thruster):
     assert thruster.report(thruster.initial_state(2)) is None
     with pytest.raises(BadInput, match="`speed_sensor` must be false"):
@@ -174,6 +177,7 @@ DYNAMIC = {
     "paper": (paper_table3("electromechanical"), 12.0, 1e-3),
     "first_order": (first_order(time_constant=0.05), 12.0, 1e-2),
     "axial_flow": (axial_flow(), 3.0, 1e-2),
+    "commanded_thrust": (commanded_thrust(time_constant=0.05), 12.0, 1e-2),
 }
 
 

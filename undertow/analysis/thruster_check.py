@@ -46,14 +46,14 @@ def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
 
 
 def full_voltage(thruster: AbstractThruster) -> float:
-    """Full voltage, V; a moderate one where there is no limit."""
+    """Full voltage, V, or full command of one that is commanded otherwise; a moderate one where there is no limit."""
     supply = float(np.min(thruster.supply))
     return supply if np.isfinite(supply) else _VOLTAGE
 
 
 def settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, float]:
-    """Thrust, N, long after a voltage, and after its opposite, was applied to thrusters at rest."""
-    volts = jnp.array([voltage, -voltage])
+    """Thrust, N, long after a voltage within the limits, and after its opposite, was applied to thrusters at rest."""
+    volts = jnp.clip(jnp.array([voltage, -voltage]), *thruster.limits())
     start = thruster.initial_state(2)
     flat, tree = ravel_pytree(start)
     if flat.size:
@@ -71,9 +71,10 @@ def _ways(thruster: AbstractThruster) -> Iterator[Finding]:
     for thrust, volts, word in ((forward, full, "positive"), (-reverse, -full, "negative")):
         if not thrust > 0:
             got = f"{forward if volts > 0 else reverse:.4g} N"
-            yield error("sign", "thrust", f"be {word} at {volts:+.4g} V", got)
+            yield error("sign", "thrust", f"be {word} at {volts:+.4g} {thruster.input_unit}", got)
             return
     if gain > 0 and not 1 / _FACTOR < gain * full / forward < _FACTOR:
-        got = f"{gain:.4g} N/V where {full:.4g} V give {forward:.4g} N"
+        unit = thruster.input_unit
+        got = f"{gain:.4g} N/{unit} where {full:.4g} {unit} give {forward:.4g} N"
         should = "be about the thrust per volt: it is the gain of the model that the controller inverts"
         yield advice("gain", "voltage_gain", should, got)

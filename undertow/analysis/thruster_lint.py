@@ -1,6 +1,7 @@
 """Is this thruster possible? Its motor's constants, and what it makes of its supply."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -31,21 +32,24 @@ def _findings(thruster: AbstractThruster) -> Iterator[Finding]:
 
 def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str], ...]:
     """(what, value, unit), a row each."""
-    supply, limit = float(thruster.supply), full_voltage(thruster)
+    supply, limit, unit = float(thruster.supply), full_voltage(thruster), thruster.input_unit
     rows = [
-        ("supply, dead zone", f"{supply:.4g}, {float(thruster.dead_zone):.4g}", "V"),
-        ("gain of the linear model", f"{float(np.min(thruster.voltage_gain())):.4g}", "N/V"),
+        (
+            "supply, dead zone" if unit == "V" else "largest command, dead zone",
+            _row([supply, thruster.dead_zone]),
+            unit,
+        ),
+        ("gain of the linear model", f"{float(np.min(thruster.voltage_gain())):.4g}", f"N/{unit}"),
     ]
     motor = getattr(thruster, "motor", None)
     if isinstance(motor, DCMotor):
-        rows += _of_motor(motor, limit)
+        rows += _of_motor(motor, limit, thruster.terminal(jnp.asarray([limit, -limit])))
     else:
-        rows.append((f"steady thrust at +-{limit:g} V", _row(settled_thrust(thruster, limit)), "N"))
+        rows.append((f"steady thrust at +-{limit:g} {unit}", _row(settled_thrust(thruster, limit)), "N"))
     return tuple(rows)
 
 
-def _of_motor(motor: DCMotor, limit: float) -> list[tuple[str, str, str]]:
-    volts = jnp.asarray([limit, -limit])
+def _of_motor(motor: DCMotor, limit: float, volts: Any) -> list[tuple[str, str, str]]:
     speed = motor.steady_speed(volts)
     powers = motor.powers(volts, motor.steady_current(speed), speed)
     share = np.asarray((powers.water + powers.friction) / powers.source)

@@ -44,6 +44,9 @@ class HybridPower(eqx.Module):
             part = getattr(self, name)
             if part is not None and not isinstance(part, kind):
                 raise BadInput(name, f"be a {kind.__name__}", type(part).__name__)
+            if part is not None and thruster.input_unit != "V":
+                hint = "A battery and speed controllers deal in volts: take a thruster with a motor, such as t200"
+                raise BadInput(name, f"be left out with a thruster commanded in {thruster.input_unit}", hint=hint)
         if self.esc is not None and self.battery is None and not _finite(thruster.supply):
             hint = "Give the thruster a supply, or the vehicle a battery"
             raise BadInput("esc", "have a bus voltage to share out", "on an infinite supply", hint=hint)
@@ -58,7 +61,7 @@ class HybridPower(eqx.Module):
 
     def dynamics(self, thruster: AbstractThruster, state: Any, rates: Any, power: PowerState, u) -> PowerState:
         """Rates of the electrical state, with those of the thrusters given."""
-        taken = drive_power(thruster, state, u).sum()
+        taken = thruster.electrical_power(state, u).sum()
         current = loss = None
         if self.battery is not None:
             current, loss = self.battery.current(power.drawn, taken), self.battery.loss(power.drawn, taken)
@@ -72,10 +75,10 @@ class HybridPower(eqx.Module):
 
     def admissible(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
         """Voltages within the supply, within what the battery can give, in whole pulses."""
-        wanted, limited = jnp.clip(u, -thruster.supply, thruster.supply), False
+        wanted, limited = jnp.clip(u, *thruster.limits()), False
         if self.battery is not None:
             within = lambda voltage: jnp.clip(wanted, -voltage, voltage)
-            taken = lambda voltage: drive_power(thruster, state, within(voltage)).sum()
+            taken = lambda voltage: thruster.electrical_power(state, within(voltage)).sum()
             most = self.battery.limit(power.drawn, taken, jnp.abs(wanted).max())
             wanted, limited = within(most), most < jnp.abs(wanted).max()
         if self.esc is not None:
@@ -85,18 +88,19 @@ class HybridPower(eqx.Module):
 
     def saturated(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
         """True where an applied voltage is at the limit of the supply, or of the battery."""
-        limited = jnp.abs(u) >= thruster.supply
+        low, high = thruster.limits()
+        limited = (u <= low) | (u >= high)
         if self.battery is None:
             return limited
         top, more = jnp.abs(u).max(), (1 + _AT_LIMIT) * u
-        spare = self.battery.allows(power.drawn, jnp.abs(more).max(), drive_power(thruster, state, more).sum())
+        spare = self.battery.allows(power.drawn, jnp.abs(more).max(), thruster.electrical_power(state, more).sum())
         return limited | ((jnp.abs(u) >= (1 - _AT_LIMIT) * top) & ~spare)
 
     def bus_voltage(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> Scalar:
         """Voltage of the bus, V, while the thrusters get u."""
         if self.battery is None:
             return thruster.supply
-        return self.battery.bus_voltage(power.drawn, drive_power(thruster, state, u).sum())
+        return self.battery.bus_voltage(power.drawn, thruster.electrical_power(state, u).sum())
 
     def books(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> dict[str, Scalar]:
         """What is worth recording, by name."""
@@ -119,11 +123,6 @@ class HybridPower(eqx.Module):
         }
         energies = {name: (meaning, "J") for name, meaning in books.COLUMNS.items()}
         return (battery if self.battery is not None else {}) | (energies if self.ledger else {})
-
-
-def drive_power(thruster: AbstractThruster, state: Any, u):
-    """Electrical power of each thruster, W: no voltage, no power, though a spinning motor may carry a current."""
-    return thruster.terminal(u) * thruster.current(state, u)
 
 
 def has_motor(thruster: AbstractThruster) -> bool:

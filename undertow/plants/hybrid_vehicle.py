@@ -18,7 +18,7 @@ from undertow.numerics.rotations import (
     rotation_from_quaternion,
 )
 from undertow.plants.hybrid_model import HybridModel
-from undertow.plants.hybrid_power import HybridPower, drive_power, has_motor
+from undertow.plants.hybrid_power import HybridPower, has_motor
 from undertow.plants.hybrid_state import VehicleState, state_at
 from undertow.plants.reachability import open_loop_advice
 from undertow.power import ESC, Battery
@@ -68,7 +68,7 @@ class HybridVehicle(AbstractPlant):
         self.body, self.thruster_matrix = vehicle.body(), vehicle.thruster_matrix()
         self.outputs = ("north", "east", "down", "roll", "pitch", "yaw")
         self.output_units = ("m", "m", "m", "rad", "rad", "rad")
-        self.input_unit = "V"
+        self.input_unit = thruster.input_unit
 
     def initial_state(self, position=None, velocity=None) -> VehicleState:
         thrusters = self.thruster.initial_state(self.inputs())
@@ -121,7 +121,7 @@ class HybridVehicle(AbstractPlant):
 
     def effort(self, x: VehicleState, u) -> Effort:
         limited = self.power.saturated(self.thruster, x.thrusters, x.power, u)
-        return Effort(drive_power(self.thruster, x.thrusters, u), limited.astype(u.dtype))
+        return Effort(self.thruster.electrical_power(x.thrusters, u), limited.astype(u.dtype))
 
     def books(self, x: VehicleState, u):
         return self.power.books(self.thruster, x.thrusters, x.power, u)

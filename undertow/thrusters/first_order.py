@@ -8,11 +8,24 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.drive import DirectDrive, LaggedDrive
+from undertow.core.drive import LaggedDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
+from undertow.thrusters.memoryless import MemorylessThruster
 from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.steady_drive import SteadyDrive
 from undertow.thrusters.thruster import PerThruster
+
+_OF_STEADY_STATE = (
+    "thrust_per_volt",
+    "power",
+    "current_per_thrust",
+    "linear_gain",
+    "supply",
+    "dead_zone",
+    "dead_zone_kind",
+    "reverse_share",
+)
 
 
 class LaggedThrust(NamedTuple):
@@ -36,19 +49,20 @@ class FirstOrderThruster(AbstractMotorlessThruster):
     linear_gain: Float[Array, ""] = param("N/V", "gain the controller's model assumes", symbol="alpha")
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
     dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
-        for name in ("thrust_per_volt", "power", "time_constant", "reverse_share", "current_per_thrust", "linear_gain"):
-            checks.positive(name, getattr(self, name))
-        checks.positive("supply", self.supply, "V", finite=False)
-        checks.not_negative("dead_zone", self.dead_zone, "V")
+        checks.positive("time_constant", self.time_constant, "s")
+        self.settled()
+
+    def settled(self) -> MemorylessThruster:
+        """The same thruster without its lag."""
+        return MemorylessThruster(**{name: getattr(self, name) for name in _OF_STEADY_STATE})
 
     def steady_thrust(self, voltage: PerThruster) -> PerThruster:
         """Thrust, N, that a voltage in V leads to."""
-        volts = self.terminal(voltage)
-        share = jnp.where(volts < 0, self.reverse_share, 1.0)
-        return share * self.thrust_per_volt * jnp.sign(volts) * jnp.abs(volts) ** self.power
+        return self.settled().thrust((), voltage)
 
     def initial_state(self, count) -> LaggedThrust:
         return LaggedThrust(jnp.zeros(count))
@@ -68,7 +82,7 @@ class FirstOrderThruster(AbstractMotorlessThruster):
         raise BadInput("speed_sensor", "be false with thruster first_order", "true", hint=hint)
 
     def drive(self, count: int, measured: bool) -> LaggedDrive:
-        return LaggedDrive(DirectDrive(self.voltage_gain(), -self.supply, self.supply), self.time_constant, count)
+        return LaggedDrive(SteadyDrive(self.settled()), self.time_constant, count)
 
     def advice(self):
         return ()
@@ -83,8 +97,11 @@ def first_order(
     linear_gain: float | None = None,
     supply: float = math.inf,
     dead_zone: float = 0.0,
+    dead_zone_kind: str = "pass",
 ) -> FirstOrderThruster:
     """Thrust that follows T = c V (or c V|V|) with a first-order lag, for those who know no more of a thruster.
+
+    For limits in newtons, which may differ forward and in reverse, take `commanded_thrust`.
 
     Default gain and current are those of the paper's motor at 10 V; the time constant is a guess, as it is for most
     thrusters: published ones of small vehicles go from 0.05 s (RexROV, LAUV) to 0.2 s.
@@ -98,6 +115,7 @@ def first_order(
         linear_gain: alpha that the controller's model assumes, N/V; None for thrust_per_volt, when power is 1.
         supply: voltage limit, V.
         dead_zone: voltage below which nothing turns, V.
+        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
 
     Raises:
         BadInput: a value that is not positive, or no linear_gain for a thrust that is not linear.
@@ -110,4 +128,4 @@ def first_order(
             raise BadInput("linear_gain", "be given when `power` is not 1", hint=hint)
         linear_gain = thrust_per_volt
     known = (thrust_per_volt, power, time_constant, reverse_share, current_per_thrust, linear_gain)
-    return FirstOrderThruster(*known, supply, dead_zone)
+    return FirstOrderThruster(*known, supply, dead_zone, dead_zone_kind)

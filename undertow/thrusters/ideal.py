@@ -16,6 +16,7 @@ class IdealThruster(AbstractThruster):
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
     dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 
     def initial_state(self, count):
@@ -53,7 +54,7 @@ class IdealThruster(AbstractThruster):
 
     def voltage_for(self, thrust: PerThruster) -> PerThruster:
         """V, V, that gives a thrust in N."""
-        return self.motor.ideal_voltage(thrust)
+        return self.commanded(self.motor.ideal_voltage(thrust))
 
     def drive(self, count: int, measured: bool) -> SteadyDrive:
         return SteadyDrive(self)

@@ -18,7 +18,13 @@ RUNGS = {
 }
 
 
-def on_rung(motor: DCMotor, rung: str, supply: float = float(jnp.inf), dead_zone: float = 0.0) -> AbstractThruster:
+def on_rung(
+    motor: DCMotor,
+    rung: str,
+    supply: float = float(jnp.inf),
+    dead_zone: float = 0.0,
+    dead_zone_kind: str = "pass",
+) -> AbstractThruster:
     """The motor on a rung of the ladder.
 
     Args:
@@ -26,14 +32,14 @@ def on_rung(motor: DCMotor, rung: str, supply: float = float(jnp.inf), dead_zone
         rung: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; infinite by default.
         dead_zone: voltage below which nothing turns, V.
+        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
 
     Raises:
-        BadInput: unknown rung, supply not positive, dead zone negative, no inductance on `electromechanical`.
+        BadInput: unknown rung or kind, supply not positive, dead zone negative, no inductance on `electromechanical`.
     """
     checks.choice("rung", rung, tuple(RUNGS))
     if not supply > 0:
         checks.positive("supply", supply, "V")
-    checks.not_negative("dead_zone", dead_zone, "V")
     if rung == "electromechanical":
         checks.positive("inductance", motor.inductance, "H")
-    return RUNGS[rung](motor=motor, supply=supply, dead_zone=dead_zone)
+    return RUNGS[rung](motor=motor, supply=supply, dead_zone=dead_zone, dead_zone_kind=dead_zone_kind)

@@ -6,7 +6,11 @@ from undertow.thrusters.memoryless import MemorylessThruster
 
 
 def linear_voltage(
-    thrust_per_volt: float = 10.9, current_per_thrust: float = 0.072, supply: float = math.inf, dead_zone: float = 0.0
+    thrust_per_volt: float = 10.9,
+    current_per_thrust: float = 0.072,
+    supply: float = math.inf,
+    dead_zone: float = 0.0,
+    dead_zone_kind: str = "pass",
 ) -> MemorylessThruster:
     """T = c_0 V, I = c_I T. Defaults go through the steady state of the paper's motor at 10 V.
 
@@ -15,5 +19,7 @@ def linear_voltage(
         current_per_thrust: c_I, A/N.
         supply: voltage limit, V.
         dead_zone: voltage below which nothing turns, V.
+        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
     """
-    return MemorylessThruster(thrust_per_volt, 1.0, current_per_thrust, thrust_per_volt, supply, dead_zone)
+    known = (thrust_per_volt, 1.0, current_per_thrust, thrust_per_volt)
+    return MemorylessThruster(*known, supply, dead_zone, dead_zone_kind)

@@ -11,9 +11,11 @@ from undertow.thrusters.motorless import AbstractMotorlessThruster
 from undertow.thrusters.steady_drive import SteadyDrive
 from undertow.thrusters.thruster import PerThruster
 
+_LEAST = 1e-30  # stands for 0, where a power has no slope
+
 
 class MemorylessThruster(AbstractMotorlessThruster):
-    """Thrust c |V|^(p-1) V with no motor behind it; current proportional to thrust.
+    """Thrust c |V|^(p-1) V, less by a share in reverse, with no motor behind it; current proportional to thrust.
 
     Raises:
         BadInput: a coefficient is not positive.
@@ -25,11 +27,14 @@ class MemorylessThruster(AbstractMotorlessThruster):
     linear_gain: Float[Array, ""] = param("N/V", "gain the controller's model assumes", symbol="alpha")
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
     dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone_kind: str = eqx.field(static=True, default="pass")
+    reverse_share: Float[Array, ""] = param("", "thrust in reverse, as a share of that forward", default=1.0)
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
-        for name in ("thrust_per_volt", "power", "current_per_thrust", "linear_gain"):
+        for name in ("thrust_per_volt", "power", "current_per_thrust", "linear_gain", "reverse_share"):
             checks.positive(name, getattr(self, name))
+        checks.positive("supply", self.supply, "V", finite=False)
 
     def initial_state(self, count):
         return jnp.zeros(0)
@@ -39,7 +44,7 @@ class MemorylessThruster(AbstractMotorlessThruster):
 
     def thrust(self, state, voltage) -> PerThruster:
         volts = self.terminal(voltage)
-        return self.thrust_per_volt * jnp.sign(volts) * jnp.abs(volts) ** self.power
+        return self._coefficient(volts) * _signed_power(volts, self.power)
 
     def current(self, state, voltage) -> PerThruster:
         return self.current_per_thrust * self.thrust(state, voltage)
@@ -49,10 +54,19 @@ class MemorylessThruster(AbstractMotorlessThruster):
 
     def voltage_for(self, thrust: PerThruster) -> PerThruster:
         """V, V, that gives a thrust in N."""
-        return jnp.sign(thrust) * (jnp.abs(thrust) / self.thrust_per_volt) ** (1 / self.power)
+        return self.commanded(_signed_power(thrust / self._coefficient(thrust), 1 / self.power))
 
     def drive(self, count: int, measured: bool) -> SteadyDrive:
         return SteadyDrive(self)
 
     def advice(self):
         return ()
+
+    def _coefficient(self, direction: PerThruster) -> PerThruster:
+        return jnp.where(direction < 0, self.reverse_share, 1.0) * self.thrust_per_volt
+
+
+def _signed_power(x: PerThruster, power: PerThruster) -> PerThruster:
+    """|x|^(p-1) x, whose slope at 0 is that of its neighbours: 1 where p is 1."""
+    size = jnp.abs(x)
+    return x * jnp.where(size > 0, size, _LEAST) ** (power - 1)

@@ -32,9 +32,14 @@ class WithMotor(Protocol):
     motor: DCMotor
     supply: PerThruster
     dead_zone: PerThruster
+    dead_zone_kind: str
 
     def terminal(self, voltage: PerThruster) -> PerThruster:
         """Voltage that turns the motor."""
+        ...
+
+    def commanded(self, terminal: PerThruster) -> PerThruster:
+        """`terminal` solved."""
         ...
 
 
@@ -73,7 +78,9 @@ class MotorDrive(AbstractDrive):
         motor = self.thruster.motor
         resisted = motor.steady_voltage(state.speed)
         limited = jnp.isfinite(self.thruster.supply)
-        volts = jnp.where(limited, self.thruster.supply, 0.0)  # so that what is unlimited has gradients, too
+        volts = self.thruster.terminal(
+            jnp.where(limited, self.thruster.supply, 0.0)
+        )  # so that what is unlimited has gradients, too
         low, high = (state.speed + (side * volts - resisted) / (motor.k1 * rate) for side in (-1, 1))
         return jnp.where(limited, motor.thrust(low), -jnp.inf), jnp.where(limited, motor.thrust(high), jnp.inf)
 
@@ -85,7 +92,7 @@ class MotorDrive(AbstractDrive):
         pull = motor.rotor_inertia * rate * (motor.speed_at(force) - state.speed)
         wanted = motor.steady_current(state.speed) + pull / motor.torque_constant
         held = motor.resistance * wanted + motor.back_emf_constant * state.speed
-        return held + self._boost(rate) * (wanted - state.current)
+        return self.thruster.commanded(held + self._boost(rate) * (wanted - state.current))
 
     def aim(self, state: MotorState, u, rate) -> PerThruster:
         motor, boost = self.thruster.motor, self._boost(rate)
@@ -105,8 +112,8 @@ class MotorDrive(AbstractDrive):
         return MotorState(speed, settled + (state.current - settled) * jnp.exp(-fading))
 
     def steady(self) -> SteadyDrive:
-        thruster = self.thruster
-        return SteadyDrive(StaticThruster(motor=thruster.motor, supply=thruster.supply, dead_zone=thruster.dead_zone))
+        names = ("motor", "supply", "dead_zone", "dead_zone_kind")
+        return SteadyDrive(StaticThruster(**{name: getattr(self.thruster, name) for name in names}))
 
     def _boost(self, rate) -> PerThruster:
         """By itself the current comes at R / L; where that is too slow, more voltage makes it faster, ohm."""

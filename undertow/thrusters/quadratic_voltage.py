@@ -11,6 +11,7 @@ def quadratic_voltage(
     linear_gain: float = 10.9,
     supply: float = math.inf,
     dead_zone: float = 0.0,
+    dead_zone_kind: str = "pass",
 ) -> MemorylessThruster:
     """T = c_V V|V|, I = c_I T. Defaults go through the steady state of the paper's motor at 10 V.
 
@@ -20,5 +21,7 @@ def quadratic_voltage(
         linear_gain: alpha that the controller's model assumes, N/V.
         supply: voltage limit, V.
         dead_zone: voltage below which nothing turns, V.
+        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
     """
-    return MemorylessThruster(thrust_per_volt_squared, 2.0, current_per_thrust, linear_gain, supply, dead_zone)
+    known = (thrust_per_volt_squared, 2.0, current_per_thrust, linear_gain)
+    return MemorylessThruster(*known, supply, dead_zone, dead_zone_kind)

@@ -25,6 +25,7 @@ class ShaftThruster(AbstractThruster):
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
     dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
     def initial_state(self, count) -> ShaftState:

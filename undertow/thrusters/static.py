@@ -17,6 +17,7 @@ class StaticThruster(AbstractThruster):
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
     dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 
     def initial_state(self, count):
@@ -55,7 +56,7 @@ class StaticThruster(AbstractThruster):
 
     def voltage_for(self, thrust: PerThruster) -> PerThruster:
         """V, V, that gives a thrust in N."""
-        return self.motor.steady_voltage(self.motor.speed_at(thrust))
+        return self.commanded(self.motor.steady_voltage(self.motor.speed_at(thrust)))
 
     def drive(self, count: int, measured: bool) -> SteadyDrive:
         return SteadyDrive(self)

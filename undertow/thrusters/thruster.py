@@ -7,9 +7,13 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.core import checks
 from undertow.core.drive import AbstractDrive, DirectDrive
 
 PerThruster = Float[Array, " N"]
+
+# What is left of a voltage outside the dead zone: the whole of it, or what is beyond the zone.
+DEAD_ZONES = ("pass", "subtract")
 
 
 class PropellerReport(NamedTuple):
@@ -34,8 +38,14 @@ class AbstractThruster(eqx.Module):
 
     supply: eqx.AbstractVar[Float[Array, ""]]  # V; the drive can give -supply ... supply
     dead_zone: eqx.AbstractVar[Float[Array, ""]]  # V; smaller voltages turn nothing
+    dead_zone_kind = "pass"  # one of DEAD_ZONES; a field where a thruster offers both
+    input_unit = "V"  # of what it is commanded with; where this is not V, read every voltage below in that unit
     # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, rungs `ideal` and `static`.
     has_prescribed_acceleration: eqx.AbstractVar[bool]
+
+    def __check_init__(self):
+        checks.not_negative("dead_zone", self.dead_zone, self.input_unit)
+        checks.choice("dead_zone_kind", self.dead_zone_kind, DEAD_ZONES)
 
     @abc.abstractmethod
     def initial_state(self, count: int) -> Any:
@@ -80,12 +90,37 @@ class AbstractThruster(eqx.Module):
             count: N.
             measured: whether propeller speeds are reported.
         """
-        return DirectDrive(self.voltage_gain(), -self.supply, self.supply, at_once=False)
+        return DirectDrive(self.voltage_gain(), *self.limits(), at_once=False)
 
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:
         """What is odd about this thruster."""
 
+    def limits(self) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+        """Smallest and largest command that the drive can carry out, V."""
+        return -self.supply, self.supply
+
+    def electrical_power(self, state: Any, voltage: PerThruster) -> PerThruster:
+        """Electrical power, W: no voltage, no power, though a spinning motor may carry a current."""
+        return self.terminal(voltage) * self.current(state, voltage)
+
     def terminal(self, voltage: PerThruster) -> PerThruster:
-        """Voltage that turns the motor: zero inside the dead zone."""
-        return jnp.where(jnp.abs(voltage) > self.dead_zone, voltage, 0.0)
+        """Voltage, V, that turns the motor: zero inside the dead zone; what is not a number stays so.
+
+        Outside, it is the whole voltage (`pass`), or |V| less the dead zone with the sign of V (`subtract`); the drive
+        loses no power with what it subtracts.
+        """
+        size = jnp.abs(voltage)
+        inside = (size <= self.dead_zone) & (self.dead_zone > 0)  # without a zone, 0 V has the slope of its neighbours
+        if self.dead_zone_kind == "subtract":
+            return jnp.where(inside, 0.0, voltage - jnp.sign(voltage) * self.dead_zone)
+        return jnp.where(inside, 0.0, voltage)
+
+    def commanded(self, terminal: PerThruster) -> PerThruster:
+        """Command, V, for a voltage that is to turn the motor: `terminal` solved.
+
+        A voltage that `pass` cannot give, since it is inside the dead zone, is returned as it is, and turns nothing.
+        """
+        if self.dead_zone_kind == "subtract":
+            return terminal + jnp.sign(terminal) * self.dead_zone
+        return terminal

@@ -33,6 +33,7 @@ class Propellers:
         self._thrust_coefficients = np.asarray(motor.thrust_coefficient), np.asarray(motor.reverse_thrust_coefficient)
         self._torque_coefficients = np.asarray(motor.torque_coefficient), np.asarray(motor.reverse_torque_coefficient)
         self._supply, self._dead_zone = float(thruster.supply), float(thruster.dead_zone)
+        self._lost = self._dead_zone if thruster.dead_zone_kind == "subtract" else 0.0
         self._turns_at_once = isinstance(thruster, StaticThruster)
         self.speed = np.zeros(count)
 
@@ -50,7 +51,8 @@ class Propellers:
         Returns:
             Thrust (N) at the ends of `samples` equal parts of dt, shape (samples + 1, N).
         """
-        terminal = np.where(np.abs(voltage) > self._dead_zone, voltage, 0.0)
+        outside = voltage - self._lost * np.sign(voltage)
+        terminal = np.where(np.abs(voltage) <= self._dead_zone, 0.0, outside)
         if self._turns_at_once:
             self.speed = self._steady(terminal)
             return np.tile(self.thrust(), (samples + 1, 1))

@@ -1,0 +1,204 @@
+"""The dead zone of a thruster: outside it the whole voltage turns the motor (`pass`), or what is beyond (`subtract`)."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.analysis.metrics import Metrics, results
+from undertow.controllers import pid, rcaf
+from undertow.core.errors import BadInput
+from undertow.disturbances import sinusoid
+from undertow.lanes.program import Program
+from undertow.loop import in_lanes, sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.numerics.integrators import rk4
+from undertow.plants import hybrid_vehicle
+from undertow.references import setpoint
+from undertow.sensors import perfect
+from undertow.thrusters import first_order, linear_voltage, paper_table3, quadratic_voltage, t200, t500
+from undertow.vehicles import bluerov2_heavy
+
+ZONE, SUPPLY = 1.5, 12.0  # V
+KINDS = ("pass", "subtract")
+MAKERS = {
+    **{rung: lambda rung=rung, **zone: paper_table3(rung, **zone) for rung in ("ideal", "static")},
+    **{rung: lambda rung=rung, **zone: paper_table3(rung, **zone) for rung in ("shaft", "electromechanical")},
+    "linear": linear_voltage,
+    "quadratic": quadratic_voltage,
+    "first_order": lambda **zone: first_order(reverse_share=0.6, **zone),
+    "t200": t200,
+    "t500": t500,
+}
+VOLTS = np.array([-12.0, -4.0, -1.6, -1.5, -0.7, 0.0, 0.7, 1.5, 1.6, 4.0, 12.0])
+TURNS = {
+    "pass": np.array([-12.0, -4.0, -1.6, 0.0, 0.0, 0.0, 0.0, 0.0, 1.6, 4.0, 12.0]),
+    "subtract": np.array([-10.5, -2.5, -0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1, 2.5, 10.5]),
+}
+
+
+def with_zone(name, kind, zone=ZONE):
+    return MAKERS[name](supply=SUPPLY, dead_zone=zone, dead_zone_kind=kind)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", MAKERS)
+def test_what_turns_the_motor(name, kind):
+    """It behaves as the same thruster without a dead zone at another voltage."""
+    thruster, free = with_zone(name, kind), with_zone(name, kind, zone=0.0)
+    np.testing.assert_allclose(thruster.terminal(VOLTS), TURNS[kind], rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(free.terminal(VOLTS), VOLTS)
+    state = jax.tree.map(lambda leaf: leaf + jnp.linspace(-3.0, 4.0, leaf.size), thruster.initial_state(11))
+    for found, expected in (
+        (thruster.dynamics(state, VOLTS), free.dynamics(state, TURNS[kind])),
+        (thruster.thrust(state, VOLTS), free.thrust(state, TURNS[kind])),
+        (thruster.electrical_power(state, VOLTS), free.electrical_power(state, TURNS[kind])),
+    ):
+        jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-13, atol=1e-13), found, expected)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_voltage_that_is_not_a_number_does_not_become_zero_volts(kind):
+    """Neither by XLA nor in the batch compiler."""
+    thruster, volts = with_zone("static", kind), np.array([[np.nan], [0.3], [-6.0]])
+    by_xla = np.asarray(eqx.filter_jit(thruster.terminal)(volts))
+    one, nothing = jnp.zeros(1), np.zeros(())
+    program = Program(
+        lambda numbers: numbers,
+        lambda numbers: nothing,
+        lambda numbers, carry, k: carry,
+        lambda numbers, carry, k: thruster.terminal(numbers[0]),
+        (one,),
+        [False],
+        0,
+    )
+    _, batched = program.run((volts,), ticks=1, every=1)
+    for found in (by_xla, np.asarray(batched)[:, 0]):
+        assert np.isnan(found[0, 0])
+        np.testing.assert_allclose(found[1:, 0], [0.0, -6.0 if kind == "pass" else -4.5], rtol=1e-15)
+    assert np.isnan(thruster.thrust((), jnp.array([jnp.nan]))).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_slope_and_precision(kind):
+    """Slope 1 outside and 0 inside; float32 stays float32."""
+    terminal = with_zone("static", kind).terminal
+    slopes = jax.vmap(jax.grad(terminal))(jnp.array([-4.0, -1.0, 1.0, 4.0]))
+    np.testing.assert_array_equal(slopes, [1.0, 0.0, 0.0, 1.0])
+    with jax.enable_x64(False):
+        found = with_zone("static", kind).terminal(jnp.asarray(VOLTS))
+    assert found.dtype == jnp.float32
+    np.testing.assert_allclose(found, TURNS[kind], rtol=0, atol=2e-7)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", ["ideal", "static", "linear", "quadratic"])
+def test_without_a_zone_no_thruster_loses_its_slope_at_zero_volts(name, kind):
+    """A loop at rest is linearised there: thrust per volt, and volts per newton, as on both sides of it."""
+    thruster = with_zone(name, kind, zone=0.0)
+    slopes = jax.vmap(jax.grad(lambda volts: thruster.thrust((), volts)))(jnp.array([-1e-9, 0.0, 1e-9]))
+    np.testing.assert_allclose(slopes[1], slopes[2], rtol=1e-6, atol=1e-7)
+    if name in ("ideal", "linear"):
+        np.testing.assert_allclose(slopes, thruster.voltage_gain(), rtol=1e-9)
+        back = jax.vmap(jax.grad(thruster.voltage_for))(jnp.array([-1e-9, 0.0, 1e-9]))
+        np.testing.assert_allclose(back * slopes, 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ideal", "static", "linear", "quadratic", "first_order"])
+def test_voltage_for_a_thrust(name):
+    """The curve of a drive and its inverse; `pass` cannot give the thrusts whose voltage is inside the zone."""
+    newtons = np.array([-30.0, -8.0, -0.01, 0.0, 0.01, 8.0, 30.0])
+    for kind in KINDS:
+        drive = with_zone(name, kind).drive(7, False)
+        volts = np.asarray(drive.command((), newtons, 1.0))
+        found = np.asarray(drive.force((), volts))
+        lost = np.abs(volts) <= ZONE
+        np.testing.assert_array_equal(lost[2:5], [kind == "pass", True, kind == "pass"])
+        np.testing.assert_allclose(found[~lost], newtons[~lost], rtol=1e-9)
+        np.testing.assert_array_equal(found[lost], 0.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", ["shaft", "electromechanical", "t200"])
+def test_drive_of_a_motor(name, kind):
+    """Its command aims where it was told to; its prediction turns as the true motor; its range ends at the supply."""
+    thruster, rate = with_zone(name, kind), 40.0
+    drive = thruster.drive(4, False)
+    state = jax.tree.map(lambda leaf: jnp.asarray([20.0, -30.0, 5.0, 0.5]), drive.init())
+    wanted = jnp.asarray([9.0, -7.0, 15.0, -4.0])
+    volts = drive.command(state, wanted, rate)
+    heard = np.abs(volts) > ZONE
+    assert heard.sum() >= (3 if kind == "pass" else 4)
+    np.testing.assert_allclose(drive.aim(state, volts, rate)[heard], wanted[heard], rtol=1e-9)
+    resting = drive.init()
+    for limit, side in zip(drive.range(resting, 10.0), (-1.0, 1.0), strict=True):
+        expected = thruster.motor.thrust(
+            side * (SUPPLY - (ZONE if kind == "subtract" else 0.0)) / thruster.motor.k1 / 10
+        )
+        np.testing.assert_allclose(limit, np.full(4, expected), rtol=1e-12)
+    assert drive.steady().thruster.dead_zone_kind == kind
+
+    if name == "shaft":
+        return  # the drive knows of the inductance that this fidelity leaves out
+    truth, belief, dt, fine = thruster.initial_state(4), resting, 2e-3, 400
+    volts = jnp.asarray([1.0, -2.0, 4.0, -9.0])
+    turn = jax.jit(lambda y: jax.lax.fori_loop(
+        0, fine, lambda _, s: rk4(lambda t, x: thruster.dynamics(x, volts), 0.0, s, dt / fine), y
+    ))  # fmt: skip
+    for _ in range(25):
+        truth, belief = turn(truth), drive.advance(belief, volts, dt)
+    assert truth.speed[0] == belief.speed[0] == 0.0
+    np.testing.assert_allclose(belief.speed[1:], truth.speed[1:], rtol=0.03)
+
+
+def station(kind, law, **loads):
+    """The Heavy, held where it is for 6 s."""
+    plant = hybrid_vehicle(bluerov2_heavy(), t200(dead_zone_kind=kind))
+    return ClosedLoop(plant, law(plant.model()), setpoint([0.0] * 6), sinusoid(0.3, 1.0, **loads), perfect())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_energy_is_accounted_for(kind):
+    """What the drives take goes into copper, water and rotors, to the error of the integrator."""
+    law = lambda model: rcaf(model, preset="robust", sampling_time=0.02)
+    run = sampled.simulate(station(kind, law, offset=0.2), duration=2.0, dt=0.02, record_every=10, substeps=8)
+    found = {name: np.asarray(values) for name, values in run.samples.books.items() if name.startswith("energy_")}
+    assert found["energy_source"][-1] > 5.0
+    assert np.abs(found["energy_defect"]).max() < 1e-3 * found["energy_source"][-1]
+
+
+@pytest.mark.parametrize("make", [t200, t500], ids=["t200", "t500"])
+def test_a_law_that_knows_the_zone_loses_nothing_to_it(make):
+    """Small forces: `subtract` gives them all, as its inverse adds the zone; `pass` none below its own."""
+    newtons = jnp.linspace(-0.2, 0.2, 21)
+    for kind, least in (("subtract", 0.0), ("pass", None)):
+        drive = make(dead_zone_kind=kind).drive(21, False).steady()
+        given = np.asarray(drive.force((), drive.command((), newtons, 1.0)))
+        if least is None:
+            np.testing.assert_array_equal(given, 0.0)
+        else:
+            np.testing.assert_allclose(given, newtons, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("law", [pytest.param(rcaf, marks=pytest.mark.slow), pid], ids=["robust", "pid"])
+def test_batches_and_xla_agree_where_the_zone_subtracts(law):
+    options = {"preset": "robust"} if law is rcaf else {}
+    loop = station("subtract", lambda model: law(model, sampling_time=0.02, **options))
+    how = dict(duration=0.6, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 0.6),))
+    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
+    for name in ("position", "voltage", "power"):
+        here, there = getattr(found.samples, name), np.asarray(getattr(wanted.samples, name))
+        np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max(), err_msg=name)
+    assert np.abs(wanted.samples.voltage[np.abs(wanted.samples.voltage) > 0]).min() > 1.2, "the zone is added"
+    assert results(found.accumulated[0])["voltage_rms"] > 1.2
+
+
+def test_what_cannot_be():
+    with pytest.raises(BadInput, match="`dead_zone_kind` must be one of pass, subtract, but is substract"):
+        t200(dead_zone_kind="substract")
+    for make in (linear_voltage, first_order, paper_table3):
+        with pytest.raises(BadInput, match="`dead_zone_kind` must be one of pass, subtract"):
+            make(dead_zone_kind="none")
+        with pytest.raises(BadInput, match="`dead_zone` must be zero or positive, but is -1 V"):
+            make(dead_zone=-1.0)

@@ -1,0 +1,111 @@
+"""A thruster that takes its command in newtons: thrust within limits of its own each way, behind a first-order lag."""
+
+import math
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.drive import DirectDrive, LaggedDrive
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.thrusters.first_order import LaggedThrust
+from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.thruster import PerThruster
+
+
+class CommandedThrust(AbstractMotorlessThruster):
+    """tau T_dot = T_c - T with T_c the command within its limits, and |T_dot| limited; nothing is known of a motor.
+
+    Raises:
+        BadInput: a limit or the time constant is not positive, or the power negative.
+    """
+
+    thrust_forward_max: Float[Array, ""] = param("N", "largest thrust forward", symbol="T+")
+    thrust_reverse_max: Float[Array, ""] = param("N", "largest thrust in reverse, as a positive number", symbol="T-")
+    time_constant: Float[Array, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
+    thrust_rate_max: Float[Array, ""] = param("N/s", "fastest change of thrust", default=jnp.inf)
+    power_per_thrust: Float[Array, ""] = param("W/N", "electrical power per thrust asked for", default=0.0)
+    has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
+    input_unit = "N"
+
+    def __check_init__(self):
+        for name in ("thrust_forward_max", "thrust_reverse_max"):
+            checks.positive(name, getattr(self, name), "N", finite=False)
+        checks.positive("time_constant", self.time_constant, "s")
+        checks.positive("thrust_rate_max", self.thrust_rate_max, "N/s", finite=False)
+        checks.not_negative("power_per_thrust", self.power_per_thrust, "W/N")
+
+    @property
+    def supply(self):  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Largest command either way, N."""
+        return jnp.maximum(self.thrust_forward_max, self.thrust_reverse_max)
+
+    @property
+    def dead_zone(self):  # pyright: ignore[reportIncompatibleVariableOverride]
+        """None, N."""
+        return jnp.zeros(())
+
+    @property
+    def linear_gain(self):  # pyright: ignore[reportIncompatibleVariableOverride]
+        """N per N."""
+        return jnp.ones(())
+
+    def limits(self):
+        return -self.thrust_reverse_max, self.thrust_forward_max
+
+    def terminal(self, voltage) -> PerThruster:
+        """The command, N, as it is."""
+        return voltage
+
+    def initial_state(self, count) -> LaggedThrust:
+        return LaggedThrust(jnp.zeros(count))
+
+    def dynamics(self, state, voltage) -> LaggedThrust:
+        rate = (voltage - state.thrust) / self.time_constant
+        return LaggedThrust(jnp.clip(rate, -self.thrust_rate_max, self.thrust_rate_max))
+
+    def thrust(self, state, voltage) -> PerThruster:
+        return state.thrust
+
+    def current(self, state, voltage) -> PerThruster:
+        """Zero: what is commanded in newtons has no voltage, so only its `electrical_power` means something."""
+        return jnp.zeros_like(state.thrust)
+
+    def electrical_power(self, state, voltage) -> PerThruster:
+        return self.power_per_thrust * jnp.abs(voltage)
+
+    def speed_term(self, report):
+        hint = "It takes newtons, whatever turns inside. Leave its lag to the estimator"
+        raise BadInput("speed_sensor", "be false with thruster commanded_thrust", "true", hint=hint)
+
+    def drive(self, count: int, measured: bool) -> LaggedDrive:
+        return LaggedDrive(DirectDrive(self.linear_gain, *self.limits()), self.time_constant, count)
+
+    def advice(self):
+        if float(jnp.max(self.power_per_thrust)) > 0:
+            return ()
+        return ("the power of this thruster is not known: its energy counts as 0. Give `power_per_thrust`.",)
+
+
+def commanded_thrust(
+    thrust_forward_max: float = 51.4,
+    thrust_reverse_max: float = 39.9,
+    time_constant: float = 0.1,
+    thrust_rate_max: float = math.inf,
+    power_per_thrust: float = 7.6,
+) -> CommandedThrust:
+    """Thrust commanded in newtons, with limits of its own each way and a first-order lag: as autopilots command it.
+
+    Default limits and power are those of the T200 at 16 V in the manufacturer's table: 51.4 N and -39.9 N, 389 W
+    forward. The time constant is a guess, as that of `first_order`.
+
+    Args:
+        thrust_forward_max: largest thrust forward, N.
+        thrust_reverse_max: largest thrust in reverse, N; a positive number.
+        time_constant: from a step of the command to 63 % of its thrust, s.
+        thrust_rate_max: fastest change of thrust, N/s; infinite by default.
+        power_per_thrust: electrical power per newton asked for, either way, W/N; 0 for not known.
+    """
+    return CommandedThrust(thrust_forward_max, thrust_reverse_max, time_constant, thrust_rate_max, power_per_thrust)
