@@ -27,12 +27,12 @@ ONE_TO_FOUR = commanded_thrust(FORWARD, REVERSE, time_constant=0.1)
 LAWS = {"robust": lambda model, **how: rcaf(model, preset="robust", **how), "pid": pid}
 
 
-def settle(thruster, command, duration, dt=1e-3):
-    """State a time after a command, from rest."""
+def settle(thruster, command, duration, start=None, dt=1e-3):
+    """State a time after a command, from rest or from where it starts."""
     command = jnp.asarray(command)
     step = lambda _, state: rk4(lambda t, x: thruster.dynamics(x, command), 0.0, state, dt)
     return jax.jit(lambda state: jax.lax.fori_loop(0, round(duration / dt), step, state))(
-        thruster.initial_state(command.size)
+        thruster.initial_state(command.size) if start is None else start
     )
 
 
@@ -122,13 +122,30 @@ THRUSTERS = {
 def test_a_drive_knows_both_limits_and_the_steady_curve(name):
     thruster, limits = THRUSTERS[name]
     drive = thruster.drive(3, False)
-    np.testing.assert_allclose(drive.range((), 1.0), limits)
-    assert float(drive.lag(5.0)) == 0.1
+    still, natural = drive.init(), 10.0  # 1/s: no faster than by itself
+    np.testing.assert_allclose(drive.range(still, natural), np.repeat(np.array(limits)[:, None], 3, 1))
+    np.testing.assert_allclose(drive.range(still, 2 * natural), np.repeat(np.array(limits)[:, None], 3, 1) / 2)
+    assert float(drive.time_constant()) == 0.1
     newtons = np.array([-5.0, 0.5, 11.0])
-    commands = drive.command((), newtons, 5.0)
+    commands = drive.command(still, newtons, natural)
     np.testing.assert_allclose(settle(thruster, commands, 3.0).thrust, newtons, rtol=1e-9)
-    np.testing.assert_allclose(drive.force((), commands), newtons, rtol=1e-12)
-    np.testing.assert_allclose(drive.aim((), commands, 5.0), newtons, rtol=1e-12)
+    np.testing.assert_allclose(drive.steady().force((), commands), newtons, rtol=1e-12)
+    np.testing.assert_allclose(drive.aim(still, commands, natural), newtons, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", THRUSTERS)
+def test_a_drive_predicts_the_thrust_behind_its_lag(name):
+    """Step by step with the thruster itself; made to follow faster than by itself, it does: exp(-rate t)."""
+    thruster, _ = THRUSTERS[name]
+    drive, rate, dt = thruster.drive(3, False), 30.0, 0.01
+    wanted, believed, true = jnp.array([-1.0, 0.5, 3.0]), drive.init(), thruster.initial_state(3)
+    for k in range(1, 20):
+        volts = drive.command(believed, wanted, rate)
+        believed, true = drive.advance(believed, volts, dt), settle(thruster, volts, dt, true)
+        np.testing.assert_allclose(drive.force(believed, volts), true.thrust, rtol=1e-6)
+        # Held over dt the command does in each step what exp(-dt / tau) leaves of it.
+        left = (1 - rate * 0.1 * -np.expm1(-dt / 0.1)) ** k
+        np.testing.assert_allclose(true.thrust, wanted * (1 - left), rtol=1e-6)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -139,6 +156,8 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
     plant = hybrid_vehicle(bluerov2_heavy(), thruster)
     controller = LAWS[law](plant.model(), sampling_time=0.02, direction=1e6)
     own, rng, shares = controller.model, np.random.default_rng(5), []
+    # What makes thrusters follow faster than by themselves is taken from the same limits.
+    lead = 0.1 * float(controller.actuator_rate) if law == "robust" else 1.0
 
     @eqx.filter_jit
     def decide(position):
@@ -152,7 +171,7 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
     for _ in range(6):
         position = jnp.asarray(rng.normal(size=6) * [3.0, 3.0, 3.0, 0.3, 0.3, 0.6])
         u, share, forces, effect = decide(position)
-        given = thruster.drive(8, False).force((), u)
+        given = thruster.drive(8, False).steady().force((), u)
         assert float(jnp.min(given)) >= low - 1e-9 and float(jnp.max(given)) <= high + 1e-9
         wanted = np.asarray(effect @ forces)
         # max s with effect f = s a, low <= f <= high, 0 <= s <= 1
@@ -160,7 +179,7 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
             np.r_[np.zeros(8), -1.0],
             A_eq=np.c_[np.asarray(effect), -wanted],
             b_eq=np.zeros(6),
-            bounds=[(low, high)] * 8 + [(0.0, 1.0)],
+            bounds=[(low / lead, high / lead)] * 8 + [(0.0, 1.0)],
         )
         np.testing.assert_allclose(share, -found.fun, rtol=2e-3)
         shares.append(float(share))

@@ -110,7 +110,7 @@ def test_voltage_for_a_thrust(name):
     """The curve of a drive and its inverse; `pass` cannot give the thrusts whose voltage is inside the zone."""
     newtons = np.array([-30.0, -8.0, -0.01, 0.0, 0.01, 8.0, 30.0])
     for kind in KINDS:
-        drive = with_zone(name, kind).drive(7, False)
+        drive = with_zone(name, kind).drive(7, False).steady()
         volts = np.asarray(drive.command((), newtons, 1.0))
         found = np.asarray(drive.force((), volts))
         lost = np.abs(volts) <= ZONE

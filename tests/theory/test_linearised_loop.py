@@ -195,3 +195,29 @@ def test_runs_do_what_was_foretold(name):
     for one in compare(metrics, run.steady):
         if one.measured > 1e-6 and not one.name.endswith(("max", "peak")):
             assert one.departure < 0.10, one
+
+
+@pytest.mark.parametrize(("sets", "said"), [(5, "weights that move apart may change that"), (1, "")])
+def test_what_is_said_of_moving_weights(sets, said):
+    """Table 1 on `shaft`: five sets last 2,000 s where one does not, and both have these poles at fixed weights."""
+    _, why_not = foretold(ground(build(_odin("shaft", {"sets": sets}))))
+    assert why_not.startswith("the loop linearised at fixed weights is unstable") and said in why_not
+    assert ("only a run tells" in why_not) == (sets > 1)
+
+
+@pytest.mark.parametrize("bound", [None, 20.0])
+def test_no_figure_is_predicted_that_the_law_forbids(bound):
+    """W1: the linear model's robust term passes 10 m/s^2, which tanh cannot."""
+    choices = {"composite": 20} | ({} if bound is None else {"weights_bound": bound})
+    metrics, why_not = foretold(ground(build(_odin("electromechanical", choices))))
+    assert metrics is None and "asks for a robust term of" in why_not and "bounds to 10" in why_not
+
+
+def _odin(fidelity, choices):
+    return {
+        "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "rung": fidelity}},
+        "controller": {"kind": "rcaf", **choices},
+        "reference": {"kind": "setpoint", "position": [2, 3, 4, 1.0472, 0.7854, 1.2566]},
+        "disturbance": "u1",
+        "loop": {"duration": 20, "dt": 1e-3, "record": 1e-2},
+    }

@@ -44,7 +44,7 @@ def test_estimator_poles_are_those_of_continuous_time(damping, dt):
 def test_one_step_moves_the_estimate_by_a_given_amount_whatever_the_sets():
     moved = []
     for sets in (1, 3, 7):
-        estimator = Estimator(gaussian_sets(sets), bandwidth=30.0)
+        estimator = Estimator(gaussian_sets(sets), bandwidth=30.0, leakage=0.0)
         state = estimator.init(jnp.array([0.2]))
         seen = estimator.look(state, jnp.zeros(1))
         after = estimator.advance(state, seen, jnp.zeros(1), jnp.zeros(1), 1e-3)

@@ -38,7 +38,7 @@ def _points(prediction: Prediction) -> Rows:
         "Poles over the operating range",
         ("of loads smaller", "input used", "rightmost pole, 1/s", "spectral radius", "verdict"),
         rows,
-        "The whole loop, linearised exactly where it rests under loads that act along the reference.",
+        "The whole loop, linearised exactly where it rests under loads along the reference; fuzzy weights held.",
     )
 
 

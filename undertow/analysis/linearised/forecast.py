@@ -29,10 +29,10 @@ class Comparison(NamedTuple):
         return abs(self.measured - self.predicted) / self.predicted if self.predicted else float("inf")
 
 
-def forecast(
+def signals_within(
     at: Rest, loop: LinearLoop, around: Surroundings, window: tuple[float, float], every: int = 1
-) -> dict[str, float]:
-    """Metrics over a window (s), by the names of results files.
+) -> dict[str, np.ndarray]:
+    """Predicted signals at the records of a window, arrays (records, entries) by name.
 
     Args:
         at: the loop at rest under the mean load of the window.
@@ -53,6 +53,11 @@ def forecast(
         direct = np.hstack([_direct(loop, name, way) for way in _ENTRIES])
         departure = states @ small.signals[name].T + driven @ direct.T
         signals[name] = (at.local.values[name] + departure)[inside]
+    return signals
+
+
+def metrics_of(signals: dict[str, np.ndarray]) -> dict[str, float]:
+    """Metrics of predicted signals, by the names of results files."""
     rms = lambda values: float(np.sqrt((values**2).mean()))
     return {
         "tracking_rms": rms(signals["error"]),

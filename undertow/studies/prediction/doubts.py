@@ -3,6 +3,7 @@
 import numpy as np
 
 from undertow.controllers.law import RCAF
+from undertow.studies.prediction.grounding import has_weights
 from undertow.studies.prediction.predict import Prediction
 
 # An estimator faster than this share of the sampling rate is at the mercy of sampling.
@@ -28,9 +29,14 @@ def _stability(prediction: Prediction) -> tuple[str, ...]:
     worst = max(unstable, key=lambda point: point.radius)
     pole = worst.poles[0]
     turning = f" at {abs(pole.imag):.3g} rad/s" if pole.imag else ""
+    moving = (
+        " This is at fixed weights: weights that move apart add damping, so that a run may last or not. Run it"
+        if has_weights(prediction.ground.built)
+        else ""
+    )
     return (
         f"the loop is unstable at {len(unstable)} of {len(prediction.points)} operating points: rightmost pole "
-        f"{pole.real:+.3g} 1/s{turning}. Take preset: robust, or a slower estimator",
+        f"{pole.real:+.3g} 1/s{turning}. Take preset: robust, or a slower estimator.{moving}".rstrip("."),
     )
 
 
@@ -70,8 +76,8 @@ def _noise(prediction: Prediction) -> tuple[str, ...]:
     axes = prediction.ground.around.load.shape[1]
     present = float(prediction.ground.around.noise[:, axes:].std(axis=0).max())
     largest = prediction.noise.largest
-    if present <= largest:
-        return ()
+    if not present > largest or any(point.radius >= 1 for point in prediction.points):
+        return ()  # an unstable loop has no stationary noise
     return (
         f"measured velocities are off by {present:.2g} m/s or rad/s (standard deviation); white noise of more than "
         f"{largest:.2g} fills the input by itself",
@@ -83,4 +89,6 @@ def _drift(prediction: Prediction) -> tuple[str, ...]:
         return ()
     added, breaks = prediction.drift
     bound = "nothing bounds the weights" if np.isinf(added) else f"weights in their box may add {added:.3g} 1/s"
-    return (f"{bound}, and noise drives them until {breaks:.3g} 1/s break the loop: set weights_bound, or sets: 1",)
+    return (
+        f"{bound}, and noise or a lasting load drives them until {breaks:.3g} 1/s break the loop: set weights_bound",
+    )

@@ -1,6 +1,6 @@
 """Where a scenario's loop rests under its mean load, and the metrics of its run foretold from there."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -8,11 +8,15 @@ from jax.flatten_util import ravel_pytree
 
 from undertow.analysis.linearised import margins
 from undertow.analysis.linearised.closing import LinearLoop
-from undertow.analysis.linearised.forecast import forecast, from_start
+from undertow.analysis.linearised.forecast import from_start, metrics_of, signals_within
 from undertow.analysis.linearised.rest import Rest, rest
 from undertow.analysis.linearised.surroundings import Surroundings, surroundings
+from undertow.controllers.law import RCAF
+from undertow.controllers.robust.law import RobustRCAF
+from undertow.core.contracts import AbstractController
 from undertow.scenario.build import Built
 
+_HELD = "at fixed weights"
 _MOST_TICKS = 200_000  # that are foretold one by one
 
 
@@ -47,12 +51,40 @@ def foretold(known: Ground) -> tuple[dict[str, float] | None, str]:
         return None, f"no input holds the mean load: something still moves at {known.mean.moving:.2g} per second"
     if known.radius >= 1:
         pole = margins.poles(known.linear)[0]
-        return None, f"the linearised loop is unstable: rightmost pole {pole.real:+.3g} {_turning(pole)}1/s"
+        moving = "; weights that move apart may change that, which only a run tells" if has_weights(known.built) else ""
+        return (
+            None,
+            f"the loop linearised {_HELD} is unstable: rightmost pole {pole.real:+.3g} {_turning(pole)}1/s{moving}",
+        )
     start, stop = known.built.window()
     settings = known.built.scenario.loop
     every = max(1, round(settings.record / settings.dt))
     begun = from_start(known.linear, known.mean, *_start(known))
-    return forecast(known.mean, begun, known.around, (start, stop), every), ""
+    signals = signals_within(known.mean, begun, known.around, (start, stop), every)
+    forbidden = _forbidden(known.built.closed_loop.controller, signals)
+    return (None, forbidden) if forbidden else (metrics_of(signals), "")
+
+
+def has_weights(built: Built) -> bool:
+    """Whether the law has several fuzzy weights per axis, of which a linearisation sees the present ones only."""
+    law = built.closed_loop.controller
+    return isinstance(law, RCAF) and law.fuzzy.rules > 1
+
+
+def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
+    """What of the predicted signals the law itself would not allow, in a sentence; empty where all is allowed."""
+    bounds: dict[str, tuple[str, Any]] = {}
+    if isinstance(law, RCAF | RobustRCAF):
+        weights = law.weights_bound if isinstance(law, RCAF) else law.estimator.bound
+        bounds = {"robust": ("robust term", law.robust_gain), "estimate": ("estimate", weights)}
+    for name, (meaning, bound) in bounds.items():
+        share = np.abs(signals[name]) / np.maximum(np.asarray(bound, dtype=float), 1e-300)
+        if share.max() > 1 and np.abs(signals[name]).max() > 0:
+            row, axis = np.unravel_index(share.argmax(), share.shape)
+            limit = np.broadcast_to(np.asarray(bound, dtype=float), share.shape[1:])[axis]
+            asked = f"the linear model asks for a {meaning} of {abs(signals[name][row, axis]):.3g}"
+            return f"{asked}, which the law bounds to {limit:.3g}: the loop does not stay where it is linear"
+    return ""
 
 
 def _start(known: Ground) -> list[np.ndarray]:

@@ -144,7 +144,7 @@ def _noise(known: Ground) -> Noise:
     of_input, of_estimate = (margins.noise_gain(sampled, name, one) / _NOISE for name in ("u", "estimate"))
     low, high = _limits(known.built, known.mean)
     room = np.minimum(high - known.mean.at["u"], known.mean.at["u"] - low)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         largest = float(np.maximum(room / (_DEVIATIONS * of_input), 0.0).min())
     return Noise(of_input, of_estimate, largest)
 
