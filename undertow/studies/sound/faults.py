@@ -109,7 +109,7 @@ def _slow_rate(n: Numbers) -> str:
         return ""
     return (
         f"Slow sampling of plain axes. At 100 Hz, velocities exact and no motor, Table 1 tracks to {paper:.2g} m; "
-        f"`robust` keeps room for two ticks of delay, and tracks to {sound:.2g} m (A8)."
+        f"`robust` keeps room for three sampling times of delay, and tracks to {sound:.2g} m (A8)."
     )
 
 
