@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from undertow.analysis.linearised.forecast import Comparison, compare
 from undertow.core.foreign import python_says
-from undertow.scenario.build import Built
+from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.execute import Executed
 from undertow.studies.prediction.grounding import foretold, ground
 
@@ -63,6 +63,7 @@ def in_results(foresight: Foresight | None) -> dict[str, Any]:
     return {"predicted": foresight.metrics} | ({"not_predicted": foresight.why_not} if foresight.why_not else {})
 
 
+@in_its_precision
 def _foresee(built: Built) -> Foresight:
     try:
         return Foresight(*foretold(ground(built)))

@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import Measurement
@@ -20,7 +21,7 @@ from undertow.numerics.rotations import (
     rotation_from_quaternion,
 )
 
-GRAVITY = jnp.array([0.0, 0.0, 9.81])  # m/s^2, world; what an accelerometer adds and the observer takes away again
+GRAVITY = np.array([0.0, 0.0, 9.81])  # m/s^2, world; what an accelerometer adds and the observer takes away again
 
 
 class Motion(NamedTuple):

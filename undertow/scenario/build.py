@@ -1,7 +1,8 @@
 """From a scenario to a closed loop ready to run."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -18,6 +19,22 @@ from undertow.scenario.schema import Part, Scenario, validate
 from undertow.scenario.stepping import step_advice
 from undertow.scenario.workshop import Workshop
 
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+def in_its_precision(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """A function of a scenario (its first argument, read or built) that computes in the precision it names."""
+
+    @functools.wraps(function)
+    def computed(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
+        given: Any = arguments[0]
+        scenario = given.scenario if isinstance(given, Built) else validate(given)
+        with runtime.in_precision(scenario.precision):
+            return function(*arguments, **options)
+
+    return computed
+
 
 class Built(NamedTuple):
     """A scenario turned into objects."""
@@ -26,6 +43,7 @@ class Built(NamedTuple):
     scenario: Scenario
     resolved: dict[str, Any]  # the scenario with every default filled in
 
+    @in_its_precision
     def advice(self) -> tuple[str, ...]:
         """What is odd about it, though it can be run."""
         (start, _), end = self.window(), self.scenario.loop.duration
@@ -49,14 +67,13 @@ def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) ->
     Raises:
         BadInput: anything wrong with it, with key path and place.
     """
-    with runtime.on_processor():
-        return _build(source if isinstance(source, Text) else from_data(source), workshop or Workshop())
-
-
-def _build(text: Text, workshop: Workshop) -> Built:
+    text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
-    if scenario.precision == "float32":
-        runtime.use_single_precision()
+    with runtime.on_processor(), runtime.in_precision(scenario.precision):
+        return _build(text, scenario, workshop or Workshop())
+
+
+def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
     resolved = scenario.model_dump(include={"description", "loop", "initial", "seed", "precision"})
 
     start, stop = scenario.steady.of_run(scenario.loop.duration)

@@ -17,7 +17,7 @@ from undertow.lanes.errors import Unsupported
 from undertow.loop import continuous, in_lanes, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
-from undertow.scenario.build import Built, build
+from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.labelling import label
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
@@ -48,6 +48,7 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
         return _execute(source if isinstance(source, Built) else build(source))
 
 
+@in_its_precision
 def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
     gathered = (Metrics(*built.window()),) if scenario.steady.every_tick else ()
