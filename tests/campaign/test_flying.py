@@ -1,6 +1,5 @@
 """Lanes: the same figures as one run at a time, whoever flies beside; failures stay where they are."""
 
-
 import jax
 import numpy as np
 import pytest

@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
@@ -76,7 +77,8 @@ class ClosedLoop(eqx.Module):
 
     def draw(self, key: PRNGKeyArray) -> "Drawn":
         """Draw everything random once."""
-        return Drawn(self, self.disturbance.draw(key), self.sensor.draw(jnp.flip(key)))
+        of_disturbance, of_sensor = jax.random.split(key)
+        return Drawn(self, self.disturbance.draw(of_disturbance), self.sensor.draw(of_sensor))
 
 
 class Drawn(NamedTuple):

@@ -14,6 +14,7 @@ from undertow.instruments.imu import IMU
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.propeller_speed import PropellerSpeed
 from undertow.instruments.sampling import Spoken
+from undertow.numerics.randomness import numbered
 
 # (m/s)^2 s; less counts as none.
 _NOISELESS = 1e-20
@@ -101,7 +102,7 @@ class Navigation(AbstractSensor):
 def _chances(keys, numbers, readings) -> list:
     """Standard normal numbers, one per entry of each reading and one more; drawn together, which compiles faster."""
     most = max(reading.size for reading in readings) + 1
-    draw = lambda key, number: jax.random.normal(jax.random.fold_in(key, number), (most,), dtype=readings[0].dtype)
+    draw = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
     together = jax.vmap(draw)(keys, numbers)
     return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]
 
