@@ -72,7 +72,7 @@ class Run:
 
     def __repr__(self) -> str:
         steady, whole = self.metrics["steady"], self.metrics["whole"] or {}
-        lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.status.sentence}"]
+        lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.outcome.sentence()}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
         for name, (_, unit) in MEANINGS.items():
             if name in whole:

@@ -25,6 +25,7 @@ MEANINGS = {
     "energy": Meaning("electrical energy drawn", "J"),
     "settling_time": Meaning("last time the position error is more than 2 % of its first value", "s"),
     "saturated_fraction": Meaning("share of thruster-seconds at a limit", ""),
+    "bad_readings": Meaning("readings until then that were no numbers; the law got what it expected instead", ""),
     "energy_books_share": Meaning("what the energy ledger leaves over, share of the energy drawn: rounding", ""),
     "energy_defect_share": Meaning("the same against the state itself: error of the integrator", ""),
     "rules": Meaning("fuzzy rules per axis", ""),

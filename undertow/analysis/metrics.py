@@ -37,6 +37,7 @@ class MetricsState(NamedTuple):
     energy: Scalar
     saturated: Scalar
     weights_peak: Scalar
+    bad_readings: Scalar
     step: PerAxis  # |error| at the first sample of the run
     settled_at: PerAxis
     previous: Any  # (t, voltage, power, inside) of the sample before
@@ -71,6 +72,7 @@ class Metrics(AbstractAccumulator):
             energy=zero,
             saturated=zero,
             weights_peak=zero,
+            bad_readings=zero,
             step=-jnp.ones_like(axes),
             settled_at=axes,
             previous=(zero, jnp.zeros_like(sample.voltage), zero, zero),
@@ -93,6 +95,7 @@ class Metrics(AbstractAccumulator):
             energy=state.energy + between * (t - last_t) * (power + last_power) / 2,
             saturated=state.saturated + inside * sample.saturated.mean(),
             weights_peak=jnp.maximum(state.weights_peak, inside * sample.weights_peak),
+            bad_readings=jnp.maximum(state.bad_readings, inside * sample.bad_readings.astype(inside.dtype)),
             step=step,
             settled_at=jnp.where(size > _SETTLED * step, t, state.settled_at),
             previous=(t, sample.voltage, power, inside),
@@ -123,6 +126,7 @@ _OVERALL: dict[str, Callable[[MetricsState, Any], Any]] = {
     "energy": lambda s, count: s.energy,
     "settling_time": lambda s, count: s.settled_at.max(-1),
     "saturated_fraction": lambda s, count: s.saturated / count,
+    "bad_readings": lambda s, count: s.bad_readings,
 }
 OVERALL = tuple(_OVERALL)
 

@@ -88,4 +88,4 @@ class AbstractThruster(eqx.Module):
 
     def terminal(self, voltage: PerThruster) -> PerThruster:
         """Voltage that turns the motor: zero inside the dead zone."""
-        return jnp.where(jnp.abs(voltage) > self.dead_zone, voltage, 0.0)
+        return jnp.where(jnp.abs(voltage) <= self.dead_zone, 0.0, voltage)  # what is no number stays none

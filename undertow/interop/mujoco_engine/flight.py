@@ -70,7 +70,7 @@ def fly(
         z = controller.init(y, r) if z is None else z
         volts, _ = command(z, y, r)
         applied = propellers.admissible(np.asarray(volts))
-        status = body.status() if np.isfinite(applied).all() else Status.NOT_FINITE
+        status = body.status() if np.isfinite(volts).all() else Status.COMMAND_NOT_FINITE
         if status != Status.OK:
             break
         rows.append((t, body.position(), body.velocity(), np.asarray(r.position), applied))

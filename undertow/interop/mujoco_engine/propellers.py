@@ -50,7 +50,7 @@ class Propellers:
         Returns:
             Thrust (N) at the ends of `samples` equal parts of dt, shape (samples + 1, N).
         """
-        terminal = np.where(np.abs(voltage) > self._dead_zone, voltage, 0.0)
+        terminal = np.where(np.abs(voltage) <= self._dead_zone, 0.0, voltage)
         if self._turns_at_once:
             self.speed = self._steady(terminal)
             return np.tile(self.thrust(), (samples + 1, 1))
