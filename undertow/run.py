@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from undertow.analysis.meanings import MEANINGS
+from undertow.analysis.meanings import MEANINGS, unit_of
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
@@ -74,10 +74,11 @@ class Run:
         steady, whole = self.metrics["steady"], self.metrics["whole"] or {}
         lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.outcome.sentence()}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
-        for name, (_, unit) in MEANINGS.items():
+        of_input = self.dataset["voltage"].attrs["units"]
+        for name in MEANINGS:
             if name in whole:
-                late = f"{steady[name]:.4g}" if steady else "-"
-                lines.append(f"  {name:<20}{late:>12}{whole[name]:>12.4g}  {unit}".rstrip())
+                late = f"{steady[name]:.4g}" if steady and name in steady else "-"
+                lines.append(f"  {name:<20}{late:>12}{whole[name]:>12.4g}  {unit_of(name, of_input)}".rstrip())
         return "\n".join(lines)
 
 

@@ -92,6 +92,6 @@ def test_a_campaign_across_precisions():
         assert found["tracking_rms"].dtype == np.float64
         for place, row in enumerate(rows):
             trial, combination = divmod(row, 2)
-            for name in ("tracking_rms", "voltage_variation", "weights_peak"):
+            for name in ("tracking_rms", "input_variation", "weights_peak"):
                 assert found[name][place] == alone[list(alone)[combination]][name][trial], name
     site.cache_clear()

@@ -61,8 +61,8 @@ def forecast(
         "uncertainty_rms": rms(signals["uncertainty"]),
         "model_rms": rms(signals["modelling_error"]),
         "robust_rms": rms(signals["robust"]),
-        "voltage_rms": rms(signals["u"]),
-        "voltage_peak": float(np.abs(signals["u"]).max()),
+        "input_rms": rms(signals["u"]),
+        "input_peak": float(np.abs(signals["u"]).max()),
     }
 
 

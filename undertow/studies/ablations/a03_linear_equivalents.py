@@ -12,7 +12,7 @@ from undertow.studies.ablations.on_axes import loop
 
 QUESTION = "Is a plain linear observer of the same bandwidth as good?"
 PREDICTION = "Linear observer (ESO, ADRC, PI observer) and INDI do the same within 1 %; RAFC at Table 1 does not."
-METRICS = ("tracking_rms", "estimation_rms", "voltage_variation")
+METRICS = ("tracking_rms", "estimation_rms", "input_variation")
 
 _LINEAR = f"pole {gains.POLE:.4g}, b2 {gains.STIFFNESS:.5g}, K ({gains.FEEDBACK[0]:g}, {gains.FEEDBACK[1]:g})"
 _SAME = {"pole": gains.POLE, "stiffness": gains.STIFFNESS, "feedback": gains.FEEDBACK}
