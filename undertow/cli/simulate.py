@@ -72,7 +72,7 @@ def _judge_ending(executed: Executed) -> int:
         return DONE
     ended, duration = float(executed.outcome.ended), executed.built.scenario.loop.duration
     ending = f"ended as `{executed.status.word}` at {ended:.4g} s of {duration:g} s"
-    complain(f"the run {ending}. {executed.outcome.sentence()}")
+    complain(f"the run {ending}. {executed.dataset.attrs['status_sentence']}")
     return RUN_FAILED
 
 

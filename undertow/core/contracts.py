@@ -279,6 +279,10 @@ class AbstractReference(eqx.Module):
     def at(self, t: Time) -> Target:
         """Wanted position, velocity and acceleration at time t."""
 
+    def beginning_at(self, position: Outputs) -> "AbstractReference":
+        """This reference for a plant that starts at a position; itself unless it leaves open where it begins."""
+        return self
+
 
 class AbstractSensor(eqx.Module):
     """What stands between the truth and the measurement."""

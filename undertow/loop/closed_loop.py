@@ -84,6 +84,12 @@ class ClosedLoop(eqx.Module):
         made = lambda given: as_array(zero if given is None else given)
         return made(position), made(velocity)
 
+    def beginning_at(self, position: Any) -> "ClosedLoop":
+        """This loop with its reference beginning where the plant does; at zero where None."""
+        start, _ = self.outputs_at_start(position, None)
+        reference = self.reference.beginning_at(start)
+        return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.sensor)
+
     def draw(self, key: PRNGKeyArray) -> "Drawn":
         """Draw everything random once."""
         of_disturbance, of_sensor = jax.random.split(key)

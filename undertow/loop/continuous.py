@@ -47,6 +47,7 @@ def simulate(
         BadInput: duration, record_step or dt not positive, or as `check`.
     """
     check(loop)
+    loop = loop.beginning_at(position)
     # As many records as fit; what a division of whole multiples leaves over does not count.
     records = math.floor(duration / record_step * (1 + 1e-9)) if 0 < duration < math.inf and record_step > 0 else 0
     if records < 1:

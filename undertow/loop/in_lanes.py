@@ -136,7 +136,7 @@ def simulate(
     Raises:
         Unsupported: a part needs something that lanes cannot do.
     """
-    ticks = sampled.ticks_of(duration, dt, record_every)
+    ticks, loop = sampled.ticks_of(duration, dt, record_every), loop.beginning_at(position)
     start = loop.outputs_at_start(position, velocity)
     run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
     numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[None], eqx.filter(run, eqx.is_array))

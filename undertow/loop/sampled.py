@@ -60,7 +60,7 @@ def simulate(
     Raises:
         BadInput: duration or dt not positive, or duration shorter than one record.
     """
-    ticks = ticks_of(duration, dt, record_every)
+    ticks, loop = ticks_of(duration, dt, record_every), loop.beginning_at(position)
     key = jax.random.PRNGKey(0) if key is None else key
     start = loop.outputs_at_start(position, velocity)
     plan = (ticks, record_every, method, substeps)

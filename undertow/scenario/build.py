@@ -13,7 +13,7 @@ from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import parts
-from undertow.scenario.fitting import check_fit, check_times, placed
+from undertow.scenario.fitting import check_fit, check_times, placed, rounded_times
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
 from undertow.scenario.stepping import step_advice
@@ -21,6 +21,9 @@ from undertow.scenario.workshop import Workshop
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
+
+
+_TOLD_APART = 2**24  # whole numbers that float32 holds
 
 
 def in_its_precision(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
@@ -50,7 +53,11 @@ class Built(NamedTuple):
         late = f"the steady window starts at {start:g} s, the run ends at {end:g} s: no steady metrics"
         plant = self.closed_loop.plant
         fast = step_advice(plant.thruster, self.scenario.loop) if isinstance(plant, HybridVehicle) else ()
-        return plant.advice() + fast + ((late,) if start >= end else ())
+        loop, ticks = self.scenario.loop, self.scenario.loop.duration / self.scenario.loop.dt
+        times = rounded_times(loop)
+        if self.scenario.precision == "float32" and loop.method != "adaptive" and ticks > _TOLD_APART:
+            times += (f"float32 tells no instants apart beyond {_TOLD_APART} steps, {_TOLD_APART * loop.dt:.6g} s",)
+        return plant.advice() + fast + times + ((late,) if start >= end else ())
 
     def window(self) -> tuple[float, float]:
         """Start and stop of the steady metrics, s."""
@@ -110,4 +117,4 @@ def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
     check_times(text, scenario.loop, scenario.steady)
     if not workshop.seen((loop, [value and len(value) for _, value in scenario.initial])):
         check_fit(text, loop, scenario.initial)
-    return Built(loop, scenario, resolved)
+    return Built(loop.beginning_at(scenario.initial.position), scenario, resolved)

@@ -22,6 +22,7 @@ from undertow.scenario.labelling import label
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Initial, Loop
+from undertow.scenario.stepping import step_failure
 
 
 class Executed(NamedTuple):
@@ -53,7 +54,8 @@ def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
     gathered = (Metrics(*built.window()),) if scenario.steady.every_tick else ()
     outcome = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
-    attributes = {
+    why = step_failure(built.closed_loop, scenario.loop, outcome)
+    attributes = ({"status_sentence": why} if why else {}) | {
         "title": scenario.description or "a closed loop run by undertow",
         "scenario": text,
         "scenario_hash": text_hash(text),
