@@ -5,9 +5,14 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.core import runtime
+from undertow.core.contracts import Load, Place
+from undertow.disturbances.u1 import u1
+from undertow.numerics.rotations import cross
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
 from undertow.studies.campaign.layout import layout
@@ -95,3 +100,16 @@ def test_a_campaign_across_precisions():
             for name in ("tracking_rms", "input_variation", "weights_peak"):
                 assert found[name][place] == alone[list(alone)[combination]][name][trial], name
     site.cache_clear()
+
+
+def test_constants_of_parts_follow():
+    """JAX remembers what NumPy arrays were made into: constants of u1 and of rotations are made anew in each precision."""
+    place = Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3))
+    load = jax.jit(lambda t, calm: u1().at((), t, place, calm).acceleration)
+    for precision in ("float64", "float32", "float64"):
+        with runtime.in_precision(precision):
+            calm = Load(jnp.zeros(6), jnp.zeros(6))
+            assert str(load(jnp.asarray(0.5), calm).dtype) == precision
+            turned = jax.jit(cross)(jnp.array([1.0, 0.0, 0.0]), jnp.array([0.0, 1.0, 0.0]))
+            np.testing.assert_array_equal(turned, [0.0, 0.0, 1.0])
+            assert str(turned.dtype) == precision

@@ -28,13 +28,10 @@ MEANINGS = {
     "input_variation": Meaning("total variation of the input per second, mean over inputs: chattering", "[input]/s"),
     "weights_peak": Meaning("largest |theta|: drift shows here first", "m/s^2, rad/s^2"),
     "energy": Meaning("electrical energy drawn", "J"),
-    "settling_time": Meaning(
-        "time from which the target rests and the error stays within 2 % of the way to it; infinite if it never does, "
-        "none for a target that moves to the end",
-        "s",
-    ),
+    # Infinite if it never does; not defined for a target that moves to the end.
+    "settling_time": Meaning("time from which the target rests and the error stays within 2 % of the way to it", "s"),
     "saturated_fraction": Meaning("share of input-seconds at a limit", ""),
-    "bad_readings": Meaning("readings until then that were no numbers; the law got what it expected instead", ""),
+    "bad_readings": Meaning("readings so far that were no numbers, left out or replaced by what the law expected", ""),
     "energy_books_share": Meaning("what the energy ledger leaves over, share of the energy drawn: rounding", ""),
     "energy_defect_share": Meaning("the same against the state itself: error of the integrator", ""),
     "rules": Meaning("fuzzy rules per axis", ""),

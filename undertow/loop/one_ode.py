@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, PyTree
 from undertow.core.continuous import AbstractContinuousController
 from undertow.loop.closed_loop import Drawn
 from undertow.loop.outcome import Ending
+from undertow.loop.readings import all_sound
 
 
 @jax.jit  # traced once, although an integrator calls it in several places
@@ -33,5 +34,8 @@ def blamed(ending: Ending, drawn: Drawn, t: Float[Array, ""], state: tuple[PyTre
     for share in (0.0, 0.5, 1.0):
         there = t + share * dt
         ahead = jax.tree.map(lambda now, change, share=share: now + share * dt * change, state, rate)
-        ending = ending.blamed(drawn.decide(there, *(ahead if share else state)).command, there)
+        at = ahead if share else state
+        blame = ending.blamed(drawn.decide(there, *at).command, there)
+        # Of a state that is itself no number, which a load can make, every command is none.
+        ending = Ending(*(jnp.where(all_sound(at), new, old) for new, old in zip(blame, ending, strict=True)))
     return ending
