@@ -1,6 +1,7 @@
 """One closed loop from Python: what `undertow simulate` does, one level down."""
 
 import dataclasses
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -9,7 +10,7 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from undertow.analysis.meanings import MEANINGS
+from undertow.analysis.meanings import MEANINGS, unit_of
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
@@ -24,10 +25,11 @@ from undertow.disturbances.none import none
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.scenario import execute
-from undertow.scenario.fitting import check_fit, check_times
+from undertow.scenario.fitting import check_fit, check_times, rounded_times
 from undertow.scenario.labelling import certificate_of, label
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.schema import Initial, Loop, Window, complaint
+from undertow.scenario.stepping import step_failure
 from undertow.sensors.perfect import perfect
 
 if TYPE_CHECKING:
@@ -72,12 +74,13 @@ class Run:
 
     def __repr__(self) -> str:
         steady, whole = self.metrics["steady"], self.metrics["whole"] or {}
-        lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.status.sentence}"]
+        lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.dataset.attrs['status_sentence']}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
-        for name, (_, unit) in MEANINGS.items():
+        of_input = self.dataset["voltage"].attrs["units"]
+        for name in MEANINGS:
             if name in whole:
-                late = f"{steady[name]:.4g}" if steady else "-"
-                lines.append(f"  {name:<20}{late:>12}{whole[name]:>12.4g}  {unit}".rstrip())
+                late = f"{steady[name]:.4g}" if steady and name in steady else "-"
+                lines.append(f"  {name:<20}{late:>12}{whole[name]:>12.4g}  {unit_of(name, of_input)}".rstrip())
         return "\n".join(lines)
 
 
@@ -136,6 +139,8 @@ def simulate(
         window = Window()
         check_times(nowhere, settings, window)
         check_fit(nowhere, closed_loop, start)
+        for sentence in rounded_times(settings):
+            warnings.warn(sentence, stacklevel=2)
     except ValidationError as errors:
         wrong = complaint(errors, nowhere)
         raise BadInput("loop" if wrong.name == "kind" else wrong.name, wrong.must, wrong.got) from None
@@ -143,7 +148,9 @@ def simulate(
         name = error.name.removeprefix("loop.").removeprefix("initial.")
         raise BadInput(name, error.must, error.got, hint=error.hint) from error.__cause__
     outcome = execute.run_loop(closed_loop, settings, start, seed)
-    attributes = {"title": "a closed loop run by undertow", "seed": seed}
+    attributes: dict[str, Any] = {"title": "a closed loop run by undertow", "seed": seed}
+    if why := step_failure(closed_loop, settings, outcome):
+        attributes["status_sentence"] = why
     steady = window.of_run(settings.duration)
     return _run(outcome, *label(closed_loop, outcome, steady, settings.dt, attributes))
 

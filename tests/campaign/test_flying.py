@@ -1,8 +1,5 @@
 """Lanes: the same figures as one run at a time, whoever flies beside; failures stay where they are."""
 
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
-
 import jax
 import numpy as np
 import pytest
@@ -130,11 +127,10 @@ def test_series_are_those_of_the_runs(campaign):
 
 
 def test_single_precision(campaign):
-    """In a process of its own, as precision is a matter of the process; without noise, which is drawn differently."""
+    """Without noise, which is drawn differently."""
     scenario = campaign()["scenario"] | {"sensor": "perfect"}
     single = text_of(campaign(scenario=scenario | {"precision": "float32"}))
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        found = pool.submit(fly, single, "", range(9)).result()
+    found = fly(single, "", range(9))
     wanted = columns(campaign(scenario=scenario), range(9))
     assert found["tracking_rms"].dtype == np.float32 and wanted["tracking_rms"].dtype == np.float64
     np.testing.assert_allclose(found["tracking_rms"], wanted["tracking_rms"], rtol=1e-4)

@@ -59,7 +59,7 @@ def test_a_run_is_put_beside_its_prediction(undertow, tmp_path):
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
     assert said.code == 0 and "As predicted: no metric departs by more than 10 %." in said.out, said.out
     found = json.loads((tmp_path / "out" / "metrics.json").read_text())
-    for name in ("tracking_rms", "estimation_rms", "voltage_rms"):
+    for name in ("tracking_rms", "estimation_rms", "input_rms"):
         assert found["predicted"][name] == pytest.approx(found["steady"][name], rel=0.1)
 
 

@@ -60,11 +60,8 @@ def test_made_while_jax_traces_it_serves_later():
 
 def test_precision_and_device_are_those_of_the_moment():
     double = as_array(0.1)
-    try:
-        jax.config.update("jax_enable_x64", False)
+    with runtime.in_precision("float32"):
         single = as_array(0.1)
-    finally:
-        jax.config.update("jax_enable_x64", True)
     assert (double.dtype, single.dtype) == (np.float64, np.float32)
     with runtime.on_processor():
         assert as_array(0.1) is not double and as_array(0.1) is as_array(0.1)

@@ -91,8 +91,8 @@ def test_metrics_count_each_limit():
     run = sampled.simulate(loop, duration=1.0, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 1.0),))
     found = results(run.accumulated[0])
     assert found["saturated_fraction"] == pytest.approx(2 / 8)
-    assert found["voltage_peak"] == pytest.approx(FORWARD)
-    assert found["voltage_rms"] == pytest.approx(np.sqrt((30**2 + 12**2 + 15**2 + 11**2) / 8))
+    assert found["input_peak"] == pytest.approx(FORWARD)
+    assert found["input_rms"] == pytest.approx(np.sqrt((30**2 + 12**2 + 15**2 + 11**2) / 8))
     assert found["energy"] == pytest.approx(7.6 * (30 + 12 + 15 + 11) * 0.98, rel=1e-9), "50 samples"
 
 

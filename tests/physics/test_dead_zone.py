@@ -191,7 +191,7 @@ def test_batches_and_xla_agree_where_the_zone_subtracts(law):
         here, there = getattr(found.samples, name), np.asarray(getattr(wanted.samples, name))
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max(), err_msg=name)
     assert np.abs(wanted.samples.voltage[np.abs(wanted.samples.voltage) > 0]).min() > 1.2, "the zone is added"
-    assert results(found.accumulated[0])["voltage_rms"] > 1.2
+    assert results(found.accumulated[0])["input_rms"] > 1.2
 
 
 def test_what_cannot_be():

@@ -6,9 +6,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.controllers.rcaf import rcaf
 from undertow.core.errors import BadInput
+from undertow.disturbances.none import none
+from undertow.loop import continuous, sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.double_integrator import double_integrator
 from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, waypoints
 from undertow.scenario import parts
+from undertow.scenario.execute import execute
+from undertow.sensors.perfect import perfect
 
 RNG = np.random.default_rng(4)
 SQUARE = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [0, 4, 1], [0, 0, 0.5]], dtype=float)
@@ -110,6 +117,32 @@ def test_settling_takes_its_time():
     np.testing.assert_allclose(position[2000], (start + goal) / 2, rtol=1e-15)
     np.testing.assert_allclose(np.abs(velocity).max(0), 1.875 * np.abs(goal - start) / 4, rtol=1e-12)
     np.testing.assert_allclose(np.abs(acceleration).max(0), 10 / np.sqrt(3) * np.abs(goal - start) / 16, rtol=1e-6)
+
+
+def test_settling_starts_where_the_plant_does_unless_told():
+    """A cart and a vehicle that start away from zero are not sent to zero and back; a step and a given start stay."""
+    goal, begun = np.array([3.0, -1.0]), np.array([5.0, 2.0])
+    for told, start in ((None, begun), ([1.0, 0.0], [1.0, 0.0])):
+        position, _, _ = at(setpoint(goal, 4.0, told).beginning_at(begun), np.linspace(0, 4, 401))
+        np.testing.assert_array_equal(position[[0, -1]], [start, goal])
+        assert (position <= np.maximum(start, goal) + 1e-12).all() and (
+            position >= np.minimum(start, goal) - 1e-12
+        ).all()
+    np.testing.assert_array_equal(at(setpoint(goal).beginning_at(begun), [0.0])[0], [goal])
+    cart = {
+        "plant": "inverted_pendulum",
+        "controller": {"kind": "pid", "frequency": 4.0},
+        "reference": {"kind": "setpoint", "position": [0.05], "settling": 1.0},
+        "loop": {"duration": 0.1, "dt": 0.01},
+        "initial": {"position": [0.1]},
+    }
+    assert float(execute(cart).dataset["target"][0, 0]) == 0.1
+    plant = double_integrator(2)
+    for simulate in (sampled.simulate, continuous.simulate):
+        law = rcaf(plant.model(), sets=3)
+        loop = ClosedLoop(plant, law, setpoint(goal, 4.0), none(), perfect())
+        found = simulate(loop, duration=0.1, dt=0.01, position=begun)
+        np.testing.assert_array_equal(found.samples.target[0], begun)
 
 
 def test_settling_may_be_traced_and_zero():

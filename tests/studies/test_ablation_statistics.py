@@ -86,7 +86,7 @@ def test_search_takes_the_cheapest_of_its_grid(monkeypatch):
     def pretend(loop, schedule, seeds, family):
         tried.append((loop, seeds, family))
         first, second = loop
-        return {"tracking_rms": np.full(seeds, ERROR * (first - 3) ** 2), "voltage_variation": np.full(seeds, second)}
+        return {"tracking_rms": np.full(seeds, ERROR * (first - 3) ** 2), "input_variation": np.full(seeds, second)}
 
     monkeypatch.setattr("undertow.studies.ablations.tuning.run", pretend)
     best = tuned(lambda *point: point, ((1.0, 3.0, 9.0), (0.0, VARIATION)), SHORT, seeds=5)
@@ -95,7 +95,7 @@ def test_search_takes_the_cheapest_of_its_grid(monkeypatch):
 
 
 def test_cost_is_a_median():
-    outcomes = {"tracking_rms": ERROR * np.array([1.0, 2.0, np.inf]), "voltage_variation": VARIATION * np.ones(3)}
+    outcomes = {"tracking_rms": ERROR * np.array([1.0, 2.0, np.inf]), "input_variation": VARIATION * np.ones(3)}
     assert cost(outcomes) == pytest.approx(3.0)
 
 

@@ -40,7 +40,7 @@ def ablation(identity, medians, failures=0):
 
 
 def row(place, law, tracking=None, ended=None):
-    metrics = dict.fromkeys(("estimation_rms", "voltage_rms", "voltage_variation", "saturated_fraction"), 0.5)
+    metrics = dict.fromkeys(("estimation_rms", "input_rms", "input_variation", "saturated_fraction"), 0.5)
     return {
         "place": place,
         "words": f"at {place}",

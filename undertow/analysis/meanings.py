@@ -4,10 +4,15 @@ from typing import NamedTuple
 
 
 class Meaning(NamedTuple):
-    """One metric: its meaning in words and its unit."""
+    """One metric: its meaning in words and its unit, with `[input]` for that of the plant's input."""
 
     meaning: str
     unit: str
+
+
+def unit_of(metric: str, input_unit: str) -> str:
+    """Unit of a metric for a plant whose input has a unit."""
+    return MEANINGS[metric].unit.replace("[input]", input_unit)
 
 
 # In the order in which tables show them. Over all axes: root mean square of the axes' own figures.
@@ -18,13 +23,15 @@ MEANINGS = {
     "uncertainty_rms": Meaning("rms of the lumped uncertainty d = x_ddot - F - G V", "m/s^2, rad/s^2"),
     "robust_rms": Meaning("rms of the robust term u_r", "m/s^2, rad/s^2"),
     "model_rms": Meaning("rms of the modelling error eps = x_hat_dot - x_dot", "m/s, rad/s"),
-    "voltage_rms": Meaning("rms of the applied voltage over all thrusters", "V"),
-    "voltage_peak": Meaning("largest applied voltage", "V"),
-    "voltage_variation": Meaning("total variation of the voltage per second, mean over thrusters: chattering", "V/s"),
+    "input_rms": Meaning("rms of the applied input over all inputs", "[input]"),
+    "input_peak": Meaning("largest applied input", "[input]"),
+    "input_variation": Meaning("total variation of the input per second, mean over inputs: chattering", "[input]/s"),
     "weights_peak": Meaning("largest |theta|: drift shows here first", "m/s^2, rad/s^2"),
     "energy": Meaning("electrical energy drawn", "J"),
-    "settling_time": Meaning("last time the position error is more than 2 % of its first value", "s"),
-    "saturated_fraction": Meaning("share of thruster-seconds at a limit", ""),
+    # Infinite if it never does; not defined for a target that moves to the end.
+    "settling_time": Meaning("time from which the target rests and the error stays within 2 % of the way to it", "s"),
+    "saturated_fraction": Meaning("share of input-seconds at a limit", ""),
+    "bad_readings": Meaning("readings so far that were no numbers, left out or replaced by what the law expected", ""),
     "energy_books_share": Meaning("what the energy ledger leaves over, share of the energy drawn: rounding", ""),
     "energy_defect_share": Meaning("the same against the state itself: error of the integrator", ""),
     "rules": Meaning("fuzzy rules per axis", ""),

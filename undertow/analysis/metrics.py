@@ -20,8 +20,9 @@ Scalar = Float[Array, ""]
 # Sample times are k * dt in floating point: a window takes its borders in.
 _HAIR = 1e-9  # s
 
-# Share of its step that the position error must leave no more to be settled.
+# Share of the way to the last target that the error must leave no more to be settled.
 _SETTLED = 0.02
+_NO_WAY = 1e-9  # m, rad; an axis that has no further to go has nothing to settle
 
 
 class MetricsState(NamedTuple):
@@ -30,16 +31,47 @@ class MetricsState(NamedTuple):
     samples: Scalar  # number of them inside the window
     squares: dict[str, PerAxis]  # of the signals of _SIGNALS
     largest_error: PerAxis
-    voltage_squares: Scalar
-    voltage_peak: Scalar
-    variation: Scalar  # sum over samples of the mean |V_k - V_{k-1}|
+    input_squares: Scalar
+    input_peak: Scalar
+    variation: Scalar  # sum over samples of the mean |u_k - u_{k-1}|
     span: Scalar  # s covered by steps inside the window
     energy: Scalar
     saturated: Scalar
     weights_peak: Scalar
-    step: PerAxis  # |error| at the first sample of the run
-    settled_at: PerAxis
-    previous: Any  # (t, voltage, power, inside) of the sample before
+    bad_readings: Scalar
+    settling: "Settling"
+    previous: Any  # (t, input, power, inside) of the sample before
+
+
+class Settling(NamedTuple):
+    """Since when the target has stayed where it is, and the error small."""
+
+    begun: Scalar  # 1 from the first sample on
+    start: PerAxis  # way to a target at zero, from where the run began
+    target: PerAxis  # of the sample before
+    since: PerAxis  # time after which neither moved on; the last time it did
+    last: Scalar  # time of the last sample, s
+    resting: Scalar  # 1 while the target stays
+
+    def updated(self, t: Scalar, sample: Sample, counts: Any) -> "Settling":
+        """With a sample more, where it counts."""
+        first = self.begun == 0
+        start = jnp.where(first, sample.error - sample.target, self.start)
+        rests = first | (sample.target == self.target).all()
+        outside = jnp.abs(sample.error) > _SETTLED * jnp.abs(start + sample.target)
+        since = jnp.where(rests & ~outside, self.since, t)
+        resting = jnp.where(rests, 1.0, 0.0)
+        new = Settling(jnp.ones_like(self.begun), start, sample.target, since, t, resting)
+        return Settling(*(jnp.where(counts, now, before) for now, before in zip(new, self, strict=True)))
+
+    def times(self) -> np.ndarray:
+        """Settling time of each axis, s; infinite where it is not settled, NaN where there is nothing to settle.
+
+        Of results on the host, whose leaves may have leading axes.
+        """
+        last, resting = self.last[..., None], self.resting[..., None]
+        found = np.where(self.since < last, self.since, np.inf)
+        return np.where((np.abs(self.start + self.target) > _NO_WAY) & (resting > 0), found, np.nan)
 
 
 # Metric name -> the signal whose rms it is.
@@ -64,38 +96,37 @@ class Metrics(AbstractAccumulator):
             samples=zero,
             squares=dict.fromkeys(_SIGNALS, axes),
             largest_error=axes,
-            voltage_squares=zero,
-            voltage_peak=zero,
+            input_squares=zero,
+            input_peak=zero,
             variation=zero,
             span=zero,
             energy=zero,
             saturated=zero,
             weights_peak=zero,
-            step=-jnp.ones_like(axes),
-            settled_at=axes,
+            bad_readings=zero,
+            settling=Settling(zero, axes, axes, axes, zero, zero),
             previous=(zero, jnp.zeros_like(sample.voltage), zero, zero),
         )
 
     def update(self, state: MetricsState, t: Scalar, sample: Sample) -> MetricsState:
         inside = jnp.where((t >= self.start - _HAIR) & (t <= self.stop + _HAIR), 1.0, 0.0)
-        last_t, last_voltage, last_power, last_inside = state.previous
+        last_t, last_input, last_power, last_inside = state.previous
         power, between = sample.power.sum(), inside * last_inside
-        size = jnp.abs(sample.error)
-        step = jnp.where(state.step < 0, size, state.step)
+        size, applied = jnp.abs(sample.error), sample.voltage
         return MetricsState(
             samples=state.samples + inside,
             squares={name: state.squares[name] + inside * pick(sample) ** 2 for name, pick in _SIGNALS.items()},
             largest_error=jnp.maximum(state.largest_error, inside * size),
-            voltage_squares=state.voltage_squares + inside * (sample.voltage**2).mean(),
-            voltage_peak=jnp.maximum(state.voltage_peak, inside * jnp.abs(sample.voltage).max()),
-            variation=state.variation + between * jnp.abs(sample.voltage - last_voltage).mean(),
+            input_squares=state.input_squares + inside * (applied**2).mean(),
+            input_peak=jnp.maximum(state.input_peak, inside * jnp.abs(applied).max()),
+            variation=state.variation + between * jnp.abs(applied - last_input).mean(),
             span=state.span + between * (t - last_t),
             energy=state.energy + between * (t - last_t) * (power + last_power) / 2,
             saturated=state.saturated + inside * sample.saturated.mean(),
             weights_peak=jnp.maximum(state.weights_peak, inside * sample.weights_peak),
-            step=step,
-            settled_at=jnp.where(size > _SETTLED * step, t, state.settled_at),
-            previous=(t, sample.voltage, power, inside),
+            bad_readings=jnp.maximum(state.bad_readings, inside * sample.bad_readings.astype(inside.dtype)),
+            settling=state.settling.updated(t, sample, t <= self.stop + _HAIR),
+            previous=(t, applied, power, inside),
         )
 
 
@@ -106,23 +137,25 @@ def results(state: MetricsState) -> dict[str, Any]:
     found: dict[str, Any] = {name: float(value) for name, value in overall(host).items()}
     for name, squares in host.squares.items():
         found[f"{name}_rms_axes"] = np.sqrt(squares / count).tolist()
-    return found | {
-        "tracking_max_axes": host.largest_error.tolist(),
-        "settling_time_axes": host.settled_at.tolist(),
-    }
+    found["tracking_max_axes"] = host.largest_error.tolist()
+    if np.isnan(found["settling_time"]):  # what is not defined is not there
+        del found["settling_time"]
+        return found
+    return found | {"settling_time_axes": host.settling.times().tolist()}
 
 
 # Over all axes: name -> value of a state whose leaves may have leading axes, given its number of samples.
 _OVERALL: dict[str, Callable[[MetricsState, Any], Any]] = {
     **{f"{name}_rms": lambda s, count, name=name: np.sqrt(s.squares[name].mean(-1) / count) for name in _SIGNALS},
     "tracking_max": lambda s, count: s.largest_error.max(-1),
-    "voltage_rms": lambda s, count: np.sqrt(s.voltage_squares / count),
-    "voltage_peak": lambda s, count: s.voltage_peak,
-    "voltage_variation": lambda s, count: np.where(s.span > 0, s.variation / np.where(s.span > 0, s.span, 1.0), 0.0),
+    "input_rms": lambda s, count: np.sqrt(s.input_squares / count),
+    "input_peak": lambda s, count: s.input_peak,
+    "input_variation": lambda s, count: np.where(s.span > 0, s.variation / np.where(s.span > 0, s.span, 1.0), 0.0),
     "weights_peak": lambda s, count: s.weights_peak,
     "energy": lambda s, count: s.energy,
-    "settling_time": lambda s, count: s.settled_at.max(-1),
+    "settling_time": lambda s, count: np.fmax.reduce(s.settling.times(), axis=-1),
     "saturated_fraction": lambda s, count: s.saturated / count,
+    "bad_readings": lambda s, count: s.bad_readings,
 }
 OVERALL = tuple(_OVERALL)
 
@@ -136,7 +169,11 @@ def overall(state: MetricsState) -> dict[str, np.ndarray]:
 
 def measure(outcome: Outcome, start: float = 0.0, stop: float = float("inf")) -> dict[str, Any]:
     """Metrics of a recorded run over start <= t <= stop, s, at the rate of the record."""
-    return results(_over_series(Metrics(start, stop), outcome.time, outcome.samples))
+    samples, kept = outcome.samples, int((np.asarray(outcome.time) <= stop + _HAIR).sum())
+    if 0 < kept < len(outcome.time):  # what comes later may be no numbers, and none of them times zero is none
+        index = np.minimum(np.arange(len(outcome.time)), kept - 1)
+        samples = jax.tree.map(lambda series: np.asarray(series)[index], samples)
+    return results(_over_series(Metrics(start, stop), outcome.time, samples))
 
 
 @eqx.filter_jit

@@ -11,10 +11,10 @@ def table(results: Results, found: dict) -> Table:
     table = Table(title="Median [5 %, 95 %] of the trials that lasted", title_justify="left", title_style="bold")
     crossed = list(results.campaign.cross)
     counts = ("trials", "failed", "refused") if found["refused"] else ("trials", "failed")
-    for column in (*crossed, *counts, "tracking rms", "voltage rms"):
+    for column in (*crossed, *counts, "tracking rms", "input rms"):
         table.add_column(column)
     for one in found["combinations"]:
-        cells = [_spread(one["metrics"].get(name)) for name in ("tracking_rms", "voltage_rms")]
+        cells = [_spread(one["metrics"].get(name)) for name in ("tracking_rms", "input_rms")]
         table.add_row(*(one["values"][key] for key in crossed), *(str(one[count]) for count in counts), *cells)
     return table
 

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from undertow.analysis.meanings import MEANINGS, PER_AXIS
+from undertow.analysis.meanings import MEANINGS, PER_AXIS, unit_of
 from undertow.cli.tables import wide_console
 from undertow.scenario import describing
 from undertow.scenario.schema import keys
@@ -20,7 +20,10 @@ def describe(name: str) -> None:
         rows = [(key.path, key.type, _text(key.default), key.meaning) for key in keys()]
         _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
     elif name == "metrics":
-        rows = [(key, unit, "yes" if key in PER_AXIS else "", meaning) for key, (meaning, unit) in MEANINGS.items()]
+        rows = [
+            (key, unit_of(key, "unit of the input"), "yes" if key in PER_AXIS else "", one.meaning)
+            for key, one in MEANINGS.items()
+        ]
         _show_table(console, "Metrics", ("metric", "unit", "also <metric>_axes", "meaning"), rows)
     else:
         for description in describing.describe(name):

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from undertow.analysis.linearised.forecast import Comparison, compare
 from undertow.core.foreign import python_says
-from undertow.scenario.build import Built
+from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.execute import Executed
 from undertow.studies.prediction.grounding import foretold, ground
 
@@ -16,7 +16,7 @@ Result = TypeVar("Result")
 _DEPARTS = 0.10
 
 # Metrics that tell more about the hardest moment than about the law: shown, not judged.
-_PEAKS = ("tracking_max", "voltage_peak")
+_PEAKS = ("tracking_max", "input_peak")
 
 # Of the wanted: numbers below this share of the largest of their kind are zero.
 _NOTHING = 1e-9
@@ -63,6 +63,7 @@ def in_results(foresight: Foresight | None) -> dict[str, Any]:
     return {"predicted": foresight.metrics} | ({"not_predicted": foresight.why_not} if foresight.why_not else {})
 
 
+@in_its_precision
 def _foresee(built: Built) -> Foresight:
     try:
         return Foresight(*foretold(ground(built)))

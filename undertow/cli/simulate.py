@@ -35,7 +35,8 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
             _write(executed, foresight, staging)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
     foretold = foresight.metrics if foresight else None
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), foretold))
+    unit = executed.built.closed_loop.plant.input_unit
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, foretold))
     if foresight:
         console.print(f"{judgement(foresight, executed)}.", highlight=False, soft_wrap=True)
     certificate = certificate_of(executed.dataset)
@@ -71,7 +72,7 @@ def _judge_ending(executed: Executed) -> int:
         return DONE
     ended, duration = float(executed.outcome.ended), executed.built.scenario.loop.duration
     ending = f"ended as `{executed.status.word}` at {ended:.4g} s of {duration:g} s"
-    complain(f"the run {ending}. {executed.status.sentence}")
+    complain(f"the run {ending}. {executed.dataset.attrs['status_sentence']}")
     return RUN_FAILED
 
 

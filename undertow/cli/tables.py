@@ -5,13 +5,14 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from undertow.analysis.meanings import MEANINGS
+from undertow.analysis.meanings import MEANINGS, unit_of
 
 
 def metrics_table(
     steady: dict[str, Any] | None,
     whole: dict[str, Any],
     window: tuple[float, float],
+    input_unit: str,
     predicted: dict[str, float] | None = None,
 ) -> Table:
     """Metrics of the steady window beside those foretold for it and those of the whole run."""
@@ -22,10 +23,11 @@ def metrics_table(
     table.add_column(f"{window[0]:g} to {window[1]:g} s", justify="right")
     table.add_column("whole run", justify="right")
     table.add_column("unit")
-    for name, (_, unit) in MEANINGS.items():
+    for name in MEANINGS:
         if name in whole:
             foretold = [_number(predicted[name]) if name in predicted else ""] if predicted else []
-            table.add_row(name, *foretold, _number(steady[name]) if steady else "-", _number(whole[name]), unit)
+            late = _number(steady[name]) if steady and name in steady else "-"
+            table.add_row(name, *foretold, late, _number(whole[name]), unit_of(name, input_unit))
     return table
 
 
@@ -83,4 +85,4 @@ def _share(value: float | None) -> str:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}"
+    return "never" if value == float("inf") else f"{value:.4g}"

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray, PyTree
+from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.arrays import as_array
 from undertow.core.drive import AbstractDrive, DirectDrive
@@ -279,6 +279,10 @@ class AbstractReference(eqx.Module):
     def at(self, t: Time) -> Target:
         """Wanted position, velocity and acceleration at time t."""
 
+    def beginning_at(self, position: Outputs) -> "AbstractReference":
+        """This reference for a plant that starts at a position; itself unless it leaves open where it begins."""
+        return self
+
 
 class AbstractSensor(eqx.Module):
     """What stands between the truth and the measurement."""
@@ -296,6 +300,10 @@ class AbstractSensor(eqx.Module):
     @abc.abstractmethod
     def measure(self, path: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
         """Measurement at time t, and the state after it."""
+
+    def ignored(self, state: PyTree) -> Int[Array, ""]:
+        """Readings so far that were no numbers, and that it has left out."""
+        return jnp.zeros((), dtype=int)
 
     def velocity_noise(self, dt: float) -> Array:
         """What a law is told of it: standard deviation of white noise, new at every tick of dt (s), on velocities.

@@ -1,9 +1,10 @@
-"""How JAX is set up for undertow: precision, and one compiled function per closed loop.
+"""How JAX is set up for undertow: precision, device, and one compiled function per closed loop.
 
 Imported first by `undertow.core`; must run before JAX touches a device to have its full effect.
 """
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -24,9 +25,15 @@ def configure() -> None:
         os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_extra_options={_ONE_FUNCTION_PER_LOOP}".strip()
 
 
-def use_single_precision() -> None:
-    """Build and run everything made from now on in float32 (meant for large campaigns on a GPU)."""
-    jax.config.update("jax_enable_x64", False)
+def in_precision(precision: str) -> AbstractContextManager[Any]:
+    """What JAX makes inside, in this thread, is float64 or float32; other threads, and what comes after, are not."""
+    return jax.enable_x64(precision == "float64")
+
+
+def workers(count: int) -> ThreadPoolExecutor:
+    """Threads that compute in the precision of the one that asks for them."""
+    double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
+    return ThreadPoolExecutor(count, initializer=lambda: jax.enable_x64(double).__enter__())
 
 
 def on_processor() -> AbstractContextManager[Any]:

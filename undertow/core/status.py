@@ -12,6 +12,7 @@ class Status(enum.IntEnum):
     PITCH_SINGULAR = 3
     STEPS_EXHAUSTED = 4
     OUT_OF_RANGE = 5
+    COMMAND_NOT_FINITE = 6
 
     @property
     def word(self) -> str:
@@ -32,4 +33,5 @@ _SENTENCES = {
     Status.STEPS_EXHAUSTED: "The adaptive integrator could go no further: too stiff a loop, or an undefined rate.",
     Status.OUT_OF_RANGE: "An output left the range in which the plant can be held: a ball touched its magnet, "
     "or a pendulum fell flat.",
+    Status.COMMAND_NOT_FINITE: "The controller commanded an input that is infinite or undefined.",
 }

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import param
@@ -24,7 +25,7 @@ class SuiteU1(AbstractDisturbance):
     def at(self, path, t, place, calm: Load) -> Load:
         if calm.acceleration.shape != (6,):
             raise BadInput("disturbance", "fit the plant", "u1, which has 6 axes", hint="Use kind: table")
-        swell, fast, ripple, slow, square, pulse, chirp = jnp.sin(_RATES * t + _SWEEPS * t**2)
+        swell, fast, ripple, slow, square, pulse, chirp = jnp.sin(as_array(_RATES) * t + as_array(_SWEEPS) * t**2)
         signals = jnp.stack(
             [
                 4 * swell + _step(t, 8.0, 6.0) - _step(t, 14.0, 9.0),

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement
 from undertow.instruments.sampling import Sampling
 from undertow.numerics.linear import matvec
@@ -20,7 +21,10 @@ from undertow.numerics.rotations import (
     rotation_from_quaternion,
 )
 
-GRAVITY = jnp.array([0.0, 0.0, 9.81])  # m/s^2, world; what an accelerometer adds and the observer takes away again
+
+def gravity() -> Vector3:
+    """What an accelerometer adds and the observer takes away again, m/s^2, world."""
+    return as_array((0.0, 0.0, 9.81))  # made when it is needed, in the precision of the moment
 
 
 class Motion(NamedTuple):
@@ -103,7 +107,7 @@ def motion_of(truth: Measurement, velocity_before: Vector3, elapsed) -> Motion:
     rates = Kinematics(rotation).to_body(truth.velocity)[3:]
     velocity = truth.velocity[:3]
     acceleration = jnp.where(elapsed > 0, (velocity - velocity_before) / jnp.where(elapsed > 0, elapsed, 1.0), 0.0)
-    force = matvec(rotation.T, acceleration - GRAVITY)
+    force = matvec(rotation.T, acceleration - gravity())
     return Motion(truth.position[:3], angles, rotation, velocity, rates, force, truth.actuator)
 
 

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.instruments.estimate import GRAVITY, Estimate, Motion
+from undertow.instruments.estimate import Estimate, Motion, gravity
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.sampling import Sampling
 from undertow.numerics.linear import matvec
@@ -19,7 +19,7 @@ class IMU(AbstractInstrument):
         return jnp.full(6, jnp.inf).at[3:].set(self.sampling.noise[2:5])
 
     def foretell(self, estimate: Estimate, reading) -> Estimate:
-        acceleration = matvec(estimate.rotation(), reading[5:]) + GRAVITY
+        acceleration = matvec(estimate.rotation(), reading[5:]) + gravity()
         return estimate._replace(rates=reading[2:5], acceleration=acceleration)
 
     def correct(self, estimate: Estimate, reading) -> Estimate:

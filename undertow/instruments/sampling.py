@@ -42,7 +42,7 @@ class Sampling(eqx.Module):
 
     reading = resolution round((truth + bias + noise) / resolution). The noise is new for every sample and depends on
     its number only, not on the rate of the loop; the bias is drawn once for a run. Where several samples fall between
-    two ticks, the newest is delivered. More than 2^31 samples are too many.
+    two ticks, the newest is delivered. In single precision more than 2^24 samples are too many to be told apart.
 
     Raises:
         BadInput: a period not positive, a probability of one or more, anything else negative.

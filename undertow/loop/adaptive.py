@@ -9,8 +9,8 @@ import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
 
 from undertow.core.status import Status
-from undertow.loop.one_ode import flow
-from undertow.loop.outcome import Outcome, health
+from undertow.loop.one_ode import blamed, flow
+from undertow.loop.outcome import Outcome, going, health
 
 _MAX_STEPS = 2**20
 _FIRST_STEP = 1e-4  # s; the integrator finds its own from there
@@ -51,4 +51,5 @@ def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
     index = jnp.minimum(jnp.arange(times.shape[0]), last)
     samples = jax.lax.map(lambda at: drawn.look(at[0], *unravel(at[1])), (times[index], states[index]))
     sound = jnp.where(status == int(Status.OK), final[0], states[last])
-    return Outcome(times, samples, (), unravel(sound), status, ended[0])
+    ending = blamed(going()._replace(status=status, time=ended[0]), drawn, ended[0], unravel(final[0]), _FIRST_STEP)
+    return Outcome(times, samples, (), unravel(sound), *ending)

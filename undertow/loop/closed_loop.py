@@ -3,9 +3,10 @@
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray, PyTree
+from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.arrays import as_array
 from undertow.core.contracts import (
@@ -22,6 +23,7 @@ from undertow.core.contracts import (
     Telemetry,
     Time,
 )
+from undertow.loop.readings import Expected, at_start
 
 
 class Sample(NamedTuple):
@@ -45,7 +47,15 @@ class Sample(NamedTuple):
     command: Inputs  # asked for
     power: Inputs
     saturated: Inputs
+    bad_readings: Int[Array, ""]  # so far
     books: dict[str, Array]  # what this plant alone has to tell, by name
+
+
+class Heard(NamedTuple):
+    """What is remembered of measurements."""
+
+    sensor: PyTree  # state of the sensor
+    expected: Expected | None  # None for a smooth sensor, whose readings are numbers wherever the truth is
 
 
 class Decision(NamedTuple):
@@ -56,7 +66,7 @@ class Decision(NamedTuple):
     command: Inputs
     applied: Inputs
     telemetry: Telemetry
-    heard: PyTree  # state of the sensor afterwards
+    heard: Any  # Heard afterwards; () where nothing is remembered
 
 
 class ClosedLoop(eqx.Module):
@@ -74,9 +84,16 @@ class ClosedLoop(eqx.Module):
         made = lambda given: as_array(zero if given is None else given)
         return made(position), made(velocity)
 
+    def beginning_at(self, position: Any) -> "ClosedLoop":
+        """This loop with its reference beginning where the plant does; at zero where None."""
+        start, _ = self.outputs_at_start(position, None)
+        reference = self.reference.beginning_at(start)
+        return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.sensor)
+
     def draw(self, key: PRNGKeyArray) -> "Drawn":
         """Draw everything random once."""
-        return Drawn(self, self.disturbance.draw(key), self.sensor.draw(jnp.flip(key)))
+        of_disturbance, of_sensor = jax.random.split(key)
+        return Drawn(self, self.disturbance.draw(of_disturbance), self.sensor.draw(of_sensor))
 
 
 class Drawn(NamedTuple):
@@ -90,32 +107,47 @@ class Drawn(NamedTuple):
         """States of plant and controller at t = 0, from the outputs there."""
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
-        truth = self.loop.plant.output(zero, x)
-        y, _ = self.loop.sensor.measure(self.sensor_path, self.loop.sensor.init(self.sensor_path, truth), zero, truth)
+        y, _ = self._read(zero, self.loop.plant.output(zero, x), self.listen(x))
         return x, self.loop.controller.init(y, self.loop.reference.at(zero))
 
-    def listen(self, x: PyTree) -> PyTree:
-        """State of the sensor at t = 0."""
-        return self.loop.sensor.init(self.sensor_path, self.loop.plant.output(jnp.zeros(()), x))
+    def listen(self, x: PyTree) -> Heard:
+        """What is remembered of measurements at t = 0."""
+        zero, sensor = jnp.zeros(()), self.loop.sensor
+        truth = self.loop.plant.output(zero, x)
+        state = sensor.init(self.sensor_path, truth)
+        if sensor.smooth:
+            return Heard(state, None)
+        y, _ = sensor.measure(self.sensor_path, state, zero, truth)
+        return Heard(state, at_start(self.loop.controller.model, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
         """What the surroundings do to the plant at time t."""
         plant = self.loop.plant
         return self.loop.disturbance.at(self.disturbance_path, t, plant.place(x), plant.no_load())
 
-    def decide(self, t: Time, x: PyTree, z: PyTree, heard: PyTree = ()) -> Decision:
-        """Measure, compare, command, limit; `heard` is the state of a sensor that has one."""
-        truth = self.loop.plant.output(t, x)
-        y, heard = self.loop.sensor.measure(self.sensor_path, heard, t, truth)
+    def decide(self, t: Time, x: PyTree, z: PyTree, heard: Any = ()) -> Decision:
+        """Measure, compare, command, limit; `heard` of a sensor with a memory, and where readings may be no numbers."""
+        y, heard = self._read(t, self.loop.plant.output(t, x), heard)
         r = self.loop.reference.at(t)
         command, telemetry = self.loop.controller.command(z, y, r)
         return Decision(y, r, command, self.loop.plant.admissible(x, command), telemetry, heard)
+
+    def _read(self, t: Time, truth: Measurement, heard: Any) -> tuple[Measurement, Any]:
+        """What the law is given, and what is remembered afterwards."""
+        measure = self.loop.sensor.measure
+        if not isinstance(heard, Heard):
+            return measure(self.sensor_path, heard, t, truth)
+        y, state = measure(self.sensor_path, heard.sensor, t, truth)
+        if heard.expected is None:
+            return y, Heard(state, None)
+        y, expected = heard.expected.repaired(self.loop.controller.model, y)
+        return y, Heard(state, expected)
 
     def sample(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Sample:
         """What is written down about time t. Errors are those of the truth, not of the measurement."""
         plant, controller = self.loop.plant, self.loop.controller
         truth = plant.output(t, x)
-        y, r, command, applied, telemetry, _ = decision
+        y, r, command, applied, telemetry, heard = decision
         acceleration = plant.acceleration(t, x, applied, self.load(t, x))
         effort = plant.effort(x, applied)
         return Sample(
@@ -137,9 +169,16 @@ class Drawn(NamedTuple):
             command=command,
             power=effort.power,
             saturated=effort.saturated,
+            bad_readings=self._bad_readings(heard),
             books=plant.books(x, applied) | (telemetry.books or {}),
         )
 
-    def look(self, t: Time, x: PyTree, z: PyTree, heard: PyTree = ()) -> Sample:
+    def _bad_readings(self, heard: Any) -> Int[Array, ""]:
+        """Readings so far that were no numbers: left out by the sensor, or replaced for the law."""
+        if not isinstance(heard, Heard) or heard.expected is None:
+            return jnp.zeros((), dtype=int)
+        return heard.expected.replaced + self.loop.sensor.ignored(heard.sensor)
+
+    def look(self, t: Time, x: PyTree, z: PyTree, heard: Any = ()) -> Sample:
         """`sample` of the decision taken at time t."""
         return self.sample(t, x, z, self.decide(t, x, z, heard))

@@ -11,10 +11,9 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.errors import BadInput
-from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.one_ode import flow
-from undertow.loop.outcome import Outcome
+from undertow.loop.one_ode import blamed, flow
+from undertow.loop.outcome import Outcome, going
 from undertow.loop.recording import instant, keep_sound, record
 from undertow.numerics.integrators import rk4_compact
 
@@ -48,6 +47,7 @@ def simulate(
         BadInput: duration, record_step or dt not positive, or as `check`.
     """
     check(loop)
+    loop = loop.beginning_at(position)
     # As many records as fit; what a division of whole multiples leaves over does not count.
     records = math.floor(duration / record_step * (1 + 1e-9)) if 0 < duration < math.inf and record_step > 0 else 0
     if records < 1:
@@ -88,11 +88,11 @@ def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, in
     drawn, controller = loop.draw(key), cast(AbstractContinuousController, loop.controller)
 
     def tick(carry, k):
-        state, status, ended = carry
+        state, ending = carry
         t = instant(k, dt)
         x, z = rk4_compact(lambda s, state: flow(s, state, drawn), t, state, dt)
-        return keep_sound(loop, state, (x, controller.project(z)), status, ended, t + dt)
+        return keep_sound(loop, state, (x, controller.project(z)), ending, t, dt)
 
-    carry = (drawn.start(*start), jnp.asarray(int(Status.OK)), jnp.zeros(()))
-    (final, status, ended), (time, samples) = record(drawn, tick, carry, dt, ticks, every)
-    return Outcome(time, samples, (), final, status, jnp.where(status == int(Status.OK), instant(ticks, dt), ended))
+    (final, ending), (time, samples) = record(drawn, tick, (drawn.start(*start), going()), dt, ticks, every)
+    ending = blamed(ending, drawn, ending.time - dt, final, dt)  # where the step that failed began
+    return Outcome(time, samples, (), final, *ending.until(instant(ticks, dt)))

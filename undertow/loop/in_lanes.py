@@ -61,6 +61,7 @@ class Ended(NamedTuple):
     final: Any
     status: np.ndarray
     ended: np.ndarray
+    input: np.ndarray
     time: np.ndarray
     series: dict[str, Any]
 
@@ -112,9 +113,9 @@ class Fleet:
         """
         ticks, every = self._plan.ticks, self._plan.every
         carry, (time, series) = self._program.run(numbers, ticks, every)
-        states, accumulated, status, ended = carry
+        states, accumulated, (status, ended, wrong) = carry
         ended = np.where(status == int(Status.OK), ticks * self._plan.dt, ended)
-        return Ended(accumulated, states[:2], status, ended, time, series)
+        return Ended(accumulated, states[:2], status, ended, wrong, time, series)
 
 
 def simulate(
@@ -135,7 +136,7 @@ def simulate(
     Raises:
         Unsupported: a part needs something that lanes cannot do.
     """
-    ticks = sampled.ticks_of(duration, dt, record_every)
+    ticks, loop = sampled.ticks_of(duration, dt, record_every), loop.beginning_at(position)
     start = loop.outputs_at_start(position, velocity)
     run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
     numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[None], eqx.filter(run, eqx.is_array))
@@ -143,4 +144,4 @@ def simulate(
     plan = Plan(ticks, dt, record_every, Sample._fields, method, substeps)
     flown = Fleet(run, plan, constant, lanes=1).fly(numbers)
     one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, flown)
-    return Outcome(one.time, Sample(**one.series), one.accumulated, one.final, one.status, one.ended)
+    return Outcome(one.time, Sample(**one.series), one.accumulated, one.final, one.status, one.ended, one.input)

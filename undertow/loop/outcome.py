@@ -2,12 +2,37 @@
 
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PyTree
 
+from undertow.core.contracts import Inputs
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Sample
+from undertow.loop.readings import all_sound
+
+
+class Ending(NamedTuple):
+    """How and when a run ended; it goes on while the status is OK."""
+
+    status: Int[Array, ""]  # a Status code
+    time: Float[Array, ""]  # s; when it failed
+    input: Int[Array, ""]  # number, from 1, of the first input that was commanded to be no number; 0 for none
+
+    def until(self, end: Any) -> "Ending":
+        """That of a run that was to last until `end` (s)."""
+        return self._replace(time=jnp.where(self.status == int(Status.OK), end, self.time))
+
+    def blamed(self, command: Inputs, t: Any) -> "Ending":
+        """With the cause named if the run failed at `t` (s) by a command that is no number."""
+        failed = (self.status == int(Status.NOT_FINITE)) | (self.status == int(Status.STEPS_EXHAUSTED))
+        wrong = wrong_input(command)
+        by_command = Ending(jnp.asarray(int(Status.COMMAND_NOT_FINITE)), jnp.asarray(t, dtype=float), wrong)
+        return Ending(*(jnp.where(failed & (wrong > 0), new, old) for new, old in zip(by_command, self, strict=True)))
+
+
+def going() -> Ending:
+    """Of a run that begins."""
+    return Ending(jnp.asarray(int(Status.OK)), jnp.zeros(()), jnp.zeros((), dtype=int))
 
 
 class Outcome(NamedTuple):
@@ -19,19 +44,26 @@ class Outcome(NamedTuple):
     final: Any  # states (x, z) of plant and controller at the end
     status: Int[Array, ""]  # a Status code
     ended: Float[Array, ""]  # s; when it failed, else the duration
+    input: Int[Array, ""]  # number, from 1, of the first input that was commanded to be no number; 0 for none
+
+    def sentence(self) -> str:
+        """How the run ended, for people."""
+        status, said = Status(int(self.status)), ""
+        if status is Status.COMMAND_NOT_FINITE:
+            said = f" It is input {int(self.input)}, at {float(self.ended):.6g} s."
+        return status.sentence + said
 
 
 def health(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
     """Status code of an instant; what the controller's model can bear is no failure."""
-    finite = jnp.stack([_finite(leaf).all() for leaf in jax.tree.leaves((x, z))]).all()
     code = loop.plant.health(x)
     for borne in loop.controller.model.bears():
         code = jnp.where(code == int(borne), int(Status.OK), code)
-    return jnp.where(finite, code, int(Status.NOT_FINITE))
+    return jnp.where(all_sound((x, z)), code, int(Status.NOT_FINITE))
 
 
-def _finite(leaf: Array) -> Array:
-    """Which numbers have a square, as metrics need it; a filter may grow for long before it overflows."""
-    if not jnp.issubdtype(leaf.dtype, jnp.floating):
-        return jnp.isfinite(leaf)
-    return jnp.abs(leaf) < jnp.sqrt(jnp.finfo(leaf.dtype).max)
+def wrong_input(command: Inputs) -> Int[Array, ""]:
+    """Number, from 1, of the first input that is no number; 0 for none."""
+    numbers = jnp.arange(1, command.shape[0] + 1)
+    first = jnp.where(jnp.isfinite(command), command.shape[0] + 1, numbers).min()
+    return jnp.where(first > command.shape[0], 0, first)

@@ -25,6 +25,7 @@ _MEANINGS = {
     "command": ("input", "input asked for", None),
     "power": ("input", "electrical power drawn", "W"),
     "saturated": ("input", "1 where the input is at its limit", "1"),
+    "bad_readings": (None, "readings so far that were no numbers: left out, or replaced by what the law expects", "1"),
     "weights_peak": (None, "largest |theta|", "m/s^2, rad/s^2"),
     "weights": ("rule", "weights theta of the fuzzy rules", "/s^2"),
 }
@@ -43,7 +44,7 @@ def to_dataset(outcome: Outcome, plant: AbstractPlant, controller: AbstractContr
     return xr.Dataset(
         variables,
         coords=coordinates(np.asarray(outcome.time), plant),
-        attrs={"status": status.word, "status_sentence": status.sentence, "ended": float(outcome.ended)},
+        attrs={"status": status.word, "status_sentence": outcome.sentence(), "ended": float(outcome.ended)},
     )
 
 

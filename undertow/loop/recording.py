@@ -7,9 +7,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from undertow.core.contracts import Inputs
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
-from undertow.loop.outcome import health
+from undertow.loop.outcome import Ending, health, wrong_input
 
 
 def record(
@@ -36,18 +37,32 @@ def record(
 
 
 def keep_sound(
-    loop: ClosedLoop, old: Any, new: Any, status: Int[Array, ""], ended: Float[Array, ""], t: Float[Array, ""]
-):
-    """States (x, z, ...) after a tick that ends at t: the new ones, or for ever the old ones once something is wrong.
+    loop: ClosedLoop,
+    old: Any,
+    new: Any,
+    ending: Ending,
+    t: Float[Array, ""],
+    dt: Float[Array, ""],
+    command: Inputs | None = None,
+) -> tuple[Any, Ending]:
+    """States (x, z, ...) after a tick from t to t + dt: the new ones, or for ever the old ones once something is wrong.
 
-    Returns:
-        States, status and time of the end.
+    Args:
+        loop: the five roles.
+        old, new: states before and after.
+        ending: of the run so far.
+        t, dt: s.
+        command: of the tick, where a command that is no number ends the run.
     """
-    code = health(loop, *new[:2])
-    failing = (status == int(Status.OK)) & (code != int(Status.OK))
-    status, ended = jnp.where(failing, code, status), jnp.where(failing, t, ended)
-    sound = status == int(Status.OK)
-    return jax.tree.map(lambda n, o: jnp.where(sound, n, o), new, old), status, ended
+    code, time, wrong = health(loop, *new[:2]), t + dt, jnp.zeros((), dtype=int)
+    if command is not None:
+        wrong = wrong_input(command)
+        code = jnp.where(wrong > 0, int(Status.COMMAND_NOT_FINITE), code)
+        time = jnp.where(wrong > 0, t, time)
+    failing = (ending.status == int(Status.OK)) & (code != int(Status.OK))
+    ending = Ending(*(jnp.where(failing, now, was) for now, was in zip((code, time, wrong), ending, strict=True)))
+    sound = ending.status == int(Status.OK)
+    return jax.tree.map(lambda n, o: jnp.where(sound, n, o), new, old), ending
 
 
 def instant(tick: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:

@@ -11,9 +11,8 @@ from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
-from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
-from undertow.loop.outcome import Outcome
+from undertow.loop.outcome import Outcome, going
 from undertow.loop.recording import instant, keep_sound, record
 from undertow.numerics.integrators import METHODS
 
@@ -61,7 +60,7 @@ def simulate(
     Raises:
         BadInput: duration or dt not positive, or duration shorter than one record.
     """
-    ticks = ticks_of(duration, dt, record_every)
+    ticks, loop = ticks_of(duration, dt, record_every), loop.beginning_at(position)
     key = jax.random.PRNGKey(0) if key is None else key
     start = loop.outputs_at_start(position, velocity)
     plan = (ticks, record_every, method, substeps)
@@ -90,8 +89,8 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
     else:
         carry, (time, samples) = record(drawn, one, carry, dt, ticks, record_every)
-    final, gathered, status, ended = carry
-    return Outcome(time, samples, gathered, final[:2], status, jnp.where(status == int(Status.OK), ticks * dt, ended))
+    final, gathered, ending = carry
+    return Outcome(time, samples, gathered, final[:2], *ending.until(ticks * dt))
 
 
 def begin(drawn: Drawn, start: tuple[Outputs, Outputs], accumulators) -> PyTree:
@@ -100,12 +99,12 @@ def begin(drawn: Drawn, start: tuple[Outputs, Outputs], accumulators) -> PyTree:
     states = (x, z, drawn.listen(x))
     blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.look, jnp.zeros(()), *states))
     gathered = tuple(a.init(blank) for a in accumulators)
-    return (states, gathered, jnp.asarray(int(Status.OK)), jnp.zeros(()))
+    return (states, gathered, going())
 
 
 def tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
     """Command, move the plant with the input held, then let the controller learn from what was applied."""
-    (x, z, heard), gathered, status, ended = carry
+    (x, z, heard), gathered, ending = carry
     loop, t = drawn.loop, instant(k, dt)
     decision = drawn.decide(t, x, z, heard)
     if accumulators:
@@ -116,9 +115,15 @@ def tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
         new_x = step(motion, t, x, h)
     else:
         new_x = jax.lax.fori_loop(0, substeps, lambda i, x: step(motion, t + instant(i, h), x, h), x)
-    new_z = loop.controller.advance(z, decision.y, decision.r, decision.applied, dt)
-    state, status, ended = keep_sound(loop, (x, z, heard), (new_x, new_z, decision.heard), status, ended, t + dt)
-    return state, gathered, status, ended
+    y, law = decision.y, loop.controller
+    new_z = law.advance(z, y, decision.r, decision.applied, dt)
+    remembered = decision.heard
+    if remembered.expected is not None:
+        expected = remembered.expected.after(law, z, y, decision.telemetry, decision.applied, dt)
+        remembered = remembered._replace(expected=expected)
+    new = (new_x, new_z, remembered)
+    state, ending = keep_sound(loop, (x, z, heard), new, ending, t, dt, decision.command)
+    return state, gathered, ending
 
 
 def _motion(drawn: Drawn, applied, t, x):

@@ -40,4 +40,5 @@ def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
         substeps=plan.substeps,
     )
     series = {name: getattr(outcome.samples, name) for name in plan.signals}
-    return Ended(outcome.accumulated, outcome.final, outcome.status, outcome.ended, outcome.time, series)
+    ending = outcome.status, outcome.ended, outcome.input
+    return Ended(outcome.accumulated, outcome.final, *ending, outcome.time, series)

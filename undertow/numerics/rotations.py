@@ -6,7 +6,6 @@ z-y-x; quaternion (w, x, y, z), rotating body vectors into the world.
 """
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 Vector3 = Float[Array, "3"]
@@ -15,9 +14,10 @@ Matrix3 = Float[Array, "3 3"]
 Quaternion = Float[Array, "4"]
 
 # Permutation symbol: (a x b)_i = e_ijk a_j b_k. As one product it stays one operation for the compiler.
-_LEVI_CIVITA = np.array(
-    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]],
-    dtype=float,
+_LEVI_CIVITA = (
+    ((0, 0, 0), (0, 0, 1), (0, -1, 0)),
+    ((0, 0, -1), (0, 0, 0), (1, 0, 0)),
+    ((0, 1, 0), (-1, 0, 0), (0, 0, 0)),
 )
 
 # cos(pitch) is kept from vanishing by this much, so that a body passing through the vertical stays finite.
@@ -26,7 +26,7 @@ _SMALLEST_COSINE = 1e-12
 
 def cross(a: Vector3, b: Vector3) -> Vector3:
     """Cross product a x b."""
-    return (_LEVI_CIVITA * (a[:, None] * b)).sum((1, 2))
+    return (jnp.array(_LEVI_CIVITA, dtype=float) * (a[:, None] * b)).sum((1, 2))
 
 
 def skew(a: Vector3) -> Matrix3:

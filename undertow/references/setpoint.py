@@ -2,11 +2,11 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
@@ -21,19 +21,24 @@ class Transition(eqx.Module):
     """
 
     settling: Float[Array, ""] = param("s", "time of the transition; 0 for a step")
-    start: Float[Array, " n"] = param("m, rad", "position at t = 0")
+    # Position at t = 0, m and rad; None for where the plant starts.
+    start: Float[Array, " n"] | None = eqx.field(
+        converter=lambda at: None if at is None else as_array(at), default=None
+    )
 
     def __check_init__(self):
         checks.not_negative("settling", self.settling, "s")
-        checks.finite("start", self.start)
+        if self.start is not None:
+            checks.finite("start", self.start)
 
     def to(self, goal, t) -> Target:
         """Target at time t on the way to a goal."""
         smooth = self.settling > 0
         duration = jnp.where(smooth, self.settling, 1.0)
         share, rate, second = with_rates(lambda t: jnp.where(smooth, quintic(t / duration), 1.0), t)
-        change = goal - self.start
-        return Target((1 - share) * self.start + share * goal, change * rate, change * second)
+        start = jnp.zeros_like(goal) if self.start is None else self.start
+        change = goal - start
+        return Target((1 - share) * start + share * goal, change * rate, change * second)
 
 
 class Setpoint(AbstractReference):
@@ -48,15 +53,21 @@ class Setpoint(AbstractReference):
 
     def __check_init__(self):
         checks.finite("position", self.position)
-        if self.transition is not None and self.transition.start.shape != self.position.shape:
+        start = None if self.transition is None else self.transition.start
+        if start is not None and start.shape != self.position.shape:
             must = f"have shape {self.position.shape}, as `position` has"
-            raise BadInput("start", must, f"of shape {self.transition.start.shape}")
+            raise BadInput("start", must, f"of shape {start.shape}")
 
     def at(self, t) -> Target:
         if self.transition is not None:
             return self.transition.to(self.position, t)
         zero = jnp.zeros_like(self.position)
         return Target(self.position, zero, zero)
+
+    def beginning_at(self, position):
+        if self.transition is None or self.transition.start is not None:
+            return self
+        return Setpoint(self.position, Transition(self.transition.settling, position))
 
 
 def setpoint(position, settling: float = 0.0, start=None) -> Setpoint:
@@ -69,9 +80,10 @@ def setpoint(position, settling: float = 0.0, start=None) -> Setpoint:
         position: one entry per output, m and rad.
         settling: time of the transition from `start`, s; 0 for a step. Its largest velocity is 1.875 times
             distance / settling, its largest acceleration 5.77 times distance / settling^2.
-        start: position at t = 0, one entry per output, m and rad; None for zero. A step has no use for it.
+        start: position at t = 0, one entry per output, m and rad; None for where the plant starts. A step has no use
+            for it.
     """
     # Without a transition compiled loops know that the goal never moves.
     if not isinstance(settling, Tracer) and settling == 0:
         return Setpoint(position)
-    return Setpoint(position, Transition(settling, jnp.zeros(np.shape(position)) if start is None else start))
+    return Setpoint(position, Transition(settling, start))

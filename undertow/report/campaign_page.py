@@ -47,7 +47,7 @@ def write_campaign(title: str, results: Results, found: Mapping[str, Any], folde
         tag("p", f"{found['done']} of {found['trials']} trials", class_="lead"),
         section("endings", "How they ended", *_endings(found)),
         *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(found)),
-        section("metrics", "Distributions", drawn["distributions"], distributions(found)),
+        section("metrics", "Distributions", drawn["distributions"], distributions(results, found)),
         *_optional("dependence", "What they depend on", drawn["sensitivity"], *_choices(found)),
         section("worst", "The worst trials", _how(found), worst(results, found)),
         section("asked", "What was flown", *asked(results)),
@@ -84,9 +84,9 @@ def _how(found: Mapping[str, Any]) -> Html:
 
 def _drawn(results: Results, found: Mapping[str, Any], folder: Path) -> dict[str, Html]:
     """Figures by name; nothing where there is nothing to draw."""
-    values = _values(results, found)
+    values, units = _values(results, found), {metric: results.unit(metric) for metric in results.metrics}
     figures = {
-        "distributions": distributions_figure(values, _flown(found)) if values else None,
+        "distributions": distributions_figure(values, _flown(found), units) if values else None,
         "sensitivity": sensitivity_figure(found["sensitivity"]) if found["sensitivity"] else None,
     }
     drawn = dict.fromkeys(figures, Html(""))
@@ -109,5 +109,6 @@ def _values(results: Results, found: Mapping[str, Any]) -> dict[str, dict[str, n
         rows = results.rows.isel(trial=results.combinations == number)
         for metric in one["metrics"]:
             whole = rows[metric].values
-            values.setdefault(metric, {})[named(one)] = whole[np.isfinite(whole)]
+            if np.isfinite(whole).any():
+                values.setdefault(metric, {})[named(one)] = whole[np.isfinite(whole)]
     return values

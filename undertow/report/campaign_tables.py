@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-from undertow.analysis.meanings import MEANINGS
 from undertow.core.status import Status
 from undertow.report.formats import chip, ending, number, prose, unit
 from undertow.report.page import Html, join, table, tag
@@ -13,7 +12,7 @@ from undertow.studies.campaign.results import Results
 from undertow.studies.campaign.schema import Spread
 
 _DIGITS = 4
-_BY_CHOICE = ("tracking_rms", "voltage_rms")
+_BY_CHOICE = ("tracking_rms", "input_rms")
 
 
 def named(combination: Mapping[str, Any]) -> str:
@@ -53,14 +52,14 @@ def requirements(found: Mapping[str, Any]) -> Html:
     return table(head, rows) if rows else Html("")
 
 
-def distributions(found: Mapping[str, Any]) -> Html:
+def distributions(results: Results, found: Mapping[str, Any]) -> Html:
     """Quantiles of every metric, side by side for the combinations."""
     several = found["combinations"]
     names = dict.fromkeys(name for one in several for name in one["metrics"])
     rows = []
     for name in names:
         cells = (_spread(one["metrics"].get(name)) for one in several)
-        rows.append((join(_metric(name), " ", unit(MEANINGS[name].unit)), *cells))
+        rows.append((join(_metric(name), " ", unit(results.unit(name))), *cells))
     head = ("median [5 %, 95 %]", *map(named, several))
     return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 1)
 

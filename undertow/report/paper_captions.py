@@ -34,8 +34,8 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
         "fig09": join(
             "Left the first second, right the rest, on scales of their own. The start asks for voltages no supply "
             "gives; after it the two controllers need the same voltage, because the same disturbance must be met.",
-            _pair(one, "voltage_peak", "Largest voltage, V", "whole"),
-            _pair(one, "voltage_variation", "Variation after 10 s, V/s"),
+            _pair(one, "input_peak", "Largest voltage, V", "whole"),
+            _pair(one, "input_variation", "Variation after 10 s, V/s"),
         ),
         "fig10": join(
             "Without speed sensors, on a motor that is in its steady state at every instant, RCAFC tracks as in "
@@ -56,7 +56,7 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
         ),
         "fig13": join(
             "As Fig. 9, for RCAFC without speed sensors.",
-            _single(two, "voltage_peak", "Largest voltage, V", "whole"),
+            _single(two, "input_peak", "Largest voltage, V", "whole"),
         ),
         "ladder": join("The law of Table 1 on four truths of the same thruster. A cross marks a run that ended early."),
         "sweep": join(

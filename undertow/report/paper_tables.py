@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from undertow.analysis.meanings import MEANINGS
+from undertow.analysis.meanings import unit_of
 from undertow.report.formats import chip, condition, ending, number, percent, prose, unit
 from undertow.report.page import Html, join, table, tag
 
@@ -27,10 +27,10 @@ _TABLE2 = {
     "tracking_max": ("largest error", None),
     "estimation_rms": ("estimation of uncertainties", ("excellent", "fair", "fair", "poor")),
     "robust_rms": ("robust control signals", ("small", "small/meddle", "large/meddle", "large")),
-    "voltage_variation": ("chattering", ("very small", "small/meddle", "small/meddle", "serious/meddle")),
+    "input_variation": ("chattering", ("very small", "small/meddle", "small/meddle", "serious/meddle")),
     "model_rms": ("trajectories of the identification model", ("very good", "favorable", "favorable", "unavailable")),
     "rules": ("number of fuzzy rules per axis", ("few", "numerous", "few", "numerous")),
-    "voltage_rms": ("voltage", None),
+    "input_rms": ("voltage", None),
     "weights_peak": ("largest weight", None),
     "settling_time": ("settling to 2 %", None),
 }
@@ -65,7 +65,7 @@ def table2(results: dict[str, Any]) -> Html:
     for metric, (row, words) in _TABLE2.items():
         values = [(results[key].get("steady") or {}).get(metric) for key in keys]
         cells = [_worded(number(v), words[p] if words else "") for v, p in zip(values, places, strict=True)]
-        rows.append((join(row, Html("<br>"), unit(MEANINGS[metric].unit)), *cells))
+        rows.append((join(row, Html("<br>"), unit(unit_of(metric, "V"))), *cells))
     endings = [_worded(ending(results[key]), _ROBUSTNESS[p]) for key, p in zip(keys, places, strict=True)]
     rows.append(("robustness: how the run ended", *endings))
     return table(("", *(_COLUMNS[key] for key in keys)), rows, numeric=range(1, 5), wide=True)
@@ -77,7 +77,7 @@ def ladder(results: dict[str, Any]) -> Html:
     for rung, entries in results.items():
         for key, entry in entries.items():
             steady = entry.get("steady") or {}
-            figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "voltage_variation")]
+            figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "input_variation")]
             ended = tag("span", ending(entry), class_=f"chip {'holds' if entry['status'] == 'ok' else 'fails'}")
             place = join(tag("b", rung), tag("span", _RUNGS.get(rung, ""), class_="said"))
             rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
@@ -114,7 +114,7 @@ def provenance(results: dict[str, Any]) -> Html:
 
 
 def _named(metric: str) -> Html:
-    return join(metric.replace("_", " "), Html(" "), unit(MEANINGS[metric].unit))
+    return join(metric.replace("_", " "), Html(" "), unit(unit_of(metric, "V")))
 
 
 def _condition(verdict: str) -> Html:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from undertow.analysis.meanings import unit_of
 from undertow.studies.prediction.predict import Prediction
 
 
@@ -140,9 +141,8 @@ def _reach(prediction: Prediction) -> Rows:
 
 
 def _metrics(prediction: Prediction) -> Rows:
-    from undertow.analysis.meanings import MEANINGS
-
-    rows = [(name, _number(value), MEANINGS[name].unit) for name, value in (prediction.metrics or {}).items()]
+    of_input = prediction.ground.built.closed_loop.plant.input_unit
+    rows = [(name, _number(value), unit_of(name, of_input)) for name, value in (prediction.metrics or {}).items()]
     return Rows(
         "Metrics foretold for the steady window",
         ("metric", "predicted", "unit"),

@@ -1,7 +1,8 @@
 """From a scenario to a closed loop ready to run."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -12,11 +13,30 @@ from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import parts
-from undertow.scenario.fitting import check_fit, check_times, placed
+from undertow.scenario.fitting import check_fit, check_times, placed, rounded_times
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
 from undertow.scenario.stepping import step_advice
 from undertow.scenario.workshop import Workshop
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+_TOLD_APART = 2**24  # whole numbers that float32 holds
+
+
+def in_its_precision(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """A function of a scenario (its first argument, read or built) that computes in the precision it names."""
+
+    @functools.wraps(function)
+    def computed(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
+        given: Any = arguments[0]
+        scenario = given.scenario if isinstance(given, Built) else validate(given)
+        with runtime.in_precision(scenario.precision):
+            return function(*arguments, **options)
+
+    return computed
 
 
 class Built(NamedTuple):
@@ -26,13 +46,18 @@ class Built(NamedTuple):
     scenario: Scenario
     resolved: dict[str, Any]  # the scenario with every default filled in
 
+    @in_its_precision
     def advice(self) -> tuple[str, ...]:
         """What is odd about it, though it can be run."""
         (start, _), end = self.window(), self.scenario.loop.duration
         late = f"the steady window starts at {start:g} s, the run ends at {end:g} s: no steady metrics"
         plant = self.closed_loop.plant
         fast = step_advice(plant.thruster, self.scenario.loop) if isinstance(plant, HybridVehicle) else ()
-        return plant.advice() + fast + ((late,) if start >= end else ())
+        loop, ticks = self.scenario.loop, self.scenario.loop.duration / self.scenario.loop.dt
+        times = rounded_times(loop)
+        if self.scenario.precision == "float32" and loop.method != "adaptive" and ticks > _TOLD_APART:
+            times += (f"float32 tells no instants apart beyond {_TOLD_APART} steps, {_TOLD_APART * loop.dt:.6g} s",)
+        return plant.advice() + fast + times + ((late,) if start >= end else ())
 
     def window(self) -> tuple[float, float]:
         """Start and stop of the steady metrics, s."""
@@ -49,14 +74,13 @@ def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) ->
     Raises:
         BadInput: anything wrong with it, with key path and place.
     """
-    with runtime.on_processor():
-        return _build(source if isinstance(source, Text) else from_data(source), workshop or Workshop())
-
-
-def _build(text: Text, workshop: Workshop) -> Built:
+    text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
-    if scenario.precision == "float32":
-        runtime.use_single_precision()
+    with runtime.on_processor(), runtime.in_precision(scenario.precision):
+        return _build(text, scenario, workshop or Workshop())
+
+
+def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
     resolved = scenario.model_dump(include={"description", "loop", "initial", "seed", "precision"})
 
     start, stop = scenario.steady.of_run(scenario.loop.duration)
@@ -93,4 +117,4 @@ def _build(text: Text, workshop: Workshop) -> Built:
     check_times(text, scenario.loop, scenario.steady)
     if not workshop.seen((loop, [value and len(value) for _, value in scenario.initial])):
         check_fit(text, loop, scenario.initial)
-    return Built(loop, scenario, resolved)
+    return Built(loop.beginning_at(scenario.initial.position), scenario, resolved)

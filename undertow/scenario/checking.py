@@ -14,7 +14,7 @@ from undertow.core import catalogue
 from undertow.core.contracts import AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario import parts
-from undertow.scenario.build import build
+from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.reading import Text, key_path, read
 from undertow.scenario.schema import Scenario
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
@@ -105,6 +105,7 @@ def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
     return _report(findings, title=title, rows=() if broken else derived_of_thruster(thruster))
 
 
+@in_its_precision
 def _of_scenario(text: Text) -> list[Report]:
     """The scenario itself, the vehicle and the thruster in it, and the plant and its references."""
     built = build(text)

@@ -17,11 +17,12 @@ from undertow.lanes.errors import Unsupported
 from undertow.loop import continuous, in_lanes, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
-from undertow.scenario.build import Built, build
+from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.labelling import label
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Initial, Loop
+from undertow.scenario.stepping import step_failure
 
 
 class Executed(NamedTuple):
@@ -48,11 +49,13 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
         return _execute(source if isinstance(source, Built) else build(source))
 
 
+@in_its_precision
 def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
     gathered = (Metrics(*built.window()),) if scenario.steady.every_tick else ()
     outcome = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
-    attributes = {
+    why = step_failure(built.closed_loop, scenario.loop, outcome)
+    attributes = ({"status_sentence": why} if why else {}) | {
         "title": scenario.description or "a closed loop run by undertow",
         "scenario": text,
         "scenario_hash": text_hash(text),

@@ -1,5 +1,6 @@
 """Whether times and parts fit together: shapes only, nothing is computed."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,9 @@ from undertow.scenario.schema import Initial, Loop, Window
 # A record takes about a kilobyte, a sampling time some microseconds.
 MOST_RECORDS = 1_000_000
 MOST_TICKS = 2_000_000_000
+
+# Of a time: multiples of decimal steps are met to this share.
+_ROUNDING = 1e-9
 
 
 def placed(text: Text, key: str, make: Callable[[], Any]) -> Any:
@@ -56,6 +60,22 @@ def check_times(text: Text, loop: Loop, window: Window) -> None:
     if stepped and not whole_steps(loop.record, loop.dt):
         must, got = f"be a whole number of steps ({loop.dt:g} s)", f"{loop.record:g} s"
         raise BadInput("loop.record", must, got, where=text.where(("loop", "record")))
+
+
+def rounded_times(loop: Loop) -> tuple[str, ...]:
+    """A sentence where a run ends at another time than it is told to, and where its last record is not at its end."""
+    stepped, said = loop.method != "adaptive", []
+    dt = loop.dt if loop.kind == "sampled" else loop.record / round(loop.record / loop.dt) if stepped else 0.0
+    end = round(loop.duration / dt) * dt if stepped else loop.duration
+    if abs(end - loop.duration) > _ROUNDING * loop.duration:
+        said.append(f"the run lasts {end:.9g} s, a whole number of steps of {dt:g} s, not {loop.duration:.9g} s")
+    last = math.floor(end / loop.record * (1 + _ROUNDING)) * loop.record
+    if end - last > _ROUNDING * end:
+        said.append(
+            f"the last record is at {last:.9g} s, {end - last:.3g} s before the end: `loop.duration` is no multiple of "
+            f"`loop.record` ({loop.record:g} s)"
+        )
+    return tuple(said)
 
 
 def whole_steps(interval: float, step: float) -> bool:

@@ -42,7 +42,9 @@ def label(
     covered = status is Status.OK and window[0] < ended
     dataset = to_dataset(outcome, loop.plant, loop.controller)
     over = lambda start, stop: measure(outcome, start, stop) | closure(dataset, start, stop) | counted
-    steady, whole = over(*window) if covered else None, over(0.0, ended)
+    # A run that was ended by a command has none at that instant.
+    last = ended - dt / 2 if status is Status.COMMAND_NOT_FINITE else ended
+    steady, whole = over(*window) if covered else None, over(0.0, last)
     if steady is not None and outcome.accumulated:
         steady |= results(outcome.accumulated[0])
     certified = certify(dataset, loop.controller, window, dt)

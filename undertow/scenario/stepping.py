@@ -1,15 +1,25 @@
-"""Whether steps of fixed length are short enough for the thrusters, the fastest thing there is in a vehicle."""
+"""Whether steps of fixed length are short enough: for the thrusters beforehand, for all else once a run has failed."""
+
+from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
+from undertow.core.status import Status
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.one_ode import flow
+from undertow.loop.outcome import Outcome
 from undertow.scenario.schema import Loop
 from undertow.thrusters.thruster import AbstractThruster
 
 # Largest step times decay rate at which a method is stable.
 _LIMITS = {"rk4": 2.785, "euler": 2.0}
+
+# Records of a failed run that are looked at.
+_LOOKS = 9
 
 
 def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[str, ...]:
@@ -20,13 +30,18 @@ def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[str, ...]:
     longest = _LIMITS[loop.method] / rate if rate else np.inf
     if step <= longest:
         return ()
-    remedy = (
-        f"loop.substeps: {int(np.ceil(loop.dt / longest))} or more," if loop.kind == "sampled" else "a shorter loop.dt,"
-    )
     return (
         f"the thrusters settle in {1e3 / rate:.3g} ms, but steps of {1e3 * step:g} ms are unstable beyond "
-        f"{1e3 * longest:.3g} ms: the run will diverge by its steps alone. Take {remedy} or another rung",
+        f"{1e3 * longest:.3g} ms: the run will diverge by its steps alone. Take {_remedy(loop, longest)}, or another "
+        "rung",
     )
+
+
+def _remedy(loop: Loop, longest: float) -> str:
+    """A setting with steps of at most so many seconds."""
+    if loop.kind == "continuous":
+        return f"a loop.dt of at most {longest:.2g} s"
+    return f"loop.substeps: {int(np.ceil(loop.dt / longest))} or more"
 
 
 def fastest_decay(thruster: AbstractThruster) -> float:
@@ -36,3 +51,64 @@ def fastest_decay(thruster: AbstractThruster) -> float:
         return 0.0
     rates = lambda x: ravel_pytree(thruster.dynamics(tree(x), jnp.zeros(1)))[0]
     return float(np.abs(np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(rates))(rest)))).max())
+
+
+def step_failure(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> str:
+    """Why a run failed if its steps were too long for what was integrated; nothing if that is not the cause.
+
+    A sampled run integrates the plant, one ODE the law with it. Looked at is where the run began, and further records
+    up to where it moved faster than it should: drag that is quadratic makes any plant fast once it has run away.
+    """
+    failed = Status(int(outcome.status)) in (Status.DIVERGED, Status.NOT_FINITE)
+    if not failed or loop.method not in _LIMITS:
+        return ""
+    rate = max(_decays(closed_loop, loop, outcome), default=0.0)
+    step, longest = loop.dt / loop.substeps, _LIMITS[loop.method] / rate if rate else np.inf
+    if loop.kind == "continuous":
+        step = loop.dt
+    if step <= longest:
+        return ""
+    what = "plant and law together settle" if loop.kind == "continuous" else "the plant settles"
+    return (
+        f"A state left every sensible envelope, but not because the loop is unstable: {what} in {1e3 / rate:.3g} ms, "
+        f"and steps of {1e3 * step:g} ms ({loop.method}) are unstable by themselves beyond {1e3 * longest:.3g} ms. "
+        f"Take {_remedy(loop, longest)}."
+    )
+
+
+def _decays(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> list[float]:
+    """Fastest decays of what is integrated at some records, 1/s; none where it grows by itself."""
+    plant, samples = closed_loop.plant, outcome.samples
+    ordinary = np.abs(np.asarray(samples.velocity)).max(axis=1) <= _ordinary(closed_loop, outcome)
+    rows = np.flatnonzero(ordinary & (np.asarray(outcome.time) <= float(outcome.ended)))
+    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, _LOOKS).round().astype(int))] if len(rows) else []
+    first = plant.initial_state(samples.position[0], samples.velocity[0])
+    if loop.kind == "continuous":
+        drawn = closed_loop.draw(jax.random.PRNGKey(0))
+        flat, tree = ravel_pytree(drawn.start(samples.position[0], samples.velocity[0]))
+        rates = lambda state: ravel_pytree(flow(jnp.zeros(()), tree(state), drawn))[0]
+        return _fastest(rates, [(flat,)])
+    _, tree = ravel_pytree(first)
+    still = plant.no_load()
+    rates = lambda state, u: ravel_pytree(plant.dynamics(jnp.zeros(()), tree(state), u, still))[0]
+    states = [ravel_pytree(plant.initial_state(samples.position[i], samples.velocity[i]))[0] for i in chosen]
+    return _fastest(rates, [(state, samples.voltage[i]) for state, i in zip(states, chosen, strict=True)])
+
+
+def _ordinary(closed_loop: ClosedLoop, outcome: Outcome) -> float:
+    """A speed that is nothing unusual, m/s or rad/s: a few times that of the reference or of the start."""
+    times = np.linspace(0.0, float(outcome.ended), _LOOKS)
+    wanted = np.abs([np.asarray(closed_loop.reference.at(jnp.asarray(t)).velocity) for t in times]).max()
+    return max(1.0, 3 * float(wanted), 1.5 * float(np.abs(np.asarray(outcome.samples.velocity[0])).max()))
+
+
+def _fastest(rates: Callable[..., Any], points: list[tuple[Any, ...]]) -> list[float]:
+    """Fastest decay at each point; those where something grows faster than it decays are left out."""
+    slopes, found = jax.jit(jax.jacfwd(rates)), []
+    for point in points:
+        matrix = np.asarray(slopes(*map(jnp.asarray, point)))
+        if np.isfinite(matrix).all():
+            poles = np.linalg.eigvals(matrix)
+            fastest = poles[np.abs(poles).argmax()]
+            found += [float(abs(fastest))] if fastest.real < 0 else []
+    return found

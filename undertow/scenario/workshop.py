@@ -18,7 +18,7 @@ class Workshop:
         self._checked: set[Any] = set()
 
     def part(self, where: str, description: Mapping[str, Any], given: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """Result of `make`, or what it was for the same description and the same other parts.
+        """Result of `make`, or what it was for the same description and the same other parts, in the same precision.
 
         Args:
             where: key of the part.
@@ -30,7 +30,8 @@ class Workshop:
             told = json.dumps(description, sort_keys=True)
         except (TypeError, ValueError):  # arrays in Python data
             return make()
-        key = (where, told, tuple(id(part) for part in given))
+        double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
+        key = (where, told, double, tuple(id(part) for part in given))
         if key not in self._made:
             if len(self._made) >= _MOST:
                 self._made.clear()

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from undertow.core.contracts import AbstractSensor, Measurement
 from undertow.core.errors import BadInput
@@ -14,6 +14,7 @@ from undertow.instruments.imu import IMU
 from undertow.instruments.instrument import AbstractInstrument
 from undertow.instruments.propeller_speed import PropellerSpeed
 from undertow.instruments.sampling import Spoken
+from undertow.numerics.randomness import numbered
 
 # (m/s)^2 s; less counts as none.
 _NOISELESS = 1e-20
@@ -26,6 +27,7 @@ class NavigationState(NamedTuple):
     velocity: Float[Array, "3"]  # the true one then, m/s: accelerometers feel its change
     spoken: tuple[Spoken, ...]  # one per instrument
     estimate: Estimate
+    ignored: Int[Array, ""]  # readings so far that were no numbers
 
 
 class Navigation(AbstractSensor):
@@ -34,7 +36,7 @@ class Navigation(AbstractSensor):
     Between readings the estimate moves on by rates and acceleration of the IMU. A late reading is compared with what
     the estimate was when it was taken. There is no Kalman filter and no estimate of a bias: an offset of the
     accelerometers, or of roll or pitch (times gravity), shows in the velocity, as large as it grows to until the next
-    reading of the DVL over the share that is given to it.
+    reading of the DVL over the share that is given to it. A reading that is no number counts as lost.
 
     Raises:
         BadInput: no instrument, or no IMU.
@@ -74,7 +76,7 @@ class Navigation(AbstractSensor):
         estimate = estimate_of(truth)
         if not any(isinstance(instrument, PropellerSpeed) for instrument in self.instruments):
             estimate = estimate._replace(actuator=None)
-        return NavigationState(jnp.zeros(()), motion.velocity, spoken, estimate)
+        return NavigationState(jnp.zeros(()), motion.velocity, spoken, estimate, jnp.zeros((), dtype=int))
 
     def measure(self, path, state: NavigationState, t, truth: Measurement):
         elapsed = t - state.time
@@ -87,7 +89,15 @@ class Navigation(AbstractSensor):
                 self.instruments, state.spoken, readings, _chances(path, numbers, readings), strict=True
             )
         ]
-        news = [(instrument, arrival) for instrument, (arrival, _) in zip(self.instruments, heard, strict=True)]
+        arrivals = [arrival for arrival, _ in heard]
+        finite = [jnp.isfinite(reading).all() for reading, _ in arrivals]
+        ignored = state.ignored + sum(
+            jnp.where(fresh & ~good, 1, 0) for (_, fresh), good in zip(arrivals, finite, strict=True)
+        )
+        news = [
+            (instrument, (reading, fresh & good))
+            for instrument, (reading, fresh), good in zip(self.instruments, arrivals, finite, strict=True)
+        ]
         estimate = state.estimate
         for instrument, (reading, fresh) in news:
             estimate = _either(fresh, instrument.foretell(estimate, reading), estimate)
@@ -95,13 +105,16 @@ class Navigation(AbstractSensor):
         for instrument, (reading, fresh) in news:
             estimate = _either(fresh, instrument.correct(estimate, reading), estimate)
         spoken = tuple(spoken for _, spoken in heard)
-        return estimate.measurement(), NavigationState(t, motion.velocity, spoken, estimate)
+        return estimate.measurement(), NavigationState(t, motion.velocity, spoken, estimate, ignored)
+
+    def ignored(self, state: NavigationState):
+        return state.ignored
 
 
 def _chances(keys, numbers, readings) -> list:
     """Standard normal numbers, one per entry of each reading and one more; drawn together, which compiles faster."""
     most = max(reading.size for reading in readings) + 1
-    draw = lambda key, number: jax.random.normal(jax.random.fold_in(key, number), (most,), dtype=readings[0].dtype)
+    draw = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
     together = jax.vmap(draw)(keys, numbers)
     return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]
 

@@ -3,15 +3,16 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractSensor, Measurement
 from undertow.core.param import param
+from undertow.numerics.randomness import numbered
 
 
 class WhiteNoise(AbstractSensor):
-    """Independent Gaussian errors, new at every sample of the control loop.
+    """Independent Gaussian errors, new at every sample of the control loop; the number of the sample picks them.
 
     Raises:
         BadInput: a standard deviation negative.
@@ -32,18 +33,17 @@ class WhiteNoise(AbstractSensor):
     def velocity_noise(self, dt):
         return self.velocity
 
-    def init(self, path, truth) -> tuple[()]:
-        return ()
+    def init(self, path, truth) -> Int[Array, ""]:
+        """Samples so far."""
+        return jnp.zeros((), dtype=int)
 
     def measure(self, path, state, t, truth: Measurement):
-        # One draw per instant: the time in microseconds picks it, whatever the sampling rate.
-        instant = jax.random.fold_in(path, jnp.round(t * 1e6).astype(jnp.uint32))
-        errors = jax.random.normal(instant, (2, *truth.position.shape), dtype=truth.position.dtype)
+        errors = jax.random.normal(numbered(path, state), (2, *truth.position.shape), dtype=truth.position.dtype)
         noisy = truth._replace(
             position=truth.position + self.position * errors[0],
             velocity=truth.velocity + self.velocity * errors[1],
         )
-        return noisy, ()
+        return noisy, state + 1
 
 
 def white_noise(position=0.0, velocity=0.01) -> WhiteNoise:

@@ -66,8 +66,8 @@ def metrics_of(signals: dict[str, np.ndarray]) -> dict[str, float]:
         "uncertainty_rms": rms(signals["uncertainty"]),
         "model_rms": rms(signals["modelling_error"]),
         "robust_rms": rms(signals["robust"]),
-        "voltage_rms": rms(signals["u"]),
-        "voltage_peak": float(np.abs(signals["u"]).max()),
+        "input_rms": rms(signals["u"]),
+        "input_peak": float(np.abs(signals["u"]).max()),
     }
 
 

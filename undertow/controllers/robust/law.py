@@ -15,6 +15,7 @@ from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
 from undertow.core.param import param
+from undertow.fuzzy.tsk import FuzzySystem
 from undertow.numerics.linear import matvec
 from undertow.numerics.lyapunov import companion_lyapunov
 
@@ -84,6 +85,11 @@ class RobustRCAF(AbstractController):
         own = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
         estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound", "leakage")}
         check_gains(self.feedback, self.weight, own | estimators, len(self.model.angles))
+
+    @property
+    def fuzzy(self) -> FuzzySystem:
+        """That of the estimator."""
+        return self.estimator.fuzzy
 
     def init(self, y: Measurement, r: Target) -> RobustState:
         smoothing = None if self.filter is None else self.filter.init(y.position)

@@ -61,7 +61,9 @@ def fly(
     if steps < 1 or abs(steps * timestep - dt) > 1e-9 * dt:
         raise BadInput("dt", f"be a whole number of the engine's steps ({timestep:g} s)", f"{dt:g} s")
     propellers = Propellers(thruster, body.model.nu)
-    body.place(np.zeros(6) if position is None else position, np.zeros(6))
+    start = np.zeros(6) if position is None else np.asarray(position, dtype=float)
+    body.place(start, np.zeros(6))
+    reference = reference.beginning_at(jnp.asarray(start))
     command, advance, wanted = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
     z, rows, ticks, status = None, [], round(duration / dt), Status.OK
     for tick in range(ticks + 1):
@@ -70,7 +72,7 @@ def fly(
         z = controller.init(y, r) if z is None else z
         volts, _ = command(z, y, r)
         applied = propellers.admissible(np.asarray(volts))
-        status = body.status() if np.isfinite(applied).all() else Status.NOT_FINITE
+        status = body.status() if np.isfinite(volts).all() else Status.COMMAND_NOT_FINITE
         if status != Status.OK:
             break
         rows.append((t, body.position(), body.velocity(), np.asarray(r.position), applied))

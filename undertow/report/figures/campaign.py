@@ -7,11 +7,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from undertow.analysis.meanings import MEANINGS
 from undertow.report.figures import style
 
 # The metrics that are drawn, where they are there.
-_SHOWN = ("tracking_rms", "tracking_max", "estimation_rms", "voltage_rms", "voltage_variation", "saturated_fraction")
+_SHOWN = ("tracking_rms", "tracking_max", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
 _LOOKS = (
     style.SOLID,
     style.DASHED,
@@ -27,12 +26,15 @@ _WIDE = 100.0  # ratio of largest and smallest from which on an axis is logarith
 _DARK = 0.6  # correlations beyond this stand on dark ground
 
 
-def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]], flown: Mapping[str, int]) -> Figure:
+def distributions_figure(
+    values: Mapping[str, Mapping[str, np.ndarray]], flown: Mapping[str, int], units: Mapping[str, str]
+) -> Figure:
     """Share of trials below each value of a metric: the empirical distribution function; a failure is below none.
 
     Args:
         values: metric -> name of the combination -> finite values, in any order; the first eight are drawn.
         flown: name of the combination -> its trials, with those that failed.
+        units: metric -> unit.
     """
     shown = [name for name in _SHOWN if name in values]
     rows = -(-len(shown) // _COLUMNS)
@@ -56,8 +58,8 @@ def distributions_figure(values: Mapping[str, Mapping[str, np.ndarray]], flown: 
             panel.set_xscale("log")
             panel.xaxis.set_minor_formatter(NullFormatter())  # their numbers would run into one another
         panel.set_ylim(0, 1)
-        units = [style.power(unit) for unit in MEANINGS[metric].unit.split(", ") if unit]
-        style.label(panel, ", ".join([metric.replace("_", " "), *units]))
+        said = [style.power(unit) for unit in units[metric].split(", ") if unit]
+        style.label(panel, ", ".join([metric.replace("_", " "), *said]))
         panel.xaxis.set_label_coords(0.5, -0.19)  # clear of powers of ten
     return figure
 

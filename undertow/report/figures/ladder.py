@@ -14,7 +14,7 @@ from undertow.report.figures import signals, style
 _SHOWN = {
     "tracking_rms": "tracking error rms, m and rad",
     "estimation_rms": "estimation error rms, m/s$^2$ and rad/s$^2$",
-    "voltage_variation": "voltage variation, V/s",
+    "input_variation": "voltage variation, V/s",
     "weights_peak": "largest weight, m/s$^2$ or rad/s$^2$",
 }
 _MARKS = {"rcafc": "o", "rafc": "s"}

@@ -19,7 +19,7 @@ PREDICTION = (
     "Linear observer (ESO, ADRC, PI observer) and INDI do the same within 1 %, beside RCAFC at Table 1 and beside "
     "preset `robust`; RAFC at Table 1 does not."
 )
-METRICS = ("tracking_rms", "estimation_rms", "voltage_variation")
+METRICS = ("tracking_rms", "estimation_rms", "input_variation")
 
 _LINEAR = f"pole {gains.POLE:.4g}, b2 {gains.STIFFNESS:.5g}, K ({gains.FEEDBACK[0]:g}, {gains.FEEDBACK[1]:g})"
 _OF_ROBUST = {"robust", "robust, 1 set", "robust's linear observer", "robust's INDI"}

@@ -10,7 +10,7 @@ from undertow.studies.ablations.rough_sensor import RoughSensor
 
 QUESTION = "What does the robust term do?"
 PREDICTION = "It is a PD of gain 100: without it the error is 19 times larger and the noise in u 2.6 times smaller."
-METRICS = ("tracking_rms", "voltage_rms", "voltage_variation")
+METRICS = ("tracking_rms", "input_rms", "input_variation")
 
 _LAWS = {
     "with": ("Table 1", {}),
@@ -39,7 +39,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
 def judge(found) -> Answer:
     """Error and noise with and without."""
     error = found["without"]["tracking_rms"] / found["with"]["tracking_rms"]
-    noise = found["with, noise"]["voltage_variation"] / found["without, noise"]["voltage_variation"]
+    noise = found["with, noise"]["input_variation"] / found["without, noise"]["input_variation"]
     same = found["PD instead"]["tracking_rms"] / found["with"]["tracking_rms"]
     text = (
         f"Without it the tracking error is {error:.1f} times larger and the input varies {noise:.1f} times less in "

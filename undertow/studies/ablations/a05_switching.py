@@ -9,7 +9,7 @@ from undertow.studies.ablations.on_axes import loop
 QUESTION = "Amplitude and boundary layer of the robust term; sign or tanh?"
 PREDICTION = "Only the slope w_bar/phi counts, as a PD gain; sign chatters at half the sampling rate."
 LONG = True
-METRICS = ("tracking_rms", "voltage_rms", "voltage_variation")
+METRICS = ("tracking_rms", "input_rms", "input_variation")
 
 _PAIRS = ((10.0, 0.5), (20.0, 1.0), (2.0, 0.5), (10.0, 2.5))
 
@@ -31,9 +31,9 @@ def judge(found) -> Answer:
     """Equal slopes against each other, and the variation of sign."""
     same = found["20 / 1"]["tracking_rms"] / found["10 / 0.5"]["tracking_rms"]
     slope = found["10 / 2.5"]["tracking_rms"] / found["2 / 0.5"]["tracking_rms"]
-    chatter = found["sign"]["voltage_variation"] / found["10 / 0.5"]["voltage_variation"]
+    chatter = found["sign"]["input_variation"] / found["10 / 0.5"]["input_variation"]
     text = (
         f"Same slope, other amplitude: {same:.3f} and {slope:.3f} times the error. sign varies the input by "
-        f"{found['sign']['voltage_variation']:.3g} m/s^2 per s, {chatter:.0f} times as much as tanh."
+        f"{found['sign']['input_variation']:.3g} m/s^2 per s, {chatter:.0f} times as much as tanh."
     )
     return answer(abs(same - 1) < 0.02 and abs(slope - 1) < 0.02 and chatter > 100, text, partly=chatter > 100)

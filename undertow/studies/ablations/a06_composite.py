@@ -15,7 +15,7 @@ from undertow.studies.ablations.tuning import COST, tuned
 QUESTION = "Is the composite law better than RAFC once each is tuned?"
 PREDICTION = "Not in accuracy, and a linear observer does as well; the composite law survives limits, RAFC does not."
 LONG = True
-METRICS = ("tracking_rms", "estimation_rms", "voltage_variation")
+METRICS = ("tracking_rms", "estimation_rms", "input_variation")
 LEFT_OUT = f"other costs than {COST}; 16 trials on 4 other seeds each, 1 mm/s of velocity noise"
 
 _GRID = ((0.1, 1.0, 10.0, 100.0), (0.0, 0.1, 0.3, 1.0))  # on the loop gain of Table 1, on its robust term

@@ -12,7 +12,7 @@ from undertow.studies.ablations.rough_sensor import RoughSensor
 QUESTION = "How well must the velocity be measured?"
 PREDICTION = "Table 1 multiplies noise by 110 into the input and cannot use a 5 Hz DVL; the fewer rad/s, the better."
 LONG = True
-METRICS = ("tracking_rms", "voltage_rms", "voltage_variation", "weights_peak")
+METRICS = ("tracking_rms", "input_rms", "input_variation", "weights_peak")
 LEFT_OUT = "drift to divergence, which takes longer: see A18 and A21"
 
 # White noise alone, without a load, tells the noise in the input; the others meet the load of every ablation.
@@ -45,7 +45,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
 
 def judge(found) -> Answer:
     """Input noise per velocity noise, and what 5 Hz does."""
-    amplified = {law: found[f"{law}, 1 mm/s"]["voltage_rms"] / 1e-3 for law in _LAWS}
+    amplified = {law: found[f"{law}, 1 mm/s"]["input_rms"] / 1e-3 for law in _LAWS}
     large = {law: found[f"{law}, 5 cm/s"] for law in _LAWS}
     slow = {law: found[f"{law}, 5 Hz"] for law in _LAWS}
     text = "Noise in the input per velocity noise, 1/s: " + ", ".join(f"{k} {v:.3g}" for k, v in amplified.items())

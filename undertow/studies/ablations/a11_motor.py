@@ -10,7 +10,7 @@ from undertow.studies.ablations.on_odin import loop
 QUESTION = "What do the thrusters' dynamics do?"
 PREDICTION = "Table 1 is fine without and unstable with them; a slow observer or an inner speed loop is stable."
 LONG = True
-METRICS = ("tracking_rms", "estimation_rms", "voltage_variation")
+METRICS = ("tracking_rms", "estimation_rms", "input_variation")
 
 # The theory page's slow observer, section 3.9: 30 rad/s, damping 1, no robust term.
 _SLOW = {"pole": 60.0, "adaptation": 900.0 / 0.4047 / 500.0, "robust_gain": 0.0, "compensation_gain": 0.0}

@@ -8,7 +8,7 @@ from undertow.studies.ablations.on_odin import loop
 QUESTION = "What if thrusters fail and nobody is told?"
 PREDICTION = "Any loss that keeps rank 6 is borne (one always, two in 16 of 28 pairs, three never); a reversed one not."
 LONG = True
-METRICS = ("tracking_rms", "estimation_rms", "voltage_rms")
+METRICS = ("tracking_rms", "estimation_rms", "input_rms")
 LEFT_OUT = "thrusters that are stuck at a thrust"
 
 _LOSSES = {

@@ -6,7 +6,7 @@ from undertow.studies.ablations.on_heavy import SCHEDULE, hand_tuned, loop, soun
 QUESTION = "Do current, waves and a tether trouble it?"
 PREDICTION = "No: all of it is slower than 10 rad/s."
 LONG = True
-METRICS = ("tracking_rms", "estimation_rms", "voltage_rms", "saturated_fraction")
+METRICS = ("tracking_rms", "estimation_rms", "input_rms", "saturated_fraction")
 LEFT_OUT = "payload pick-up, whose mass matrix is inverted at every step"
 
 _WATER = {

@@ -8,7 +8,7 @@ from undertow.studies.ablations.on_heavy import SCHEDULE, hand_tuned, loop, soun
 QUESTION = "Does it follow what moves, through steep pitch and past a heading of 180 deg?"
 PREDICTION = "Euler angles fail near a pitch of 90 deg; a law in body axes does not."
 LONG = True
-METRICS = ("tracking_rms", "estimation_rms", "voltage_rms")
+METRICS = ("tracking_rms", "estimation_rms", "input_rms")
 LEFT_OUT = "errors are told in Euler angles, which exaggerates them at steep pitch"
 
 _REFERENCES = {

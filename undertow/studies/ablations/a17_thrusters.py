@@ -7,7 +7,7 @@ from undertow.studies.ablations.on_odin import loop
 QUESTION = "What with fewer than eight thrusters?"
 PREDICTION = "Six independent ones do; below rank 6 there are directions in open loop."
 LONG = True
-METRICS = ("lost_axes", "tracking_rms", "voltage_rms")
+METRICS = ("lost_axes", "tracking_rms", "input_rms")
 
 _FITTED = {
     8: None,

@@ -14,7 +14,7 @@ QUESTION = "What keeps the weights from drifting in noise?"
 PREDICTION = (
     "Nothing: lost in 7.5 s; leakage 1e-3 or a dead zone of 3 sigma: lost; projection, leakage 1e-2, one set: kept."
 )
-METRICS = ("tracking_rms", "voltage_rms", "weights_peak")
+METRICS = ("tracking_rms", "input_rms", "weights_peak")
 
 _NOISE = 0.01  # m/s
 _SETS = {"sets": 3, "reach": (0.1,)}

@@ -10,7 +10,7 @@ PREDICTION = (
     "As printed the variant with sensors is ill-posed and unstable; an inner loop of computed voltage uses them."
 )
 LONG = True
-METRICS = ("tracking_rms", "voltage_rms", "voltage_variation")
+METRICS = ("tracking_rms", "input_rms", "input_variation")
 
 _MOTOR = {"rung": "electromechanical", "supply": 24.0}
 
@@ -31,7 +31,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
 def judge(found) -> Answer:
     """Error and how much the voltage moves."""
     text = "Tracking rms and variation of the voltage: " + "; ".join(
-        f"{name} {one['tracking_rms']:.3g}, {one['voltage_variation']:.3g} V/s" for name, one in found.items()
+        f"{name} {one['tracking_rms']:.3g}, {one['input_variation']:.3g} V/s" for name, one in found.items()
     )
     bad = all(one["tracking_rms"] > 5e-3 for name, one in found.items() if name.startswith("Table 1"))
     good = all(one["tracking_rms"] < 5e-3 for name, one in found.items() if name.startswith("robust"))

@@ -11,7 +11,7 @@ from undertow.studies.ablations.tuning import COST, tuned
 QUESTION = "What does a search find with motor, limits and noise in?"
 PREDICTION = "An estimator of 20 to 50 rad/s and hardly a robust term, instead of 142 rad/s and 10 m/s^2."
 LONG = True
-METRICS = ("tracking_rms", "voltage_rms", "voltage_variation")
+METRICS = ("tracking_rms", "input_rms", "input_variation")
 LEFT_OUT = f"other costs than {COST}; 12 trials on 4 other seeds per law"
 
 _SEA = {"rung": "electromechanical", "supply": 24.0, "noise": 2e-3}
@@ -48,7 +48,7 @@ def _robust(bandwidth: float, rate: float, model):
 def judge(found) -> Answer:
     """Error of each."""
     text = "Tracking rms and variation of the voltage: " + "; ".join(
-        f"{name} {one['tracking_rms']:.3g}, {one['voltage_variation']:.3g} V/s" for name, one in found.items()
+        f"{name} {one['tracking_rms']:.3g}, {one['input_variation']:.3g} V/s" for name, one in found.items()
     )
     better = found["paper's law, searched"]["tracking_rms"] < found["Table 1"]["tracking_rms"]
     return answer(better and found["robust, searched"]["tracking_rms"] < found["Table 1"]["tracking_rms"], text + ".")

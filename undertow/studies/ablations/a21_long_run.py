@@ -14,7 +14,7 @@ from undertow.studies.ablations.rough_sensor import RoughSensor
 QUESTION = "Who is alive after a long time in noise?"
 PREDICTION = "Only projected and linear laws; without projection three sets spaced 0.2 are lost after 21 s."
 LONG = True
-METRICS = ("tracking_rms", "voltage_rms", "weights_peak")
+METRICS = ("tracking_rms", "input_rms", "weights_peak")
 LEFT_OUT = "24 h: here 60 s with narrow sets, for which the drift is 25 times as fast as for sets spaced 1"
 
 _SETS = {"sets": 3, "reach": (0.2,)}

@@ -21,8 +21,8 @@ METRICS = (
     "tracking_rms",
     "estimation_rms",
     "uncertainty_rms",
-    "voltage_rms",
-    "voltage_variation",
+    "input_rms",
+    "input_variation",
     "weights_peak",
     "saturated_fraction",
 )

@@ -46,4 +46,4 @@ def tuned(
 
 def cost(outcomes) -> float:
     """Median over seeds of what is made small."""
-    return float(np.median(outcomes["tracking_rms"] / ERROR + outcomes["voltage_variation"] / VARIATION))
+    return float(np.median(outcomes["tracking_rms"] / ERROR + outcomes["input_variation"] / VARIATION))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from undertow.analysis.meanings import MEANINGS
+from undertow.analysis.meanings import MEANINGS, unit_of
 from undertow.analysis.metrics import OVERALL
 from undertow.core.status import Status
 from undertow.loop import record
@@ -33,8 +33,8 @@ def _codes(name: str, words: dict[int, str]) -> dict[str, Any]:
     return {"long_name": name, "flag_values": list(words), "flag_meanings": " ".join(words.values())}
 
 
-# Columns of every campaign, with their attributes.
-ALWAYS = {
+# Columns of every campaign, with their attributes; those of inputs get the unit of the plant's.
+ALWAYS: dict[str, dict[str, Any]] = {
     "trial": {"long_name": "number, as in the names of files of the worst"},
     "seed": {"long_name": "seed of everything random"},
     "status": _codes("how the run ended", ENDINGS),
@@ -57,7 +57,9 @@ def labels(several: Trials, built: Built) -> dict[str, Label]:
         several: the trials.
         built: one of them.
     """
-    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in several.columns()} | ALWAYS
+    of_input = built.closed_loop.plant.input_unit
+    always = ALWAYS | {name: _said(MEANINGS[name].meaning, unit_of(name, of_input)) for name in OVERALL}
+    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in several.columns()} | always
     along = (*several.campaign.cross, DRAWS)
     found = {name: Label(along, attributes) for name, attributes in of_trials.items()}
     for name in several.campaign.series.signals if several.campaign.series else ():

@@ -11,8 +11,11 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 
 def quantiles(values: np.ndarray) -> dict[str, float]:
-    """5 %, median and 95 % of some numbers."""
-    return dict(zip(map(str, QUANTILES), np.quantile(values, QUANTILES).tolist(), strict=True))
+    """5 %, median and 95 % of some numbers, those that are not defined left out; some may be infinite."""
+    known = values[~np.isnan(values)]
+    method: Any = "linear" if np.isfinite(known).all() else "higher"
+    found = np.quantile(known, QUANTILES, method=method) if known.size else np.full(len(QUANTILES), np.nan)
+    return dict(zip(map(str, QUANTILES), found.tolist(), strict=True))
 
 
 def correlations(results: Results) -> dict[str, dict[str, float]]:
@@ -24,7 +27,9 @@ def correlations(results: Results) -> dict[str, dict[str, float]]:
         if "choices" in column.attrs:
             continue
         for name in results.metrics:
-            pairs = [(column.values[group], results.rows[name].values[group]) for group in groups]
+            values = results.rows[name].values
+            finite = [group & np.isfinite(values) for group in groups]
+            pairs = [(column.values[group], values[group]) for group in finite]
             known = [
                 float(spearmanr(*pair)[0]) for pair in pairs if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
             ]

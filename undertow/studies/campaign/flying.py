@@ -10,12 +10,14 @@ import jax
 import numpy as np
 
 from undertow.analysis.metrics import overall
+from undertow.core import runtime
 from undertow.core.status import Status
 from undertow.lanes import nvidia
 from undertow.lanes.errors import Unsupported
 from undertow.loop import in_lanes, vmapped
 from undertow.loop.in_lanes import Plan, Run
 from undertow.scenario.build import Built
+from undertow.scenario.schema import Scenario
 from undertow.scenario.workshop import structure
 from undertow.studies.campaign.runs import leaves, planned, run_of, shared_numbers
 from undertow.studies.campaign.schema import Series
@@ -41,6 +43,7 @@ class _Kind(NamedTuple):
     plan: Plan
     usual: bool  # numbers that were the same in all probes are the same here
     engine: str
+    precision: str
 
 
 class _Crew(NamedTuple):
@@ -76,7 +79,7 @@ class Hangar:
         for i, one in enumerate(built):
             run = run_of(one)
             numbers = leaves(run)
-            kind = self._kind(run, numbers, planned(one, asked), one.scenario.loop.engine)
+            kind = self._kind(run, numbers, planned(one, asked), one.scenario)
             crew = crews.setdefault(kind, _Crew(run, [], []))
             crew.members.append(i)
             pairs = zip(numbers, self._common(kind, len(numbers)), strict=True)
@@ -84,7 +87,10 @@ class Hangar:
             crew.numbers.append([np.array(leaf) for leaf, shared in pairs if shared is None])
         if not crews:  # none of them, as one would be
             return jax.tree.map(lambda kept: kept[:0], self.fly(self._probes()[:1], asked))
-        pieces = [self._together(kind, crew) for kind, crew in crews.items()]
+        pieces = []
+        for kind, crew in crews.items():
+            with runtime.in_precision(kind.precision):
+                pieces.append(self._together(kind, crew))
         back = np.argsort([i for crew in crews.values() for i in crew.members])
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
@@ -108,14 +114,14 @@ class Hangar:
         found = self._commons().get(kind.structure) if kind.usual else None
         return [None] * count if found is None else found
 
-    def _kind(self, run: Run, numbers: list[Any], plan: Plan, engine: str) -> _Kind:
+    def _kind(self, run: Run, numbers: list[Any], plan: Plan, scenario: Scenario) -> _Kind:
         form = structure(run)
         common = self._commons().get(form)
         usual = common is not None and all(
             shared is None or leaf is shared or np.array_equal(leaf, shared)
             for leaf, shared in zip(numbers, common, strict=True)
         )
-        return _Kind(form, plan, usual, engine)
+        return _Kind(form, plan, usual, scenario.loop.engine, scenario.precision)
 
     def _commons(self) -> dict[Any, list[np.ndarray | None]]:
         """Numbers that all probes of a structure share, by structure: None for those that differ."""

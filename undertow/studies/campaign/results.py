@@ -31,8 +31,13 @@ class Results(NamedTuple):
 
     @property
     def metrics(self) -> list[str]:
-        """Names, in the order of tables."""
-        return [name for name in MEANINGS if name in self.rows]
+        """Names of those that are defined for any trial that lasted, in the order of tables."""
+        known = lambda name: name in self.rows and not np.isnan(self.rows[name].values[self.lasted]).all()
+        return [name for name in MEANINGS if known(name)]
+
+    def unit(self, metric: str) -> str:
+        """Of a metric; nothing for a plain number."""
+        return self.rows[metric].attrs["units"].removesuffix("1") if metric in self.rows else ""
 
     @property
     def combinations(self) -> np.ndarray:

@@ -9,13 +9,14 @@ import numpy as np
 
 from undertow.analysis.metrics import Metrics
 from undertow.loop.in_lanes import Plan, Run
-from undertow.scenario.build import Built
+from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.workshop import structure
 from undertow.studies.campaign.schema import Series
 
 _STARTS = ("position", "velocity")
 
 
+@in_its_precision
 def run_of(built: Built) -> Run:
     """Loop, accumulators, start and key of a trial."""
     scenario = built.scenario

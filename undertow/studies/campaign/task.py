@@ -78,8 +78,10 @@ def _flown(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns["status"] = spread(flown.status, REFUSED)
     columns["ended"] = spread(flown.ended, np.nan)
     columns["engine"] = spread(flown.engine, REFUSED)
-    columns |= {name: spread(values, np.nan) for name, values in flown.metrics.items()}
-    return columns | {f"series:{name}": spread(values, np.nan) for name, values in flown.series.items()}
+    found = flown.metrics | {f"series:{name}": values for name, values in flown.series.items()}
+    if "precision" in (*here.trials.campaign.vary, *here.trials.campaign.cross):  # one array holds both
+        found = {name: values.astype(np.float64) for name, values in found.items()}
+    return columns | {name: spread(values, np.nan) for name, values in found.items()}
 
 
 def build_trial(several: Trials, workshop: Workshop, row: int) -> Built:

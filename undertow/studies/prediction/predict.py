@@ -11,7 +11,7 @@ from undertow.analysis.linearised.closing import LinearLoop
 from undertow.analysis.linearised.reach import Reach, reach
 from undertow.analysis.linearised.rest import Rest, rest
 from undertow.plants.reachability import open_loop_advice
-from undertow.scenario.build import Built
+from undertow.scenario.build import Built, in_its_precision
 from undertow.studies.prediction.grounding import Ground, foretold, ground
 
 # Loads at which the loop is looked at: larger than these shares of all that act along the reference.
@@ -77,6 +77,7 @@ class Prediction(NamedTuple):
     why_not: str  # a sentence where there are none
 
 
+@in_its_precision
 def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
     """Everything that can be said of a scenario before it is run.
 

@@ -26,7 +26,7 @@ def _supply(n: Numbers) -> str:
 
 
 def _noise(n: Numbers) -> str:
-    paper, slow = (n.median("A9", f"{law}, 1 mm/s", "voltage_rms") / 1e-3 for law in ("Table 1", "robust 10 rad/s"))
+    paper, slow = (n.median("A9", f"{law}, 1 mm/s", "input_rms") / 1e-3 for law in ("Table 1", "robust 10 rad/s"))
     return (
         f"Noise. Table 1 passes velocity noise into the input times {paper:.0f} 1/s, an observer of 10 rad/s times "
         f"{slow:.1f} (A9)."
@@ -114,7 +114,7 @@ def _slow_rate(n: Numbers) -> str:
 
 
 def _noisy_motor(n: Numbers) -> str:
-    own, searched = (n.median("A20", law, "voltage_variation") for law in ("robust", "robust, searched"))
+    own, searched = (n.median("A20", law, "input_variation") for law in ("robust", "robust, searched"))
     if not own > 2 * searched:
         return ""
     return (

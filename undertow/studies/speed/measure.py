@@ -6,8 +6,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from multiprocessing import get_context
 from typing import Any
 
 import jax
@@ -52,7 +50,8 @@ def measure(watch: Watch) -> dict[str, Any]:
         found |= _by_xla(run)
     for i, kind in enumerate(("float64", "float32")):
         watch(f"many runs, {kind}", 0.4 + 0.2 * i)
-        found |= _by_itself(_many, kind, threads)
+        with runtime.in_precision(kind):
+            found |= _many(kind, threads)
     watch("plain NumPy", 0.8)
     found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_TICKS), 1) / _NUMPY_TICKS
     found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
@@ -91,18 +90,10 @@ def _by_xla(run: Run) -> dict[str, float]:
     return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / TICKS}
 
 
-def _by_itself(function: Callable[..., dict[str, Any]], *arguments: Any) -> dict[str, Any]:
-    """What a function gives in a process of its own: JAX keeps to the precision that it began with."""
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        return pool.submit(function, *arguments).result()
-
-
 def _many(kind: str, threads: int) -> dict[str, Any]:
-    """Many runs in a precision, on this machine's processor and on its GPU if it has one."""
-    if kind == "float32":
-        runtime.use_single_precision()
+    """Many runs, on this machine's processor and on its GPU if it has one."""
     with runtime.on_processor():
-        run = workload.one()
+        run = workload.one(kind)
         found = {f"batch_{kind}_{key}": value for key, value in _batch(run, threads).items()}
     if jax.default_backend() == "gpu":
         found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(run, _ON_GPU, ticks=200)}
@@ -119,7 +110,7 @@ def _batch(run: Run, threads: int) -> dict[str, float]:
     numbers = workload.several(run, _BATCH)
 
     def together(count: int) -> float:
-        with ThreadPoolExecutor(count) as pool:
+        with runtime.workers(count) as pool:
             return _shortest(lambda: list(pool.map(lambda _: program.fly(numbers), range(count)))) / count
 
     each = TICKS * _BATCH

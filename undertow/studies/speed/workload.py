@@ -17,9 +17,10 @@ TICKS = 20_000
 PLAN = Plan(TICKS, 1e-3, 0, (), "rk4", 1)
 
 
-def one() -> Run:
-    """One run."""
-    loop = build(scenario("W1", rung="electromechanical", composite=20.0, loop={"kind": "sampled"})).closed_loop
+def one(precision: str = "float64") -> Run:
+    """One run; to be run in the same precision."""
+    described = scenario("W1", rung="electromechanical", composite=20.0, loop={"kind": "sampled"})
+    loop = build(described | {"precision": precision}).closed_loop
     return Run(loop, (Metrics(10.0, 20.0),), loop.outputs_at_start(None, None), jax.random.PRNGKey(0))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.analysis.linearised.pieces import without
+from undertow.core import runtime
 from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -88,8 +89,8 @@ class Evaluation:
         self, bench: Bench, make: Callable[[Any], AbstractController], like: AbstractController, trials: Trials
     ):
         self._bench, self._training = bench, trials
-        self._pool, self._lock = concurrent.futures.ThreadPoolExecutor(_WORKERS), threading.Lock()
-        self._compilers = concurrent.futures.ThreadPoolExecutor(_WORKERS)
+        self._pool, self._lock = runtime.workers(_WORKERS), threading.Lock()
+        self._compilers = runtime.workers(_WORKERS)
         self._programs: dict[str, concurrent.futures.Future[Any]] = {}
         self._plant_rest = eqx.filter(trials.plants, eqx.is_array, inverse=True)
         self._law_numbers, self._law_rest = eqx.partition(like, eqx.is_array)

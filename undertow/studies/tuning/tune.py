@@ -9,6 +9,7 @@ import numpy as np
 
 from undertow.core.contracts import AbstractController
 from undertow.core.errors import BadInput
+from undertow.scenario.build import in_its_precision
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.studies.tuning.certifying import Certificate, Certifier, refusal
@@ -58,6 +59,7 @@ class Tuned(NamedTuple):
         return self.problem.scenario(self.judged[-1].options or {})
 
 
+@in_its_precision
 def tune(
     text: Text,
     journal: Path,
@@ -127,6 +129,7 @@ def tune(
     )
 
 
+@in_its_precision
 def judge(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Judged, ...]:
     """How the gains of a scenario, and other choices of its options by name, do in the runs that `tune` would take.
 

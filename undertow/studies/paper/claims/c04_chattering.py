@@ -12,4 +12,4 @@ def scenarios(quick: bool) -> dict:
 
 def judge(runs: Runs) -> Finding:
     """Total variation of the voltages; suite U1 itself accounts for most of it."""
-    return compared(runs, "voltage_variation", "total variation of the voltages", "V/s")
+    return compared(runs, "input_variation", "total variation of the voltages", "V/s")

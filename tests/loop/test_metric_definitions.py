@@ -1,0 +1,129 @@
+"""Metrics of inputs have the unit of the input, and what is not defined is not there."""
+
+import json
+
+import numpy as np
+import pytest
+
+import undertow as ut
+from undertow.analysis.meanings import MEANINGS, unit_of
+from undertow.analysis.metrics import Metrics, overall, results
+from undertow.cli.main import run as command
+from undertow.controllers.pid import pid
+from undertow.controllers.rcaf import rcaf
+from undertow.disturbances.none import none
+from undertow.disturbances.sinusoid import sinusoid
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants import double_integrator, inverted_pendulum, magnetic_levitation, two_link_arm
+from undertow.references.setpoint import setpoint
+from undertow.references.sine import sine
+from undertow.scenario.execute import execute
+from undertow.scenario.reading import dump
+from undertow.sensors.perfect import perfect
+
+DT = 0.01
+
+
+def settling(reference, duration=20.0, position=None, load=None, stop=np.inf):
+    """Settling times by every sample, of all axes and of each, and the run."""
+    plant = double_integrator(2)
+    loop = ClosedLoop(
+        plant, pid(plant.model(), frequency=2.0, reference_frequency=0), reference, load or none(), perfect()
+    )
+    at = {"duration": duration, "dt": DT, "record_every": 1, "position": position}
+    outcome = sampled.simulate(loop, accumulators=(Metrics(0.0, stop),), **at)
+    found = results(outcome.accumulated[0])
+    return found.get("settling_time"), found.get("settling_time_axes"), outcome
+
+
+def test_a_step_settles_when_the_error_stays_within_2_percent_of_it():
+    """By the recorded error itself."""
+    whole, axes, outcome = settling(setpoint([1.0, -3.0]), position=np.array([0.5, 0.0]))
+    error, time = np.abs(np.asarray(outcome.samples.error)), np.asarray(outcome.time)
+    wanted = [time[np.flatnonzero(error[:, i] > 0.02 * step)[-1]] for i, step in enumerate((0.5, 3.0))]
+    np.testing.assert_allclose(axes, wanted, atol=1e-12)
+    assert whole == max(axes) and 1.0 < whole < 15.0
+
+
+def test_a_transition_settles_after_its_end():
+    """Not before the target rests, however well it is followed; 2 % of the way, not of an error that was none at first."""
+    whole, _, outcome = settling(setpoint([1.0, 2.0], settling=5.0))
+    error, time = np.abs(np.asarray(outcome.samples.error)), np.asarray(outcome.time)
+    late = max(time[np.flatnonzero(error[:, i] > 0.02 * way)[-1:]].max(initial=0.0) for i, way in enumerate((1.0, 2.0)))
+    assert whole == pytest.approx(max(5.0, late), abs=2 * DT)
+
+
+def test_a_moving_target_has_no_settling_time():
+    whole, axes, _ = settling(sine(amplitude=[1.0, 1.0]))
+    assert whole is None and axes is None
+
+
+def test_until_a_window_ends():
+    """What comes after the window does not count: a load that unsettles it later."""
+    assert settling(setpoint([1.0, 1.0]), stop=1.0)[0] == np.inf
+    assert settling(setpoint([1.0, 1.0]), stop=12.0)[0] == settling(setpoint([1.0, 1.0]))[0] < 12.0
+
+
+def test_never_and_no_way_to_go():
+    whole, axes, _ = settling(setpoint([1.0, 0.0]), load=sinusoid(30.0, 1.0))
+    assert whole == axes[0] == np.inf, "the load keeps it out of the band for ever"
+    assert np.isnan(axes[1]), "an axis that starts at its target has nothing to settle"
+    assert settling(setpoint([0.0, 0.0]))[0] is None
+
+
+def test_many_runs_at_once_have_the_same_times():
+    import jax
+
+    _, _, outcome = settling(setpoint([1.0, -3.0]))
+    several = jax.tree.map(lambda leaf: np.stack([leaf, leaf]), outcome.accumulated[0])
+    one = overall(outcome.accumulated[0])
+    for name, values in overall(several).items():
+        np.testing.assert_array_equal(values, [one[name]] * 2, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("plant", "unit"),
+    [
+        (inverted_pendulum(), "N"),
+        (two_link_arm(), "N m"),
+        (magnetic_levitation(), "A^2"),
+        (double_integrator(), "m/s^2"),
+    ],
+)
+def test_inputs_are_told_in_their_own_unit(plant, unit):
+    assert plant.input_unit == unit
+    told = {name: unit_of(name, plant.input_unit) for name in MEANINGS}
+    assert told["input_rms"] == told["input_peak"] == unit and told["input_variation"] == f"{unit}/s"
+    assert not any("[" in one for one in told.values())
+    assert not any("voltage" in name or "V" in one.unit or "volt" in one.meaning for name, one in MEANINGS.items())
+
+
+SCENARIO = {
+    "plant": {"kind": "inverted_pendulum"},
+    "controller": {"kind": "rcaf", "preset": "robust"},
+    "reference": {"kind": "setpoint", "position": [0.0]},
+    "initial": {"position": [0.1]},
+    "loop": {"duration": 2.0, "dt": 0.01},
+}
+
+
+def test_the_table_of_a_run_says_newtons(tmp_path, capsys):
+    """And how many rules the preset `robust` has."""
+    (tmp_path / "cart.yaml").write_text(dump(SCENARIO), encoding="utf-8")
+    assert command(["simulate", str(tmp_path / "cart.yaml"), "--out", str(tmp_path / "out"), "--no-prediction"]) == 0
+    rows = [line.replace("│", " ").split() for line in capsys.readouterr().out.splitlines()]
+    units = {row[0]: row[-1] for row in rows if len(row) > 3}
+    assert (units["input_rms"], units["input_peak"], units["input_variation"]) == ("N", "N", "N/s")
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert metrics["steady"]["rules"] == metrics["whole"]["rules"] == 5
+    found = execute(SCENARIO | {"controller": {"kind": "rcaf", "preset": "robust", "sets": 3}})
+    assert found.whole["rules"] == 3
+
+
+def test_from_python_too():
+    plant = ut.plants.inverted_pendulum()
+    law = rcaf(plant.model(), preset="robust", sampling_time=DT)
+    found = ut.simulate(plant, law, setpoint([0.0]), duration=1.0, dt=DT, position=[0.1])
+    lines = {line.split()[0]: line.split()[-1] for line in repr(found).splitlines()[2:]}
+    assert (lines["input_rms"], lines["input_variation"]) == ("N", "N/s")

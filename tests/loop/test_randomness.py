@@ -1,0 +1,111 @@
+"""Every part has a key of its own, and noise is new at every sample however long a run is or however short its steps."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.controllers.pid import pid
+from undertow.core import runtime
+from undertow.core.contracts import AbstractDisturbance, AbstractSensor, Measurement
+from undertow.disturbances.adding import Together
+from undertow.disturbances.none import none
+from undertow.instruments import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.instruments.instrument import AbstractInstrument
+from undertow.loop import in_lanes, sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.numerics.randomness import numbered
+from undertow.plants.double_integrator import double_integrator
+from undertow.references.setpoint import setpoint
+from undertow.sensors.navigation import navigation
+from undertow.sensors.white_noise import white_noise
+
+DEVIATION = 0.1
+
+
+class Keyed(AbstractDisturbance):
+    """No load; its path is its key."""
+
+    def draw(self, key):
+        return key
+
+    def at(self, path, t, place, calm):
+        return calm
+
+    def jumps(self, duration):
+        return ()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2**32 - 1])
+def test_no_two_parts_share_a_key(seed):
+    """Disturbances by nine, three of them in a group of their own, all instruments, and each of their samples."""
+    disturbance = Together((*(Keyed() for _ in range(6)), Together((Keyed(), Keyed(), Keyed()))))
+    instruments = [imu(), dvl(), depth(), position_fix(), compass(), propeller_speed()]
+    plant = double_integrator()
+    loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, navigation(instruments))
+    drawn = loop.draw(jax.random.PRNGKey(seed))
+    keys = [*jax.tree.leaves(drawn.disturbance_path), *drawn.sensor_path]
+    samples = [numbered(key, jnp.asarray(k)) for key in drawn.sensor_path for k in (-1, 0, 1, 2, 3, 4, 5)]
+    assert len(keys) == 9 + len(instruments) and all(isinstance(one, AbstractInstrument) for one in instruments)
+    assert len({tuple(np.asarray(key).tolist()) for key in (*keys, *samples)}) == len(keys) + len(samples)
+
+
+def test_numbers_that_differ_in_any_bit_have_other_keys():
+    """In 64 bits also those 2^32 apart, which are one number to `jax.random.fold_in`."""
+    key = jax.random.PRNGKey(0)
+    numbers = [-1, 0, 1, 2**31 - 1, 2**31, 2**32 - 1, 2**32, 2**32 + 1, 2**33, 2**53, 2**62]
+    keys = {tuple(np.asarray(numbered(key, jnp.asarray(number))).tolist()) for number in numbers}
+    assert len(keys) == len(numbers)
+    assert all((jax.random.fold_in(key, np.int64(2**32)) == jax.random.fold_in(key, 0)).tolist()), "the reason"
+
+
+def noise_of_a_run(duration, dt, simulate=sampled.simulate):
+    """Errors of the measured position at every sample."""
+    plant = double_integrator()
+    law = pid(plant.model(), sampling_time=dt, frequency=0.05 / dt)
+    loop = ClosedLoop(plant, law, setpoint([0.0]), none(), white_noise(DEVIATION, 0.0))
+    samples = simulate(loop, duration=duration, dt=dt, record_every=1).samples
+    return np.asarray(samples.measured_position - samples.position)[:-1, 0]
+
+
+@pytest.mark.parametrize("simulate", [sampled.simulate, in_lanes.simulate], ids=["xla", "lanes"])
+@pytest.mark.parametrize(("duration", "dt"), [(6e3, 1.0), (1e7, 2e3), (5e-4, 1e-7)])
+def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
+    """Beyond 2^32 microseconds, to four months, and below a microsecond."""
+    errors = noise_of_a_run(duration, dt, simulate)
+    n = len(errors)
+    assert n == round(duration / dt) and len(set(errors)) == n, "no sample shares its draw"
+    for part in (errors[: n // 2], errors[n // 2 :], errors[-500:]):
+        m = len(part)
+        assert part.std() == pytest.approx(DEVIATION, rel=4 / np.sqrt(2 * m))
+        assert abs(part.mean()) < 4 * DEVIATION / np.sqrt(m)
+        assert abs((part[1:] * part[:-1]).mean()) < 4 * DEVIATION**2 / np.sqrt(m)
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+def test_instruments_are_heard_and_noisy_at_any_time(precision):
+    """After 1e7 s at 10 s, and in double precision at a tenth of a microsecond."""
+    with runtime.in_precision(precision):
+        times = [(0.0, 10.0), (1e7, 10.0)] + [(0.0, 1e-7), (1e5, 1e-7)] * (precision == "float64")
+        for start, period in times:
+            sensor = navigation([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
+            truth = Measurement(jnp.zeros(6), jnp.zeros(6))
+            path = sensor.draw(jax.random.PRNGKey(1))
+
+            def step(state, k, sensor=sensor, path=path, truth=truth, start=start, period=period):
+                told, state = sensor.measure(path, state, start + period * k, truth)
+                return state, told.position[5]
+
+            first = sensor.init(path, truth)
+            yaw = np.asarray(jax.lax.scan(step, first, jnp.arange(400, dtype=float))[1])
+            assert yaw[1:].std() == pytest.approx(DEVIATION, rel=4 / np.sqrt(2 * 400)), (start, period)
+            assert len(set(yaw[1:])) > 390
+
+
+def test_single_precision_noise_outlives_its_clock():
+    """Beyond 2^24 steps two instants are one in float32, but their noise is not: samples are counted."""
+    with runtime.in_precision("float32"):
+        sensor: AbstractSensor = white_noise(DEVIATION, 0.0)
+        path, truth, state = sensor.draw(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)), 2**24
+        told = [sensor.measure(path, jnp.asarray(state + k), jnp.asarray(1e5), truth)[0].position[0] for k in range(9)]
+        assert len(set(map(float, told))) == 9

@@ -1,0 +1,55 @@
+"""Readings that are no numbers: the law goes on with what it has reason to expect in their place."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Int
+
+from undertow.core.contracts import AbstractController, AbstractModel, Inputs, Measurement, Outputs, Telemetry, Time
+
+
+def sound(numbers: Array) -> Bool[Array, "..."]:
+    """Which numbers have a square, as laws and metrics need it; a filter may grow for long before it overflows."""
+    if not jnp.issubdtype(numbers.dtype, jnp.floating):
+        return jnp.isfinite(numbers)
+    return jnp.abs(numbers) < jnp.sqrt(jnp.finfo(numbers.dtype).max)
+
+
+def all_sound(tree: Any) -> Bool[Array, ""]:
+    """Whether all numbers of a tree are sound."""
+    return jnp.stack([sound(leaf).all() for leaf in jax.tree.leaves(tree)]).all()
+
+
+class Expected(NamedTuple):
+    """What the next measurement should be, by the law's own knowledge: x_ddot = F + G u + d_hat.
+
+    A law that gets this in place of a reading neither learns from it nor forgets: its identification model, which goes
+    on by the same equation, departs from it by no more than from the last reading.
+    """
+
+    position: Outputs  # m, rad
+    rates: Outputs  # in the coordinates of the model, m/s, rad/s
+    actuator: Any  # as reported last
+    replaced: Int[Array, ""]  # readings so far of which something was replaced
+
+    def repaired(self, model: AbstractModel, y: Measurement) -> tuple[Measurement, "Expected"]:
+        """The measurement, each entry that is no number replaced by what is expected of it; and the count."""
+        known = Measurement(self.position, self.rates, self.actuator)
+        known = known._replace(velocity=model.outward(known, self.rates))
+        whole = jax.tree.map(lambda read, own: jnp.where(sound(read), read, own), y, known)
+        return whole, self._replace(replaced=self.replaced + jnp.where(all_sound(y), 0, 1))
+
+    def after(
+        self, law: AbstractController, z: Any, y: Measurement, telemetry: Telemetry, applied: Inputs, dt: Time
+    ) -> "Expected":
+        """A sampling time later, with an input applied."""
+        acceleration = law.known(z, y, applied) + telemetry.estimate
+        rates = law.model.rates(y) + dt * acceleration
+        return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)
+
+
+def at_start(model: AbstractModel, truth: Measurement, y: Measurement) -> Expected:
+    """Before the first reading `y` the law knows where it was put: the truth, and actuators at rest unless reported."""
+    actuator = jax.tree.map(lambda read: jnp.where(sound(read), read, jnp.zeros_like(read)), y.actuator)
+    return Expected(truth.position, model.rates(truth), actuator, jnp.zeros((), dtype=int))
