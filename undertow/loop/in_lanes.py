@@ -104,13 +104,14 @@ class Fleet:
 
         self._program = Program(draw, start, tick, look, numbers, constant, lanes, driver)
 
-    def fly(self, numbers: Any) -> Ended:
+    def fly(self, numbers: Any, ticks: int | None = None) -> Ended:
         """Run them.
 
         Args:
             numbers: arrays of the runs, as in `run`, with a leading axis over runs.
+            ticks: how many; as planned unless given.
         """
-        ticks, every = self._plan.ticks, self._plan.every
+        ticks, every = self._plan.ticks if ticks is None else ticks, self._plan.every
         carry, (time, series) = self._program.run(numbers, ticks, every)
         states, accumulated, status, ended = carry
         ended = np.where(status == int(Status.OK), ticks * self._plan.dt, ended)

@@ -7,7 +7,9 @@ from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import AbstractThruster
 
 
-def paper_table3(rung: str = "electromechanical", supply: float = math.inf, dead_zone: float = 0.0) -> AbstractThruster:
+def paper_table3(
+    rung: str = "electromechanical", supply: float = math.inf, dead_zone: float = 0.0, inductance: float = 0.01
+) -> AbstractThruster:
     """Thruster of Table 3, as printed, on a rung of the fidelity ladder.
 
     An impossible motor: k_t / k_e is 117, so the shaft gives several times the power the supply puts in.
@@ -16,10 +18,11 @@ def paper_table3(rung: str = "electromechanical", supply: float = math.inf, dead
         rung: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; infinite by default.
         dead_zone: voltage below which nothing turns, V.
+        inductance: of the winding, H; Table 3 prints 0.01. It decides whether Table 1 is stable.
     """
     motor = DCMotor(
         resistance=1.2,
-        inductance=0.01,
+        inductance=inductance,
         torque_constant=1.27,
         back_emf_constant=0.01086,
         friction=0.06,
