@@ -104,6 +104,11 @@ class Fleet:
 
         self._program = Program(draw, start, tick, look, numbers, constant, lanes, driver)
 
+    @property
+    def operations(self) -> int:
+        """Arithmetic operations of one step of one run: law, plant and its integration, what is accumulated."""
+        return self._program.operations
+
     def fly(self, numbers: Any, ticks: int | None = None) -> Ended:
         """Run them.
 

@@ -93,7 +93,8 @@ def audit(claims: list[dict[str, Any]]) -> Html:
         name = claim.get("scenario")
         command = tag("div", tag("code", f"undertow simulate {name}")) if name else ""
         identity = tag("b", claim["id"], id=claim["id"])
-        rows.append((identity, prose(claim["claim"]), verdict, join(prose(claim["evidence"]), command)))
+        simulated = tag("div", prose(f"Simulated: {claim['simulated']}."), class_="small")
+        rows.append((identity, prose(claim["claim"]), verdict, join(prose(claim["evidence"]), simulated, command)))
     return table(("", "claim", "verdict", "evidence, and the run that shows it"), rows, wide=True)
 
 

@@ -84,7 +84,9 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ende
     """Runs of one program, by name with their numbers of ticks; those of one length side by side."""
     first = next(iter(runs.values()))[0]
     numbers = {name: leaves(run) for name, (run, _) in runs.items()}
-    constant = [all(np.array_equal(column[0], other) for other in column[1:]) for column in zip(*numbers.values())]
+    constant = [
+        all(np.array_equal(column[0], other) for other in column[1:]) for column in zip(*numbers.values(), strict=True)
+    ]
     lengths = {ticks: [name for name in runs if runs[name][1] == ticks] for _, ticks in runs.values()}
     # A program for one run is faster than one for eight that flies one.
     width = min(lanes_of(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())

@@ -29,8 +29,8 @@ def judge(runs: Runs, long: Long) -> Finding:
         lives = "lasts" if run.lasted else f"ends at {run.ended:.0f} s"
         late = f", {last['tracking_rms']:.2g} at its end" if last else ""
         said.append(
-            f"{level}: {found['tracking_rms']:.2g} m and rad rms at 10 to 20 s with {found['voltage_variation']:.0f} V/s of "
-            f"chattering, {lives}{late}"
+            f"{level}: {found['tracking_rms']:.2g} m and rad rms at 10 to 20 s with {found['voltage_variation']:.0f} "
+            f"V/s of chattering, {lives}{late}"
         )
     kept = {value: run for value, run in windings(long).items() if run.windows[0] is not None}
     lost = {value: run for value, run in windings(long).items() if run.windows[0] is None}

@@ -36,8 +36,8 @@ def judge(runs: Runs, long: Long) -> Finding:
         numbers["tracking_rms_shaft"] = found["tracking_rms"]
         text += (
             f"Without, and with a rotor that has inertia (shaft): {found['tracking_rms']:.3g}, but with "
-            f"{found['voltage_variation']:.0f} V/s of chattering and weights up to {found['weights_peak']:.0f}; there the "
-            "sensor is no use, since Eq. (23) becomes an algebraic loop of gain 1. "
+            f"{found['voltage_variation']:.0f} V/s of chattering and weights up to {found['weights_peak']:.0f}; there "
+            "the sensor is no use, since Eq. (23) becomes an algebraic loop of gain 1. "
         )
     for name, run in full.items():
         if run.status is Status.OK:

@@ -77,8 +77,8 @@ def judge(runs: Runs, long: Long) -> Finding:
         "noise_expected": expected,
     }
     text = (
-        f"Level ideal, continuous and without noise, 20 s: halving or doubling any gain of Table 1, or starting elsewhere "
-        f"({len(swept)} runs), changes the tracking rms by factors from {ratios[low]:.2f} "
+        "Level ideal, continuous and without noise, 20 s: halving or doubling any gain of Table 1, or starting "
+        f"elsewhere ({len(swept)} runs), changes the tracking rms by factors from {ratios[low]:.2f} "
         f"({low[4:]}) to {ratios[high]:.2f} ({high[4:]})" + (f"; {len(failed)} runs end early. " if failed else ". ")
     )
     simulated = f"level ideal, U1, 20 s; with noise six axes without a motor, 1 kHz, {_NOISY:g} s"

@@ -45,9 +45,9 @@ def sentences(long: Long, metric: str, unit: str) -> tuple[str, dict[str, Any]]:
     volts = ", ".join(f"{one:g}" for one in LIMITS)
     text = (
         f"That is so while voltages are unlimited and velocities exact. With limits of {volts} V (1 kHz) RCAFC tracks "
-        f"to {_listed(tracking['rcafc'])} m and rad, RAFC with gamma raised to {_listed(tracking['rafc'])}, because its "
-        f"weights wind up (within {BOUND:g} they cannot: {_listed(tracking['rafc_bounded'])}). With 1 cm/s of velocity "
-        f"noise: RCAFC {noisy['rcafc']:.3g} {unit}, RAFC with gamma raised {noisy['rafc']:.3g}."
+        f"to {_listed(tracking['rcafc'])} m and rad, RAFC with gamma raised to {_listed(tracking['rafc'])}, because "
+        f"its weights wind up (within {BOUND:g} they cannot: {_listed(tracking['rafc_bounded'])}). With 1 cm/s of "
+        f"velocity noise: RCAFC {noisy['rcafc']:.3g} {unit}, RAFC with gamma raised {noisy['rafc']:.3g}."
     )
     return text, {"limits": list(LIMITS), "limited": limited, "noisy": noisy}
 
