@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from undertow.report.formats import number, prose
+from undertow.report.formats import number, prose, round_time
 from undertow.report.page import Html, join, table, tag
 
 FIGURES = ("horizons", "lags", "drifting")
@@ -85,7 +85,7 @@ def _between(gains: Sequence[float]) -> str:
 
 def _ended(row: Mapping[str, Any]) -> Html:
     word = str(row["status"]).replace("_", " ")
-    said = f"lasts {row['ended']:g} s" if row["lasted"] else f"{word} at {row['ended']:.3g} s"
+    said = f"lasts {row['ended']:g} s" if row["lasted"] else f"{word} at {round_time(row['ended'])} s"
     return tag("span", said, class_=f"chip {'holds' if row['lasted'] else 'fails'}")
 
 

@@ -78,7 +78,9 @@ def ladder(results: dict[str, Any]) -> Html:
         for key, entry in entries.items():
             steady = entry.get("steady") or {}
             figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "voltage_variation")]
-            ended = tag("span", ending(entry), class_=f"chip {'holds' if entry['status'] == 'ok' else 'fails'}")
+            lasted = entry["status"] == "ok"
+            said = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
+            ended = tag("span", said, class_=f"chip {'holds' if lasted else 'fails'}")
             place = join(tag("b", rung), tag("span", _RUNGS.get(rung, ""), class_="said"))
             rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
     head = ("rung", "controller", "how it ended", "tracking rms", "estimation rms", "voltage variation, V/s", "why")

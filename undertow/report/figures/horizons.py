@@ -8,15 +8,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from undertow.report.figures import style
+from undertow.report.formats import round_time
 
 # Law -> what it is called in the key, and how it looks; bounded weights are drawn thin in the same colour.
 _LOOKS = {
     "rcafc": ("RCAFC, Table 1", style.SOLID),
     "rafc": ("RAFC, Table 1", style.DASHED),
-    "w1": ("RCAFC, gamma_eps 20", style.Look("#7a5195", (0, (6, 1.5, 1, 1.5)), 1.1, 2)),
+    "w1": (r"RCAFC, $\gamma_\epsilon$ 20", style.Look("#7a5195", (0, (6, 1.5, 1, 1.5)), 1.1, 2)),
     "robust": ("robust", style.Look("#00785a", (0, (1, 1)), 1.3, 4)),
 }
 _BOUNDED = style.Look("#8c8c8c", "-", 0.8, 1)
+
+_TOP = 1e4  # m/s^2, of the axis; weights that pass it are about to end their run
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -41,7 +44,7 @@ def horizons_figure(rows: Rows, duration: float) -> Figure:
     _survival(panel, [row for row in rows if row["level"] == levels[-1] and row["composite"] is not None], duration)
     style.label(
         panel,
-        "gamma$_\\epsilon$ (0: RAFC)",
+        r"$\gamma_\epsilon$ (0: RAFC)",
         "lasts, s",
         f"{levels[-1]}: how long, by composite gain; five sets, gamma 100",
     )
@@ -60,8 +63,9 @@ def _growth(panel: Axes, rows: Rows) -> None:
         time, peak = row["growth"]["time"], row["growth"]["weights_peak"]
         panel.plot(time, peak, color=look.colour, linestyle=look.dashes, linewidth=look.width, zorder=look.order)
         if not row["lasted"]:
-            panel.plot(max(row["ended"], time[-1]), peak[-1], "X", color=look.colour, markersize=6, zorder=5)
-    panel.set_ylim(0.3, 1e5)
+            at = max(row["ended"], time[-1]), min(peak[-1], _TOP)
+            panel.plot(*at, "X", color=look.colour, markersize=6, zorder=5, clip_on=False)
+    panel.set_ylim(1.0, _TOP)
 
 
 def _survival(panel: Axes, rows: Rows, duration: float) -> None:
@@ -73,7 +77,7 @@ def _survival(panel: Axes, rows: Rows, duration: float) -> None:
         colour = _BOUNDED.colour if row["bounded"] else style.SOLID.colour
         at = duration if row["lasted"] else row["ended"]
         panel.plot([place, place], [0.3, at], color=colour, linewidth=6, solid_capstyle="butt", zorder=2)
-        words = "lasts" if row["lasted"] else f"{row['ended']:.3g} s"
+        words = "lasts" if row["lasted"] else f"{round_time(row['ended'])} s"
         panel.text(place, at * 1.15, words, fontsize=style.TINY, ha="center", va="bottom")
     panel.set_xticks(range(len(swept)), [f"{value:g}" for value in swept])
     panel.set_xlim(-0.6, len(swept) - 0.4)

@@ -29,11 +29,13 @@ def lags_figure(rows: Rows, windows: Sequence[Sequence[float]]) -> Figure:
         windows: first and last time of each, s.
     """
     keys = {name: style.Look(colour, "-", 1.2, 3) for law, (name, colour, _) in _LAWS.items() if _of(rows, law=law)}
-    dashes = dict(zip(windows, _DASHES[-len(windows) :], strict=True)) if len(windows) <= len(_DASHES) else {}
+    dashes = (
+        dict(zip(map(tuple, windows), _DASHES[-len(windows) :], strict=True)) if len(windows) <= len(_DASHES) else {}
+    )
     keys |= {f"{a:g} to {b:g} s": style.Look(style.INK, look, 1.1, 1) for (a, b), look in dashes.items()}
     kinds = [kind for kind in _KINDS if _of(rows, kind=kind)]
     figure = style.blank(9.6, 0.5 + 2.05 * len(kinds))
-    style.head(figure, "Table 1 behind a motor that takes time", keys)
+    style.head(figure, "Table 1 behind a lag", keys)
     for number, kind in enumerate(kinds):
         words, _ = _KINDS[kind]
         top = 0.6 + 2.05 * number

@@ -58,6 +58,7 @@ def _metrics(run: Executed) -> dict[str, Any]:
     return {
         "status": run.status.word,
         "diverged_at": float(run.outcome.ended) if failed else None,
+        "simulated_s": float(run.outcome.ended),
         "steady": run.steady,
         "whole": run.whole,
     }

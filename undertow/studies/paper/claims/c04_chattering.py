@@ -33,18 +33,19 @@ def judge(runs: Runs, long: Long) -> Finding:
 
 
 def perfect_variation(run: Executed) -> float:
-    """Total variation, V/s, of the voltages that cancel the d of a run at its goal at rest; over its steady window."""
-    model = law_of(run).model
-    late = run.dataset.sel(time=slice(*run.built.window()))
-    late = late.isel(time=slice(None, -1))  # where d jumps at the very end no law has followed it yet
-    goal, d = late["target"].values, late["uncertainty"].values
+    """Total variation, V/s, of the voltages that cancel the prescribed d at the goal, over the steady window."""
+    loop, model = run.built.closed_loop, law_of(run).model
+    late = run.dataset["target"].sel(time=slice(*run.built.window()))
+    path, x = loop.draw(jax.random.PRNGKey(0)).disturbance_path, loop.plant.initial_state()
 
     @jax.jit
     @jax.vmap
-    def cancelling(position, load):
-        y = Measurement(position, 0 * position)
-        return model.invert(y, -model.drift(y) - load)
+    def cancelling(t, goal):
+        y = Measurement(goal, 0 * goal)
+        load = loop.disturbance.at(path, t, loop.plant.place(x), loop.plant.no_load())
+        return model.invert(y, -model.drift(y) - load.acceleration)
 
-    volts = np.asarray(cancelling(goal, d))
-    time = late["time"].values
+    # Between the records: a jump of d at a record is followed by the law after it, and several at once are one.
+    time = late["time"].values - run.built.scenario.loop.record / 2
+    volts = np.asarray(cancelling(time, late.values))
     return float(np.abs(np.diff(volts, axis=0)).mean(1).sum() / (time[-1] - time[0]))

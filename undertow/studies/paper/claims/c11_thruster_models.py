@@ -29,7 +29,7 @@ def judge(runs: Runs, long: Long) -> Finding:
     text += (
         ". In the loop RCAFC at Table 1 meets the same difference, U2 at 1 kHz: "
         + ", ".join(
-            f"{level} lasts {run.ended:g} s" if run.lasted else f"{level} ends at {run.ended:.3g} s"
+            f"{level} lasts {run.ended:g} s" if run.lasted else f"{level} ends at {run.ended:.1f} s"
             for level, run in ends.items()
         )
         + "."
