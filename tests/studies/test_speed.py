@@ -19,7 +19,6 @@ from undertow.scenario.build import build
 from undertow.scenario.reading import read
 from undertow.studies.speed import measure, plain_numpy, workload
 
-
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 W1 = workload.workload(workload.W1)
