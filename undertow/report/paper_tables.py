@@ -105,7 +105,8 @@ def glance(claims: list[dict[str, Any]]) -> Html:
     items = []
     for claim in claims:
         link = tag("a", claim["id"], href=f"#{claim['id']}")
-        words = join(prose(claim["claim"]), _condition(claim["verdict"]))
+        simulated = tag("span", prose(f"Simulated: {claim['simulated']}."), class_="said")
+        words = join(prose(claim["claim"]), _condition(claim["verdict"]), simulated)
         items.append(tag("li", link, tag("span", chip(claim["verdict"])), tag("span", words)))
     return tag("ul", *items, class_="verdicts")
 

@@ -42,7 +42,7 @@ def judge(runs: Runs, long: Long) -> Finding:
         "ended": {level: None if run.lasted else run.ended for level, run in lasting.items()},
         "windings_ended": {f"{value:g}": None if run.lasted else run.ended for value, run in windings(long).items()},
     }
-    simulated = f"every level, U2 at 1 kHz, {horizon:g} s"
+    simulated = f"levels {', '.join(lasting)}, U2 at 1 kHz, {horizon:g} s"
     good = [level for level, found in short.items() if found and found["tracking_rms"] < _SMALL]
     if len(good) == len(short) and not lost:
         return Finding("holds", text, "ideal_rcafc", simulated, numbers)
@@ -51,7 +51,7 @@ def judge(runs: Runs, long: Long) -> Finding:
     verdict = f"holds if the winding has at most {1e3 * max(kept, default=0):g} mH and 20 s are enough"
     early = [f"{level} ends at {run.ended:.0f} s" for level, run in lasting.items() if level in good and not run.lasted]
     lives = [level for level in good if lasting[level].lasted]
-    verdict += f"; for {horizon:g} s on {' and '.join(lives)} only" if lives else ""
+    verdict += f"; for {horizon:g} s, of {', '.join(lasting)}, on {' and '.join(lives)} only" if lives else ""
     verdict += f" ({', '.join(early)})" if early else ""
     return Finding(verdict, text, "electromechanical_rcafc", simulated, numbers)
 
