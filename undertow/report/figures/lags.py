@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
@@ -76,6 +77,8 @@ def _metric(panel: Axes, rows: Rows, metric: str, dashes: Sequence[Any]) -> None
                     markersize=3,
                     label=law,
                 )
+    low, high = np.log10(panel.get_ylim())
+    panel.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))  # whole decades: two labels at least
 
 
 def _life(panel: Axes, rows: Rows, longest: float) -> None:
