@@ -78,6 +78,7 @@ def results_of_a_study():
     lasted = {
         "status": "ok",
         "diverged_at": None,
+        "simulated_s": 20.0,
         "steady": metrics(1),
         "whole": metrics(1),
         "why": "stable at k_e < 1",
@@ -100,6 +101,7 @@ def results_of_a_study():
                 "claim": f"Claim number {k} <script>alert(1)</script> & more.",
                 "verdict": verdict,
                 "evidence": f"rms 0.{k} m/s^2 of `sign`",
+                "simulated": f"level ideal, {10 * k} s",
                 "scenario": None if verdict == "open" else f"scenarios/c{k:02d}.yaml",
             }
             for k, verdict in enumerate(verdicts, 1)

@@ -72,7 +72,7 @@ def test_conclusions_say_what_the_numbers_say():
     found = conclusions(ROWS, ABLATIONS)
     assert len(found["wins"]) == 1 and "17 m off, and RAFC 22 m (A10)" in found["wins"][0]
     assert found["same"] == [
-        "Accuracy. A textbook linear observer of the same bandwidth has 1.020 times the error of RCAFC (A3)."
+        "Accuracy. A linear observer of the same bandwidth has 1.020 times the error of RCAFC (A3)."
     ]
     (motor,), (again,) = found["loses"], found["neither"]
     assert "ends after 1.5 s" in motor and "0.0003" in motor

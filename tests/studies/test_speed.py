@@ -1,9 +1,11 @@
-"""Workload W1 is what it is said to be, and `undertow bench` tells it."""
+"""Workloads W1 and W2 are what they are said to be, and `undertow bench` tells them."""
 
 import json
+from pathlib import Path
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from lanes.emulated_gpu import EmulatedGpu
@@ -11,37 +13,69 @@ from lanes.emulated_gpu import EmulatedGpu
 from undertow.cli.main import run
 from undertow.lanes import nvidia
 from undertow.lanes.cuda import Driver
+from undertow.lanes.program import Program
 from undertow.loop import sampled
-from undertow.loop.in_lanes import Fleet
+from undertow.scenario.build import build
+from undertow.scenario.reading import read
 from undertow.studies.speed import measure, plain_numpy, workload
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+W1 = workload.workload(workload.W1)
+
+
+def short(one, ticks):
+    return one._replace(plan=one.plan._replace(ticks=ticks))
 
 
 def test_the_workload_is_that_of_plain_numpy():
     """Mean square of the error over the second half of the first two seconds: two programs that share no code."""
-    one = workload.one()
-    late = eqx.tree_at(lambda run: (run.accumulators[0].start, run.accumulators[0].stop), one, (0.9995, 1.9995))
-    fleet = Fleet(late, workload.PLAN._replace(ticks=2000), workload.constant(late))
+    late = eqx.tree_at(lambda run: (run.accumulators[0].start, run.accumulators[0].stop), W1.run, (0.9995, 1.9995))
+    fleet = workload.fleet(short(workload.Workload(late, W1.plan), 2000))
     found = workload.tracking(fleet.fly(workload.alone(late)).accumulated)[0]
-    assert found == pytest.approx(np.sqrt(plain_numpy.workload_w1(2000)), rel=1e-9)
+    bounded = np.sqrt(plain_numpy.workload_w1(2000))
+    assert found == pytest.approx(bounded, rel=1e-9)
+    assert abs(np.sqrt(plain_numpy.workload_w1(2000, bound=np.inf)) / bounded - 1) > 1e-3, "the bound is met"
 
 
 def test_runs_of_a_batch_start_from_different_places():
-    one = workload.one()
-    fleet = Fleet(one, workload.PLAN._replace(ticks=11_000), workload.constant(one))
-    rms = workload.tracking(fleet.fly(workload.several(one, 9)).accumulated)
+    run = W1.run
+    rms = workload.tracking(workload.fleet(short(W1, 11_000)).fly(workload.several(run, 9)).accumulated)
     assert len(set(rms)) == 9
-    places = workload.several(one, 9).start
+    places = workload.several(run, 9).start
     at = {"position": places[0][4], "velocity": places[1][4]}
-    wanted = sampled.simulate(one.loop, duration=11.0, record_every=0, accumulators=one.accumulators, **at)
+    wanted = sampled.simulate(run.loop, duration=11.0, record_every=0, accumulators=run.accumulators, **at)
     assert rms[4] == pytest.approx(workload.tracking(wanted.accumulated), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("data", "example", "steps"), [(workload.W1, "w1", 20_000), (workload.W2, "bluerov2_heavy", 12_000)]
+)
+def test_workloads_are_the_examples(data, example, steps):
+    """Benchmark, section 7: W1 with bounded weights, W2 what users run; part by part what the example describes."""
+    theirs, ours = build(read(EXAMPLES / f"{example}.yaml")), build(data)
+    for one, other in zip(*(jax.tree.leaves(each.closed_loop) for each in (ours, theirs)), strict=True):
+        np.testing.assert_array_equal(one, other)
+    mine = workload.workload(data)
+    assert mine.ticks == steps == round(theirs.scenario.loop.duration / theirs.scenario.loop.dt)
+    assert mine.plan.dt == theirs.scenario.loop.dt and mine.plan.every == 0
+
+
+def test_operations_are_counted():
+    """Adding one axis to six adds a sixth of what the law does; a loop of plain arithmetic is counted by hand."""
+    program = lambda step: Program(
+        lambda numbers: numbers, lambda known: known, step, lambda known, carry, k: carry, jnp.ones(3), [False]
+    )
+    assert program(lambda known, carry, k: carry * 2.5 + known).operations == 6
+    assert program(lambda known, carry, k: carry + jnp.sin(known)).operations == 3, "sin(known) is done before"
+    assert workload.fleet(short(W1, 1), lanes=1).operations > 2_000
 
 
 def test_what_a_gpu_would_do(monkeypatch):
     """What is measured on a GPU: by `jax.vmap`, a narrow program here, and by threads, for which this processor stands in."""
-    one = workload.one()
-    assert measure.vmapped_ns(one, runs=3, ticks=5) > 0
+    assert measure.vmapped_ns(short(W1, 5), runs=3) > 0
     monkeypatch.setattr(nvidia, "ptx", lambda assembly, generation: assembly)
-    found = measure.on_gpu(one, Driver(EmulatedGpu()), runs=40, ticks=5)
+    found = measure.on_gpu(short(W1, 5), Driver(EmulatedGpu()), runs=40)
     assert found["ns"] > 0 and found["ticks_per_second"] == pytest.approx(1e9 / found["ns"])
 
 
@@ -49,10 +83,13 @@ def test_what_a_gpu_would_do(monkeypatch):
 def test_bench(capsys):
     assert run(["bench", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["tracking_rms"] == pytest.approx(0.004312, abs=1e-6)
+    assert found["tracking_rms"] == pytest.approx(0.004575, abs=1e-6)
     assert found["single_times_numpy"] == pytest.approx(found["numpy_ns"] / found["single_ns"], rel=1e-4)
     assert found["first_cold_s"] > found["first_kept_s"] > 0
     assert found["batch_float64_ns"] < found["single_ns"] < found["numpy_ns"]
+    assert found["w2_tracking_rms"] == pytest.approx(0.0082, rel=0.05) and found["w2_ticks"] == 12_000
+    assert found["w2_operations"] > found["operations"] > 2_000
     assert run(["bench"]) == 0
-    assert "plain NumPy" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "plain NumPy" in said and "W2" in said and "operations per step" in said
     assert jax.config.jax_enable_x64

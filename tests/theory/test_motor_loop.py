@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from undertow.analysis import linear, motor_loop
+from undertow.analysis import drift, linear, motor_loop
 from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop.closed_loop import ClosedLoop
@@ -83,7 +83,9 @@ def test_observer_alone_tolerates_any_lag_or_a_closed_form(table1):
         assert (roots.real.max() < 0) == stable
 
 
-def test_linear_model_is_the_jacobian_of_the_code():
+@pytest.mark.parametrize("skew", [0.0, 200.0])
+def test_linear_model_is_the_jacobian_of_the_code(skew):
+    """At equal weights, and at weights that drifted apart: these are damping, c = -xi'(0)^T theta."""
     speed = 20.0
     plant = hybrid_vehicle(odin(), paper_table3(), ledger=False)  # energies are never in equilibrium
     law = rcaf(plant.model(), sets=3)
@@ -98,7 +100,9 @@ def test_linear_model_is_the_jacobian_of_the_code():
     drawn = loop.draw(jax.random.PRNGKey(0))
     _, z = drawn.start()
     estimate = -(law.model.drift(y) + law.model.gain(y) @ volts)
-    z = z._replace(weights=jnp.broadcast_to(estimate[:, None], z.weights.shape))
+    z = z._replace(weights=estimate[:, None] + skew * jnp.array([1.0, 0.0, -1.0]))
+    drifted = drift.gain_of(law, np.asarray(z.weights))[0]
+    assert drifted == pytest.approx(skew * 0.848, rel=1e-3)
     flat, restore = ravel_pytree((x, z))
 
     @jax.jit
@@ -111,6 +115,16 @@ def test_linear_model_is_the_jacobian_of_the_code():
     assert np.abs(flow(flat)).max() < 1e-9, "this is an equilibrium"
     nudges = 1e-6 * np.eye(flat.size)
     found = np.linalg.eigvals(np.stack([(flow(flat + nudge) - flow(flat - nudge)) / 2e-6 for nudge in nudges], 1))
-    for value in np.linalg.eigvals(motor_loop.motor_matrix(law, MOTOR, speed)):
+    for value in np.linalg.eigvals(motor_loop.motor_matrix(law, MOTOR, speed, drifted=drifted)):
         assert np.abs(found - value).min() < 1e-4 * max(1.0, abs(value)), (value, found)
-    assert found.real.max() > 20, "and so the simulated vehicle is unstable too"
+    assert (found.real.max() > 20) == (skew == 0), "and so the simulated vehicle is unstable too"
+
+
+def test_gains_between_which_a_lagged_loop_is_stable(table1):
+    """Edges of the interval are where the rightmost eigenvalue changes its sign; a slow winding leaves no interval."""
+    law = table1(sets=5)
+    low, high = motor_loop.stable_gains(lambda c: motor_loop.lag_matrix(law, 0.05, drifted=c), 1000.0)
+    assert high == 1000.0 and low == pytest.approx(453, abs=1)
+    edge = [motor_loop.rightmost(motor_loop.lag_matrix(law, 0.05, drifted=low - back)).real for back in (1, 0)]
+    assert edge[0] >= 0 > edge[1]
+    assert motor_loop.stable_gains(lambda c: motor_loop.motor_matrix(law, MOTOR, 20.0, drifted=c), 3000.0) is None

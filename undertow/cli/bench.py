@@ -1,6 +1,7 @@
 """`undertow bench`: how fast it is here."""
 
 import json
+from typing import Any
 
 import typer
 from rich.table import Table
@@ -22,10 +23,15 @@ _ROWS = {
     "gpu_float32_vmap_ns": "the same by XLA",
     "numpy_ns": "one run in plain NumPy",
 }
+# What each workload is, and what its figures begin with.
+_WORKLOADS = {
+    "W1, ODIN with eight whole motors, 1 kHz": "",
+    "W2, BlueROV2 Heavy at sea, 100 Hz": "w2_",
+}
 
 
 def bench(as_json: bool) -> int:
-    """Measure workload W1, and print a table or JSON."""
+    """Measure workloads W1 and W2, and print tables or JSON."""
     console = wide_console()
     if as_json:
         found = interruptible(lambda: measure(lambda what, share: None))
@@ -33,20 +39,35 @@ def bench(as_json: bool) -> int:
         return DONE
     with shares(console) as progress:
         found = interruptible(lambda: measure(progress))
-    title = f"Workload W1: nanoseconds per tick and run, {found['lanes']} lanes, {found['threads']} threads"
-    table = Table(title=title, title_justify="left", title_style="bold")
+    for words, prefix in _WORKLOADS.items():
+        console.print(_table(words, found, prefix))
+        compiling = f"{found[f'{prefix}single_compile_s']:.2g} s for one run"
+        if f"{prefix}single_xla_compile_s" in found:
+            compiling += f" (XLA {found[f'{prefix}single_xla_compile_s']:.2g} s)"
+        compiling += f", {found[f'{prefix}batch_float64_compile_s']:.2g} s for many"
+        figures = (
+            f"{found[f'{prefix}operations']} operations per step, tracking rms {found[f'{prefix}tracking_rms']:.6f}"
+        )
+        console.print(f"Made ready in {compiling}; {figures}.", highlight=False)
+    first = f"{found['first_cold_s']:.2g} s, {found['first_kept_s']:.2g} s with compiled code from before"
+    console.print(f"From the start of a process to its first result (W1): {first}.", highlight=False)
+    return DONE
+
+
+def _table(words: str, found: dict[str, Any], prefix: str) -> Table:
+    """One workload; ratios to plain NumPy where that was measured, too."""
+    steps = f"{found[f'{prefix}ticks']} steps, {found['lanes']} lanes, {found['threads']} threads"
+    table = Table(title=f"{words}: nanoseconds per step and run ({steps})", title_justify="left", title_style="bold")
     table.add_column("what")
     table.add_column("ns", justify="right")
-    table.add_column("times NumPy", justify="right")
-    for key, words in _ROWS.items():
-        if key in found:
-            table.add_row(words, f"{found[key]:.4g}", f"{found['numpy_ns'] / found[key]:.3g}")
-    console.print(table)
-    compiling = f"lanes {found['single_compile_s']:.2g} s, XLA {found['single_xla_compile_s']:.2g} s"
-    console.print(f"Made ready in: {compiling}. Tracking rms {found['tracking_rms']:.6f}.", highlight=False)
-    first = f"{found['first_cold_s']:.2g} s, {found['first_kept_s']:.2g} s with compiled code from before"
-    console.print(f"From the start of a process to its first result: {first}.", highlight=False)
-    return DONE
+    compared = f"{prefix}numpy_ns" in found
+    if compared:
+        table.add_column("times NumPy", justify="right")
+    for key, row in _ROWS.items():
+        if (value := found.get(f"{prefix}{key}")) is not None:
+            ratio = (f"{found[f'{prefix}numpy_ns'] / value:.3g}",) if compared else ()
+            table.add_row(row, f"{value:.4g}", *ratio)
+    return table
 
 
 def _short(value: float | str) -> float | str:

@@ -1,5 +1,8 @@
-"""Suite U1: large, sudden, fast; one signal per axis, as the paper's Fig. 7 describes them."""
+"""Suite U1: large, sudden, fast; one signal per axis, as the paper's Fig. 7 describes them. U2 repeats it."""
 
+import math
+
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -18,6 +21,7 @@ class SuiteU1(AbstractDisturbance):
     """Six lumped accelerations: steps on a swell, high frequency, square wave, pulse, ramp and reset, chirp."""
 
     scale: Float[Array, ""] = param("", "factor on all six", default=1.0)
+    period: float = eqx.field(static=True, default=math.inf)  # s, after which it begins again
 
     def draw(self, key) -> tuple[()]:
         return ()
@@ -25,6 +29,8 @@ class SuiteU1(AbstractDisturbance):
     def at(self, path, t, place, calm: Load) -> Load:
         if calm.acceleration.shape != (6,):
             raise BadInput("disturbance", "fit the plant", "u1, which has 6 axes", hint="Use kind: table")
+        if self.period < math.inf:
+            t = t - self.period * jnp.floor(t / self.period)
         swell, fast, ripple, slow, square, pulse, chirp = jnp.sin(as_array(_RATES) * t + as_array(_SWEEPS) * t**2)
         signals = jnp.stack(
             [
@@ -39,10 +45,12 @@ class SuiteU1(AbstractDisturbance):
         return calm._replace(acceleration=calm.acceleration + self.scale * signals)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
-        steps = {6.0, 8.0, 10.0, 14.0}
-        square = {2.0 * k for k in range(1, int(duration // 2) + 1)}
-        resets = {10.0 * k for k in range(1, int(duration // 10) + 1)}
-        return tuple(sorted(t for t in steps | square | resets if t < duration))
+        once = min(duration, self.period)
+        square = {2.0 * k for k in range(1, int(once // 2) + 1)}
+        resets = {10.0 * k for k in range(1, int(once // 10) + 1)}
+        jumps = {t for t in {6.0, 8.0, 10.0, 14.0} | square | resets if t <= once}
+        turns = range(math.ceil(duration / once)) if duration > 0 else ()
+        return tuple(sorted({t + k * once for t in jumps for k in turns if t + k * once < duration}))
 
 
 def _step(t: Float[Array, ""], at: float, size: float) -> Float[Array, ""]:

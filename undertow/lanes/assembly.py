@@ -119,6 +119,13 @@ def assembly(graph: Graph, sections: Sections, lanes: int, head: Head = VECTORS)
     return _FRAME.format(head=head.text, place=head.place, **texts, row=row, functions=functions)
 
 
+def operations(graph: Graph, sections: Sections) -> int:
+    """Operations of one tick of one run, those inside a loop counted once; an elementary function counts as one."""
+    fixed, needed = _fixed(graph), graph.needed(sections.tick)
+    worked = lambda node: graph.operations[node].name not in ("constant", "input", "region", "result")
+    return sum(needed[node] and not same and worked(node) for node, same in enumerate(fixed))
+
+
 def _fixed(graph: Graph) -> list[bool]:
     """Which nodes are the same in every tick."""
     fixed: list[bool] = []

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.lanes import nvidia
-from undertow.lanes.assembly import TICK, Sections, assembly
+from undertow.lanes.assembly import TICK, Sections, assembly, operations
 from undertow.lanes.beginning import Beginning, inputs
 from undertow.lanes.cuda import Driver
 from undertow.lanes.errors import Unsupported
@@ -73,6 +73,7 @@ class Program:
         ticked, looked = (evaluate(graph, traced.closed, given, _MOST) for traced in (self._tick, self._look))
 
         sections = Sections(*map(flat, (first, ticked, looked)))
+        self.operations = operations(graph, sections)
         if driver is None:
             lanes = lanes or lanes_of(8 * np.dtype(number.dtype).itemsize)
             self._code = Code(assembly(graph, sections, lanes))

@@ -105,13 +105,19 @@ class Fleet:
 
         self._program = Program(draw, start, tick, look, numbers, constant, lanes, driver)
 
-    def fly(self, numbers: Any) -> Ended:
+    @property
+    def operations(self) -> int:
+        """Arithmetic operations of one step of one run: law, plant and its integration, what is accumulated."""
+        return self._program.operations
+
+    def fly(self, numbers: Any, ticks: int | None = None) -> Ended:
         """Run them.
 
         Args:
             numbers: arrays of the runs, as in `run`, with a leading axis over runs.
+            ticks: how many; as planned unless given.
         """
-        ticks, every = self._plan.ticks, self._plan.every
+        ticks, every = self._plan.ticks if ticks is None else ticks, self._plan.every
         carry, (time, series) = self._program.run(numbers, ticks, every)
         states, accumulated, (status, ended, wrong) = carry
         ended = np.where(status == int(Status.OK), ticks * self._plan.dt, ended)

@@ -63,6 +63,11 @@ def ending(entry: dict[str, Any]) -> str:
     return word if when is None else f"{word} at {when:.3g} s"
 
 
+def round_time(seconds: float) -> str:
+    """Three digits, but whole seconds from 100 s on."""
+    return f"{seconds:.0f}" if seconds >= 100 else f"{seconds:.3g}"
+
+
 def _minus(value: str) -> str:
     """With a true minus."""
     return value.replace("-", "\u2212")

@@ -38,7 +38,7 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
             _pair(one, "input_variation", "Variation after 10 s, V/s"),
         ),
         "fig10": join(
-            "Without speed sensors, on a motor that is in its steady state at every instant, RCAFC tracks as in "
+            "Without speed sensors, on a motor that is in its steady state at every instant, RCAFC tracks nearly as in "
             "Example 1.",
             _single(two, "tracking_rms", "Rms error after 10 s"),
         ),

@@ -6,6 +6,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from undertow.report import horizon_section
 from undertow.report import paper_tables as tables
 from undertow.report.figures.writing import save
 from undertow.report.formats import prose
@@ -17,7 +18,7 @@ from undertow.report.sound_section import CAPTIONS, FIGURES, TITLE, sound_sectio
 _TITLE = "The paper, reproduced and audited"
 
 # Figures that stand in a section of their own; all others stand in the first.
-_ELSEWHERE = ("ladder", "sweep", *FIGURES)
+_ELSEWHERE = ("ladder", "sweep", *horizon_section.FIGURES, *FIGURES)
 
 
 def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path) -> Path:
@@ -35,7 +36,7 @@ def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], fold
         OSError: the folder cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    said = captions(dict(results)) | CAPTIONS
+    said = captions(dict(results)) | horizon_section.CAPTIONS | CAPTIONS
     drawn = {}
     for name, one in figures.items():
         vector, _ = save(one, folder / "figures", name)
@@ -96,20 +97,25 @@ def _ladder(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]
     if not results.get("ladder"):
         return []
     told = (
-        "Both controllers at the gains of Table 1 meet the same vehicle and the same disturbance on four rungs: each "
-        "takes more of the motor for real. Tracking rms in m and rad, estimation rms in m/s^2, rad/s^2, 10 s to 20 s."
+        "Both controllers at the gains of Table 1 meet the same vehicle and the same disturbance on four levels: each "
+        "takes more of the motor for real. First 20 s of U1, as one differential equation, tracking rms in m and rad, "
+        "estimation rms in m/s^2, rad/s^2, 10 s to 20 s; what lasts for so long need not last."
     )
     return [
         tag("p", prose(told)),
         *(drawn[name] for name in ("ladder",) if name in drawn),
         tables.ladder(results["ladder"]),
+        *horizon_section.horizon_section(results, drawn),
     ]
 
 
 def _audit(claims: list[dict[str, Any]], drawn: Mapping[str, Html]) -> list[Html]:
     if not claims:
         return []
-    told = "Each verdict names the run behind it. The commands are to be typed in the folder of this page."
+    told = (
+        "Each verdict names the run behind it, and says on which levels and for how long was simulated; it says "
+        "nothing beyond. The commands are to be typed in the folder of this page."
+    )
     return [tag("p", prose(told)), tables.audit(claims), *(drawn[name] for name in ("sweep",) if name in drawn)]
 
 

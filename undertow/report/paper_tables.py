@@ -78,7 +78,9 @@ def ladder(results: dict[str, Any]) -> Html:
         for key, entry in entries.items():
             steady = entry.get("steady") or {}
             figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "input_variation")]
-            ended = tag("span", ending(entry), class_=f"chip {'holds' if entry['status'] == 'ok' else 'fails'}")
+            lasted = entry["status"] == "ok"
+            said = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
+            ended = tag("span", said, class_=f"chip {'holds' if lasted else 'fails'}")
             place = join(tag("b", rung), tag("span", _RUNGS.get(rung, ""), class_="said"))
             rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
     head = ("rung", "controller", "how it ended", "tracking rms", "estimation rms", "voltage variation, V/s", "why")
@@ -93,7 +95,8 @@ def audit(claims: list[dict[str, Any]]) -> Html:
         name = claim.get("scenario")
         command = tag("div", tag("code", f"undertow simulate {name}")) if name else ""
         identity = tag("b", claim["id"], id=claim["id"])
-        rows.append((identity, prose(claim["claim"]), verdict, join(prose(claim["evidence"]), command)))
+        simulated = tag("div", prose(f"Simulated: {claim['simulated']}."), class_="small")
+        rows.append((identity, prose(claim["claim"]), verdict, join(prose(claim["evidence"]), simulated, command)))
     return table(("", "claim", "verdict", "evidence, and the run that shows it"), rows, wide=True)
 
 
@@ -102,7 +105,8 @@ def glance(claims: list[dict[str, Any]]) -> Html:
     items = []
     for claim in claims:
         link = tag("a", claim["id"], href=f"#{claim['id']}")
-        words = join(prose(claim["claim"]), _condition(claim["verdict"]))
+        simulated = tag("span", prose(f"Simulated: {claim['simulated']}."), class_="said")
+        words = join(prose(claim["claim"]), _condition(claim["verdict"]), simulated)
         items.append(tag("li", link, tag("span", chip(claim["verdict"])), tag("span", words)))
     return tag("ul", *items, class_="verdicts")
 

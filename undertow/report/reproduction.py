@@ -7,6 +7,9 @@ from matplotlib.figure import Figure
 
 from undertow.report.figures import ladder_figure, paper_figures, sweep_figure
 from undertow.report.figures.ablations import ablations_figure
+from undertow.report.figures.drifting import drifting_figure
+from undertow.report.figures.horizons import horizons_figure
+from undertow.report.figures.lags import lags_figure
 from undertow.report.figures.sound_ladder import sound_ladder_figure
 from undertow.report.paper_report import write_report
 from undertow.studies.paper.reproduce import Reproduction
@@ -28,6 +31,9 @@ def draw(found: Reproduction) -> dict[str, Figure]:
     figures = paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
         "ladder": ladder_figure(ladder, {rung: found.datasets(rung) for rung in ladder}),
         "sweep": sweep_figure(numbers["C6"]["sweep"]),
+        "horizons": horizons_figure(found.results["horizons"]["rows"], found.results["horizons"]["duration"]),
+        "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),
+        "drifting": drifting_figure(found.results["drifting"]),
     }
     sound = found.results.get("sound")
     return figures | _of_last_chapter(found, sound) if sound else figures

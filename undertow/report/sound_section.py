@@ -24,7 +24,7 @@ CAPTIONS = {
 
 _LISTS = {
     "wins": "Where the paper's idea wins",
-    "same": "Where a plain linear observer is as good",
+    "same": "Where a plain linear observer is as good: axes without a motor, 20 s at most",
     "loses": "Where it loses",
     "neither": "Where the sound version is no better, or costs something",
 }

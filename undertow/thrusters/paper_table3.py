@@ -8,7 +8,11 @@ from undertow.thrusters.thruster import AbstractThruster
 
 
 def paper_table3(
-    rung: str = "electromechanical", supply: float = math.inf, dead_zone: float = 0.0, dead_zone_kind: str = "pass"
+    rung: str = "electromechanical",
+    supply: float = math.inf,
+    dead_zone: float = 0.0,
+    dead_zone_kind: str = "pass",
+    inductance: float = 0.01,
 ) -> AbstractThruster:
     """Thruster of Table 3, as printed, on a rung of the fidelity ladder.
 
@@ -19,10 +23,11 @@ def paper_table3(
         supply: voltage limit, V; infinite by default.
         dead_zone: voltage below which nothing turns, V.
         dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        inductance: of the winding, H; Table 3 prints 0.01. It decides whether Table 1 is stable.
     """
     motor = DCMotor(
         resistance=1.2,
-        inductance=0.01,
+        inductance=inductance,
         torque_constant=1.27,
         back_emf_constant=0.01086,
         friction=0.06,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from undertow.analysis.drift import gain_of
 from undertow.analysis.motor_loop import motor_matrix, rightmost
 from undertow.core.status import Status
 from undertow.scenario.execute import Executed
@@ -57,6 +58,7 @@ def _metrics(run: Executed) -> dict[str, Any]:
     return {
         "status": run.status.word,
         "diverged_at": float(run.outcome.ended) if failed else None,
+        "simulated_s": float(run.outcome.ended),
         "steady": run.steady,
         "whole": run.whole,
     }
@@ -72,17 +74,28 @@ def _why(runs: Mapping[str, Executed], rung: str, controller: str) -> str:
     winding = rung == "electromechanical"
     modes = [rightmost(motor_matrix(law, motor, speed, winding)) for speed in _SPEEDS]
     growth = [mode.real for mode in modes]
+    # Both are statements about small motion at the weights of the start; weights that drift add damping.
     worst = max(range(len(_SPEEDS)), key=growth.__getitem__)
     at = f"at a propeller speed of {_SPEEDS[worst]:g} rad/s"
     if growth[worst] < 0:
-        return f"The linearised loop is stable from 2 to 60 rad/s: rightmost eigenvalue {growth[worst]:+.2f} 1/s {at}."
+        return (
+            f"At fixed weights the linearised loop is stable from 2 to 60 rad/s: rightmost eigenvalue "
+            f"{growth[worst]:+.2f} 1/s {at}. That says nothing of weights that drift: see the long ladder."
+        )
     number = sum(value > 0 for value in growth)
     rate = f"{growth[worst]:+.1f} 1/s, {abs(modes[worst].imag):.0f} rad/s, {at}"
+    ended = run.status is not Status.OK
     tail = (
-        "grows until something gives"
-        if run.status is not Status.OK
-        else "is held by the propeller's own drag: a limit cycle"
+        "The oscillation grows until something gives."
+        if ended
+        else f"The oscillation makes the weights drift apart, which adds damping (d_hat = z - c eps, c up to "
+        f"{_damping(run):.0f} 1/s at the end), until it is held: see below."
     )
     return (
-        f"The linearised loop is unstable at {number} of {len(_SPEEDS)} speeds (worst {rate}); the oscillation {tail}."
+        f"At fixed weights the linearised loop is unstable at {number} of {len(_SPEEDS)} speeds (worst {rate}). {tail}"
     )
+
+
+def _damping(run: Executed) -> float:
+    """Largest gain c of section 3.8 over the axes at the end of a run, 1/s."""
+    return float(gain_of(law_of(run), run.dataset["weights"].values[-1]).max())

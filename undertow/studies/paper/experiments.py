@@ -18,12 +18,18 @@ def run_all(scenarios: Scenarios, folder: Path, progress: Callable[[str, float],
         folder: where the results go.
         progress: told a message and the share done.
     """
-    (folder / "scenarios").mkdir(parents=True, exist_ok=True)
+    write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)
     found = {}
     for name, scenario in scenarios.items():
         progress(f"running {name}", len(found) / len(scenarios))
-        (folder / "scenarios" / f"{name}.yaml").write_text(dump(scenario), encoding="utf-8")
         found[name] = execute(scenario)
         save(found[name].dataset, folder / "runs" / f"{name}.nc")
     return found
+
+
+def write_all(scenarios: Scenarios, folder: Path) -> None:
+    """Write `scenarios/<name>.yaml`, for those who want to run them again."""
+    (folder / "scenarios").mkdir(parents=True, exist_ok=True)
+    for name, scenario in scenarios.items():
+        (folder / "scenarios" / f"{name}.yaml").write_text(dump(scenario), encoding="utf-8")

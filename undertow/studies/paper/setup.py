@@ -6,6 +6,7 @@ from typing import Any, cast
 from undertow.controllers.law import RCAF
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.execute import Executed
+from undertow.studies.paper.batches import Flown
 from undertow.thrusters.electromechanical import ElectromechanicalThruster
 from undertow.thrusters.motor import DCMotor
 
@@ -70,16 +71,16 @@ SIX_AXES = {
 }
 
 
-def law_of(run: Executed) -> RCAF:
+def law_of(run: Executed | Flown) -> RCAF:
     """The law that ran."""
     return cast(RCAF, run.built.closed_loop.controller)
 
 
-def plant_of(run: Executed) -> HybridVehicle:
+def plant_of(run: Executed | Flown) -> HybridVehicle:
     """The vehicle that was run."""
     return cast(HybridVehicle, run.built.closed_loop.plant)
 
 
-def motor_of(run: Executed) -> DCMotor:
+def motor_of(run: Executed | Flown) -> DCMotor:
     """The motor of its thrusters."""
     return cast(ElectromechanicalThruster, plant_of(run).thruster).motor

@@ -12,7 +12,7 @@ def _motor(n: Numbers) -> str:
     kept = sound["steady"]["tracking_rms"]
     return (
         f"A motor. With all of Eqs. (8) to (11) Table 1 ends after {paper['diverged_at']:.2g} s; preset `robust`, "
-        f"which knows the motor, tracks to {kept:.2g} without propeller speeds."
+        f"which knows the motor, tracks to {kept:.2g} without propeller speeds (20 s; 2,000 s: see the ladder)."
     )
 
 

@@ -74,7 +74,13 @@ def places(quick: bool) -> dict[str, Place]:
         two = {key: (name, one | {"steady": {"start": _JUDGED}}) for key, (name, one) in two.items()}
         found["overload"] = Place(words, two)
         words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own instruments"
-        found["sea"] = Place(words, {key: (name, _at_sea(name, law)) for key, (name, law) in _AT_SEA.items()})
+        found["sea"] = Place(
+            words,
+            {
+                key: (name, at_sea(f"{name}: BlueROV2 Heavy at sea, from its own instruments", law))
+                for key, (name, law) in _AT_SEA.items()
+            },
+        )
         found |= {place: Place(*each) for place, each in station.places().items()}
     return found
 
@@ -122,8 +128,8 @@ def _laws(
     return found
 
 
-def _at_sea(name: str, law: dict[str, Any]) -> dict[str, Any]:
-    """As examples/bluerov2_heavy.yaml, with a law to be compared."""
+def at_sea(description: str, law: dict[str, Any]) -> dict[str, Any]:
+    """As examples/bluerov2_heavy.yaml, with a law to be compared; speed workload W2, too."""
     instruments = [
         "imu",
         {"kind": "dvl", "period": 0.125, "noise": 0.005, "delay": 0.05},
@@ -132,7 +138,7 @@ def _at_sea(name: str, law: dict[str, Any]) -> dict[str, Any]:
         {"kind": "position_fix", "period": 1, "noise": 0.05, "delay": 0.2},
     ]
     return {
-        "description": f"{name}: BlueROV2 Heavy at sea, from its own instruments",
+        "description": description,
         "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
         "model": {"rate_term": True},
         "controller": law,

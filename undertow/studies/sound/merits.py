@@ -36,15 +36,15 @@ def _one_design(n: Numbers) -> str:
         return ""
     return (
         "One design for any plant of the form (17). Without a gain being given, the sound version tracks to "
-        f"{motor['steady']['tracking_rms']:.2g} on ODIN with the whole motor at 1 kHz and to "
-        f"{sea['steady']['tracking_rms']:.2g} on BlueROV2 Heavy at sea at 100 Hz; for other plants see C14."
+        f"{motor['steady']['tracking_rms']:.2g} on ODIN with the whole motor at 1 kHz (20 s) and to "
+        f"{sea['steady']['tracking_rms']:.2g} on BlueROV2 Heavy at sea at 100 Hz (120 s); for other plants see C14."
     )
 
 
 def _linear(n: Numbers) -> str:
     fuzzy = n.median("A3", "RCAFC")
     plain = n.median("A3", "linear observer") / fuzzy
-    return f"Accuracy. A textbook linear observer of the same bandwidth has {plain:.3f} times the error of RCAFC (A3)."
+    return f"Accuracy. A linear observer of the same bandwidth has {plain:.3f} times the error of RCAFC (A3)."
 
 
 def _robust(n: Numbers) -> str:
@@ -59,12 +59,12 @@ def _robust(n: Numbers) -> str:
 
 def _sets(n: Numbers) -> str:
     one, five = (n.median("A2", f"{count} sets", "estimation_rms") for count in (1, 5))
-    return f"Fuzzy sets. A single one, which is an integrator, has {one / five:.3f} times the error of five (A2)."
+    return f"Fuzzy sets. A single one, an integrator, has {one / five:.3f} times the error of five (A2; see C5)."
 
 
 def _input(n: Numbers) -> str:
     own, matched = (n.median("A1", name, "estimation_rms") for name in ("error", "state, matched"))
-    return f"Fuzzy input. The state does {matched / own:.3f} times as badly at the same gamma |xi|^2 (A1)."
+    return f"Fuzzy input. The state does {matched / own:.3f} times as badly at the same gamma |xi|^2 (A1; see C5)."
 
 
 def _robust_term(n: Numbers) -> str:

@@ -5,12 +5,12 @@ from undertow.process import prepare
 prepare()
 
 from undertow.scenario.execute import execute
-from undertow.studies.paper.setup import scenario
+from undertow.studies.speed.workload import W1
 
 
 def main() -> None:
     """Run W1 and print its tracking rms."""
-    steady = execute(scenario("W1", rung="electromechanical", composite=20.0, loop={"kind": "sampled"})).steady
+    steady = execute(W1).steady
     print(steady and steady["tracking_rms"])
 
 

@@ -1,4 +1,4 @@
-"""Times of workload W1, taken one after another on one machine, so that their ratios mean something."""
+"""Times of workloads W1 and W2, taken one after another on one machine, so that their ratios mean something."""
 
 import os
 import subprocess
@@ -17,14 +17,13 @@ from undertow.lanes import nvidia
 from undertow.lanes.cuda import Driver
 from undertow.lanes.machine import lanes_of
 from undertow.loop import sampled
-from undertow.loop.in_lanes import Run
 from undertow.loop.vmapped import Fleet as Vmapped
 from undertow.studies.speed import plain_numpy, workload
-from undertow.studies.speed.workload import TICKS
+from undertow.studies.speed.workload import W1, W2, Workload
 
 # Runs of a batch, and how often everything is done; the shortest time counts.
-_BATCH = 64
-_REPETITIONS = 7
+_BATCH, _BATCH_W2 = 64, 16
+_REPETITIONS, _REPETITIONS_W2 = 7, 3
 _ON_GPU = 65_536
 # Ticks of the yardstick, which is slow.
 _NUMPY_TICKS = 2_000
@@ -33,26 +32,34 @@ Watch = Callable[[str, float], None]
 
 
 def measure(watch: Watch) -> dict[str, Any]:
-    """Nanoseconds per tick, and per run where several fly at once; seconds of compiling.
+    """Nanoseconds per step, and per run where several fly at once; seconds of compiling; operations of one step.
 
     Args:
         watch: told what is being done, and the share done.
+
+    Returns:
+        Figures of W1 by their names, those of W2 under names that begin with `w2_`.
     """
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    found: dict[str, Any] = {"ticks": TICKS, "threads": threads, "lanes": lanes_of(64)}
+    found: dict[str, Any] = {"threads": threads, "lanes": lanes_of(64)}
     watch("first results", 0.0)
     found["first_cold_s"], found["first_kept_s"] = _first_results()
     with runtime.on_processor():
-        watch("one run, in lanes", 0.1)
-        run = workload.one()
-        found |= _in_a_lane(run)
-        watch("one run, by XLA", 0.2)
-        found |= _by_xla(run)
+        watch("W1, one run", 0.1)
+        one = workload.workload(W1)
+        found |= {"ticks": one.ticks} | _in_a_lane(one)
+        watch("W1, one run, by XLA", 0.2)
+        found |= _by_xla(one)
+        watch("W2, one run", 0.3)
+        other = workload.workload(W2)
+        second = {"ticks": other.ticks} | _in_a_lane(other, _REPETITIONS_W2)
+        second |= _prefixed("batch_float64_", _batch(other, threads, _BATCH_W2, _REPETITIONS_W2))
+        found |= _prefixed("w2_", second)
     for i, kind in enumerate(("float64", "float32")):
-        watch(f"many runs, {kind}", 0.4 + 0.2 * i)
+        watch(f"W1, many runs, {kind}", 0.5 + 0.2 * i)
         with runtime.in_precision(kind):
             found |= _many(kind, threads)
-    watch("plain NumPy", 0.8)
+    watch("W1 in plain NumPy", 0.9)
     found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_TICKS), 1) / _NUMPY_TICKS
     found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
     found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
@@ -70,66 +77,84 @@ def _first_results() -> tuple[float, float]:
         return _timed(work)[1], _timed(work)[1]
 
 
-def _in_a_lane(run: Run) -> dict[str, float]:
-    single, compiling = _timed(lambda: workload.fleet(run, lanes=1))
-    numbers = workload.alone(run)
+def _in_a_lane(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:
+    single, compiling = _timed(lambda: workload.fleet(one, lanes=1))
+    numbers = workload.alone(one.run)
     tracking = float(workload.tracking(single.fly(numbers).accumulated)[0])
-    each = _shortest(lambda: single.fly(numbers)) / TICKS
-    return {"single_compile_s": compiling, "single_ns": each, "tracking_rms": tracking}
+    each = _shortest(lambda: single.fly(numbers), repetitions) / one.ticks
+    figures = {"single_compile_s": compiling, "single_ns": each, "tracking_rms": tracking}
+    return figures | {"operations": single.operations}
 
 
-def _by_xla(run: Run) -> dict[str, float]:
+def _by_xla(one: Workload) -> dict[str, float]:
+    run, plan = one
+
     def fly():
         at = dict(zip(("position", "velocity"), run.start, strict=True))
         return jax.block_until_ready(
-            sampled.simulate(run.loop, duration=TICKS * 1e-3, record_every=0, accumulators=run.accumulators, **at)
+            sampled.simulate(
+                run.loop,
+                duration=plan.ticks * plan.dt,
+                dt=plan.dt,
+                record_every=0,
+                accumulators=run.accumulators,
+                **at,
+            )
         )
 
     _, first = _timed(fly)
     shortest = _shortest(fly)
-    return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / TICKS}
+    return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / plan.ticks}
 
 
 def _many(kind: str, threads: int) -> dict[str, Any]:
     """Many runs, on this machine's processor and on its GPU if it has one."""
     with runtime.on_processor():
-        run = workload.one(kind)
-        found = {f"batch_{kind}_{key}": value for key, value in _batch(run, threads).items()}
+        one = workload.workload(W1 | {"precision": kind})
+        found = _prefixed(f"batch_{kind}_", _batch(one, threads, _BATCH))
     if jax.default_backend() == "gpu":
-        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(run, _ON_GPU, ticks=200)}
+        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(_short(one, 200), _ON_GPU)}
     driver = nvidia.gpu()
     if driver is not None:
-        by_threads = on_gpu(run, driver, _ON_GPU, TICKS)
-        found |= {f"gpu_{kind}_{key}": value for key, value in by_threads.items()}
+        found |= _prefixed(f"gpu_{kind}_", on_gpu(one, driver, _ON_GPU))
     return found
 
 
-def _batch(run: Run, threads: int) -> dict[str, float]:
+def _batch(one: Workload, threads: int, runs: int, repetitions: int = _REPETITIONS) -> dict[str, float]:
     """Several runs per thread, all threads at once and one alone."""
-    program, compiling = _timed(lambda: workload.fleet(run))
-    numbers = workload.several(run, _BATCH)
+    program, compiling = _timed(lambda: workload.fleet(one))
+    numbers = workload.several(one.run, runs)
 
     def together(count: int) -> float:
         with runtime.workers(count) as pool:
-            return _shortest(lambda: list(pool.map(lambda _: program.fly(numbers), range(count)))) / count
+            work = lambda: list(pool.map(lambda _: program.fly(numbers), range(count)))
+            return _shortest(work, repetitions) / count
 
-    each = TICKS * _BATCH
+    each = one.ticks * runs
     return {"compile_s": compiling, "one_thread_ns": together(1) / each, "ns": together(threads) / each}
 
 
-def on_gpu(run: Run, driver: Driver, runs: int, ticks: int) -> dict[str, float]:
+def on_gpu(one: Workload, driver: Driver, runs: int) -> dict[str, float]:
     """Many runs on a GPU, a thread each; copying to and fro is counted."""
-    program, compiling = _timed(lambda: workload.fleet(run, ticks=ticks, driver=driver))
-    numbers = workload.several(run, runs)
-    each = _shortest(lambda: program.fly(numbers), 3) / (ticks * runs)
+    program, compiling = _timed(lambda: workload.fleet(one, driver=driver))
+    numbers = workload.several(one.run, runs)
+    each = _shortest(lambda: program.fly(numbers), 3) / (one.ticks * runs)
     return {"compile_s": compiling, "ns": each, "ticks_per_second": 1e9 / each}
 
 
-def vmapped_ns(run: Run, runs: int, ticks: int) -> float:
-    """Nanoseconds per tick and run by `jax.vmap` on the device that JAX uses."""
-    program = Vmapped(run, workload.PLAN._replace(ticks=ticks), width=runs)
-    numbers = jax.tree.map(jnp.asarray, workload.several(run, runs))
-    return _shortest(lambda: program.fly(numbers), 3) / (ticks * runs)
+def vmapped_ns(one: Workload, runs: int) -> float:
+    """Nanoseconds per step and run by `jax.vmap` on the device that JAX uses."""
+    program = Vmapped(one.run, one.plan, width=runs)
+    numbers = jax.tree.map(jnp.asarray, workload.several(one.run, runs))
+    return _shortest(lambda: program.fly(numbers), 3) / (one.ticks * runs)
+
+
+def _short(one: Workload, ticks: int) -> Workload:
+    return one._replace(plan=one.plan._replace(ticks=ticks))
+
+
+def _prefixed(prefix: str, figures: dict[str, Any]) -> dict[str, Any]:
+    return {f"{prefix}{key}": value for key, value in figures.items()}
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:

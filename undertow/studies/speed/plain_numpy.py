@@ -121,7 +121,7 @@ def paper_example(rung, composite, duration=20.0, h=1e-3, every=10):
     return tuple(np.array(series) for series in zip(*kept, strict=True))
 
 
-def workload_w1(ticks=20_000, h=1e-3, composite=20.0):
+def workload_w1(ticks=20_000, h=1e-3, composite=20.0, bound=20.0):
     """Benchmark workload W1: whole motor, 1 kHz hold; mean square of e over the steady half."""
 
     def rate(t, y, voltage):
@@ -137,5 +137,5 @@ def workload_w1(ticks=20_000, h=1e-3, composite=20.0):
         voltage, v_hat_dot, theta_dot, (e, *_) = law(y[0], jacobian(y[0]) @ y[1], v_hat, theta, composite)
         total += (e**2).mean() if k >= ticks // 2 else 0.0
         y = rk4(lambda t, y, voltage=voltage: rate(t, y, voltage), k * h, y, h)
-        v_hat, theta = v_hat + h * v_hat_dot, theta + h * theta_dot
+        v_hat, theta = v_hat + h * v_hat_dot, np.clip(theta + h * theta_dot, -bound, bound)
     return total / (ticks - ticks // 2)

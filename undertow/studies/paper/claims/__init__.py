@@ -1,7 +1,8 @@
 """The audit: one file per claim of the paper, C1 to C14.
 
-Each says what the claim is (`CLAIM`), what has to be run (`scenarios(quick)`), and what the numbers say
-(`judge(runs)`). A verdict is `holds`, `holds if ...`, `fails` or `open`.
+Each says what the claim is (`CLAIM`), what has to be run (`scenarios(quick)`, and `batched(quick)` for runs of which
+metrics are enough), and what the numbers say (`judge(runs, long)`). A verdict is `holds`, `holds if ...`, `fails` or
+`open`; every one says on which levels and for how long was simulated.
 """
 
 import importlib
@@ -10,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from undertow.scenario.execute import Executed
+from undertow.studies.paper.batches import Flown
 
 _MODULES = [
     importlib.import_module(f"{__name__}.{info.name}")
@@ -23,17 +25,29 @@ def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
     return {name: one for module in _MODULES for name, one in module.scenarios(quick).items()}
 
 
-def audit(runs: Mapping[str, Executed]) -> list[dict[str, Any]]:
-    """Verdicts with evidence, as they stand in results.json."""
+def batched(quick: bool) -> dict[str, dict[str, Any]]:
+    """Every run of which metrics are enough, by name: sampled scenarios."""
+    found = [module.batched(quick) for module in _MODULES if hasattr(module, "batched")]
+    return {name: one for scenarios in found for name, one in scenarios.items()}
+
+
+def audit(runs: Mapping[str, Executed], long: Mapping[str, Flown]) -> list[dict[str, Any]]:
+    """Verdicts with evidence, as they stand in results.json.
+
+    Args:
+        runs: those of `scenarios`, and of the examples.
+        long: those of `batched`, of the long ladder and of the map of lags.
+    """
     found = []
     for module in _MODULES:
-        finding = module.judge(runs)
+        finding = module.judge(runs, long)
         found.append(
             {
                 "id": f"C{int(module.__name__.rsplit('.', 1)[1][1:3])}",
                 "claim": module.CLAIM,
                 "verdict": finding.verdict,
                 "evidence": finding.evidence,
+                "simulated": finding.simulated,
                 "scenario": f"scenarios/{finding.shown_by}.yaml" if finding.shown_by else None,
                 "numbers": dict(finding.numbers),
             }

@@ -1,6 +1,8 @@
 """C3: the robust term of RCAFC is smaller."""
 
-from undertow.studies.paper.claims.finding import Finding, Runs, compared
+from undertow.studies.paper.claims.c02_estimation import compared
+from undertow.studies.paper.claims.finding import Finding, Runs
+from undertow.studies.paper.horizons import Long
 
 CLAIM = "RCAFC needs a smaller robust control signal than RAFC."
 
@@ -10,6 +12,6 @@ def scenarios(quick: bool) -> dict:
     return {}
 
 
-def judge(runs: Runs) -> Finding:
-    """At the paper's gains and at equal tuning effort. In small signal u_r is the filtered estimation error."""
-    return compared(runs, "robust_rms", "rms robust term", "m/s^2")
+def judge(runs: Runs, long: Long) -> Finding:
+    """As C2, which comes to the same: in small signal u_r is the filtered estimation error."""
+    return compared(runs, long, "robust_rms", "rms robust term", "m/s^2")

@@ -8,6 +8,7 @@ import numpy as np
 
 from undertow.analysis.linear import crossing_frequency, estimation_response
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
+from undertow.studies.paper.horizons import Long
 from undertow.studies.paper.setup import CONTROLLERS, SIX_AXES, law_of, scenario
 
 CLAIM = "The scheme estimates uncertainties of large amplitude and high frequency."
@@ -31,7 +32,7 @@ def scenarios(quick: bool) -> dict:
     }
 
 
-def judge(runs: Runs) -> Finding:
+def judge(runs: Runs, long: Long) -> Finding:
     """|d_hat - d| / |d| against frequency, measured and predicted."""
     sweep = {controller: _sweep(runs, controller) for controller in CONTROLLERS}
     points = list(zip(sweep["rcafc"]["frequency"], sweep["rcafc"]["measured"], strict=True))
@@ -42,7 +43,8 @@ def judge(runs: Runs) -> Finding:
         f"{above[0]:g} rad/s. From {crossing:.0f} rad/s on (in small signal {predicted:.0f}) it is worse than none."
     )
     numbers = {"sweep": sweep, "crossing_measured": crossing, "crossing_predicted": predicted}
-    return Finding(f"holds if d stays well below {crossing:.0f} rad/s", text, _name("rcafc", 0), numbers)
+    verdict = f"holds if d stays well below {crossing:.0f} rad/s"
+    return Finding(verdict, text, _name("rcafc", 0), "six axes without a motor, sinusoids, 20 s", numbers)
 
 
 def _name(controller: str, block: int) -> str:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from undertow.studies.paper.claims.finding import Finding, Runs
+from undertow.studies.paper.horizons import Long
 from undertow.studies.paper.setup import plant_of
 
 CLAIM = "With voltage as the control input no step from thrust to voltage is needed."
@@ -13,7 +14,7 @@ def scenarios(quick: bool) -> dict:
     return {}
 
 
-def judge(runs: Runs) -> Finding:
+def judge(runs: Runs, long: Long) -> Finding:
     """How far thrust is from the alpha V that G takes for granted, in Example 2."""
     run = runs["static_rcafc"]
     thruster = plant_of(run).thruster
@@ -28,4 +29,4 @@ def judge(runs: Runs) -> Finding:
         "has to make up for it."
     )
     verdict = "holds if the fixed ratio alpha inside G is not counted as such a step"
-    return Finding(verdict, text, "static_rcafc", {"thrust_not_alpha_v": share})
+    return Finding(verdict, text, "static_rcafc", "level static, U1, 20 s", {"thrust_not_alpha_v": share})

@@ -2,6 +2,7 @@
 
 from undertow.core.status import Status
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
+from undertow.studies.paper.horizons import Long
 from undertow.studies.paper.setup import plant_of, scenario
 
 CLAIM = "The scheme works for square and non-square gain matrices (Eqs. (22)-(28))."
@@ -15,6 +16,8 @@ _SUBSETS = {
     "n4_rank4": [1, 2, 5, 6],
 }
 _QUICK = ("n4_rank3",)
+
+_SIMULATED = "level ideal, U1, 20 s"
 
 
 def scenarios(quick: bool) -> dict:
@@ -34,7 +37,7 @@ def scenarios(quick: bool) -> dict:
     }
 
 
-def judge(runs: Runs) -> Finding:
+def judge(runs: Runs, long: Long) -> Finding:
     """Tracking by number of thrusters and rank."""
     everything = steady(runs["ideal_rcafc"])["tracking_rms"]
     numbers = {"n8_rank6": everything}
@@ -55,11 +58,11 @@ def judge(runs: Runs) -> Finding:
             failed.append((count, rank))
     text = "Tracking rms, m and rad, from 10 s on: " + "; ".join(parts) + "."
     if any(rank == 6 for _, rank in failed):
-        return Finding("fails", text, "ideal_rcafc", numbers)
+        return Finding("fails", text, "ideal_rcafc", _SIMULATED, numbers)
     if not failed:
-        return Finding("holds", text, "ideal_rcafc", numbers)
+        return Finding("holds", text, "ideal_rcafc", _SIMULATED, numbers)
     text += " Below rank 6 the directions outside the range of G are in open loop, whatever w_bar is."
-    return Finding("holds if rank G = 6, so not for N < 6", text, _name("n4_rank3"), numbers)
+    return Finding("holds if rank G = 6, so not for N < 6", text, _name("n4_rank3"), _SIMULATED, numbers)
 
 
 def _name(key: str) -> str:

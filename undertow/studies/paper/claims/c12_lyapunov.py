@@ -2,9 +2,12 @@
 
 from undertow.analysis.certificate import lyapunov_function, minimax_weight, share_increasing
 from undertow.studies.paper.claims.finding import Finding, Runs
+from undertow.studies.paper.horizons import Long
 from undertow.studies.paper.setup import GOAL, SIX_AXES, law_of, scenario
 
 CLAIM = "V_dot <= 0 along every solution (Eqs. (46)-(58))."
+
+_SIMULATED = "constant d on six axes without a motor; level ideal, U1; 20 s"
 
 _CONSTANT = [5.0, -3.0, 2.0, 1.0, -1.0, 0.5]  # m/s^2, rad/s^2
 
@@ -20,7 +23,7 @@ def scenarios(quick: bool) -> dict:
     }
 
 
-def judge(runs: Runs) -> Finding:
+def judge(runs: Runs, long: Long) -> Finding:
     """Share of 10 ms steps at which V_f grows: constant d with theta* = d, and suite U1 with the minimax theta*."""
     constant, varying = runs["c12_constant"], runs["ideal_rcafc"]
     law = law_of(varying)
@@ -34,7 +37,7 @@ def judge(runs: Runs) -> Finding:
         "range of d, which Table 1 (0.1) does not give."
     )
     if steps["constant"] > 0:
-        return Finding("fails", text, "c12_constant", steps)
+        return Finding("fails", text, "c12_constant", _SIMULATED, steps)
     if steps["u1"] > 0:
-        return Finding("holds if d is constant", text, "ideal_rcafc", steps)
-    return Finding("holds", text, "ideal_rcafc", steps)
+        return Finding("holds if d is constant", text, "ideal_rcafc", _SIMULATED, steps)
+    return Finding("holds", text, "ideal_rcafc", _SIMULATED, steps)

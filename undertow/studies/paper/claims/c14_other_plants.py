@@ -9,9 +9,12 @@ from undertow.core.status import Status
 from undertow.plants.magnetic_levitation import MagneticLevitation
 from undertow.scenario.execute import Executed
 from undertow.studies.paper.claims.finding import Finding, Runs, steady
+from undertow.studies.paper.horizons import Long
 from undertow.studies.paper.setup import scenario
 
 CLAIM = "The method works for other systems x_ddot = f + G u + d (pendulum, magnetic levitation)."
+
+_SIMULATED = "pendulum 10 s, ball 5 s"
 
 _PENDULUM = "c14_pendulum"
 _IDEAL = "c14_levitation_ideal"
@@ -37,7 +40,7 @@ def scenarios(quick: bool) -> dict:
     return {_PENDULUM: pendulum} | coils | ideal
 
 
-def judge(runs: Runs) -> Finding:
+def judge(runs: Runs, long: Long) -> Finding:
     """Tracking on both plants, and the lag of the coil at which it is lost."""
     coils = sorted((_lag(runs[_at(gap)]), gap) for gap in _GAPS if _at(gap) in runs)
     numbers = {
@@ -55,11 +58,11 @@ def judge(runs: Runs) -> Finding:
     lost = [lag for lag, gap in coils if runs[_at(gap)].status is not Status.OK]
     kept = [lag for lag, _ in coils if not lost or lag < lost[0]]
     if runs[_PENDULUM].status is not Status.OK or not kept:
-        return Finding("fails", text, _PENDULUM if kept else _at(coils[0][1]), numbers)
+        return Finding("fails", text, _PENDULUM if kept else _at(coils[0][1]), _SIMULATED, numbers)
     if not lost:
-        return Finding("holds", text, _PENDULUM, numbers)
+        return Finding("holds", text, _PENDULUM, _SIMULATED, numbers)
     verdict = f"holds if the actuator lags by no more than {1e3 * kept[-1]:.1f} ms; not with {1e3 * lost[0]:.1f} ms"
-    return Finding(verdict, text, next(_at(gap) for lag, gap in coils if lag == lost[0]), numbers)
+    return Finding(verdict, text, next(_at(gap) for lag, gap in coils if lag == lost[0]), _SIMULATED, numbers)
 
 
 def _at(gap: int) -> str:

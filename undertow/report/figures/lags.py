@@ -1,0 +1,90 @@
+"""The map of lags: error, chattering, weights and life of Table 1 behind a lag, and behind a winding."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
+
+from undertow.report.figures import style
+
+_METRICS = {
+    "tracking_rms": "tracking error rms, m and rad",
+    "input_variation": "voltage variation, V/s",
+    "weights_peak": "largest weight, m/s$^2$, rad/s$^2$",
+}
+_KINDS = {"lag": ("first-order lag, ms", 1e3), "winding": ("inductance of the winding, mH", 1e3)}
+_LAWS = {"five": ("five sets", "#0072b2", "o"), "one": ("one rule, same loop gain", "#e07b00", "s")}
+_DASHES = ((0, (1, 1.2)), (0, (4, 1.6)), "-")  # the shorter the horizon, the shorter the dashes
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+def lags_figure(rows: Rows, windows: Sequence[Sequence[float]]) -> Figure:
+    """Metrics in every window over lag and inductance, and the time at which runs ended.
+
+    Args:
+        rows: `kind`, `value`, `law`, `ended` (s), `lasted`, and by window `tracking_rms` and so on, of each run.
+        windows: first and last time of each, s.
+    """
+    keys = {name: style.Look(colour, "-", 1.2, 3) for law, (name, colour, _) in _LAWS.items() if _of(rows, law=law)}
+    dashes = (
+        dict(zip(map(tuple, windows), _DASHES[-len(windows) :], strict=True)) if len(windows) <= len(_DASHES) else {}
+    )
+    keys |= {f"{a:g} to {b:g} s": style.Look(style.INK, look, 1.1, 1) for (a, b), look in dashes.items()}
+    kinds = [kind for kind in _KINDS if _of(rows, kind=kind)]
+    figure = style.blank(9.6, 0.5 + 2.05 * len(kinds))
+    style.head(figure, "Table 1 behind a lag", keys)
+    for number, kind in enumerate(kinds):
+        words, _ = _KINDS[kind]
+        top = 0.6 + 2.05 * number
+        for column, (metric, title) in enumerate(_METRICS.items()):
+            panel = style.place(figure, 0.56 + 2.38 * column, top, 1.75, 1.3)
+            _metric(panel, _of(rows, kind=kind), metric, list(dashes.values()))
+            style.label(panel, words, "", title, style.TINY)
+        panel = style.place(figure, 0.56 + 2.38 * 3, top, 1.75, 1.3)
+        _life(panel, _of(rows, kind=kind), max(row["ended"] for row in rows))
+        style.label(panel, words, "", "ended after, s (hollow: lasted)", style.TINY)
+    return figure
+
+
+def _of(rows: Rows, **wanted: str) -> list[Mapping[str, Any]]:
+    return [row for row in rows if all(row[key] == value for key, value in wanted.items())]
+
+
+def _logarithmic(panel: Axes) -> None:
+    for axis, scale in ((panel.xaxis, panel.set_xscale), (panel.yaxis, panel.set_yscale)):
+        scale("log")
+        axis.set_major_locator(LogLocator(numticks=5))
+        axis.set_minor_locator(NullLocator())
+
+
+def _metric(panel: Axes, rows: Rows, metric: str, dashes: Sequence[Any]) -> None:
+    _logarithmic(panel)
+    for law, (_, colour, mark) in _LAWS.items():
+        for number, look in enumerate(dashes):
+            shown = [(1e3 * row["value"], row[metric][number]) for row in _of(rows, law=law)]
+            shown = [(x, y) for x, y in shown if y is not None]
+            if shown:
+                panel.plot(
+                    *zip(*shown, strict=True),
+                    mark,
+                    color=colour,
+                    linestyle=look,
+                    linewidth=1.1,
+                    markersize=3,
+                    label=law,
+                )
+    low, high = np.log10(panel.get_ylim())
+    panel.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))  # whole decades: two labels at least
+
+
+def _life(panel: Axes, rows: Rows, longest: float) -> None:
+    _logarithmic(panel)
+    for law, (_, colour, mark) in _LAWS.items():
+        for row in _of(rows, law=law):
+            inside = "white" if row["lasted"] else colour
+            panel.plot(1e3 * row["value"], row["ended"], mark, color=colour, markerfacecolor=inside, markersize=4.5)
+    panel.set_ylim(0.5, 3 * longest)
