@@ -142,8 +142,8 @@ def simulate(
     except BadInput as error:
         name = error.name.removeprefix("loop.").removeprefix("initial.")
         raise BadInput(name, error.must, error.got, hint=error.hint) from error.__cause__
-    outcome = execute.run_loop(closed_loop, settings, start, seed)
-    attributes = {"title": "a closed loop run by undertow", "seed": seed}
+    outcome, left_to_xla = execute.run_loop(closed_loop, settings, start, seed)
+    attributes = left_to_xla | {"title": "a closed loop run by undertow", "seed": seed}
     steady = window.of_run(settings.duration)
     return _run(outcome, *label(closed_loop, outcome, steady, settings.dt, attributes))
 

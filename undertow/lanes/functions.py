@@ -201,7 +201,7 @@ def acosh(x: Scalar) -> Scalar:
 def _log1p_or_twice(x: Scalar, near: Scalar) -> Scalar:
     """log(1 + near), of large x log(2 x)."""
     large = x > 2.0**28
-    return log1p(where(large, x, near)) + where(large, x.constant(0.6931471805599453), 0.0)
+    return log1p(where(large, x - 1.0, near)) + where(large, x.constant(0.6931471805599453), 0.0)
 
 
 def atanh(x: Scalar) -> Scalar:
