@@ -236,7 +236,16 @@ def test_a_long_loop_over_rows(in_lanes):
         np.testing.assert_allclose(in_lanes(fold)(rows), jax.vmap(fold)(rows), rtol=1e-12)
 
 
+def typed(key):
+    """Keys that JAX knows for keys, split, chosen, stacked and folded."""
+    one, *others = jax.random.split(jax.random.wrap_key_data(key), 3)
+    stacked = jnp.stack(others)[::-1].reshape(1, 2)[0, 1]
+    chosen = jnp.where(jax.random.bernoulli(one), one, stacked)
+    return jnp.stack([jax.random.bits(each, (2,)) for each in (one, stacked, chosen, jax.random.fold_in(one, 5))])
+
+
 RANDOM = {
+    "typed": typed,
     "bits": lambda key: jax.random.bits(key, (3,), jnp.uint32),
     "wide_bits": lambda key: jax.random.bits(key, (3,), jnp.uint64),
     "split": lambda key: jax.random.split(key, 3),

@@ -33,23 +33,25 @@ def _exp2(x: Scalar, less: Scalar) -> Scalar:
 
 
 def power(x: Scalar, y: Scalar) -> Scalar:
-    """x^y as IEEE 754 has it."""
-    y = y.to("convert", x.type)
+    """x^y as IEEE 754 has it; y may be a whole number of another type."""
     size = abs(x)
-    whole = y.apply("floor").equal(y)
-    half = y * 0.5
-    odd = whole & half.apply("floor").apply("ne", half)
+    if y.type.startswith("float"):
+        whole, half = y.apply("floor").equal(y), y * 0.5
+        odd = whole & half.apply("floor").apply("ne", half)
+    else:
+        whole, odd = y.equal(y), (y & 1).equal(1)
     result = where(size.equal(1.0) & y.equal(y), 1.0, _of_size(size, y))
     result = where((x < 0.0) & (size < inf), where(whole, result, nan), result)
     negative = x.to("bits", FORMATS[x.type].whole) < 0
     result = where(odd & negative, -result, result)
-    return where(y.equal(0.0) | x.equal(1.0), 1.0, result)
+    return where(y.equal(0) | x.equal(1.0), 1.0, result)
 
 
 def _of_size(size: Scalar, y: Scalar) -> Scalar:
     """Power of a number that is not negative; that of less than ordinary numbers is that of 0."""
+    y = y.to("convert", F64)
     if size.type != F64:
-        return exp(y.to("convert", F64) * log(size.to("convert", F64))).to("convert", size.type)
+        return exp(y * log(size.to("convert", F64))).to("convert", size.type)
     high, low = _log2(size)
     coarse = _upper(y)
     product = coarse * high
