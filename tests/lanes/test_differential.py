@@ -97,10 +97,16 @@ def examine(in_lanes, seed, length):
         folded = evaluate(graph, traced, [nodes_of(graph, x[row]) for x in given])
         for (name, places), many, nodes in zip(one.steps, found, folded, strict=True):
             known = [graph.value(node) for node in nodes.ravel().tolist()]
-            for value, other in zip(known, many[row], strict=True):
-                if value is not None:
-                    operands = [values[place][row] for place in places]
-                    assert bits(value) == bits(other), f"{name} of {operands}: {value} as a constant, else {other}"
+            pairs = [(value, other) for value, other in zip(known, many[row], strict=True) if value is not None]
+            for value, other in pairs:
+                operands = [values[place][row] for place in places]
+                assert bits(value) == bits(other), f"{name} of {operands}: {value} as a constant, else {other}"
+            if any(
+                value == 0 and np.signbit(value) != np.signbit(other)
+                for value, other in pairs
+                if value.dtype.kind == "f"
+            ):
+                break  # the sign of a zero is not kept, and what is divided by it differs from here on
 
 
 @pytest.mark.parametrize("seed", range(5))
