@@ -7,7 +7,7 @@ import os
 import platform
 from pathlib import Path
 
-from undertow.lanes.cache import cache_folder
+from undertow.lanes.cache import private_folder
 
 # Objects before the youngest are looked through. Tracing makes millions that live: Python's 700 cost half a second.
 _YOUNG, _MIDDLE, _OLD = 50_000, 20, 100
@@ -23,11 +23,11 @@ def prepare() -> None:
 def _keep_xla_code() -> None:
     """Let XLA keep its code, unless JAX was told of a place already.
 
-    The code is for one kind of processor: machines that share a home folder have a folder each.
+    The code is for one kind of processor: machines that share a home folder have a folder each. It is run as the
+    user, and XLA asks nobody whose it is: where others may write there, nothing is kept.
     """
-    folder = cache_folder() / f"xla-{_processor()}"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = private_folder(f"xla-{_processor()}")
     except OSError:
         return
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))

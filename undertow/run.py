@@ -147,8 +147,8 @@ def simulate(
     except BadInput as error:
         name = error.name.removeprefix("loop.").removeprefix("initial.")
         raise BadInput(name, error.must, error.got, hint=error.hint) from error.__cause__
-    outcome = execute.run_loop(closed_loop, settings, start, seed)
-    attributes: dict[str, Any] = {"title": "a closed loop run by undertow", "seed": seed}
+    outcome, left_to_xla = execute.run_loop(closed_loop, settings, start, seed)
+    attributes: dict[str, Any] = left_to_xla | {"title": "a closed loop run by undertow", "seed": seed}
     if why := step_failure(closed_loop, settings, outcome):
         attributes["status_sentence"] = why
     steady = window.of_run(settings.duration)

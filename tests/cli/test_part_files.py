@@ -60,3 +60,35 @@ def test_option_of_a_part_from_a_file(refused, tmp_path):
     scenario(tmp_path, "./my_rov.py:my_rov, mass: heavy")
     said = "`plant.vehicle.mass` must be a number, but is 'heavy' (s.yaml, line 2)"
     assert refused("simulate", "s.yaml") == said
+
+
+BYTES = """
+import jax.numpy as jnp
+from undertow.core.contracts import AbstractDisturbance
+
+
+class Bytes(AbstractDisturbance):
+    def draw(self, key):
+        return ()
+
+    def at(self, path, t, place, calm):
+        return calm._replace(acceleration=calm.acceleration + jnp.sin(9 * t).astype(jnp.int8).astype(t.dtype))
+
+    def jumps(self, duration):
+        return ()
+
+
+def my_bytes():
+    return Bytes()
+"""
+
+
+def test_a_part_that_lanes_cannot_do_is_told_once_with_the_reason(undertow, tmp_path):
+    (tmp_path / "my_bytes.py").write_text(BYTES)
+    (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: u1", "kind: ./my_bytes.py:my_bytes"))
+    reason = "lanes (docs/lanes.md) lack something: numbers of type int8."
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    assert said.code == 0, said.err
+    assert said.err.count(reason) == 1
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    assert "lack something" not in undertow("simulate", "s.yaml", "--out", "other").err

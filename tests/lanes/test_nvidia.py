@@ -4,6 +4,7 @@ import re
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from lanes.emulated_gpu import EmulatedGpu
@@ -12,6 +13,7 @@ from lanes.test_loops import example
 from undertow.lanes import nvidia
 from undertow.lanes.cuda import Driver
 from undertow.lanes.errors import Unsupported
+from undertow.lanes.program import Program
 from undertow.loop.in_lanes import Fleet, Plan, Run
 from undertow.studies.speed.workload import constant
 
@@ -65,6 +67,22 @@ def test_nothing_is_contracted_or_approximate(monkeypatch, generation):
     assert not re.findall(r"\b(fma|approx|ftz|mad\.f\d+)\b", text)
     rounded = set(re.findall(r"\t((?:mul|add|sub|div|sqrt|rcp)\.\S*f\d+)", text))
     assert rounded == {f"{name}.rn.f64" for name in ("mul", "add", "sub", "div", "sqrt", "rcp")}
+
+
+def test_tables_and_functions_give_the_bits_of_vectors(gpu):
+    """What lies in memory, and what is only called where a thread needs it."""
+
+    def look(numbers, carry, k):
+        x, place = numbers
+        far = jnp.sin(x[place] * 1e9) + jnp.cos(jnp.asarray(np.arange(90.0) ** 9)[place])
+        return far, (x * x)[place], jnp.sort(x[:5]), jnp.power(x[:2], 3.5)
+
+    x, place = np.random.default_rng(3).normal(size=(70, 90)), np.arange(70)
+    nothing = lambda numbers, *rest: np.zeros(())
+    parts = (lambda numbers: numbers, nothing, lambda numbers, carry, k: carry, look)
+    programs = (Program(*parts, (x[0], place[0]), [False] * 2, driver=d) for d in (Driver(gpu), None))
+    found, wanted = (program.run((x, place), 1, 1)[1] for program in programs)
+    jax.tree.map(np.testing.assert_array_equal, found, wanted)
 
 
 def test_memory_that_is_not_there_is_told_and_the_rest_given_back(gpu):

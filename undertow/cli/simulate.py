@@ -34,6 +34,9 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
         with stages("figures and files"):
             _write(executed, foresight, staging)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
+    if "left_to_xla" in executed.dataset.attrs:
+        why = executed.dataset.attrs["left_to_xla"]
+        typer.echo(f"Advice: left to XLA, which is slower, as lanes (docs/lanes.md) lack something: {why}.", err=True)
     foretold = foresight.metrics if foresight else None
     unit = executed.built.closed_loop.plant.input_unit
     console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, foretold))

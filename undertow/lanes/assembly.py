@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from undertow.lanes.calls import ARGUMENT, FORMULAS
 from undertow.lanes.emit import SLOT, Emitter
 from undertow.lanes.graph import Graph, Node
+from undertow.lanes.scalar import Scalar
 from undertow.lanes.section import Section
 
 TICK = "tick"
@@ -47,8 +49,10 @@ entry:
   br label %begin""")
 
 _FRAME = """\
+{constants}
 {head}
 begin:
+{rooms}
 {start}
   br label %started
 started:
@@ -115,8 +119,35 @@ def assembly(graph: Graph, sections: Sections, lanes: int, head: Head = VECTORS)
         section.do([node for node, same in enumerate(fixed) if needed[node] and not same])
         section.store(wanted, base)
         texts[name] = emitter.taken()
-    row, functions = len(sections.look) * SLOT * lanes, "\n".join(sorted(emitter.functions))
-    return _FRAME.format(head=head.text, place=head.place, **texts, row=row, functions=functions)
+    row = len(sections.look) * SLOT * lanes
+    called = [_function(name, dtype, emitter) for name, dtype in sorted(emitter.called)]
+    further = {
+        "constants": emitter.constants,
+        "rooms": emitter.rooms,
+        "functions": [*called, *sorted(emitter.functions)],
+    }
+    joined = {name: "\n".join(lines) for name, lines in further.items()}
+    return _FRAME.format(head=head.text, place=head.place, **texts, row=row, **joined)
+
+
+def _function(name: str, dtype: str, emitter: Emitter) -> str:
+    """A function of `calls`; it stands beside the program, so that it costs nothing where it is not called."""
+    graph = Graph()
+    result = FORMULAS[name](Scalar(graph, graph.input(ARGUMENT, dtype))).node
+    within = Emitter(graph, emitter.width, emitter.width)
+    within.constants = emitter.constants
+    section = Section(within, "f", tick="0")
+    needed = graph.needed([result])
+    section.do([node for node, wanted in enumerate(needed) if wanted])
+    kind, body = within.vector(dtype), within.taken()
+    emitter.functions |= within.functions
+    lines = [
+        f"define internal {kind} @{name}.{dtype}({kind} %x) cold noinline {{",
+        body,
+        f"  ret {kind} %f{result}",
+        "}",
+    ]
+    return "\n".join(lines)
 
 
 def operations(graph: Graph, sections: Sections) -> int:

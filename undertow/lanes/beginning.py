@@ -29,6 +29,9 @@ class Beginning:
         graph: with what is drawn in lanes.
         nodes: of its results.
         inputs: shapes and types of what every lane brings along, in the order of its slots.
+
+    Raises:
+        Unsupported: neither lanes nor XLA can do it for many runs at once.
     """
 
     def __init__(self, draw: Traced, numbers: Any, constant: list[bool]):
@@ -40,11 +43,14 @@ class Beginning:
         try:
             self.graph, given = self._given(leaves)
             self.nodes = evaluate(self.graph, draw.closed, given, _MOST)
-        except Unsupported:
+        except Unsupported as lacking:
             passed_on = draw.passed_on()
             made = [place is None for place in passed_on]
             self.inputs += [leaf for leaf, new in zip(draw.leaves, made, strict=True) if new]
-            self._before = batched(draw.only(made), numbers)
+            try:
+                self._before = batched(draw.only(made), numbers)
+            except Exception as error:  # whatever JAX raises for what it cannot do for several at once
+                raise Unsupported(f"{lacking}; nor can JAX draw it for several runs ({error})") from error
             self.graph, given = self._given(leaves)
             further = iter(given[len(leaves) :])
             self.nodes = [next(further) if place is None else given[place] for place in passed_on]

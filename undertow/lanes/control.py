@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from undertow.lanes import elementwise, regions
+from undertow.lanes import elementwise, indexing, regions
 from undertow.lanes.errors import Unsupported
-from undertow.lanes.graph import BOOL, Graph, Node
+from undertow.lanes.graph import BOOL, I64, Node
 from undertow.lanes.nodes import Nodes, filled, flat
-
-Evaluate = Callable[[Graph, Any, Sequence[Nodes]], list[Nodes]]
+from undertow.lanes.rules import Equation, rule
 
 # A loop of at most so many rounds is written out.
 _ROUNDS = 64
@@ -28,67 +27,105 @@ def _shaped(nodes: Sequence[Node], like: Sequence[Any]) -> list[Nodes]:
     return [filled(other.shape, nodes[first:last]) for (first, last), other in parts]
 
 
-def _cond(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Evaluate) -> list[Nodes]:
+@rule("cond", reads="branches", idle="branches_platforms")
+def _cond(equation: Equation, which: Nodes, *rest: Nodes) -> list[Nodes]:
     """All branches that any lane needs, and the choice between their results."""
-    which, *rest = given
-    index = int(which)
+    graph, branches, index = equation.graph, equation.params["branches"], int(which)
     known = graph.value(index)
     if known is not None:
-        return evaluate(graph, params["branches"][int(known)], rest)
-    cases = [_case(graph, index, i, branch, rest, evaluate) for i, branch in enumerate(params["branches"])]
+        return equation.evaluate(branches[min(max(int(known), 0), len(branches) - 1)], rest)
+    cases = [_case(equation, index, i, branch, rest) for i, branch in enumerate(branches)]
     choose = partial(elementwise.on(graph, "select_n"), index)
     return _shaped([choose(*row) for row in zip(*map(flat, cases), strict=True)], cases[0])
 
 
-def _case(graph: Graph, index: Node, number: int, branch: Any, rest: list[Nodes], evaluate: Evaluate) -> list[Nodes]:
-    before, loops = len(graph.operations), len(graph.regions)
-    plain = evaluate(graph, branch, rest)
-    if len(graph.operations) - before < _WORTH and len(graph.regions) == loops:
+def _case(equation: Equation, index: Node, number: int, branch: Any, rest: Sequence[Nodes]) -> list[Nodes]:
+    graph = equation.graph
+    before, loops = len(graph.operations), graph.endless
+    plain = equation.evaluate(branch, rest)
+    if len(graph.operations) - before < _WORTH and graph.endless == loops:
         return plain
     if graph.types[index] == BOOL:
         here = index if number else graph.apply("xor", index, graph.constant(True, BOOL))
     else:
         here = graph.apply("eq", index, graph.like(number, index))
-    body = lambda inner: flat(evaluate(graph, branch, _shaped(inner, rest)))
+    body = lambda inner: flat(equation.evaluate(branch, _shaped(inner, rest)))
     return _shaped(regions.branch(graph, here, flat(rest), body), plain)
 
 
-def _while(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Evaluate) -> list[Nodes]:
+@rule("platform_index", reads="platforms")
+def _platform(equation: Equation) -> Nodes:
+    """Which variant of a function is meant for processors, or for whatever there is."""
+    platforms = equation.params["platforms"]
+    number = next(i for i, names in enumerate(platforms) if names is None or "cpu" in names)
+    return np.array(equation.constant(number))
+
+
+@rule("while", reads="cond_nconsts cond_jaxpr body_nconsts body_jaxpr")
+def _while(equation: Equation, *given: Nodes) -> list[Nodes]:
+    params = equation.params
     tested, stepped = params["cond_nconsts"], params["body_nconsts"]
     of_test, of_body, carry = given[:tested], given[tested:][:stepped], given[tested + stepped :]
 
     def test(inner: list[Node]) -> Node:
-        (going,) = evaluate(graph, params["cond_jaxpr"], [*of_test, *_shaped(inner, carry)])
+        (going,) = equation.evaluate(params["cond_jaxpr"], [*of_test, *_shaped(inner, carry)])
+        if going.ndim:
+            raise Unsupported("a loop over a batch")
         return int(going)
 
-    body = lambda inner: flat(evaluate(graph, params["body_jaxpr"], [*of_body, *_shaped(inner, carry)]))
-    return _shaped(regions.repeated(graph, flat(carry), test, body), carry)
+    body = lambda inner: flat(equation.evaluate(params["body_jaxpr"], [*of_body, *_shaped(inner, carry)]))
+    return _repeated(equation, flat(carry), test, body, carry)
 
 
-def _scan(graph: Graph, given: list[Nodes], params: dict[str, Any], evaluate: Evaluate) -> list[Nodes]:
-    """Written out; where it is long and only carries, a loop."""
+def _repeated(
+    equation: Equation,
+    initial: list[Node],
+    test: Callable[[list[Node]], Node],
+    body: regions.Step,
+    like: Sequence[Any],
+) -> list[Nodes]:
+    equation.graph.endless += 1
+    return _shaped(regions.repeated(equation.graph, initial, test, body), like)
+
+
+@rule("scan", reads="reverse length jaxpr num_consts num_carry ft_in ft_out", idle="linear unroll")
+def _scan(equation: Equation, *given: Nodes) -> list[Nodes]:
+    """Written out; where it is long and keeps nothing of its rounds, a loop."""
+    params = equation.params
     constants, carried = _counts(params)
     fixed, carry, rows = given[:constants], given[constants:][:carried], given[constants + carried :]
     rounds, body = params["length"], params["jaxpr"]
     if rounds > _ROUNDS:
-        if rows or len(body.out_avals) > carried:
-            raise Unsupported(f"scan of {rounds} rounds")
-        counter = np.array(graph.constant(0, "int64"))
-        more = lambda inner: graph.apply("lt", inner[0], graph.like(rounds, inner[0]))
-
-        def step(inner: list[Node]) -> list[Node]:
-            count, *now = _shaped(inner, [counter, *carry])
-            following = graph.apply("add", int(count), graph.like(1, int(count)))
-            return [following, *flat(evaluate(graph, body, [*fixed, *now]))]
-
-        return _shaped(regions.repeated(graph, flat([counter, *carry]), more, step)[1:], carry)
+        if len(body.out_avals) > carried:
+            raise Unsupported(f"what is kept of a scan of {rounds} rounds")
+        return _long_scan(equation, fixed, carry, rows)
     stacks = []
     for i in reversed(range(rounds)) if params["reverse"] else range(rounds):
-        results = evaluate(graph, body, [*fixed, *carry, *(row[i] for row in rows)])
+        results = equation.evaluate(body, [*fixed, *carry, *(row[i] for row in rows)])
         carry = results[:carried]
         stacks.append(results[carried:])
     stacks = stacks[::-1] if params["reverse"] else stacks
-    return [*carry, *(np.stack(column) for column in zip(*stacks, strict=True))]
+    kept = [np.stack(column) for column in zip(*stacks, strict=True)]
+    return [*carry, *(kept if rounds else [np.zeros(out.shape, dtype=np.int64) for out in equation.outs[carried:]])]
+
+
+def _long_scan(
+    equation: Equation, fixed: Sequence[Nodes], carry: Sequence[Nodes], rows: Sequence[Nodes]
+) -> list[Nodes]:
+    graph, rounds = equation.graph, equation.params["length"]
+    counter = np.array(graph.constant(0, I64))
+    more = lambda inner: graph.apply("lt", inner[0], graph.constant(rounds, I64))
+
+    def step(inner: list[Node]) -> list[Node]:
+        count, *now = _shaped(inner, [counter, *carry])
+        following = graph.apply("add", int(count), graph.constant(1, I64))
+        place = graph.apply("sub", graph.constant(rounds - 1, I64), int(count))
+        place = place if equation.params["reverse"] else int(count)
+        first = graph.constant(0, I64)
+        here = [indexing.window(graph, row, [place, *[first] * (row.ndim - 1)], (1, *row.shape[1:]))[0] for row in rows]
+        return [following, *flat(equation.evaluate(equation.params["jaxpr"], [*fixed, *now, *here]))]
+
+    return _repeated(equation, flat([counter, *carry]), more, step, [counter, *carry])[1:]
 
 
 def _counts(params: dict[str, Any]) -> tuple[int, int]:
@@ -97,6 +134,3 @@ def _counts(params: dict[str, Any]) -> tuple[int, int]:
         constants, carried, _ = map(len, params["ft_in"].unpack())
         return constants, carried
     return params["num_consts"], params["num_carry"]
-
-
-RULES: dict[str, Callable[..., list[Nodes]]] = {"cond": _cond, "scan": _scan, "while": _while}

@@ -5,6 +5,7 @@ tick is done once.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,7 @@ _FLOATS = {
     "div": "fdiv {T} {0}, {1}",
     "rem": "frem {T} {0}, {1}",
     "neg": "fneg {T} {0}",
+    "copysign": "call {T} @llvm.copysign.{N}({T} {0}, {T} {1})",
     "abs": "call {T} @llvm.fabs.{N}({T} {0})",
     "sqrt": "call {T} @llvm.sqrt.{N}({T} {0})",
     "floor": "call {T} @llvm.floor.{N}({T} {0})",
@@ -56,6 +58,22 @@ _INTEGERS = {
 }
 
 
+class Table(NamedTuple):
+    """Numbers in memory.
+
+    Attributes:
+        base: name of an address.
+        first: bytes from there to the first entry.
+        step: bytes from an entry to the next one.
+        apart: bytes from a lane's number to the next lane's; 0 where all lanes share one.
+    """
+
+    base: str
+    first: int
+    step: int
+    apart: int
+
+
 class Emitter:
     """Lines of assembly.
 
@@ -63,12 +81,22 @@ class Emitter:
         graph: what they compute.
         lanes: runs side by side in memory.
         width: of them in one vector: all, or 1 where each has a thread of its own.
+
+    Attributes:
+        lines: so far.
+        functions: declarations of what they call, of LLVM's.
+        constants, rooms: what they need besides: tables of constants, and room for tables.
+        called: names and types of functions of `calls`.
+        block: the one that the lines are in.
     """
 
     def __init__(self, graph: Graph, lanes: int, width: int):
         self.graph, self.width, self._lanes = graph, width, lanes
         self.lines: list[str] = []
         self.functions: set[str] = set()
+        self.constants: list[str] = []
+        self.rooms: list[str] = []
+        self.called: set[tuple[str, str]] = set()
         self.block = "begin"
 
     def vector(self, dtype: str) -> str:
@@ -140,7 +168,11 @@ class Emitter:
         """Do what a node says."""
         what, given, _ = self.graph.operations[node]
         dtype, before = self.graph.types[node], self.graph.types[given[-1]]
-        if what == "select":
+        if what == "call":
+            self.called.add((self.graph.operations[node].detail, dtype))
+            kind = self.vector(dtype)
+            self.line(f"call {kind} @{self.graph.operations[node].detail}.{dtype}({kind} {operands[0]})", name)
+        elif what == "select":
             self.choice(operands[0], operands[1], operands[2], dtype, name)
         elif what == "bits":
             self.line(f"bitcast {self.vector(before)} {operands[0]} to {self.vector(dtype)}", name)
@@ -154,8 +186,53 @@ class Emitter:
             text = templates[what].format(*operands, shift="ashr" if signed else "lshr", **words)
             if text.startswith("call"):
                 called = text.split("(")[0].split("@")[1]
-                self.functions.add(f"declare {self.vector(before)} @{called}({self.vector(before)})")
+                kinds = ", ".join([self.vector(before)] * len(operands))
+                self.functions.add(f"declare {self.vector(before)} @{called}({kinds})")
             self.line(text, name)
+
+    def table(self, entries: Sequence[Node], values: Sequence[str], name: str) -> Table:
+        """Entries in memory: where they lie already, or among the program's constants, or in room made for them."""
+        graph, dtype = self.graph, self.graph.types[entries[0]]
+        size = np.dtype(dtype).itemsize
+        operations = [graph.operations[node] for node in entries]
+        if all(operation.name == "constant" for operation in operations):
+            label = f"@table{len(self.constants)}"
+            texts = ", ".join(f"{_TYPES[dtype]} {self._number(graph.value(node), dtype)}" for node in entries)
+            self.constants.append(f"{label} = internal constant [{len(entries)} x {_TYPES[dtype]}] [{texts}]")
+            return Table(label, 0, size, 0)
+        room = f"{name}room"
+        self.rooms.append(f"  {room} = alloca [{len(entries)} x {self.vector(dtype)}], align {size * self.width}")
+        for i, value in enumerate(values):
+            self.line(f"getelementptr i8, ptr {room}, i64 {i * size * self.width}", f"{name}p{i}")
+            self.lines.append(f"  store {self.vector(dtype)} {value}, ptr {name}p{i}, align {size * self.width}")
+        return Table(room, 0, size * self.width, size)
+
+    def stored(self, entries: Sequence[Node]) -> Table | None:
+        """Where entries lie one after another among a program's numbers or its carry; None where they do not."""
+        found = [self.graph.operations[node] for node in entries]
+        if any(one.name != "input" or one.detail[0] not in ("number", "carry") for one in found):
+            return None
+        kind, first = found[0].detail
+        if [one.detail for one in found] != [(kind, first + i) for i in range(len(found))]:
+            return None
+        size = np.dtype(self.graph.types[entries[0]]).itemsize
+        base = "%numbers" if kind == "number" else "%carry"
+        base = base if self.width == self._lanes else f"{base}{size}"
+        return Table(base, first * SLOT * self._lanes, SLOT * self._lanes, size)
+
+    def entry(self, table: Table, place: str, dtype: str, name: str) -> None:
+        """What stands in a table at a place of each lane's own."""
+        whole, kind = self.vector(I64), self.vector(dtype)
+        before = ", ".join(f"i64 {table.first + lane * table.apart}" for lane in range(self.width))
+        self.line(f"mul {whole} {place}, splat (i64 {table.step})", f"{name}m")
+        self.line(f"add {whole} {name}m, <{before}>", f"{name}a")
+        value = "poison"
+        for lane in range(self.width):
+            self.line(f"extractelement {whole} {name}a, i64 {lane}", f"{name}i{lane}")
+            self.line(f"getelementptr i8, ptr {table.base}, i64 {name}i{lane}", f"{name}q{lane}")
+            self.line(f"load {_TYPES[dtype]}, ptr {name}q{lane}, align {np.dtype(dtype).itemsize}", f"{name}v{lane}")
+            last = name if lane == self.width - 1 else f"{name}w{lane}"
+            value = self.line(f"insertelement {kind} {value}, {_TYPES[dtype]} {name}v{lane}, i64 {lane}", last)
 
     def _convert(self, before: str, dtype: str, operand: str, name: str) -> None:
         from_float, to_float = before.startswith("float"), dtype.startswith("float")
@@ -181,12 +258,12 @@ class Emitter:
     def constant(self, node: Node) -> str:
         """A constant, the same in every lane."""
         value, dtype = self.graph.value(node), self.graph.types[node]
-        if dtype.startswith("float"):
-            # LLVM writes numbers of single precision by the digits of the double that they are.
-            text = f"0x{np.float64(value).view(np.uint64):016X}"
-        else:
-            text = str(value).lower()
-        return f"splat ({_TYPES[dtype]} {text})"
+        return f"splat ({_TYPES[dtype]} {self._number(value, dtype)})"
+
+    @staticmethod
+    def _number(value: Any, dtype: str) -> str:
+        # LLVM writes numbers of single precision by the digits of the double that they are.
+        return f"0x{np.float64(value).view(np.uint64):016X}" if dtype.startswith("float") else str(value).lower()
 
     def splat(self, scalar: str, dtype: str, name: str) -> str:
         """A number of the program in every lane."""

@@ -1,16 +1,20 @@
 """Arithmetic on scalars as a graph: every operation once, and none whose result is known."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from undertow.lanes.errors import Unsupported
 from undertow.lanes.simplify import COMPARISONS, RESULTS, simpler
 
 # An entry of a graph, its position. Arrays of them stand for arrays of scalars: NumPy does all that only moves them.
 Node = int
 
-BOOL, F64, I64, U64, U32 = "bool", "float64", "int64", "uint64", "uint32"
+BOOL, F64, F32, I64, U64, U32 = "bool", "float64", "float32", "int64", "uint64", "uint32"
+
+# What numbers can be.
+TYPES = (BOOL, F64, F32, I64, "int32", U64, U32)
 
 _EITHER_WAY = ("add", "mul", "and", "or", "xor", "eq", "ne")
 
@@ -19,9 +23,10 @@ class Operation(NamedTuple):
     """What a node is.
 
     Attributes:
-        name: one of `simplify.RESULTS`, or constant, input, region, result.
-        operands: nodes that it works on.
-        detail: number of a constant, name of an input, number of a region, place of a result among a region's.
+        name: one of `simplify.RESULTS`, or constant, input, region, result, table, entry, call.
+        operands: nodes that it works on; an entry's are a table and a place in it.
+        detail: number of a constant, name of an input, number of a region, place of a result among a region's, name
+            of what is called.
     """
 
     name: str
@@ -56,6 +61,8 @@ class Graph:
         parents: the region around each region, None where there is none.
         open: the region that is being made.
         active: the lanes that need what is being made; None for all.
+        endless: loops so far whose end only the lanes know.
+        memory: what was made before, for those who make more than one operation at once.
     """
 
     def __init__(self) -> None:
@@ -66,11 +73,13 @@ class Graph:
         self.parents: list[int | None] = []
         self.open: int | None = None
         self.active: Node | None = None
+        self.endless = 0
+        self.memory: dict[Any, Node] = {}
         self._known: dict[Any, Node] = {}
 
     def constant(self, value: Any, dtype: str) -> Node:
         """A number that is the same in every lane."""
-        number = np.asarray(value).astype(dtype)[()]
+        number = np.asarray(value).astype(_supported(dtype))[()]
         return self.node(Operation("constant", detail=number), dtype, key=(number.tobytes(), dtype))
 
     def like(self, value: Any, node: Node) -> Node:
@@ -79,7 +88,7 @@ class Graph:
 
     def input(self, name: Any, dtype: str, home: int | None = None) -> Node:
         """A number that comes from elsewhere: from memory, or into a region."""
-        return self.node(Operation("input", detail=name), dtype, home)
+        return self.node(Operation("input", detail=name), _supported(dtype), home)
 
     def value(self, node: Node) -> Any:
         """The number of a constant, None for what may differ between lanes."""
@@ -95,6 +104,7 @@ class Graph:
             dtype: type of the result where the operation changes it.
         """
         dtype = dtype or (BOOL if name in COMPARISONS else self.types[nodes[-1]])
+        assert len({self.types[node] for node in nodes[name == "select" :]}) == 1, (name, dtype)
         values = [self.value(node) for node in nodes]
         if all(value is not None for value in values):
             with np.errstate(all="ignore"):
@@ -105,6 +115,14 @@ class Graph:
         same = simpler(self, name, nodes, values)
         return self.node(Operation(name, nodes), dtype) if same is None else same
 
+    def entry(self, table: Sequence[Node], place: Node) -> Node:
+        """The entry of a table at a place within it, a number of type int64; the table lies in memory."""
+        known = self.value(place)
+        if known is not None:
+            return table[int(known)]
+        held = self.node(Operation("table", tuple(table)), self.types[table[0]])
+        return self.node(Operation("entry", (held, place)), self.types[held])
+
     def node(self, operation: Operation, dtype: str, home: int | None = None, key: Any = None) -> Node:
         """The node of an operation, the same for the same one."""
         key = (operation, dtype) if key is None else key
@@ -112,9 +130,13 @@ class Graph:
             self._known[key] = len(self.operations)
             self.operations.append(operation)
             self.types.append(dtype)
-            homes = [self.homes[operand] for operand in operation.operands]
-            self.homes.append(max([home, *homes], key=self._depth))
+            inner = self.innermost(*operation.operands)
+            self.homes.append(max(home, inner, key=self._depth))
         return self._known[key]
+
+    def innermost(self, *nodes: Node) -> int | None:
+        """The home of what is made of some nodes."""
+        return max((self.homes[node] for node in nodes), key=self._depth, default=None)
 
     def inside(self, node: Node, region: int) -> bool:
         """Whether a node depends on what happens in a region."""
@@ -144,3 +166,14 @@ class Graph:
 
     def _depth(self, home: int | None) -> int:
         return 0 if home is None else 1 + self._depth(self.parents[home])
+
+
+def _supported(dtype: str) -> str:
+    """A type of numbers.
+
+    Raises:
+        Unsupported: lanes have none such.
+    """
+    if dtype not in TYPES:
+        raise Unsupported(f"numbers of type {dtype}")
+    return dtype

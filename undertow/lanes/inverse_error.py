@@ -5,6 +5,8 @@ The variable is w = -log(1 - x^2), in three parts, after M. Giles, Approximating
 2e-15.
 """
 
+from math import inf, nan
+
 from undertow.lanes.functions import log, polynomial
 from undertow.lanes.scalar import Scalar, smaller, where
 
@@ -77,11 +79,11 @@ _FAR = [
 
 
 def erf_inv(x: Scalar) -> Scalar:
-    """x for which erf is the given number; infinite at -1 and 1."""
+    """x for which erf is the given number; infinite at -1 and 1, and none beyond."""
     w = smaller(-log((1.0 - x) * (x + 1.0)), 37.0)
     root = w.apply("sqrt")
     central, middle, far = (
         polynomial(t, terms) for t, terms in ((w - 3.125, _CENTRAL), (root - 3.25, _MIDDLE), (root - 5.0, _FAR))
     )
     result = x * where(w < 6.25, central, where(w < 16.0, middle, far))
-    return where(abs(x) < 1.0, result, x * float("inf"))
+    return where(abs(x) < 1.0, result, where(abs(x).equal(1.0), x * inf, nan))

@@ -8,6 +8,7 @@ import numpy as np
 from llvmlite import binding
 
 from undertow.lanes.cache import kept
+from undertow.lanes.errors import Unsupported
 
 # Arguments of a program: numbers, carry, series; ticks, ticks between looks.
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
@@ -48,9 +49,16 @@ def _target() -> Any:
 
 
 def parsed(assembly: str) -> binding.ModuleRef:
-    """LLVM's module of an assembly, verified."""
-    module = binding.parse_assembly(assembly)
-    module.verify()
+    """LLVM's module of an assembly, verified.
+
+    Raises:
+        Unsupported: LLVM refuses it.
+    """
+    try:
+        module = binding.parse_assembly(assembly)
+        module.verify()
+    except RuntimeError as error:
+        raise Unsupported(f"LLVM refuses the program ({' '.join(str(error).split())[:200]})") from error
     return module
 
 

@@ -38,7 +38,7 @@ class Layout:
         memory = self.memory(groups)
         which = np.minimum(np.arange(groups * self._lanes), runs - 1).reshape(groups, self._lanes)
         for i, array in enumerate(arrays):
-            rows = np.asarray(array).reshape(runs, -1)[which]
+            rows = np.asarray(array).reshape(runs, self._firsts[i + 1] - self._firsts[i])[which]
             self._slots(memory, i)[:, 0] = rows.transpose(0, 2, 1)
         return memory
 

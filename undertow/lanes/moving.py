@@ -1,42 +1,59 @@
 """JAX's primitives that only move entries: NumPy does the same with arrays of nodes."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
+from undertow.lanes.nodes import Nodes
+from undertow.lanes.rules import Equation, rule
 
-def _slice(given: list[np.ndarray], params: dict[str, Any], out: Any) -> np.ndarray:
-    strides = params["strides"] or [1] * given[0].ndim
+
+@rule("slice", reads="start_indices limit_indices strides")
+def _slice(equation: Equation, given: Nodes) -> Nodes:
+    params = equation.params
+    strides = params["strides"] or [1] * len(params["start_indices"])
     cuts = zip(params["start_indices"], params["limit_indices"], strides, strict=True)
-    return given[0][tuple(slice(*cut) for cut in cuts)]
+    return given[tuple(slice(*cut) for cut in cuts)]
 
 
-def _broadcast(given: list[np.ndarray], params: dict[str, Any], out: Any) -> np.ndarray:
+@rule("broadcast_in_dim", reads="shape broadcast_dimensions")
+def _broadcast(equation: Equation, given: Nodes) -> Nodes:
+    out = equation.out
     shape = [1] * len(out.shape)
-    for size, axis in zip(given[0].shape, params["broadcast_dimensions"], strict=True):
+    for size, axis in zip(given.shape, equation.params["broadcast_dimensions"], strict=True):
         shape[axis] = size
-    return np.broadcast_to(given[0].reshape(shape), out.shape)
+    return np.broadcast_to(given.reshape(shape), out.shape)
 
 
-def _split(given: list[np.ndarray], params: dict[str, Any], out: Any) -> list[np.ndarray]:
-    return np.split(given[0], np.cumsum(params["sizes"])[:-1], axis=params["axis"])
+@rule("split", reads="sizes axis")
+def _split(equation: Equation, given: Nodes) -> list[Nodes]:
+    return np.split(given, np.cumsum(equation.params["sizes"])[:-1], axis=equation.params["axis"])
 
 
-def _reshape(given: list[np.ndarray], params: dict[str, Any], out: Any) -> np.ndarray:
-    return given[0].reshape(out.shape)
+@rule("reshape", reads="new_sizes")
+@rule("squeeze", "expand_dims", reads="dimensions")
+def _reshape(equation: Equation, given: Nodes) -> Nodes:
+    return given.reshape(equation.shape)
 
 
-RULES: dict[str, Callable[[list[np.ndarray], dict[str, Any], Any], Any]] = {
-    "reshape": _reshape,
-    "squeeze": _reshape,
-    "expand_dims": _reshape,
-    "broadcast_in_dim": _broadcast,
-    "slice": _slice,
-    "split": _split,
-    "transpose": lambda given, params, out: given[0].transpose(params["permutation"]),
-    "concatenate": lambda given, params, out: np.concatenate(given, axis=params["dimension"]),
-    "stack": lambda given, params, out: np.stack(given, axis=params["axis"]),
-    "unstack": lambda given, params, out: list(np.moveaxis(given[0], params["axis"], 0)),
-    "rev": lambda given, params, out: np.flip(given[0], params["dimensions"]),
-}
+@rule("transpose", reads="permutation")
+def _transpose(equation: Equation, given: Nodes) -> Nodes:
+    return given.transpose(equation.params["permutation"])
+
+
+@rule("concatenate", reads="dimension")
+def _concatenate(equation: Equation, *given: Nodes) -> Nodes:
+    return np.concatenate(given, axis=equation.params["dimension"])
+
+
+@rule("stack", reads="axis")
+def _stack(equation: Equation, *given: Nodes) -> Nodes:
+    return np.stack(given, axis=equation.params["axis"])
+
+
+@rule("unstack", reads="axis")
+def _unstack(equation: Equation, given: Nodes) -> list[Nodes]:
+    return list(np.moveaxis(given, equation.params["axis"], 0))
+
+
+@rule("rev", reads="dimensions")
+def _rev(equation: Equation, given: Nodes) -> Nodes:
+    return np.flip(given, equation.params["dimensions"])

@@ -24,6 +24,8 @@ class Scalar:
 
     def to(self, name: str, dtype: str) -> "Scalar":
         """`convert`ed to another type, or its `bits` read as another one of the same size."""
+        if dtype == self.type:
+            return self
         return Scalar(self.graph, self.graph.apply(name, self.node, dtype=dtype))
 
     def apply(self, name: str, *others: Any) -> "Scalar":
@@ -82,6 +84,14 @@ class Scalar:
     def __rshift__(self, other):
         return self.apply("shift_right", other)
 
+    def __floordiv__(self, other):
+        """Of whole numbers, towards zero."""
+        return self.apply("div", other)
+
+    def signed(self, other: Any) -> "Scalar":
+        """With the sign of another."""
+        return self.apply("copysign", other)
+
     def equal(self, other: Any) -> "Scalar":
         """Whether it is the same number."""
         return self.apply("eq", other)
@@ -113,7 +123,8 @@ def _chosen(one: Scalar, other: Scalar | float, comparison: str) -> Scalar:
     graph = one.graph
     if graph.value(one.node) is None:
         one, other = other, one
+    value = graph.value(one.node)
     chosen = where(one.apply(comparison, other), one, other)
-    if graph.value(one.node) is not None or not one.type.startswith("float"):
+    if not one.type.startswith("float") or (value is not None and value == value):
         return chosen
     return where(one.apply("ne", one), one, chosen)

@@ -1,6 +1,7 @@
 """From a traced function to the arithmetic of its scalars."""
 
 from collections.abc import Sequence
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -8,17 +9,20 @@ import jax
 import numpy as np
 from jax.extend.core import ClosedJaxpr, Literal
 
-from undertow.lanes import collecting, control, elementwise, indexing, moving, threefry
+from undertow.lanes import collecting, control, elementwise, indexing, linear, moving, sorting, threefry
 from undertow.lanes.errors import Unsupported
 from undertow.lanes.graph import Graph
 from undertow.lanes.nodes import Nodes, filled
+from undertow.lanes.rules import Equation, results, rule
 
-# Primitives that only call another function.
-_CALLS = ("jit", "pjit", "closed_call", "core_call", "checkpoint", "custom_jvp_call", "custom_vjp_call")
+# Modules whose import registers their rules.
+RULES_OF = (collecting, control, elementwise, indexing, linear, moving, sorting, threefry)
 
 
 def nodes_of(graph: Graph, values: Any) -> Nodes:
     """Constants."""
+    if isinstance(getattr(values, "dtype", None), jax.dtypes.extended):
+        raise Unsupported(f"a constant of type {values.dtype}")
     values = np.asarray(values)
     return filled(values.shape, [graph.constant(value, str(values.dtype)) for value in values.ravel()])
 
@@ -45,52 +49,41 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
             return nodes_of(graph, np.asarray(variable.val, dtype=aval.dtype))
         return known[variable]
 
+    within = partial(evaluate, graph, most=most)
     for equation in closed.jaxpr.eqns:
-        known |= zip(equation.outvars, _results(graph, equation, [read(v) for v in equation.invars]), strict=True)
+        asked = Equation(graph, equation.params, [variable.aval for variable in equation.outvars], within)
+        found = results(equation.primitive.name, asked, [read(variable) for variable in equation.invars])
+        known |= zip(equation.outvars, found, strict=True)
         if len(graph.operations) > most:
             raise Unsupported(f"more than {most} operations")
     return [read(variable) for variable in closed.jaxpr.outvars]
 
 
-def _results(graph: Graph, equation: Any, given: list[Nodes]) -> Sequence[Nodes]:
-    """Results of one equation."""
-    name, params = equation.primitive.name, equation.params
-    if name in control.RULES:
-        return control.RULES[name](graph, given, params, evaluate)
-    if name in _CALLS:
-        return evaluate(graph, _called(params), given)
-    if name == "call_hi_primitive":
-        return evaluate(graph, _expanded(params["_prim"]), given)
-    out = equation.outvars[0].aval
-    if name in moving.RULES:
-        moved = moving.RULES[name](given, params, out)
-        return moved if equation.primitive.multiple_results else [moved]
-    for rules in (collecting.RULES, indexing.RULES):
-        if name in rules:
-            return [rules[name](graph, given, params, out)]
-    if name in threefry.RULES:
-        return [_random(graph, name, given, params)]
-    rule = elementwise.rule(name, params, str(out.dtype))
-    if rule is None:
-        raise Unsupported(name)
-    rows = zip(*(np.broadcast_to(nodes, out.shape).ravel().tolist() for nodes in given), strict=True)
-    return [filled(out.shape, [rule(graph, *row) for row in rows])]
-
-
-def _random(graph: Graph, name: str, given: list[Nodes], params: dict[str, Any]) -> Nodes:
-    usual = params.get("bit_width", 32) in (32, 64) and str(params.get("impl", "fry")) == "fry"
-    if not (usual and threefry.available()):
-        raise Unsupported("random numbers of another kind")
-    return threefry.RULES[name](graph, given, params)
-
-
-def _called(params: dict[str, Any]) -> ClosedJaxpr:
-    """What an equation calls."""
+@rule(
+    "jit",
+    "pjit",
+    reads="jaxpr",
+    idle="in_shardings out_shardings in_layouts out_layouts donated_invars ctx_mesh name keep_unused inline"
+    " compiler_options_kvs",
+)
+@rule("closed_call", "core_call", reads="call_jaxpr", idle="name")
+@rule("checkpoint", reads="jaxpr", idle="prevent_cse differentiated policy")
+@rule("custom_jvp_call", reads="call_jaxpr", idle="jvp_jaxpr_fun num_consts symbolic_zeros")
+@rule(
+    "custom_vjp_call",
+    reads="call_jaxpr fun_jaxpr",
+    idle="fwd_jaxpr_thunk bwd num_consts out_trees symbolic_zeros",
+)
+def _call(equation: Equation, *given: Nodes) -> list[Nodes]:
+    """Primitives that only call another function."""
+    params = equation.params
     (called,) = (params[key] for key in ("jaxpr", "call_jaxpr", "fun_jaxpr") if key in params)
-    return called if isinstance(called, ClosedJaxpr) else ClosedJaxpr(called, ())
+    return equation.evaluate(called if isinstance(called, ClosedJaxpr) else ClosedJaxpr(called, ()), given)
 
 
-def _expanded(primitive: Any) -> ClosedJaxpr:
+@rule("call_hi_primitive", reads="_prim")
+def _expanded(equation: Equation, *given: Nodes) -> list[Nodes]:
     """What a primitive of primitives does; JAX has some since 0.12."""
+    primitive = equation.params["_prim"]
     whole = lambda *flat: primitive.expand(*jax.tree.unflatten(primitive.in_tree, flat))
-    return jax.make_jaxpr(whole)(*primitive.in_avals_flat)
+    return equation.evaluate(jax.make_jaxpr(whole)(*primitive.in_avals_flat), given)

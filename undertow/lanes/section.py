@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from undertow.lanes.emit import Emitter
+from undertow.lanes.calls import ARGUMENT
+from undertow.lanes.emit import Emitter, Table
 from undertow.lanes.graph import I64, Node, Region
 
 
@@ -20,10 +21,16 @@ class Section:
         self._emitter, self._letter, self._tick = emitter, letter, tick
         self._values = values or {}
         self._results: dict[Node, list[str]] = {}
+        self._tables: dict[Node, Table] = {}
 
     def after(self, letter: str, tick: str) -> "Section":
         """Another part, where everything of this one is known."""
-        return Section(self._emitter, letter, tick, dict(self._values))
+        return self._further(letter, tick)
+
+    def _further(self, letter: str, tick: str) -> "Section":
+        section = Section(self._emitter, letter, tick, dict(self._values))
+        section._tables = dict(self._tables)
+        return section
 
     def do(self, nodes: Sequence[Node], home: int | None = None) -> None:
         """Operations in order, those of one home; what lies in memory is fetched when it is first used."""
@@ -35,12 +42,22 @@ class Section:
                 self._results[node] = self._region(node, graph.regions[detail], detail)
             elif name == "result":
                 self._values[node] = self._results[operands[0]][detail]
+            elif name == "table":
+                table = self._emitter.stored(operands)
+                if table is None:
+                    values = [self.value(operand) for operand in operands]
+                    table = self._emitter.table(operands, values, f"%{self._letter}{node}")
+                self._tables[node] = table
+            elif name == "entry":
+                self._values[node] = f"%{self._letter}{node}"
+                place = self.value(operands[1])
+                self._emitter.entry(self._tables[operands[0]], place, graph.types[node], self._values[node])
             elif name not in ("constant", "input"):
                 known = [self.value(operand) for operand in operands]
                 self._emitter.operation(node, known, f"%{self._letter}{node}")
                 self._values[node] = f"%{self._letter}{node}"
         for node in nodes:
-            if graph.operations[node].name != "region":
+            if graph.operations[node].name not in ("region", "table"):
                 self.value(node)
 
     def value(self, node: Node) -> str:
@@ -62,6 +79,8 @@ class Section:
         assert operation.name in ("constant", "input"), (node, operation)
         if operation.name == "constant":
             return emitter.constant(node)
+        if operation.detail == ARGUMENT:
+            return "%x"
         if isinstance(operation.detail, str):
             return emitter.splat(self._tick, I64, name)
         kind, slot = operation.detail
@@ -71,7 +90,7 @@ class Section:
         """Names of the results of a region."""
         graph, name = self._emitter.graph, f"{self._letter}r{node}"
         given = [self.value(operand) for operand in graph.operations[node].operands[: len(region.inputs)]]
-        inner = Section(self._emitter, name, self._tick, dict(self._values))
+        inner = self._further(name, self._tick)
         if region.repeats:
             return self._repeated(inner, region, number, given, name)
         inner._values |= zip(region.inputs, given, strict=True)

@@ -35,8 +35,8 @@ def by_xla(found: Mapping[str, Any]) -> str:
     """That XLA flew some of the trials; nothing where it flew none."""
     if not found["by_xla"]:
         return ""
-    said = "slower than in lanes (docs/lanes.md says for what), and alone one is repeated to rounding, not to the bit"
-    return f"{found['by_xla']} trials were flown by XLA: {said}."
+    said = "slower than in lanes, and alone one is repeated to rounding, not to the bit"
+    return f"{found['by_xla']} trials were flown by XLA: {said}. `undertow simulate` of one says why."
 
 
 def requirements(found: Mapping[str, Any]) -> Html:

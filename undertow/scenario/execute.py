@@ -53,14 +53,18 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
 def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
     gathered = (Metrics(*built.window()),) if scenario.steady.every_tick else ()
-    outcome = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
+    outcome, left_to_xla = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
     why = step_failure(built.closed_loop, scenario.loop, outcome)
-    attributes = ({"status_sentence": why} if why else {}) | {
-        "title": scenario.description or "a closed loop run by undertow",
-        "scenario": text,
-        "scenario_hash": text_hash(text),
-        "seed": scenario.seed,
-    }
+    attributes = (
+        left_to_xla
+        | ({"status_sentence": why} if why else {})
+        | {
+            "title": scenario.description or "a closed loop run by undertow",
+            "scenario": text,
+            "scenario_hash": text_hash(text),
+            "seed": scenario.seed,
+        }
+    )
     finished = label(built.closed_loop, outcome, built.window(), scenario.loop.dt, attributes)
     return Executed(built, outcome, *finished)
 
@@ -71,16 +75,18 @@ def run_loop(
     start: Initial,
     seed: int,
     accumulators: tuple[sampled.AbstractAccumulator, ...] = (),
-) -> Outcome:
-    """Run a closed loop as `loop:` and `initial:` of a scenario say; `accumulators` for a sampled one."""
+) -> tuple[Outcome, dict[str, str]]:
+    """Run a closed loop as `loop:` and `initial:` of a scenario say; `accumulators` for a sampled one.
+
+    Returns:
+        The outcome; and attribute `left_to_xla` of its dataset, the reason, where lanes were asked for in vain.
+    """
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
     common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
     if settings.kind == "continuous":
         adaptive = (settings.rtol, settings.atol) if settings.method == "adaptive" else None
-        return jax.block_until_ready(
-            continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
-        )
-    engine = in_lanes.simulate if settings.engine == "lanes" else sampled.simulate
+        outcome = continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
+        return jax.block_until_ready(outcome), {}
     common |= {
         "dt": settings.dt,
         "record_every": round(settings.record / settings.dt),
@@ -88,10 +94,13 @@ def run_loop(
         "substeps": settings.substeps,
         "accumulators": accumulators,
     }
-    try:
-        return jax.block_until_ready(engine(loop, **common))
-    except Unsupported:
-        return jax.block_until_ready(sampled.simulate(loop, **common))
+    lacking = {}
+    if settings.engine == "lanes":
+        try:
+            return in_lanes.simulate(loop, **common), {}
+        except Unsupported as error:
+            lacking = {"left_to_xla": str(error)}
+    return jax.block_until_ready(sampled.simulate(loop, **common)), lacking
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
