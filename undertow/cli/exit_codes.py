@@ -3,17 +3,19 @@
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import typer
+
+from undertow.cli.interruptible import interrupted_by
 
 DONE = 0
 RUN_FAILED = 1
 BAD_INPUT = 2
 INTERNAL_ERROR = 3
 FILES_FAILED = 4
-INTERRUPTED = 130
+INTERRUPTED = 128  # and the number of the signal: 130 by Ctrl-C, 143 by SIGTERM
 
 
 def run_guarded(command: Any, arguments: Sequence[str]) -> int:
@@ -21,7 +23,7 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
     try:
         return command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return INTERRUPTED + interrupted_by()
     except Exception as error:
         if os.environ.get("UNDERTOW_TRACEBACK") and not isinstance(error, typer.TyperException):
             traceback.print_exc()
@@ -33,6 +35,12 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
 def complain(sentence: str) -> None:
     """Say what is wrong, in one line."""
     print("Error: " + " ".join(sentence.split()), file=sys.stderr)
+
+
+def warn_of(sentences: Iterable[str]) -> None:
+    """Say what did not go well, though the command goes on: a line each."""
+    for sentence in sentences:
+        print("Warning: " + " ".join(sentence.split()), file=sys.stderr)
 
 
 def _explain(error: Exception) -> tuple[int, str]:

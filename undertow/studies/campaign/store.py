@@ -5,18 +5,17 @@ results = xr.open_zarr("runs/my-campaign/trials.zarr", consolidated=False)
 """
 
 import contextlib
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from undertow.core.disk import alone
 from undertow.studies.campaign.arrays import chunk_file, found_array, new_array, opened
 from undertow.studies.campaign.columns import Label
 from undertow.studies.campaign.identity import Identity, draws
 from undertow.studies.campaign.layout import Layout
-from undertow.studies.campaign.lock import locked
 
 _DONE = "done"
 
@@ -46,7 +45,7 @@ class Store:
         self.layout, self._path, self._labels = layout, path, labels
         path.mkdir(parents=True, exist_ok=True)
         with contextlib.ExitStack() as held:
-            held.callback(os.close, locked(path))
+            held.enter_context(alone(path))
             self._open(identity, coordinates)
             self._held = held.pop_all()
 
