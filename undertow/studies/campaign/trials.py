@@ -80,10 +80,15 @@ class Trials(NamedTuple):
         return ""
 
     def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
-        """Key paths that are drawn, with the values by name where those are not numbers."""
-        for key, spread in self.campaign.vary.items():
-            named = spread.choice is not None and not all(map(is_number, spread.choice))
-            yield key, {words(entry): entry for entry in spread.choice or []} if named else None
+        """See `drawn`."""
+        return drawn(self.campaign)
+
+
+def drawn(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None]]:
+    """Key paths that are drawn, with the values by name where those are not numbers."""
+    for key, spread in campaign.vary.items():
+        named = spread.choice is not None and not all(map(is_number, spread.choice))
+        yield key, {words(entry): entry for entry in spread.choice or []} if named else None
 
 
 def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
