@@ -150,7 +150,10 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
             ["check", "campaign.yaml"],
             r"be a vehicle or scenario file, but is campaign.yaml, a campaign. `undertow campaign`",
         ),
-        (["campaign", "campaign.yaml", "--out", "/proc/out"], r"`--out` must be a folder that can be written, but is /proc"),
+        (
+            ["campaign", "campaign.yaml", "--out", "/proc/out"],
+            r"`--out` must be a folder that can be written, but is /proc",
+        ),
     ],
 )
 def test_a_mistake_on_the_command_line(campaign, campaign_file, tmp_path, capsys, monkeypatch, arguments, said):
