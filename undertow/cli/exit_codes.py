@@ -15,15 +15,17 @@ RUN_FAILED = 1
 BAD_INPUT = 2
 INTERNAL_ERROR = 3
 FILES_FAILED = 4
-INTERRUPTED = 128  # and the number of the signal: 130 by Ctrl-C, 143 by SIGTERM
+INTERRUPTED = 130  # by Ctrl-C; 143 by SIGTERM
+_BY_SIGNAL = 128  # and the number of the signal
 
 
 def run_guarded(command: Any, arguments: Sequence[str]) -> int:
     """Exit code of a command; whatever it raises becomes one line on stderr."""
     try:
-        return command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
+        code = command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
+        return _BY_SIGNAL + interrupted_by() if code == INTERRUPTED else code  # as typer makes of KeyboardInterrupt
     except KeyboardInterrupt:
-        return INTERRUPTED + interrupted_by()
+        return _BY_SIGNAL + interrupted_by()
     except Exception as error:
         if os.environ.get("UNDERTOW_TRACEBACK") and not isinstance(error, typer.TyperException):
             traceback.print_exc()

@@ -105,7 +105,9 @@ def tune(
     method: Annotated[
         str, typer.Option(metavar="METHOD", help="gradient, or search: without slopes, for what is not smooth.")
     ] = "gradient",
-    budget: Annotated[float, typer.Option(metavar="SECONDS", help="Time to take, all told.")] = 240.0,
+    budget: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Time to take; compiling and a first look are always finished.")
+    ] = 240.0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a tuning that was interrupted.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")] = False,
     allow_code: AllowCode = False,

@@ -52,6 +52,11 @@ class Journal:
             return self._known[self._asked]["elapsed"]
         return self._spent + time.perf_counter() - self._started
 
+    @property
+    def is_over(self) -> bool:
+        """Whether the budget is spent."""
+        return self.elapsed > self._budget
+
     def ask(self, what: str, at: np.ndarray, compute: Callable[[], Any], must: bool = False) -> Any:
         """The answer, from the journal or computed and written down.
 

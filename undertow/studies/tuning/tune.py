@@ -95,7 +95,7 @@ def tune(
     make = lambda point: wanted.law(wanted.options(point))
     first = make(wanted.start)
     evaluation = Evaluation(wanted.bench, make, first, wanted.train)
-    if method == "gradient":
+    if method == "gradient" and not notes.is_over:
         evaluation.foresee_slope(wanted.start)
     certifier = Certifier(wanted.bench, wanted.train, first)
     objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
