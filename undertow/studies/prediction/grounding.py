@@ -11,6 +11,7 @@ from undertow.analysis.linearised.closing import LinearLoop
 from undertow.analysis.linearised.forecast import forecast, from_start
 from undertow.analysis.linearised.rest import Rest, rest
 from undertow.analysis.linearised.surroundings import Surroundings, surroundings
+from undertow.core.errors import BadInput
 from undertow.scenario.build import Built
 
 _MOST_TICKS = 200_000  # that are foretold one by one
@@ -27,7 +28,11 @@ class Ground(NamedTuple):
 
 
 def ground(built: Built) -> Ground:
-    """Where the loop of a scenario rests under the mean load of its steady window, and its linearisation there."""
+    """Where the loop of a scenario rests under the mean load of its steady window, and its linearisation there.
+
+    Raises:
+        BadInput: its slopes are not finite there.
+    """
     loop, settings = built.closed_loop, built.scenario.loop
     start, stop = built.window()
     position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)
@@ -38,6 +43,9 @@ def ground(built: Built) -> Ground:
     load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
     mean = rest(loop, settings.dt, position, load)
     linear = margins.closed(mean, settings.dt, settings.kind)
+    if not all(np.isfinite(part).all() for part in (linear.matrix, *linear.entries.values(), *linear.signals.values())):
+        hint = "Some number of the reference, the disturbance or the plant is too large"
+        raise BadInput("SCENARIO", "be a loop that can be linearised", "one whose slopes are not finite", hint=hint)
     return Ground(built, around, mean, linear, margins.spectral_radius(linear))
 
 
