@@ -2,6 +2,7 @@
 
 import pytest
 from good_scenario import SCENARIO
+from matplotlib.figure import Figure
 
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.core.errors import BadInput
@@ -152,3 +153,35 @@ def test_earlier_result_is_refused(refused, tmp_path):
         "`--out` must be a folder without an earlier result, but is out, which has run.nc. "
         "Add --overwrite to replace it, or choose another folder"
     )
+
+
+def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
+    """It is a warning; the other figures are drawn, and the exit code is that of the run."""
+
+    def drawings(run):
+        return {"tracking": lambda: 1 / 0, "error": Figure}
+
+    monkeypatch.setattr("undertow.cli.simulate.run_drawings", drawings)
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    assert said.code == 0
+    line = "Warning: figure `tracking` could not be drawn (ZeroDivisionError: division by zero); the results are whole"
+    assert said.err.splitlines()[-1] == line
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "figures",
+        "metrics.json",
+        "run.nc",
+        "scenario.yaml",
+    ]
+    assert sorted(path.name for path in (tmp_path / "out" / "figures").iterdir()) == ["error.png", "error.svg"]
+
+
+def test_an_interrupt_while_figures_are_drawn_costs_no_results(undertow, tmp_path, monkeypatch):
+    def interrupted(run):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("undertow.cli.simulate.run_drawings", interrupted)
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    assert undertow("simulate", "s.yaml", "--out", "out").code == 130
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["metrics.json", "run.nc", "scenario.yaml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "s.yaml"]

@@ -44,7 +44,7 @@ def ground(built: Built) -> Ground:
     mean = rest(loop, settings.dt, position, load)
     linear = margins.closed(mean, settings.dt, settings.kind)
     if not all(np.isfinite(part).all() for part in (linear.matrix, *linear.entries.values(), *linear.signals.values())):
-        hint = "Some number of the reference, the disturbance or the plant is too large"
+        hint = "`loop.dt` is too long for this plant, or some number too large"
         raise BadInput("SCENARIO", "be a loop that can be linearised", "one whose slopes are not finite", hint=hint)
     return Ground(built, around, mean, linear, margins.spectral_radius(linear))
 
