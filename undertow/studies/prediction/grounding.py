@@ -11,7 +11,6 @@ from undertow.analysis.linearised.closing import LinearLoop
 from undertow.analysis.linearised.forecast import forecast, from_start
 from undertow.analysis.linearised.rest import Rest, rest
 from undertow.analysis.linearised.surroundings import Surroundings, surroundings
-from undertow.core.errors import BadInput
 from undertow.scenario.build import Built
 
 _MOST_TICKS = 200_000  # that are foretold one by one
@@ -43,9 +42,6 @@ def ground(built: Built) -> Ground:
     load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
     mean = rest(loop, settings.dt, position, load)
     linear = margins.closed(mean, settings.dt, settings.kind)
-    if not all(np.isfinite(part).all() for part in (linear.matrix, *linear.entries.values(), *linear.signals.values())):
-        hint = "`loop.dt` is too long for this plant, or some number too large"
-        raise BadInput("SCENARIO", "be a loop that can be linearised", "one whose slopes are not finite", hint=hint)
     return Ground(built, around, mean, linear, margins.spectral_radius(linear))
 
 
