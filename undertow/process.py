@@ -15,6 +15,8 @@ _YOUNG, _MIDDLE, _OLD = 50_000, 20, 100
 
 def prepare() -> None:
     """Keep compiled code from one process to the next, and look for garbage seldom; before JAX is imported."""
+    # Or XLA says on the terminal that compiling is slow, and asks for a bug report.
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     _keep_xla_code()
     gc.set_threshold(_YOUNG, _MIDDLE, _OLD)
     atexit.register(gc.freeze)  # or Python looks through everything once more before it goes: half a second

@@ -155,13 +155,17 @@ def simulate(
     return _run(outcome, *label(closed_loop, outcome, steady, settings.dt, attributes))
 
 
-def simulate_scenario(scenario: str | Path | Mapping[str, Any]) -> Run:
+def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool = False) -> Run:
     """Run a scenario: a .yaml file, an earlier run.nc, or the same as a mapping.
+
+    Args:
+        scenario: what to run.
+        allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
 
     Raises:
         BadInput: anything wrong with it, with key path and line.
     """
-    text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario))
+    text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
     _, outcome, status, steady, whole, dataset = execute.execute(text)
     return _run(outcome, status, steady, whole, dataset)
 

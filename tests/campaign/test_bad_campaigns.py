@@ -1,7 +1,6 @@
 """Mistakes in a campaign file or on the command line: one line each, and nothing is lost."""
 
 import json
-import os
 import re
 from pathlib import Path
 
@@ -9,9 +8,9 @@ import pytest
 from command import VEHICLE, contents
 
 from undertow.cli.main import run
+from undertow.core.disk import alone
 from undertow.scenario.reading import dump
 from undertow.studies.campaign.conduct import STORE, conduct
-from undertow.studies.campaign.lock import locked
 from undertow.studies.campaign.prepare import prepare
 
 
@@ -151,7 +150,10 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
             ["check", "campaign.yaml"],
             r"be a vehicle or scenario file, but is campaign.yaml, a campaign. `undertow campaign`",
         ),
-        (["campaign", "campaign.yaml", "--out", "/proc/out"], r"files could not be read or written: .* \(/proc/out"),
+        (
+            ["campaign", "campaign.yaml", "--out", "/proc/out"],
+            r"`--out` must be a folder that can be written, but is /proc",
+        ),
     ],
 )
 def test_a_mistake_on_the_command_line(campaign, campaign_file, tmp_path, capsys, monkeypatch, arguments, said):
@@ -229,9 +231,9 @@ def test_a_refused_overwrite_leaves_a_campaign_that_is_flying(campaign_file, tmp
     """As another process would find it: the store is locked."""
     path, out = campaign_file(trials=4), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
-    before, held = contents(out), locked(out / STORE)
-    assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 2
-    os.close(held)
+    before = contents(out)
+    with alone(out / STORE):
+        assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 2
     assert "must be a folder that nothing else writes to" in capsys.readouterr().err
     assert contents(out) == before
 

@@ -11,11 +11,13 @@ import time
 from functools import partial
 from pathlib import Path
 
+import psutil
 import pytest
 from command import contents, typed
 from distributed import Client, LocalCluster
 
 from undertow.cli.main import run
+from undertow.studies.campaign.clusters import cluster
 from undertow.studies.campaign.conduct import STORE, conduct
 from undertow.studies.campaign.engines import by_dask
 from undertow.studies.campaign.prepare import prepare
@@ -69,6 +71,14 @@ def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
         conduct(prepare(path), tmp_path / "cluster", lambda f, work: by_dask(f, work, client), watch)
     assert seen[-1] == 200 and len(seen) == 11  # no task twice
     assert contents(tmp_path / "cluster") == contents(tmp_path / "whole")
+
+
+def test_a_local_cluster_listens_on_this_machine_only():
+    """Scheduler, workers and status page: others in the network find no door."""
+    with cluster("local", 1):
+        ours = [psutil.Process(), *psutil.Process().children(recursive=True)]
+        found = [one for process in ours for one in process.net_connections("tcp") if one.status == psutil.CONN_LISTEN]
+    assert len(found) >= 3 and {one.laddr.ip for one in found} == {"127.0.0.1"}
 
 
 def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):

@@ -278,3 +278,43 @@ def test_what_a_killed_process_left_is_cleared_away(small, tmp_path):
     left = next((tmp_path / "again" / STORE).rglob("c")) / "0.0123456789abcdef.partial"
     left.write_bytes(b"half")
     assert flown(path, tmp_path / "again") == whole
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\x00junk"])
+def test_a_torn_flag_is_no_flag(small, tmp_path, content):
+    """As a power cut leaves it: the task is done again, the status of the campaign can be told all the while."""
+    path, whole = small
+    (tmp_path / "whole" / STORE / "done" / "c" / "1").write_bytes(content)
+    assert load(tmp_path / "whole").rows.sizes["trial"] == 24
+    counted = []
+    assert flown(path, tmp_path / "whole", watch=lambda tally: counted.append(tally.done)) == whole
+    assert counted == [24, 40]
+
+
+EDITS = {
+    "codecs": ('"endian": "little"', '"endian": "big"'),
+    "attributes": ('"units": "m, rad"', '"units": "ft, rad"'),
+    "data_type": ('"data_type": "float64"', '"data_type": "int64"'),
+    "fill_value": ('"fill_value": "NaN"', '"fill_value": 0.0'),
+    "chunk_grid": ('"chunk_shape": [\n        16', '"chunk_shape": [\n        8'),
+    "dimension_names": ('"draw"\n', '"drew"\n'),
+    "attributes ": ('"units":', '"scale_factor": 2.0, "units":'),
+}
+
+
+@pytest.mark.parametrize("key", EDITS)
+def test_metadata_that_were_edited_are_told(small, tmp_path, key):
+    """With others the same chunks are other numbers. Nothing is read, and nothing flown, until they are put back."""
+    path, whole = small
+    file = tmp_path / "whole" / STORE / "tracking_rms" / "zarr.json"
+    before = file.read_text()
+    old, new = EDITS[key]
+    assert old in before
+    edited = before.replace(old, new).replace('"NaN"', "0") if key == "data_type" else before.replace(old, new)
+    file.write_text(edited)
+    said = re.escape(f"{file} with another {key.strip()}")
+    for attempt in (lambda: load(tmp_path / "whole"), lambda: flown(path, tmp_path / "whole", nothing)):
+        with pytest.raises(BadInput, match=f"must hold a store as it was written, but is {said}"):
+            attempt()
+    file.write_text(before)
+    assert flown(path, tmp_path / "whole", nothing) == whole

@@ -275,8 +275,12 @@ def test_mistake_is_one_exact_line(refused, tmp_path, mistake):
         ("# nothing\n", "`SCENARIO` must be a mapping of keys to values, but is empty (s.yaml)"),
         ("- plant\n", "`SCENARIO` must be a mapping of keys to values, but is a list (s.yaml)"),
         ("plant", "`SCENARIO` must be a mapping of keys to values, but is a single str (s.yaml)"),
-        ("[" * 1000, "`SCENARIO` must be less deeply nested (s.yaml)"),
-        ("a: &a [*a]\n", "`a` must be a key of the scenario, but is unknown (s.yaml, line 1)"),
+        ("[" * 1000, "`SCENARIO` must have at most 20 levels, but is more deeply nested (s.yaml, line 1)"),
+        ("a: &a [*a]\n", f"{YAML} found undefined alias 'a' (s.yaml, line 1)"),
+        ("a: 1\n---\nb: 2\n", "`SCENARIO` must be one YAML document, but is several (s.yaml, line 2)"),
+        ("? [a, b]\n: 1\n", "`SCENARIO` must have words for keys, but is a list or mapping for a key (s.yaml, line 1)"),
+        ("loop: {<<: 3}", f"{YAML} `<<` takes a mapping, or a list of them (s.yaml, line 1)"),
+        ("seed: 1" + 5000 * "0", f"{YAML} Exceeds the limit (4300 digits) for integer string conversion"),
     ],
 )
 def test_file_that_is_no_scenario(refused, tmp_path, text, said):

@@ -152,3 +152,65 @@ except KeyboardInterrupt:
         assert process.stdout.readline() == "ended\n"
         process.kill()
     assert time.monotonic() - began < 25
+
+
+IMPORTING = """
+import sys, time
+import importlib.abc
+
+class Slow(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "undertow.cli.{module}":
+            open("begun", "w").close()
+            time.sleep(1.5)  # as long as JAX takes on a slow disk
+
+sys.meta_path.insert(0, Slow())
+sys.argv = ["undertow", *{arguments}]
+from undertow.cli.main import main
+main()
+"""
+EVERY = {
+    "reproduce": ("reproduce", ["reproduce", "--out", "out"]),
+    "check": ("check", ["check", "s.yaml"]),
+    "describe": ("describe", ["describe", "odin"]),
+    "list": ("list_parts", ["list"]),
+    "simulate": ("simulate", ["simulate", "s.yaml"]),
+}
+
+
+@pytest.mark.parametrize("signal", [2, 15])
+@pytest.mark.parametrize("command", EVERY)
+def test_signals_while_modules_are_imported_end_every_command(tmp_path, command, signal):
+    """It may not be forgotten by those that wait for no compiled code; SIGTERM ends like Ctrl-C, with its own code."""
+    write(tmp_path)
+    module, arguments = EVERY[command]
+    code = IMPORTING.replace("{module}", module).replace("{arguments}", repr(arguments))
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as it:
+        wait_for(tmp_path / "begun", it)
+        it.send_signal(signal)
+        out, err = it.communicate(timeout=60)
+    assert (it.returncode, err) == (128 + signal, b""), out
+    assert sorted(os.listdir(tmp_path)) == ["begun", "s.yaml"]
+
+
+def test_sigterm_leaves_nothing_of_a_run(tmp_path):
+    """Nor does the lock stay, nor the folder that results were to appear in."""
+    write(tmp_path, SCENARIO.replace("duration: 0.1", "duration: 9000"))
+    command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line.startswith("building"):
+                break
+        assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == [".s.lock", ".s.partial"]
+        process.terminate()
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 143 and "Traceback" not in err
+    assert os.listdir(tmp_path) == ["s.yaml"]
+
+
+def wait_for(path, process):
+    while not path.exists() and process.poll() is None:
+        time.sleep(0.01)

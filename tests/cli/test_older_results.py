@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.scenario.provenance import content_hash
+from undertow.scenario.provenance import checksum, content_hash
 from undertow.scenario.repetition import compare
 
 
 def labelled(**columns):
     run = xr.Dataset({name: ("time", values) for name, values in columns.items()}, coords={"time": [0.0, 1.0]})
-    return run.assign_attrs(content_hash=content_hash(run), scenario="", version_undertow="0.1.0")
+    run = run.assign_attrs(content_hash=content_hash(run), scenario="", version_undertow="0.1.0")
+    return run.assign_attrs(checksum=checksum(run))
 
 
 NOW = labelled(position=np.array([1.0, 2.0]), lyapunov=np.array([4.0, 3.0]), lyapunov_rate=np.array([np.nan, -1.0]))
@@ -36,7 +37,14 @@ def test_an_older_file_that_differs_is_explained(written):
     found = compare(written(labelled(position=np.array([1.0, 2.5]))), NOW)
     assert not found.equal and found.explained
     said = "before.nc was not repeated bit for bit; other versions: one without lyapunov, lyapunov_rate"
-    assert found.sentence == said
+    assert found.sentence == f"{said}. What differs: position"
+
+
+def test_a_file_from_before_there_were_checksums_is_told(written):
+    before = NOW.copy()
+    del before.attrs["checksum"]
+    found = compare(written(before), NOW)
+    assert found.equal and found.sentence.endswith("; it has no checksum that tells whether it is as it was written")
 
 
 def test_missing_rates_do_not_hide_a_difference(written):

@@ -49,10 +49,11 @@ def test_impossible_folder_is_refused_first(refused, tmp_path):
     assert refused("reproduce", "--out", "file") == "`--out` must be a folder, but is file, and file is a file"
 
 
-def test_failure_leaves_nothing(undertow, tmp_path, short_study, monkeypatch):
+def test_a_report_that_cannot_be_written_costs_no_results(undertow, tmp_path, short_study, monkeypatch):
     def fail(found, folder):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(command, "write", fail)
     assert undertow("reproduce").code == 4
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["reproduction"]
+    assert (tmp_path / "reproduction" / "results.json").is_file()

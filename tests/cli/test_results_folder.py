@@ -2,8 +2,9 @@
 
 import pytest
 from good_scenario import SCENARIO
+from matplotlib.figure import Figure
 
-from undertow.cli.results_folder import next_free, results_folder
+from undertow.cli.results_folder import output_folder, results_folder
 from undertow.core.errors import BadInput
 
 NAMES = ("run.nc", "figures")
@@ -17,40 +18,42 @@ def fill(staging, text="new"):
 
 def test_appears_whole_with_its_parents(tmp_path):
     folder = tmp_path / "a" / "b"
-    with results_folder(folder, NAMES, "run.nc", overwrite=False) as staging:
-        fill(staging)
+    with results_folder(folder, NAMES, "run.nc", overwrite=False) as draft:
+        fill(draft.path)
         assert not folder.exists()
     assert sorted(path.name for path in folder.rglob("*")) == ["a.svg", "figures", "run.nc"]
     assert [path.name for path in folder.parent.iterdir()] == ["b"]
 
 
 def test_nothing_is_left_of_a_failure(tmp_path):
-    with pytest.raises(KeyboardInterrupt), results_folder(tmp_path / "a" / "b", NAMES, "run.nc", False) as staging:
-        fill(staging)
-        raise KeyboardInterrupt
+    folder = tmp_path / "a" / "b"
+    with pytest.raises(KeyboardInterrupt), output_folder(folder, folder):
+        with results_folder(folder, NAMES, "run.nc", False) as draft:
+            fill(draft.path)
+            raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
 
 
 def test_other_files_stay(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
-    with results_folder(tmp_path, NAMES, "run.nc", overwrite=False) as staging:
-        fill(staging)
+    with results_folder(tmp_path, NAMES, "run.nc", overwrite=False) as draft:
+        fill(draft.path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figures", "notes.txt", "run.nc"]
 
 
 def test_earlier_result_is_kept_unless_told(tmp_path):
-    with results_folder(tmp_path / "o", NAMES, "run.nc", overwrite=False) as staging:
-        fill(staging, "old")
+    with results_folder(tmp_path / "o", NAMES, "run.nc", overwrite=False) as draft:
+        fill(draft.path, "old")
     with (
         pytest.raises(BadInput, match="without an earlier result"),
         results_folder(tmp_path / "o", NAMES, "run.nc", False),
     ):
         pass
-    with pytest.raises(OSError), results_folder(tmp_path / "o", NAMES, "run.nc", overwrite=True) as staging:
+    with pytest.raises(OSError), results_folder(tmp_path / "o", NAMES, "run.nc", overwrite=True) as draft:
         raise OSError
     assert (tmp_path / "o" / "run.nc").read_text() == "old"
-    with results_folder(tmp_path / "o", NAMES, "run.nc", overwrite=True) as staging:
-        fill(staging)
+    with results_folder(tmp_path / "o", NAMES, "run.nc", overwrite=True) as draft:
+        fill(draft.path)
     assert (tmp_path / "o" / "figures" / "a.svg").read_text() == "new"
     assert sorted(path.name for path in (tmp_path / "o").iterdir()) == ["figures", "run.nc"]
 
@@ -62,14 +65,67 @@ def test_what_undertow_did_not_write_is_never_replaced(tmp_path):
             pass
 
 
-def test_next_free(tmp_path):
+def chosen(default):
+    with output_folder(None, default) as folder:
+        return folder
+
+
+def test_default_folder_is_the_first_that_is_free(tmp_path):
     folder = tmp_path / "w1"
-    assert next_free(folder) == folder
+    assert chosen(folder) == folder
     folder.mkdir()
-    assert next_free(folder) == folder
+    assert chosen(folder) == folder
     (folder / "run.nc").touch()
     (tmp_path / "w1-2").touch()
-    assert next_free(folder) == tmp_path / "w1-3"
+    assert chosen(folder) == tmp_path / "w1-3"
+
+
+def test_two_at_once_take_two_folders(tmp_path):
+    """Nobody says where: the second takes the next folder. Both want the same one: the second is told."""
+    folder = tmp_path / "runs" / "w1"
+    with output_folder(None, folder) as first, output_folder(None, folder) as second:
+        assert (first, second) == (folder, tmp_path / "runs" / "w1-2")
+        with pytest.raises(BadInput, match="be a folder that nothing else writes to"), output_folder(first, first):
+            pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_first_of_two_is_not_lost(tmp_path):
+    """The second waits until the first has ended, then finds its result, though there was none when it began."""
+    folder = tmp_path / "o"
+    with output_folder(folder, folder), results_folder(folder, NAMES, "run.nc", False) as draft:
+        fill(draft.path, "first")
+    with pytest.raises(BadInput, match="without an earlier result"), output_folder(folder, folder):
+        with results_folder(folder, NAMES, "run.nc", False):
+            pass
+    assert (folder / "run.nc").read_text() == "first"
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_what_a_killed_process_left_is_cleared_away(tmp_path, exists):
+    """Beside the folder, or in it where it was there; what somebody else left stays."""
+    folder, other = tmp_path / "o", tmp_path / ".other.partial"
+    for left in (other, (folder if exists else tmp_path) / ".o.partial"):
+        left.mkdir(parents=True)
+        (left / "half").touch()
+    (tmp_path / ".o.lock").touch()
+    with output_folder(None, folder) as chosen, results_folder(chosen, NAMES, "run.nc", False) as draft:
+        assert chosen == folder and list(draft.path.iterdir()) == []
+        fill(draft.path)
+    assert sorted(path.name for path in folder.iterdir()) == ["figures", "run.nc"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".other.partial", "o"]
+
+
+def test_what_is_published_stays_whatever_follows(tmp_path):
+    folder = tmp_path / "o"
+    for _ in range(2):  # new, and in place of an earlier one
+        with pytest.raises(KeyboardInterrupt), results_folder(folder, NAMES, "run.nc", overwrite=True) as draft:
+            (draft.path / "run.nc").write_text("new")
+            draft.publish()
+            (draft.path / "figures").mkdir()
+            raise KeyboardInterrupt
+        assert [path.name for path in folder.iterdir()] == ["run.nc"] and list(tmp_path.iterdir()) == [folder]
+        (folder / "figures").mkdir()  # of an earlier one
 
 
 @pytest.mark.parametrize(
@@ -97,3 +153,35 @@ def test_earlier_result_is_refused(refused, tmp_path):
         "`--out` must be a folder without an earlier result, but is out, which has run.nc. "
         "Add --overwrite to replace it, or choose another folder"
     )
+
+
+def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
+    """It is a warning; the other figures are drawn, and the exit code is that of the run."""
+
+    def drawings(run):
+        return {"tracking": lambda: 1 / 0, "error": Figure}
+
+    monkeypatch.setattr("undertow.cli.simulate.run_drawings", drawings)
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    assert said.code == 0
+    line = "Warning: figure `tracking` could not be drawn (ZeroDivisionError: division by zero); the results are whole"
+    assert said.err.splitlines()[-1] == line
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "figures",
+        "metrics.json",
+        "run.nc",
+        "scenario.yaml",
+    ]
+    assert sorted(path.name for path in (tmp_path / "out" / "figures").iterdir()) == ["error.png", "error.svg"]
+
+
+def test_an_interrupt_while_figures_are_drawn_costs_no_results(undertow, tmp_path, monkeypatch):
+    def interrupted(run):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("undertow.cli.simulate.run_drawings", interrupted)
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    assert undertow("simulate", "s.yaml", "--out", "out").code == 130
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["metrics.json", "run.nc", "scenario.yaml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "s.yaml"]

@@ -90,3 +90,34 @@ def test_wrong_options(refused, tmp_path):
         refused("tune", "s.yaml", "--out", "out", "--resume")
         == "`--resume` must find an unfinished tuning, but is nothing in out"
     )
+
+
+def test_a_budget_that_ends_while_compiling_gives_what_was_begun(undertow, tmp_path):
+    """No time for anything: the given gains are tried all the same, with some beside them, certified and judged."""
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    said = undertow("tune", "s.yaml", "--out", "out", "--budget", "1e-3")
+    assert said.code == 0, said
+    assert "ended by its budget before the search began" in said.out
+    found = json.loads((tmp_path / "out" / "tuning.json").read_text())
+    assert not found["finished"] and found["evaluations"] == 12
+    given, tuned = found["gains"]["given"], found["gains"]["tuned"]
+    assert tuned["train_cost"] <= given["train_cost"] and max(tuned["spectral_radii"]) < 1
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["figures", "tuned.yaml", "tuning.json"]
+
+
+def test_an_interrupt_before_the_first_answer_promises_nothing(undertow, tmp_path, monkeypatch):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    monkeypatch.setattr("undertow.studies.tuning.evaluation.Evaluation.costs", interrupted)
+    said = undertow("tune", "s.yaml", "--out", "out")
+    assert said.code == 130 and said.err == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
+
+
+@pytest.mark.parametrize("content", ["junk\n", '{"about": 1}\n[]\n', "\udcff\n"])
+def test_a_journal_that_cannot_be_read(refused, tmp_path, content):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "tuning.jsonl").write_bytes(content.encode("utf-8", "surrogateescape"))
+    assert refused("tune", "s.yaml", "--out", "out", "--resume").startswith(
+        "`--resume` must find a journal that can be"
+    )

@@ -6,9 +6,9 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from undertow.cli.exit_codes import DONE
+from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
-from undertow.cli.results_folder import next_free, results_folder
+from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
 from undertow.report.prediction_page import write_prediction
@@ -23,17 +23,21 @@ from undertow.studies.prediction.summary import summary
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 
 
-def analyze(scenario: Path, out: Path | None, overwrite: bool) -> int:
+def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool) -> int:
     """Exit code of a prediction whose page went to `out`, or to a folder under runs/ that was free."""
     console = wide_console()
-    folder = next_free(Path("runs") / f"{scenario.stem}-prediction") if out is None else out
-    with results_folder(folder, _WRITTEN, "prediction.json", overwrite) as staging:
-        built = build(read(scenario))
+    with (
+        output_folder(out, Path("runs") / f"{scenario.stem}-prediction") as folder,
+        results_folder(folder, _WRITTEN, "prediction.json", overwrite) as draft,
+    ):
+        built = build(read(scenario, allow_code=allow_code))
         with shares(console) as progress:
             prediction = interruptible(lambda: predict(built, progress))
         doubts = (*built.advice(), *advice(prediction))
-        (staging / "prediction.json").write_text(to_json(summary(prediction), indent=1) + "\n", encoding="utf-8")
-        write_prediction(prediction, doubts, staging)
+        text = to_json(summary(prediction), indent=1) + "\n"
+        (draft.path / "prediction.json").write_text(text, encoding="utf-8")
+        draft.publish()  # whatever becomes of the figures
+        warn_of(write_prediction(prediction, doubts, draft.path))
     for rows in tables(prediction):
         console.print(_table(rows))
     if prediction.why_not:

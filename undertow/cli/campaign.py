@@ -14,9 +14,9 @@ from rich.console import Console
 
 from undertow.cli.campaign_folder import check_folder, clear_folder
 from undertow.cli.campaign_short import sentences, table
-from undertow.cli.exit_codes import DONE, RUN_FAILED
+from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
-from undertow.cli.results_folder import next_free
+from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import Stages, shares
 from undertow.cli.tables import wide_console
 from undertow.core import checks
@@ -35,7 +35,13 @@ from undertow.studies.campaign.task import build_trial
 
 
 def campaign(
-    path: Path, out: Path | None, resume: bool, workers: int | None, where: str | None, overwrite: bool
+    path: Path,
+    out: Path | None,
+    resume: bool,
+    workers: int | None,
+    where: str | None,
+    overwrite: bool,
+    allow_code: bool,
 ) -> int:
     """Exit code of a campaign whose results went to `out`, or to a folder under runs/ that was free."""
     count = os.cpu_count() or 1 if workers is None else workers
@@ -43,24 +49,24 @@ def campaign(
     if where is not None:
         check_cluster(where)
     first = Path("runs") / path.stem
-    folder = out or (first if resume else next_free(first))
-    check_folder(folder, resume, overwrite)
-    console = wide_console()
-    stages = Stages(console)
-    with stages("building first trials"):
-        prepared = interruptible(lambda: prepare(path))
-    for sentence in prepared.advice:
-        typer.echo(f"Advice: {sentence}", err=True)
-    if not resume:
-        clear_folder(folder)
-    with _engine(where, count) as engine, _live(console) as watch:
-        try:
-            interruptible(lambda: conduct(prepared, folder, engine, watch))
-        except (KeyboardInterrupt, OSError):
-            if (folder / STORE).is_dir():
-                typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
-            raise
-    return _conclude(console, stages, prepared, folder)
+    with output_folder(out or (first if resume else None), first) as folder:
+        check_folder(folder, resume, overwrite)
+        console = wide_console()
+        stages = Stages(console)
+        with stages("building first trials"):
+            prepared = interruptible(lambda: prepare(path, allow_code))
+        for sentence in prepared.advice:
+            typer.echo(f"Advice: {sentence}", err=True)
+        if not resume:
+            clear_folder(folder)
+        with _engine(where, count) as engine, _live(console) as watch:
+            try:
+                interruptible(lambda: conduct(prepared, folder, engine, watch))
+            except (KeyboardInterrupt, OSError):
+                if (folder / STORE).is_dir():
+                    typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
+                raise
+        return _conclude(console, stages, prepared, folder)
 
 
 def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path) -> int:
@@ -71,7 +77,8 @@ def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path
         (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
         _write_worst(prepared, found["worst"], folder / "worst")
         title = prepared.trials.campaign.description or f"Campaign {prepared.trials.text.name}"
-        page = write_campaign(title, results, found, folder)
+        page, failures = write_campaign(title, results, found, folder)
+    warn_of(failures)
     console.print(table(results, found))
     for sentence in sentences(found):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)

@@ -4,9 +4,9 @@ import shutil
 from pathlib import Path
 
 from undertow.cli import results_folder
+from undertow.core.disk import alone
 from undertow.core.errors import BadInput
 from undertow.studies.campaign.conduct import STORE
-from undertow.studies.campaign.lock import check_free
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
@@ -32,8 +32,9 @@ def clear_folder(folder: Path) -> None:
     Raises:
         BadInput: it is being flown.
     """
-    if (folder / STORE).exists():
-        check_free(folder / STORE)
-    for name in _WRITTEN:
-        target = folder / name
-        shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
+    if not folder.exists():
+        return
+    with alone(folder / STORE):
+        for name in _WRITTEN:
+            target = folder / name
+            shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)

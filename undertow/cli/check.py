@@ -5,18 +5,17 @@ from typing import Any
 
 from rich.table import Table
 from rich.text import Text
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.tables import wide_console
 from undertow.core.errors import BadInput
 from undertow.scenario import checking
+from undertow.scenario.yaml_text import load
 
 
-def check(thing: str, options: Sequence[str]) -> int:
+def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
     """Print what a check finds and what follows from the numbers; exit code."""
-    report = checking.check(thing, dict(map(_option, options)))
+    report = checking.check(thing, dict(map(_option, options)), allow_code)
     console = wide_console()
     for sentence in report.sentences:
         print(sentence)
@@ -35,10 +34,7 @@ def _option(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if not equals or not key:
         raise BadInput("--option", "be KEY=VALUE", text)
-    try:
-        return key, YAML(typ="safe", pure=True).load(value)
-    except YAMLError:
-        raise BadInput("--option", "have a value that YAML can read", text) from None
+    return key, load(value, "", "--option")[0]
 
 
 def _counted(number: int, what: str) -> str:

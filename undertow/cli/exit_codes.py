@@ -3,25 +3,29 @@
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import typer
+
+from undertow.cli.interruptible import interrupted_by
 
 DONE = 0
 RUN_FAILED = 1
 BAD_INPUT = 2
 INTERNAL_ERROR = 3
 FILES_FAILED = 4
-INTERRUPTED = 130
+INTERRUPTED = 130  # by Ctrl-C; 143 by SIGTERM
+_BY_SIGNAL = 128  # and the number of the signal
 
 
 def run_guarded(command: Any, arguments: Sequence[str]) -> int:
     """Exit code of a command; whatever it raises becomes one line on stderr."""
     try:
-        return command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
+        code = command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
+        return _BY_SIGNAL + interrupted_by() if code == INTERRUPTED else code  # as typer makes of KeyboardInterrupt
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return _BY_SIGNAL + interrupted_by()
     except Exception as error:
         if os.environ.get("UNDERTOW_TRACEBACK") and not isinstance(error, typer.TyperException):
             traceback.print_exc()
@@ -33,6 +37,12 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
 def complain(sentence: str) -> None:
     """Say what is wrong, in one line."""
     print("Error: " + " ".join(sentence.split()), file=sys.stderr)
+
+
+def warn_of(sentences: Iterable[str]) -> None:
+    """Say what did not go well, though the command goes on: a line each."""
+    for sentence in sentences:
+        print("Warning: " + " ".join(sentence.split()), file=sys.stderr)
 
 
 def _explain(error: Exception) -> tuple[int, str]:

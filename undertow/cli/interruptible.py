@@ -1,28 +1,43 @@
-"""Waiting for compiled code in a way that Ctrl-C can end."""
+"""Ctrl-C and SIGTERM end a command at once, whatever it is doing: importing, waiting for compiled code, or anything."""
 
 import signal
 import threading
+import time
 from collections.abc import Callable
 from types import FrameType
 from typing import TypeVar
 
 Result = TypeVar("Result")
 
-_asked = threading.Event()
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_AGAIN = 0.05  # s, until it is looked again whether modules are still being imported
+_LONGEST = 20.0  # s, that an import is waited for: a file of the user's own may never end
+
+_asked: list[tuple[int, float]] = []  # the signals that came, and when
 
 
 def remember_interrupts() -> None:
-    """From now on a Ctrl-C that compiled code swallows on its way up ends the next wait all the same.
+    """From now on Ctrl-C and SIGTERM raise KeyboardInterrupt, and one that compiled code swallows is not forgotten.
 
     While modules are imported it waits for that: an exception leaves half of them, and compiled ones crash then.
     """
+    for one in _SIGNALS:
+        signal.signal(one, _handler)
+    signal.signal(signal.SIGALRM, _handler)
 
-    def handler(number: int, frame: FrameType | None) -> None:
-        _asked.set()
-        if not _importing(frame):
-            signal.default_int_handler(number, frame)
 
-    signal.signal(signal.SIGINT, handler)
+def interrupted_by() -> int:
+    """Number of the signal that ends this process: that of Ctrl-C unless another one came."""
+    return _asked[0][0] if _asked else signal.SIGINT
+
+
+def _handler(number: int, frame: FrameType | None) -> None:
+    if number != signal.SIGALRM:
+        _asked.append((number, time.monotonic()))
+    if _importing(frame) and time.monotonic() - _asked[0][1] < _LONGEST:
+        signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+    else:
+        raise KeyboardInterrupt
 
 
 def _importing(frame: FrameType | None) -> bool:
@@ -45,7 +60,7 @@ def interruptible(work: Callable[[], Result]) -> Result:
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
     while thread.is_alive():
-        if _asked.is_set():
+        if _asked:
             raise KeyboardInterrupt
         thread.join(0.1)
     if errors:

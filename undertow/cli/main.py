@@ -2,6 +2,7 @@
 
 import os
 import sys
+import threading
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,9 +10,13 @@ from typing import Annotated
 
 import typer
 
-from undertow.cli.exit_codes import INTERRUPTED, run_guarded
+from undertow.cli.exit_codes import run_guarded
 from undertow.cli.interruptible import remember_interrupts
 from undertow.process import prepare
+
+AllowCode = Annotated[
+    bool, typer.Option("--allow-code", help="Run the Python code that a result file names; a .yaml file's always runs.")
+]
 
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
 
@@ -24,7 +29,7 @@ def undertow(
     """Robust adaptive control of underwater vehicles, from volts to trajectory, that shows its own limits.
 
     Exit codes: 0 done; 1 done, but a run failed; 2 bad input; 3 internal error; 4 files could not be read or written;
-    130 interrupted.
+    130 interrupted by Ctrl-C, 143 by SIGTERM.
     """
     if traceback:
         os.environ["UNDERTOW_TRACEBACK"] = "1"
@@ -66,6 +71,7 @@ def simulate(
         bool,
         typer.Option("--prediction/--no-prediction", help="Whether to foretell the steady metrics beside the run."),
     ] = True,
+    allow_code: AllowCode = False,
 ) -> int:
     """Run one closed loop.
 
@@ -74,7 +80,7 @@ def simulate(
     """
     from undertow.cli.simulate import simulate
 
-    return simulate(scenario, out, overwrite, prediction)
+    return simulate(scenario, out, overwrite, prediction, allow_code)
 
 
 @app.command()
@@ -99,9 +105,12 @@ def tune(
     method: Annotated[
         str, typer.Option(metavar="METHOD", help="gradient, or search: without slopes, for what is not smooth.")
     ] = "gradient",
-    budget: Annotated[float, typer.Option(metavar="SECONDS", help="Time to take, all told.")] = 240.0,
+    budget: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Time to take; compiling and a first look are always finished.")
+    ] = 240.0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a tuning that was interrupted.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")] = False,
+    allow_code: AllowCode = False,
 ) -> int:
     """Find the gains of a controller.
 
@@ -111,7 +120,7 @@ def tune(
     """
     from undertow.cli.tune import tune_scenario
 
-    return tune_scenario(scenario, out, method, budget, resume, overwrite)
+    return tune_scenario(scenario, out, method, budget, resume, overwrite, allow_code)
 
 
 @app.command()
@@ -122,6 +131,7 @@ def analyze(
         typer.Option(metavar="DIR", help="Folder for the page. Default: runs/NAME-prediction, or the next free one."),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier prediction in DIR.")] = False,
+    allow_code: AllowCode = False,
 ) -> int:
     """Predict a closed loop before it is run.
 
@@ -131,7 +141,7 @@ def analyze(
     """
     from undertow.cli.analyze import analyze
 
-    return analyze(scenario, out, overwrite)
+    return analyze(scenario, out, overwrite, allow_code)
 
 
 @app.command()
@@ -150,6 +160,7 @@ def campaign(
         str | None, typer.Option(metavar="WHERE", help="Dask: local, slurm, ssh, or the address of a scheduler.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier campaign in DIR.")] = False,
+    allow_code: AllowCode = False,
 ) -> int:
     """Fly one scenario thousands of times.
 
@@ -161,10 +172,11 @@ def campaign(
 
     if str(campaign) == "status":
         told = {"--out": out, "--resume": resume, "--workers": workers, "--cluster": cluster, "--overwrite": overwrite}
+        told["--allow-code"] = allow_code
         return command.status(folder or Path(), [name for name, value in told.items() if value])
     if folder is not None:
         command.refuse_second(folder)
-    return command.campaign(campaign, out, resume, workers, cluster, overwrite)
+    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code)
 
 
 @app.command("list")
@@ -210,6 +222,7 @@ def check(
         list[str] | None,
         typer.Option("--option", metavar="KEY=VALUE", help="Option of the part, e.g. parameters=wu2018; repeatable."),
     ] = None,
+    allow_code: AllowCode = False,
 ) -> int:
     """Check a vehicle, another part or a scenario.
 
@@ -218,7 +231,7 @@ def check(
     """
     from undertow.cli.check import check
 
-    return check(thing, option or [])
+    return check(thing, option or [], allow_code)
 
 
 @app.command()
@@ -241,7 +254,7 @@ def main() -> None:
     remember_interrupts()
     prepare()
     code = run(sys.argv[1:])
-    if code == INTERRUPTED:  # a compiled loop may still be running in its thread; nothing can stop it gently
+    if threading.active_count() > 1:  # one may be in compiled code, or compiling; nothing can stop it gently
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

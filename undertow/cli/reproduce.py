@@ -5,7 +5,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from undertow.cli.results_folder import results_folder
+from undertow.cli.interruptible import interruptible
+from undertow.cli.results_folder import Draft, output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
 from undertow.report.reproduction import write
@@ -17,18 +18,22 @@ _WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios")
 def reproduce(out: Path, quick: bool) -> None:
     """Write the report to `out` and print its verdicts."""
     console = wide_console()
-    with results_folder(out, _WRITTEN, "results.json", overwrite=True) as staging:
-        report = out / _watched(console, staging, quick).relative_to(staging)
+    with (
+        output_folder(out, out) as folder,
+        results_folder(folder, _WRITTEN, "results.json", overwrite=True) as draft,
+    ):
+        report = folder / _watched(console, draft, quick).relative_to(draft.path)
     for line in _verdicts(out / "results.json"):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(f"Report: {report}", highlight=False, soft_wrap=True)
 
 
-def _watched(console: Console, folder: Path, quick: bool) -> Path:
+def _watched(console: Console, draft: Draft, quick: bool) -> Path:
     with shares(console) as progress:
-        found = study.reproduce(folder, quick, progress)
+        found = interruptible(lambda: study.reproduce(draft.path, quick, progress))
         progress("drawing", 0.9)
-        return write(found, folder)
+        draft.publish()  # whatever becomes of the figures
+        return interruptible(lambda: write(found, draft.path))
 
 
 def _verdicts(results: Path) -> list[str]:

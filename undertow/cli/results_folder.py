@@ -1,30 +1,90 @@
-"""Where results go: nothing half-written is left behind, nothing is silently destroyed."""
+"""Where results go: nothing half-written is left behind, nothing is silently destroyed, nobody else writes there."""
 
 import contextlib
+import itertools
 import os
 import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+from undertow.core.disk import InUse, alone, lock_of, settle, sync
 from undertow.core.errors import BadInput
 
 
-def next_free(folder: Path) -> Path:
-    """The folder, or folder-2, folder-3, ...: the first that does not exist or is empty."""
-    candidate, number = folder, 1
-    while candidate.is_file() or (candidate.is_dir() and any(candidate.iterdir())):
-        number += 1
-        candidate = folder.with_name(f"{folder.name}-{number}")
-    return candidate
+class Draft(NamedTuple):
+    """Results on their way.
+
+    Attributes:
+        path: the folder that they are written to.
+        publish: moves what is there to where results go; what is written later can follow.
+    """
+
+    path: Path
+    publish: Callable[[], None]
 
 
 @contextlib.contextmanager
-def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: bool) -> Iterator[Path]:
+def output_folder(out: Path | None, default: Path) -> Iterator[Path]:
+    """The folder that a command writes to, for it alone as long as it runs.
+
+    Args:
+        out: as the user wants it.
+        default: where nothing is said, this, or the first of default-2, default-3, ... that is free and nobody's.
+
+    Raises:
+        BadInput: another process is writing there, or nothing can be written.
+    """
+    folder = default if out is None else out
+    made = [parent for parent in (folder.parent, *folder.parent.parents) if not parent.exists()]
+    try:
+        with contextlib.ExitStack() as held:
+            if out is None:
+                folder = _next_held(default, held)
+            else:
+                _hold(out, held)
+            yield folder
+    finally:
+        for parent in made:
+            with contextlib.suppress(OSError):  # results are in it
+                parent.rmdir()
+
+
+def is_free(folder: Path) -> bool:
+    """Whether there is no such folder, or nothing in it but what a process left that was killed."""
+    if not folder.is_dir():
+        return not folder.exists()
+    return {path.name for path in folder.iterdir()} <= {_staging_name(folder), lock_of(folder).name}
+
+
+def _next_held(folder: Path, held: contextlib.ExitStack) -> Path:
+    for number in itertools.count(1):
+        candidate = folder if number == 1 else folder.with_name(f"{folder.name}-{number}")
+        if not is_free(candidate):
+            continue
+        with contextlib.ExitStack() as lock, contextlib.suppress(InUse):
+            _hold(candidate, lock)
+            if is_free(candidate):  # still
+                held.enter_context(lock.pop_all())
+                return candidate
+    raise AssertionError("there are always further numbers")
+
+
+def _hold(folder: Path, held: contextlib.ExitStack) -> None:
+    _check_place(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        held.enter_context(alone(folder))
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+@contextlib.contextmanager
+def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: bool) -> Iterator[Draft]:
     """A staging folder whose contents move to `folder` when all has gone well, and vanish otherwise.
 
     Args:
-        folder: where results go; made when missing, parents too.
+        folder: where results go, held by `output_folder`; made when missing, parents too.
         names: files and folders that will be written.
         marker: the one of them by which an earlier result is known.
         overwrite: whether an earlier result may be replaced; files of other names always stay.
@@ -33,17 +93,13 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
         BadInput: `folder` cannot be used. Raised before anything is computed.
     """
     check_folder(folder, names, marker, overwrite)
-    made = [parent for parent in (folder.parent, *folder.parent.parents) if not parent.exists()]
     staging = _stage(folder)
+    publish = lambda: _publish(staging, folder, names, marker)
     try:
-        yield staging
-        _publish(staging, folder)
-    except BaseException:
+        yield Draft(staging, publish)
+        publish()
+    finally:
         shutil.rmtree(staging, ignore_errors=True)
-        for parent in made:
-            with contextlib.suppress(OSError):
-                parent.rmdir()
-        raise
 
 
 def check_folder(
@@ -58,9 +114,7 @@ def check_folder(
     Raises:
         BadInput: they may not.
     """
-    for part in (folder, *folder.parents):
-        if part.exists() and not part.is_dir():
-            raise BadInput("--out", "be a folder", f"{folder}, and {part} is a file")
+    _check_place(folder)
     taken = [name for name in names if (folder / name).exists()]
     if not taken:
         return
@@ -70,25 +124,55 @@ def check_folder(
         raise BadInput("--out", "be a folder without an earlier result", f"{folder}, which has {marker}", hint=hint)
 
 
+def _check_place(folder: Path) -> None:
+    for part in (folder, *folder.parents):
+        if part.exists() and not part.is_dir():
+            raise BadInput("--out", "be a folder", f"{folder}, and {part} is a file")
+
+
+def _unwritable(folder: Path, error: OSError) -> BadInput:
+    return BadInput("--out", "be a folder that can be written", f"{folder}: {error.strerror}")
+
+
+def _staging_name(folder: Path) -> str:
+    return f".{folder.resolve().name}.partial"
+
+
 def _stage(folder: Path) -> Path:
-    """A hidden folder inside `folder` if that exists, else beside it: on the same disk, so that moving is renaming."""
-    beside = folder if folder.exists() else folder.parent
+    """A hidden folder inside `folder` if that exists, else beside it: on the same disk, so that moving is renaming.
+
+    Its name tells whose it is: what a process left that was killed goes.
+    """
+    beside, inside = folder.parent / _staging_name(folder), folder / _staging_name(folder)
+    staging = inside if folder.exists() else beside
     try:
-        beside.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=f".{folder.resolve().name}.", suffix=".partial", dir=beside))
-        staging.chmod(0o755)
-        return staging
+        for left in (beside, inside):
+            if left.is_dir():
+                shutil.rmtree(left)
+        staging.mkdir(parents=True)
     except OSError as error:
-        raise BadInput("--out", "be a folder that can be written", f"{folder}: {error.strerror}") from None
+        raise _unwritable(folder, error) from None
+    return staging
 
 
-def _publish(staging: Path, folder: Path) -> None:
-    if not folder.exists():
+def _publish(staging: Path, folder: Path, names: Sequence[str], marker: str) -> None:
+    """Move everything, the marker last; with a marker, nothing of an earlier result stays."""
+    settle(staging)
+    if folder.exists():
+        new = sorted((path.name for path in staging.iterdir()), key=lambda name: name == marker)
+        stale = [name for name in names if name not in new] if marker in new else []
+        for name in stale:
+            _remove(folder / name)
+        for name in new:
+            if (folder / name).is_dir():
+                _remove(folder / name)
+            os.replace(staging / name, folder / name)
+    else:
         os.replace(staging, folder)
-        return
-    for new in staging.iterdir():
-        old = folder / new.name
-        if old.is_dir():
-            shutil.rmtree(old)
-        os.replace(new, old)
-    staging.rmdir()
+        staging.mkdir()
+    sync(folder)
+    sync(folder.parent)
+
+
+def _remove(path: Path) -> None:
+    shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)

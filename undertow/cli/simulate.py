@@ -5,15 +5,14 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
-from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
+from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.foresight import Foresight, beside, in_results, judgement
 from undertow.cli.interruptible import interruptible
-from undertow.cli.results_folder import next_free, results_folder
+from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import Stages
 from undertow.cli.tables import certificate_table, metrics_table, wide_console
 from undertow.core.status import Status
-from undertow.report.figures import run_figures
-from undertow.report.figures import save as save_figure
+from undertow.report.figures import run_drawings, save_all
 from undertow.scenario.build import build
 from undertow.scenario.execute import Executed, execute, save
 from undertow.scenario.labelling import certificate_of, metrics_text
@@ -24,16 +23,20 @@ from undertow.scenario.vehicle_findings import vehicle_doubts
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
 
-def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool) -> int:
+def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool) -> int:
     """Exit code of a run whose results went to `out`, or to a folder under runs/ that was free."""
     console = wide_console()
     stages = Stages(console)
-    folder = next_free(Path("runs") / scenario.stem) if out is None else out
-    with results_folder(folder, _WRITTEN, "run.nc", overwrite) as staging:
-        executed, foresight = _run(scenario, stages, prediction)
-        with stages("figures and files"):
-            _write(executed, foresight, staging)
-        repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
+    with (
+        output_folder(out, Path("runs") / scenario.stem) as folder,
+        results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
+    ):
+        executed, foresight = _run(scenario, stages, prediction, allow_code)
+        with stages("files and figures"):
+            _write(executed, foresight, draft.path)
+            repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
+            draft.publish()  # whatever becomes of the figures
+            warn_of(save_all(lambda: run_drawings(executed.dataset), draft.path / "figures").failures)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
         typer.echo(f"Advice: left to XLA, which is slower, as lanes (docs/lanes.md) lack something: {why}.", err=True)
@@ -50,9 +53,9 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
     return max(codes)
 
 
-def _run(path: Path, stages: Stages, prediction: bool) -> tuple[Executed, Foresight | None]:
+def _run(path: Path, stages: Stages, prediction: bool, allow_code: bool) -> tuple[Executed, Foresight | None]:
     with stages("reading"):
-        text = read(path)
+        text = read(path, allow_code=allow_code)
     with stages("building"):
         built = build(text)
     for sentence in (*built.advice(), *vehicle_doubts(built)):
@@ -65,9 +68,6 @@ def _write(executed: Executed, foresight: Foresight | None, folder: Path) -> Non
     save(executed.dataset, folder / "run.nc")
     (folder / "metrics.json").write_text(metrics_text(executed.dataset, in_results(foresight)), encoding="utf-8")
     (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
-    (folder / "figures").mkdir()
-    for name, figure in run_figures(executed.dataset).items():
-        save_figure(figure, folder / "figures", name)
 
 
 def _judge_ending(executed: Executed) -> int:

@@ -61,10 +61,10 @@ def _consequences(certificate: dict[str, Any]) -> list[str]:
             f"{_number(certificate['residual'])} to stay."
         )
     if "estimation_within" in certificate:
-        kept = certificate["estimation_within"]
+        kept, allowed = certificate["estimation_within"], certificate["estimation_bound"]
         said.append(
             f"|d_hat - d| within what the largest recorded |d_dot| allows (up to "
-            f"{_number(max(certificate['estimation_bound']))}): {_share(kept['steady'])} of the steady window."
+            f"{_number(None if None in allowed else max(allowed))}): {_share(kept['steady'])} of the steady window."
         )
     return said
 
@@ -84,5 +84,8 @@ def _share(value: float | None) -> str:
     return f"{100 * value:.0f} %"
 
 
-def _number(value: float) -> str:
+def _number(value: float | None) -> str:
+    """In four digits; what is not finite is null in JSON, and has none."""
+    if value is None:
+        return "-"
     return "never" if value == float("inf") else f"{value:.4g}"

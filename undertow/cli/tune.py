@@ -10,16 +10,17 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from undertow.cli.exit_codes import DONE
+from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
-from undertow.cli.results_folder import next_free, results_folder
+from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.tables import wide_console
 from undertow.core import checks
-from undertow.report.figures import save as save_figure
+from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
 from undertow.scenario.labelling import to_json
 from undertow.scenario.reading import read
 from undertow.studies.tuning.answer import as_data, as_scenario
+from undertow.studies.tuning.journal import has_answers
 from undertow.studies.tuning.objective import Step
 from undertow.studies.tuning.tune import METHODS, Tuned, tune
 
@@ -27,19 +28,34 @@ _WRITTEN = ("tuned.yaml", "tuning.json", "figures")
 _JOURNAL = "tuning.jsonl"
 
 
-def tune_scenario(scenario: Path, out: Path | None, method: str, budget: float, resume: bool, overwrite: bool) -> int:
+def tune_scenario(
+    scenario: Path,
+    out: Path | None,
+    method: str,
+    budget: float,
+    resume: bool,
+    overwrite: bool,
+    allow_code: bool,
+) -> int:
     """Exit code of a tuning whose results went to `out`, or to a folder under runs/ that was free."""
     checks.choice("--method", method, METHODS)
     checks.positive("--budget", budget, "s")
     console = wide_console()
-    text = read(scenario)
-    folder = _folder(scenario, resume) if out is None else out
-    with results_folder(folder, _WRITTEN, "tuning.json", overwrite) as staging, _kept(folder, resume) as journal:
+    text, first = read(scenario, allow_code=allow_code), Path("runs") / f"{scenario.stem}-tuned"
+    with (
+        output_folder(_unfinished(first) if resume and out is None else out, first) as folder,
+        results_folder(folder, _WRITTEN, "tuning.json", overwrite) as draft,
+        _kept(folder) as journal,
+    ):
         with _live(console, budget) as (say, watch):
             run = lambda: tune(text, journal, method=method, budget=budget, resume=resume, say=say, watch=watch)
             found = interruptible(run)
-        _write(found, staging)
-    journal.unlink()
+        data = as_data(found)
+        (draft.path / "tuned.yaml").write_text(as_scenario(found), encoding="utf-8")
+        (draft.path / "tuning.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
+        draft.publish()  # whatever becomes of the figure
+        journal.unlink()
+        warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures").failures)
     console.print(_table(found))
     for line in _sentences(found):
         console.print(line, highlight=False, soft_wrap=True)
@@ -47,29 +63,25 @@ def tune_scenario(scenario: Path, out: Path | None, method: str, budget: float, 
     return DONE
 
 
-def _folder(scenario: Path, resume: bool) -> Path:
-    """Where a new tuning goes; where the last unfinished one is."""
-    first = Path("runs") / f"{scenario.stem}-tuned"
-    if not resume:
-        return next_free(first)
-    begun = [path.parent for path in Path("runs").glob(f"{first.name}*/{_JOURNAL}")]
+def _unfinished(first: Path) -> Path:
+    """Where the last unfinished tuning is."""
+    begun = [path.parent for path in first.parent.glob(f"{first.name}*/{_JOURNAL}")]
     return max(begun, key=lambda path: (path / _JOURNAL).stat().st_mtime, default=first)
 
 
 @contextlib.contextmanager
-def _kept(folder: Path, resume: bool) -> Iterator[Path]:
-    """The journal, which stays when a tuning is interrupted, and only then."""
+def _kept(folder: Path) -> Iterator[Path]:
+    """The journal, which stays when a tuning is interrupted after its first answer, and only then."""
     existed = folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
     journal = folder / _JOURNAL
     before = journal.exists()
     try:
         yield journal
-    except KeyboardInterrupt:
-        typer.echo(f"Interrupted. `undertow tune ... --out {folder} --resume` goes on.", err=True)
-        raise
-    except BaseException:
-        if not before:
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) and has_answers(journal):
+            typer.echo(f"Interrupted. `undertow tune ... --out {folder} --resume` goes on.", err=True)
+        elif not before:
             journal.unlink(missing_ok=True)
             if not existed:
                 with contextlib.suppress(OSError):
@@ -99,13 +111,6 @@ def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], Non
         yield say, watch
 
 
-def _write(found: Tuned, folder: Path) -> None:
-    (folder / "tuned.yaml").write_text(as_scenario(found), encoding="utf-8")
-    (folder / "tuning.json").write_text(to_json(as_data(found), indent=2) + "\n", encoding="utf-8")
-    (folder / "figures").mkdir()
-    save_figure(tuning_figure(as_data(found)), folder / "figures", "tuning")
-
-
 def _table(found: Tuned) -> Table:
     table = Table(title="Cost, mean over runs", title_justify="left", title_style="bold")
     for column in ("gains", "training", "held out", "tracking", "effort", "variation", "lost", "spectral radius"):
@@ -122,6 +127,8 @@ def _sentences(found: Tuned) -> list[str]:
     given, *_, tuned = found.judged
     options = ", ".join(f"{name} {_short(value)}" for name, value in (tuned.options or {}).items())
     ending = "ended by itself" if found.finished else "ended by its budget"
+    if found.searched == 0:
+        ending += " before the search began: only the given gains and some all over their ranges were tried"
     return [
         f"Tuned: {options}",
         f"Held-out cost {given.held_out_cost / tuned.held_out_cost:.3g} times smaller than with the given gains; "

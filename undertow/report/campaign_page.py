@@ -8,7 +8,7 @@ import numpy as np
 
 from undertow.report.campaign_tables import asked, by_choice, by_xla, distributions, endings, named, requirements, worst
 from undertow.report.figures.campaign import distributions_figure, sensitivity_figure
-from undertow.report.figures.writing import save
+from undertow.report.figures.writing import Drawings, Saved, save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, tag
 from undertow.studies.campaign.results import Results
@@ -28,8 +28,8 @@ _INTERVALS = (
 )
 
 
-def write_campaign(title: str, results: Results, found: Mapping[str, Any], folder: Path) -> Path:
-    """Write `campaign.html`, and every figure as SVG and PNG into `figures/`.
+def write_campaign(title: str, results: Results, found: Mapping[str, Any], folder: Path) -> tuple[Path, list[str]]:
+    """Write `campaign.html`, and every figure as SVG and PNG into `figures/`; what could not be drawn, in sentences.
 
     Args:
         title: of the page.
@@ -40,11 +40,13 @@ def write_campaign(title: str, results: Results, found: Mapping[str, Any], folde
     Raises:
         OSError: the folder cannot be written.
     """
-    drawn = _drawn(results, found, folder)
+    saved = save_all(lambda: _drawings(results, found), folder / "figures")
+    drawn = _drawn(saved)
     page = document(
         title,
         tag("h1", prose(title)),
         tag("p", f"{found['done']} of {found['trials']} trials", class_="lead"),
+        *(tag("p", prose(sentence)) for sentence in saved.failures),
         section("endings", "How they ended", *_endings(found)),
         *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(found)),
         section("metrics", "Distributions", drawn["distributions"], distributions(results, found)),
@@ -54,7 +56,7 @@ def write_campaign(title: str, results: Results, found: Mapping[str, Any], folde
     )
     path = folder / "campaign.html"
     path.write_text(page, encoding="utf-8")
-    return path
+    return path, saved.failures
 
 
 def _endings(found: Mapping[str, Any]) -> list[Html]:
@@ -82,19 +84,22 @@ def _how(found: Mapping[str, Any]) -> Html:
     return tag("p", prose(f"{order} {again} {by_xla(found)}".rstrip()))
 
 
-def _drawn(results: Results, found: Mapping[str, Any], folder: Path) -> dict[str, Html]:
-    """Figures by name; nothing where there is nothing to draw."""
+def _drawings(results: Results, found: Mapping[str, Any]) -> Drawings:
+    """What makes each figure; nothing where there is nothing to draw."""
     values, units = _values(results, found), {metric: results.unit(metric) for metric in results.metrics}
     figures = {
-        "distributions": distributions_figure(values, _flown(found), units) if values else None,
-        "sensitivity": sensitivity_figure(found["sensitivity"]) if found["sensitivity"] else None,
+        "distributions": (lambda: distributions_figure(values, _flown(found), units)) if values else None,
+        "sensitivity": (lambda: sensitivity_figure(found["sensitivity"])) if found["sensitivity"] else None,
     }
-    drawn = dict.fromkeys(figures, Html(""))
-    for name, one in figures.items():
-        if one is not None:
-            vector, _ = save(one, folder / "figures", name)
-            drawn[name] = figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
-    return drawn
+    return {name: make for name, make in figures.items() if make is not None}
+
+
+def _drawn(saved: Saved) -> dict[str, Html]:
+    """Figures by name, for the page."""
+    return dict.fromkeys(_CAPTIONS, Html("")) | {
+        name: figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
+        for name, vector in saved.vectors.items()
+    }
 
 
 def _flown(found: Mapping[str, Any]) -> dict[str, int]:

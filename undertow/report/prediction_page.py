@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from undertow.report.figures.prediction import prediction_figures
-from undertow.report.figures.writing import save
+from undertow.report.figures.prediction import prediction_drawings
+from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import bullets, document, figure, section, table, tag
 from undertow.report.prediction_tables import Rows, tables
@@ -18,15 +18,15 @@ _CAPTIONS = {
 }
 
 
-def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path) -> Path:
-    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`.
+def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path) -> list[str]:
+    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`; what could not be drawn, in sentences.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    drawn = []
-    for name, one in prediction_figures(prediction).items():
-        vector, _ = save(one, folder / "figures", name)
+    saved = save_all(lambda: prediction_drawings(prediction), folder / "figures")
+    drawn = [tag("p", prose(sentence)) for sentence in saved.failures]
+    for name, vector in saved.vectors.items():
         said = _CAPTIONS[name]
         drawn.append(figure(vector.read_text(encoding="utf-8"), name, said, said))
     title = prediction.ground.built.scenario.description or "a closed loop"
@@ -40,9 +40,8 @@ def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path
         section("drawn", "Figures", *drawn),
         tag("p", prose(LEFT_OUT), class_="small"),
     )
-    path = folder / "prediction.html"
-    path.write_text(page, encoding="utf-8")
-    return path
+    (folder / "prediction.html").write_text(page, encoding="utf-8")
+    return saved.failures
 
 
 LEFT_OUT = (

@@ -115,6 +115,6 @@ def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
     if scenario.loop.kind == "continuous":
         placed(text, "loop", lambda: continuous.check(loop))
     check_times(text, scenario.loop, scenario.steady)
-    if not workshop.seen((loop, [value and len(value) for _, value in scenario.initial])):
-        check_fit(text, loop, scenario.initial)
+    shape = (loop, [value and len(value) for _, value in scenario.initial])
+    workshop.check_once(shape, lambda: check_fit(text, loop, scenario.initial))
     return Built(loop.beginning_at(scenario.initial.position), scenario, resolved)

@@ -44,23 +44,24 @@ class Report(NamedTuple):
         return sum(finding.level == "error" for finding, _ in self.found)
 
 
-def check(thing: str, options: Mapping[str, Any]) -> Report:
+def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> Report:
     """Check a vehicle file, a scenario, a result file, a part by name, or `./file.py:function`.
 
     Args:
         thing: what to check.
         options: of the part, or keys of the vehicle file to change.
+        allow_code: whether code that a result file names may run.
 
     Raises:
         BadInput: it cannot be read or made at all.
     """
     if Path(thing).suffix == ".nc" or is_vehicle_file(thing):
-        return _check_file(Path(thing), options)
+        return _check_file(Path(thing), options, allow_code)
     return _joined([_of_part(*_named(thing, options))])
 
 
-def _check_file(path: Path, options: Mapping[str, Any]) -> Report:
-    text = read(path, "THING")
+def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Report:
+    text = read(path, "THING", allow_code)
     if "scenario" in text.data:
         hint = "`undertow campaign` checks one before it flies it; check its scenario in a file of its own"
         raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, a campaign", hint=hint)

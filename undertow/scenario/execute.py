@@ -18,6 +18,7 @@ from undertow.loop import continuous, in_lanes, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.scenario.build import Built, build, in_its_precision
+from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.labelling import label
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
@@ -62,6 +63,7 @@ def _execute(built: Built) -> Executed:
             "title": scenario.description or "a closed loop run by undertow",
             "scenario": text,
             "scenario_hash": text_hash(text),
+            "code": code_hashes(built.resolved, Path()),  # its paths are absolute
             "seed": scenario.seed,
         }
     )

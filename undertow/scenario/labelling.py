@@ -13,7 +13,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.loop.record import to_dataset
 from undertow.power.ledger import closure
-from undertow.scenario.provenance import content_hash, versions
+from undertow.scenario.provenance import checksum, content_hash, versions
 
 
 class Labelled(NamedTuple):
@@ -35,7 +35,7 @@ def label(
         outcome: how it went; the steady metrics are those it has accumulated, if any.
         window: start and stop of the steady metrics, s.
         dt: sampling time, s.
-        attributes: of the dataset, beside status, metrics, versions and content hash.
+        attributes: of the dataset, beside status, metrics, versions and hashes.
     """
     status, ended = Status(int(outcome.status)), float(outcome.ended)
     counted = {} if rules(loop) is None else {"rules": rules(loop)}
@@ -52,7 +52,9 @@ def label(
         dataset = dataset.assign(certified.signals)
         dataset.attrs["certificate"] = to_json(certified.summary)
     dataset.attrs |= attributes | versions()
-    dataset.attrs |= {"metrics": to_json({"steady": steady, "whole": whole}), "content_hash": content_hash(dataset)}
+    dataset.attrs["metrics"] = to_json({"steady": steady, "whole": whole})
+    dataset.attrs["content_hash"] = content_hash(dataset)
+    dataset.attrs["checksum"] = checksum(dataset)
     return Labelled(status, steady, whole, dataset)
 
 

@@ -1,15 +1,23 @@
-"""Where a result comes from: versions, machine class, hashes."""
+"""Where a result comes from: versions, machine class, code of others; and the sums that say whether it is as it was."""
 
 import hashlib
 import importlib.metadata
+import json
 import platform
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
 import xarray as xr
 
 _PACKAGES = ("undertow", "jax", "jaxlib", "equinox", "diffrax", "numpy")
+
+# Attributes of a result that are results themselves; those in JSON are claims one by one.
+_CLAIMED = ("status", "ended", "certificate")
+_CLAIMED_EACH = "metrics"
 
 
 def versions() -> dict[str, str]:
@@ -27,12 +35,63 @@ def text_hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def claims(dataset: xr.Dataset) -> dict[str, str]:
+    """Everything that a run claims, with a SHA-256 each: columns, status, and metrics one by one as `metrics.whole...`.
+
+    Equal if and only if the run repeated bit for bit. Versions, machine and words are no claims.
+    """
+    found = {str(name): _of_values(dataset[name].variable) for name in dataset.variables}
+    found |= {name: _of_words(dataset.attrs[name]) for name in _CLAIMED if name in dataset.attrs}
+    each = _leaves(json.loads(dataset.attrs.get(_CLAIMED_EACH, "{}")), _CLAIMED_EACH)
+    return found | {name: _of_words(value) for name, value in each}
+
+
 def content_hash(dataset: xr.Dataset) -> str:
-    """SHA-256 of every number in a dataset: equal if and only if a run repeated bit for bit."""
-    digest = hashlib.sha256()
-    for name in sorted(map(str, dataset.variables)):
-        values = np.asarray(dataset[name].values)
-        if values.dtype.kind in "fiub":
-            digest.update(name.encode())
-            digest.update(np.ascontiguousarray(values).tobytes())
+    """SHA-256 of all that a run claims: equal if and only if it repeated bit for bit."""
+    return text_hash(json.dumps(claims(dataset), sort_keys=True))
+
+
+def checksum(dataset: xr.Dataset) -> str:
+    """SHA-256 of a whole result, units and scenario included: its attribute `checksum`, unless it was changed since.
+
+    It tells damage and edits; it is no signature, as whoever changes a file on purpose can write another one.
+    """
+    attributes = {"": {key: value for key, value in dataset.attrs.items() if key != "checksum"}}
+    attributes |= {str(name): dict(variable.attrs) for name, variable in dataset.variables.items()}
+    words = {name: {key: _plain(value) for key, value in each.items()} for name, each in attributes.items()}
+    return text_hash(json.dumps([claims(dataset), words], sort_keys=True))
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of the contents of a file; empty where it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def _of_values(variable: xr.Variable) -> str:
+    values = np.asarray(variable.values)
+    numbers = values.dtype.kind in "fiub"
+    form = [*map(str, variable.dims), *map(str, values.shape), values.dtype.str if numbers else "text"]
+    digest = hashlib.sha256("\0".join(form).encode())
+    digest.update(np.ascontiguousarray(values).tobytes() if numbers else "\0".join(map(str, values.flat)).encode())
     return digest.hexdigest()
+
+
+def _of_words(value: Any) -> str:
+    return text_hash(json.dumps(_plain(value)))
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as netCDF gives it back: a list of one entry is the entry itself."""
+    entries = np.asarray(value).ravel().tolist() if not isinstance(value, str) else [value]
+    return entries[0] if len(entries) == 1 else entries
+
+
+def _leaves(node: Any, path: str) -> Iterator[tuple[str, Any]]:
+    if not isinstance(node, dict):
+        yield path, "null" if node is None else node
+        return
+    for key, value in node.items():
+        yield from _leaves(value, f"{path}.{key}")

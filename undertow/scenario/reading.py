@@ -8,15 +8,12 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from undertow.core.errors import BadInput
-
-Path_ = tuple[str | int, ...]
-
-# Aliases let a few lines of YAML stand for very many; no scenario comes near these.
-_MOST_KEYS = 100_000
-_DEEPEST = 20
+from undertow.core.foreign import python_says
+from undertow.scenario.foreign_code import check_allowed
+from undertow.scenario.provenance import checksum
+from undertow.scenario.yaml_text import Path_, load
 
 
 class Text(NamedTuple):
@@ -46,20 +43,21 @@ def key_path(name: str) -> Path_:
     return tuple(int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", name))
 
 
-def read(path: Path, what: str = "SCENARIO") -> Text:
+def read(path: Path, what: str = "SCENARIO", allow_code: bool = False) -> Text:
     """A scenario from a .yaml file, or the resolved one from a .nc result file.
 
     Args:
         path: of the file.
         what: the argument or key that names it, for messages.
+        allow_code: whether the Python code that a result file names may run; that of a .yaml file may.
 
     Raises:
-        BadInput: missing, unreadable or malformed file.
+        BadInput: missing, unreadable, malformed or damaged file, or one that names code that may not run.
     """
     if not path.is_file():
         raise BadInput(what, "be an existing file", str(path))
     if path.suffix == ".nc":
-        return _from_result(path, what)
+        return _from_result(path, what, allow_code)
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
@@ -80,15 +78,22 @@ def dump(data: Mapping[str, Any]) -> str:
     return stream.getvalue()
 
 
-def _from_result(path: Path, what: str) -> Text:
+def _from_result(path: Path, what: str, allow_code: bool) -> Text:
     try:
         with xr.open_dataset(path, engine="netcdf4") as dataset:
-            text = dataset.attrs.get("scenario")
-    except (OSError, ValueError) as error:
-        raise BadInput(what, "be a result file of undertow", f"{path.name}: {error}") from None
-    if text is None:
+            attributes, actual = dict(dataset.attrs), checksum(dataset)
+    except Exception as error:  # whatever netCDF and xarray say of a file that is torn, or no such file
+        raise BadInput(what, "be a result file of undertow", f"{path.name}: {python_says(error)}") from None
+    text = attributes.get("scenario")
+    if not isinstance(text, str):
         raise BadInput(what, "be a result file of undertow", f"{path.name}, which holds no scenario")
-    return parse(text, path.name, path.resolve().parent, what)
+    if attributes.get("checksum", actual) != actual:
+        hint = "Take its scenario.yaml instead, if that can be trusted"
+        got = f"{path.name}, which was changed or damaged since: its checksum does not hold"
+        raise BadInput(what, "be as it was written", got, hint=hint)
+    found = parse(text, path.name, path.resolve().parent, what)
+    check_allowed(found.data, path, attributes.get("code"), what, allow_code)
+    return found
 
 
 def parse(text: str, name: str, folder: Path, what: str) -> Text:
@@ -103,39 +108,11 @@ def parse(text: str, name: str, folder: Path, what: str) -> Text:
     Raises:
         BadInput: malformed.
     """
-    try:
-        tree = YAML(typ="rt").load(text)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f"{name}, line {mark.line + 1}" if mark else name
-        problem = " ".join((error.problem or "malformed").split())
-        raise BadInput(what, "be valid YAML", f"not: {problem}", where=where) from None
-    except (YAMLError, ValueError) as error:
-        raise BadInput(what, "be valid YAML", f"not: {error}", where=name) from None
-    except RecursionError:
-        raise BadInput(what, "be less deeply nested", where=name) from None
-    if not isinstance(tree, Mapping):
-        got = "empty" if tree is None else "a list" if isinstance(tree, list) else f"a single {type(tree).__name__}"
+    data, lines = load(text, name, what)
+    if not isinstance(data, dict):
+        got = "empty" if data is None else "a list" if isinstance(data, list) else f"a single {type(data).__name__}"
         raise BadInput(what, "be a mapping of keys to values", got, where=name)
-    lines: dict[Path_, int] = {}
-    return Text(_unwrapped(tree, (), lines, name, what), name, folder, lines)
-
-
-def _unwrapped(node: Any, path: Path_, lines: dict[Path_, int], name: str, what: str) -> Any:
-    """Same data without the reader's own classes; notes the line of every key and entry."""
-    if len(path) > _DEEPEST or len(lines) > _MOST_KEYS:
-        raise BadInput(what, f"have at most {_MOST_KEYS} keys and {_DEEPEST} levels", "larger", where=name)
-    if not isinstance(node, Mapping | list):
-        return _plain(node)
-    items = node.items() if isinstance(node, Mapping) else enumerate(node)
-    unwrapped = {}
-    for key, value in items:
-        label = key if isinstance(key, int) and isinstance(node, list) else str(key)
-        place = (node.lc.data or {}).get(key)  # pyright: ignore[reportAttributeAccessIssue]  (none where merged in)
-        if place is not None:
-            lines[(*path, label)] = place[0] + 1
-        unwrapped[label] = _unwrapped(value, (*path, label), lines, name, what)
-    return unwrapped if isinstance(node, Mapping) else list(unwrapped.values())
+    return Text(data, name, folder, lines)
 
 
 def _plain(node: Any) -> Any:

@@ -5,7 +5,11 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from undertow.scenario.provenance import content_hash
+from undertow.scenario.foreign_code import changed
+from undertow.scenario.provenance import claims
+from undertow.scenario.reading import parse
+
+_SHOWN = 3  # of what differs
 
 
 class Repetition(NamedTuple):
@@ -17,27 +21,38 @@ class Repetition(NamedTuple):
 
 
 def compare(path: Path, repeated: xr.Dataset) -> Repetition:
-    """Compare a run with the result file at `path`, whose scenario it followed."""
+    """Compare a run with the result file at `path`, whose scenario it followed and whose checksum, if any, held."""
     with xr.open_dataset(path, engine="netcdf4") as earlier:
-        before, actual, held = dict(earlier.attrs), content_hash(earlier), set(map(str, earlier.variables))
-    stated = str(before.get("content_hash"))
-    if actual != stated:
-        return Repetition(
-            False, False, f"{path.name} was changed after it was written: its numbers do not match its hash"
-        )
-    if stated == repeated.attrs["content_hash"]:
-        return Repetition(True, True, f"{path.name} was repeated bit for bit (content hash {stated[:12]})")
-    added = sorted({str(name) for name in repeated.variables} - held)
-    if added and stated == content_hash(repeated.drop_vars(added)):
-        sentence = f"{path.name} was repeated bit for bit in all that it holds; new since then: {', '.join(added)}"
-        return Repetition(True, True, sentence)
-    differing = _differences(before, repeated.attrs)
-    if added:
-        differing = ", ".join(filter(None, [differing, f"one without {', '.join(added)}"]))
-    if differing:
-        return Repetition(False, True, f"{path.name} was not repeated bit for bit; other versions: {differing}")
-    hint = " Did its part file change?" if ".py:" in str(before.get("scenario")) else ""
-    return Repetition(False, False, f"{path.name} was not repeated bit for bit, with the same versions.{hint}")
+        before, held = dict(earlier.attrs), claims(earlier)
+    now = claims(repeated)
+    differing, added = [name for name, claim in held.items() if now.get(name) != claim], sorted(set(now) - set(held))
+    code = _code(path, before)
+    if not differing:
+        which = f"in all that it holds; new since then: {_listed(added)}" if added else _short(repeated)
+        though = f", though {code}" if code else ""
+        unknown = "" if "checksum" in before else "; it has no checksum that tells whether it is as it was written"
+        return Repetition(True, True, f"{path.name} was repeated bit for bit {which}{though}{unknown}")
+    others = [_differences(before, repeated.attrs), code, f"one without {_listed(added)}" if added else ""]
+    reasons = ", ".join(filter(None, others))
+    why = f"; other versions: {reasons}" if reasons else ", with the same versions"
+    return Repetition(
+        False, bool(reasons), f"{path.name} was not repeated bit for bit{why}. What differs: {_listed(differing)}"
+    )
+
+
+def _short(repeated: xr.Dataset) -> str:
+    return f"(content hash {repeated.attrs['content_hash'][:12]})"
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:_SHOWN]) + (f" and {len(names) - _SHOWN} more" if names[_SHOWN:] else "")
+
+
+def _code(path: Path, before: dict) -> str:
+    """Files of code that are not as they were."""
+    scenario = parse(str(before.get("scenario") or "{}"), path.name, path.resolve().parent, "SCENARIO")
+    files = changed(before.get("code"), scenario.data, scenario.folder)
+    return ", ".join(f"{file} has other contents now" for file in files)
 
 
 def _differences(before: dict, now: dict) -> str:

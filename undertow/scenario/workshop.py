@@ -38,12 +38,12 @@ class Workshop:
             self._made[key] = (make(), given)  # with `given` alive, its identity stays its own
         return self._made[key][0]
 
-    def seen(self, tree: Any) -> bool:
-        """Whether a tree of parts of this shape was shown before."""
+    def check_once(self, tree: Any, check: Callable[[], None]) -> None:
+        """Call `check`, unless it has passed for a tree of parts of this shape before."""
         shape = structure(tree)
-        known = shape in self._checked
-        self._checked.add(shape)
-        return known
+        if shape not in self._checked:
+            check()
+            self._checked.add(shape)
 
 
 def structure(tree: Any) -> Any:

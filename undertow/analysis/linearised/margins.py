@@ -10,6 +10,7 @@ from undertow.analysis.linear import first_crossing
 from undertow.analysis.linearised.closing import LinearLoop, close_continuous, close_sampled
 from undertow.analysis.linearised.rest import Rest, rest
 from undertow.analysis.linearised.visible import multipliers, visible
+from undertow.core.errors import BadInput
 from undertow.loop.closed_loop import ClosedLoop
 
 # What control can reach, and what shows it: freedoms that no input moves are not the law's to stabilise.
@@ -21,8 +22,16 @@ _STABLE = 1 + 1e-9  # a spectral radius of one, and rounding
 
 
 def closed(at: Rest, dt: float, kind: str = "sampled", **between: float) -> LinearLoop:
-    """The closed loop of a scenario's kind; see `close_sampled` for what may stand `between` law and plant."""
-    return close_sampled(at, dt, **between) if kind == "sampled" else close_continuous(at, dt)
+    """The closed loop of a scenario's kind; see `close_sampled` for what may stand `between` law and plant.
+
+    Raises:
+        BadInput: its slopes are not finite where it rests.
+    """
+    found = close_sampled(at, dt, **between) if kind == "sampled" else close_continuous(at, dt)
+    if not all(np.isfinite(part).all() for part in (found.matrix, *found.entries.values(), *found.signals.values())):
+        hint = "`loop.dt` is too long for this plant, or some number too large"
+        raise BadInput("SCENARIO", "be a loop that can be linearised", "one whose slopes are not finite", hint=hint)
+    return found
 
 
 def poles(loop: LinearLoop) -> np.ndarray:

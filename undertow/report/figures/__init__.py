@@ -2,8 +2,10 @@
 
 from undertow.report.figures.ladder import ladder_figure as ladder_figure
 from undertow.report.figures.paper import paper_figures as paper_figures
+from undertow.report.figures.run import run_drawings as run_drawings
 from undertow.report.figures.run import run_figures as run_figures
 from undertow.report.figures.sweep import sweep_figure as sweep_figure
 from undertow.report.figures.writing import png as png
 from undertow.report.figures.writing import save as save
+from undertow.report.figures.writing import save_all as save_all
 from undertow.report.figures.writing import svg as svg

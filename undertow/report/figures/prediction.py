@@ -1,5 +1,6 @@
 """Figures of `undertow analyze`: poles, errors against frequency, and what the actuators can give."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,11 @@ _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#7a5c00")
 _DASHES = ("-", (0, (4, 1.6)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (2, 1)), (0, (8, 2)))
 
 
-def prediction_figures(prediction: Prediction) -> dict[str, Figure]:
-    """By name: poles, frequency, actuators (where inputs have limits)."""
-    figures = {"poles": _poles(prediction), "frequency": _frequency(prediction)}
+def prediction_drawings(prediction: Prediction) -> dict[str, Callable[[], Figure]]:
+    """What makes each figure, by name: poles, frequency, actuators (where inputs have limits)."""
+    figures = {"poles": lambda: _poles(prediction), "frequency": lambda: _frequency(prediction)}
     if np.isfinite(prediction.reach.high).any():
-        figures["actuators"] = _actuators(prediction)
+        figures["actuators"] = lambda: _actuators(prediction)
     return figures
 
 

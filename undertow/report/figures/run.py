@@ -1,5 +1,7 @@
 """Figures of any single run: any number of outputs and inputs, whether it lasted or not."""
 
+from collections.abc import Callable
+
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
@@ -19,6 +21,11 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
 
     With a law that has one, `certificate` too; with a sensor that errs, `measurement`.
     """
+    return {name: draw() for name, draw in run_drawings(run).items()}
+
+
+def run_drawings(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
+    """What makes each of the figures of a run."""
     outputs, columns = signals.axis_names(run), _columns(run.sizes["axis"])
     inputs = [f"input {number}" for number in run["input"].values]
     wanted = signals.curve(run, "wanted $x_d$", "target", style.TRUTH)
@@ -31,20 +38,20 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
     places, errors = signals.places(run), signals.per_axis(run, "|error|")
     rates = signals.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
     levels = [f"input, {run['voltage'].attrs['units']}"] * run.sizes["input"]
-    figures = {
-        "tracking": small_multiples(
+    figures: dict[str, Callable[[], Figure]] = {
+        "tracking": lambda: small_multiples(
             _titled(run, "Tracking"), outputs, [_block(run, [wanted, actual], places, 0.0)], columns
         ),
-        "error": small_multiples(
+        "error": lambda: small_multiples(
             _titled(run, "Tracking error"), outputs, [Block([error], errors, 1.4, scale="log", titled=True)], columns
         ),
-        "estimate": small_multiples(
+        "estimate": lambda: small_multiples(
             _titled(run, "Lumped uncertainty and its estimate"),
             outputs,
             [_block(run, [true, estimate], rates, settled(run))],
             columns,
         ),
-        "effort": small_multiples(
+        "effort": lambda: small_multiples(
             _titled(run, "Inputs"),
             inputs,
             [_block(run, [asked, applied], levels, settled(run))],
@@ -52,10 +59,11 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
         ),
     }
     if "lyapunov" in run:
-        figures["certificate"] = certificate(run, _titled(run, "Certificate"))
+        figures["certificate"] = lambda: certificate(run, _titled(run, "Certificate"))
     if (run["measured_position"] == run["position"]).all() and (run["measured_velocity"] == run["velocity"]).all():
         return figures
-    return figures | {"measurement": small_multiples(_titled(run, "Measurement error"), outputs, _apart(run), columns)}
+    figures["measurement"] = lambda: small_multiples(_titled(run, "Measurement error"), outputs, _apart(run), columns)
+    return figures
 
 
 def _apart(run: xr.Dataset) -> list[Block]:

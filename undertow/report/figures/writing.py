@@ -3,12 +3,16 @@
 import io
 import re
 import threading
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+
+from undertow.core.foreign import python_says
 
 DOTS_PER_INCH = 150
 
@@ -19,6 +23,16 @@ _WRITING = threading.Lock()
 
 _PATH = re.compile(r'( d=")([^"]+)(")')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
+
+
+Drawings = Mapping[str, Callable[[], Figure]]  # what makes each figure, by name
+
+
+class Saved(NamedTuple):
+    """Figures that were written, and a sentence for each that could not be."""
+
+    vectors: dict[str, Path]  # .svg, by name
+    failures: list[str]
 
 
 def svg(figure: Figure) -> str:
@@ -53,3 +67,24 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     vector.write_text(svg(figure), encoding="utf-8")
     raster.write_bytes(png(figure))
     return vector, raster
+
+
+def save_all(drawings: Callable[[], Drawings], folder: Path) -> Saved:
+    """Draw and write figures. One that cannot be drawn costs no other, and none the results that it would show.
+
+    Args:
+        drawings: gives what makes each figure, by name.
+        folder: made if need be.
+    """
+    saved = Saved({}, [])
+    try:
+        makers = drawings()
+    except Exception as error:  # whatever matplotlib and xarray say of numbers that nobody thought of
+        saved.failures.append(f"no figure could be drawn ({python_says(error)}); the results are whole")
+        return saved
+    for name, make in makers.items():
+        try:
+            saved.vectors[name], _ = save(make(), folder, name)
+        except Exception as error:
+            saved.failures.append(f"figure `{name}` could not be drawn ({python_says(error)}); the results are whole")
+    return saved

@@ -19,6 +19,9 @@ _DASK = {
     "distributed.admin.system-monitor.interval": "2s",
 }
 
+# Dask's status pages ask nobody who they are: this machine alone may look at those that are started here.
+_PAGE = "127.0.0.1:0"
+
 _INSTALL = "pip install 'undertow[campaign]'"
 
 
@@ -70,8 +73,14 @@ def _started(kind: str, workers: int) -> Any:
 
         from undertow.studies.campaign import local_worker
 
-        quiet = {"dashboard_address": ":0", "silence_logs": logging.CRITICAL}  # what matters is raised here
-        return LocalCluster(n_workers=workers, threads_per_worker=1, preload=[local_worker.__name__], **quiet)
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            preload=[local_worker.__name__],
+            host="127.0.0.1",
+            dashboard_address=_PAGE,
+            silence_logs=logging.CRITICAL,  # what matters is raised here
+        )
     if kind == "ssh":
         return _over_ssh(os.environ.get("UNDERTOW_HOSTS", ""), workers)
     return _in_slurm(workers)
@@ -86,7 +95,11 @@ def _over_ssh(names: str, workers: int) -> Any:
         raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
     logging.getLogger("distributed.deploy").setLevel(logging.ERROR)  # what goes wrong is said once, below
     try:
-        return SSHCluster([hosts[0], *hosts], worker_options={"nthreads": 1, "n_workers": workers})
+        return SSHCluster(
+            [hosts[0], *hosts],
+            scheduler_options={"dashboard_address": _PAGE},
+            worker_options={"nthreads": 1, "n_workers": workers, "dashboard_address": _PAGE},
+        )
     except (OSError, Error, RuntimeError) as error:
         reason = error.__cause__ or error
         hint = "`ssh HOST` must work without a question"
@@ -105,6 +118,11 @@ def _in_slurm(workers: int) -> Any:
         said = error.stderr.strip().splitlines() or ["sinfo fails"]
         raise BadInput("--cluster", "find a SLURM that answers", said[-1]) from None
     told = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
-    found = SLURMCluster(cores=told("cores", 1), memory=told("memory", "2 GB"))
+    found = SLURMCluster(
+        cores=told("cores", 1),
+        memory=told("memory", "2 GB"),
+        scheduler_options={"dashboard_address": _PAGE, **(told("scheduler-options", {}))},
+        worker_extra_args=["--dashboard-address", _PAGE, *told("worker-extra-args", [])],
+    )
     found.scale(jobs=workers)
     return found

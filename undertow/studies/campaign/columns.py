@@ -14,8 +14,9 @@ from undertow.studies.campaign.flying import LANES, XLA
 from undertow.studies.campaign.layout import DRAWS
 from undertow.studies.campaign.naming import is_number, words
 from undertow.studies.campaign.runs import planned
+from undertow.studies.campaign.schema import Campaign
 from undertow.studies.campaign.task import REFUSED
-from undertow.studies.campaign.trials import Trials
+from undertow.studies.campaign.trials import Trials, drawn
 
 # Codes of the columns `status` and `engine`, and their words.
 ENDINGS = {int(status): status.word for status in Status} | {REFUSED: "refused"}
@@ -43,11 +44,22 @@ ALWAYS: dict[str, dict[str, Any]] = {
 } | {name: _said(*MEANINGS[name]) for name in OVERALL}
 
 
+# Flag of a task that is done, and its attributes.
+DONE = "done"
+
+INPUT_UNIT = "input_unit"  # attribute of the store
+
+
 class Label(NamedTuple):
     """Of one array of the store."""
 
     dimensions: tuple[str, ...]
     attributes: dict[str, Any]
+    dtype: str = "float64"  # whatever the precision of the runs: a campaign may cross it
+
+
+FLAGS = Label(("task",), {"long_name": "1 for what is written"}, "uint8")
+_DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "engine": "int8"}
 
 
 def labels(several: Trials, built: Built) -> dict[str, Label]:
@@ -58,14 +70,19 @@ def labels(several: Trials, built: Built) -> dict[str, Label]:
         built: one of them.
     """
     of_input = built.closed_loop.plant.input_unit
-    always = ALWAYS | {name: _said(MEANINGS[name].meaning, unit_of(name, of_input)) for name in OVERALL}
-    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in several.columns()} | always
-    along = (*several.campaign.cross, DRAWS)
-    found = {name: Label(along, attributes) for name, attributes in of_trials.items()}
+    found, along = trial_labels(several.campaign, of_input), (*several.campaign.cross, DRAWS)
     for name in several.campaign.series.signals if several.campaign.series else ():
         said = _said(*record.meaning(name, built.closed_loop.plant)) | {"comment": _AFTER}
         found[f"series:{name}"] = Label((*along, *record.dimensions(name)), said)
     return found
+
+
+def trial_labels(campaign: Campaign, input_unit: str = "") -> dict[str, Label]:
+    """Labels of the columns that hold a number for each trial, by name; for a plant whose input has a unit."""
+    of_metrics = {name: _said(MEANINGS[name].meaning, unit_of(name, input_unit)) for name in OVERALL}
+    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in drawn(campaign)} | ALWAYS | of_metrics
+    along = (*campaign.cross, DRAWS)
+    return {name: Label(along, said, _DTYPES.get(name, "float64")) for name, said in of_trials.items()}
 
 
 def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:

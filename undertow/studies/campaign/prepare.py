@@ -33,14 +33,18 @@ class Prepared(NamedTuple):
     advice: tuple[str, ...]  # what is odd about it, or about the first trials
 
 
-def prepare(path: Path) -> Prepared:
+def prepare(path: Path, allow_code: bool = False) -> Prepared:
     """Read a campaign, and build the first trials of every combination, so that mistakes are told before anything runs.
+
+    Args:
+        path: of its file.
+        allow_code: whether the code that an earlier run.nc names may run, if that is its scenario.
 
     Raises:
         BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
     """
     campaign, source = read_campaign(path)
-    several = trials(campaign, source)
+    several = trials(campaign, source, allow_code)
     text, folder = whole(campaign, several.scenario.data), several.scenario.folder
     here = tasks.site(text, str(folder))
     firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]

@@ -8,9 +8,10 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.meanings import MEANINGS
+from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.studies.campaign.arrays import chunk_file, to_be_read
-from undertow.studies.campaign.columns import ALWAYS
+from undertow.studies.campaign.arrays import check_array, chunk_file, flags, to_be_read
+from undertow.studies.campaign.columns import DONE, FLAGS, INPUT_UNIT, trial_labels
 from undertow.studies.campaign.conduct import STORE
 from undertow.studies.campaign.layout import DRAWS, Layout, layout
 from undertow.studies.campaign.reading import read_text
@@ -82,6 +83,7 @@ def load(folder: Path) -> Results:
 
     Raises:
         FileNotFoundError: there are none.
+        BadInput: its metadata are not those that it was written with.
         OSError: they are damaged.
     """
     path = folder / STORE
@@ -91,21 +93,21 @@ def load(folder: Path) -> Results:
             raise FileNotFoundError(path)  # of a process that was killed before anything stood there
         campaign, _ = read_text(str(group.attrs["campaign"]), Path())
         stored = layout(campaign)._replace(chunk=tuple(group.attrs["chunk"]))
+        labels = trial_labels(campaign, str(group.attrs.get(INPUT_UNIT, "")))
+        for name, label in {**labels, DONE: FLAGS}.items():
+            if name in group:
+                check_array(group[name], label, (1,) if name == DONE else stored.chunk, path)
         return Results(campaign, _rows(group, campaign, stored).isel(trial=_done(group, campaign, stored, path)))
-    except FileNotFoundError:
+    except (FileNotFoundError, BadInput):
         raise
     except Exception as error:  # zarr's words for what is not as it was written
         raise OSError(f"{path} is damaged ({error}); `undertow campaign --resume` mends what can be mended") from error
 
 
-def _columns(campaign: Campaign) -> list[str]:
-    return [*(f"vary:{key}" for key in campaign.vary), *ALWAYS]
-
-
 def _rows(group: Any, campaign: Campaign, stored: Layout) -> xr.Dataset:
     """All of the store by trial, without series. While room for further draws is made, arrays may be longer."""
     axes, region = (*campaign.cross, DRAWS), tuple(slice(0, size) for size in stored.shape)
-    arrays = {name: group[name] for name in _columns(campaign) if name in group and name != "trial"}
+    arrays = {name: group[name] for name in trial_labels(campaign) if name in group and name != "trial"}
     rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})
     if arrays:
         rows = rows.stack({"trial": (DRAWS, *campaign.cross)}, create_index=False)  # as they are numbered
@@ -114,9 +116,8 @@ def _rows(group: Any, campaign: Campaign, stored: Layout) -> xr.Dataset:
 
 def _done(group: Any, campaign: Campaign, stored: Layout, path: Path) -> np.ndarray:
     """Which trials are of tasks that are done."""
-    done, names = np.zeros(campaign.number, dtype=bool), _columns(campaign)
-    flags = group["done"][: stored.tasks] if "done" in group else ()
-    for task in np.flatnonzero(flags):
+    done, names = np.zeros(campaign.number, dtype=bool), trial_labels(campaign)
+    for task in np.flatnonzero(flags(group[DONE], stored.tasks)) if DONE in group else ():
         block = stored.block(task)
         if all(chunk_file(path, name, block, len(block)).exists() for name in names):
             done[stored.trials(task)] = True

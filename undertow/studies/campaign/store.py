@@ -5,20 +5,17 @@ results = xr.open_zarr("runs/my-campaign/trials.zarr", consolidated=False)
 """
 
 import contextlib
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from undertow.studies.campaign.arrays import chunk_file, found_array, new_array, opened
-from undertow.studies.campaign.columns import Label
+from undertow.core.disk import alone, sync
+from undertow.studies.campaign.arrays import check_array, chunk_file, flags, found_array, new_array, opened
+from undertow.studies.campaign.columns import DONE, FLAGS, INPUT_UNIT, Label
 from undertow.studies.campaign.identity import Identity, draws
 from undertow.studies.campaign.layout import Layout
-from undertow.studies.campaign.lock import locked
-
-_DONE = "done"
 
 
 class Store:
@@ -46,7 +43,7 @@ class Store:
         self.layout, self._path, self._labels = layout, path, labels
         path.mkdir(parents=True, exist_ok=True)
         with contextlib.ExitStack() as held:
-            held.callback(os.close, locked(path))
+            held.enter_context(alone(path))
             self._open(identity, coordinates)
             self._held = held.pop_all()
 
@@ -60,34 +57,40 @@ class Store:
             identity.check_same(known, self._path.parent)
             self.layout = self.layout._replace(chunk=tuple(known["chunk"]))
         # Asking zarr for an array takes as long as writing it.
-        found = {name: found_array(self._group, name) for name in (_DONE, *self._labels)}
+        found = {name: found_array(self._group, name) for name in (DONE, *self._labels)}
         self._arrays = {name: array for name, array in found.items() if array is not None}
+        for name, array in self._arrays.items():
+            label, chunk = (FLAGS, (1,)) if name == DONE else (self._labels[name], self.layout.chunk)
+            check_array(array, label, chunk, self._path)
         if known:
             self._grow(draws(known["campaign"]))
         if known.get("campaign") != identity.asked:
             # All at once, as no process can be killed between two of them; and last, as a growth may be cut short.
             asked = {"campaign": identity.asked, "chunk": list(self.layout.chunk)}
+            if "input_rms" in self._labels:
+                asked[INPUT_UNIT] = self._labels["input_rms"].attributes["units"]
             self._group.update_attributes({**identity.attributes, **asked})
         for name, one in coordinates.items():  # always: a process may have been killed before their values stood there
-            new_array(self._group, name, one.dtype, one.shape, one.shape, Label((name,), one.attrs))[:] = one.values
-        if _DONE not in self._arrays:
-            label = Label(("task",), {"long_name": "1 for what is written"})
-            self._arrays[_DONE] = new_array(self._group, _DONE, np.dtype(np.uint8), (self.layout.tasks,), (1,), label)
+            label = Label((name,), one.attrs, one.dtype.str)
+            new_array(self._group, name, one.shape, one.shape, label)[:] = one.values
+        if DONE not in self._arrays:
+            self._arrays[DONE] = new_array(self._group, DONE, (self.layout.tasks,), (1,), FLAGS)
+        self._settle(*self._arrays, *coordinates)
 
     def _grow(self, before: int) -> None:
         """Make room for further draws."""
-        if _DONE in self._arrays and before < self.layout.draws:
+        if DONE in self._arrays and before < self.layout.draws:
             for task in self.layout._replace(draws=before).partial():
-                self._arrays[_DONE][task] = 0
+                self._arrays[DONE][task] = 0
         for name, array in self._arrays.items():
-            own = (self.layout.tasks,) if name == _DONE else self.layout.shape
+            own = (self.layout.tasks,) if name == DONE else self.layout.shape
             shape = (*own, *array.shape[len(own) :])
             if array.shape != shape:
                 array.resize(shape)
 
     def missing(self) -> list[int]:
         """Tasks to be done; those whose rows cannot be read are among them."""
-        done = np.asarray(self._arrays[_DONE][:])
+        done = flags(self._arrays[DONE], self.layout.tasks)
         return [task for task in range(self.layout.tasks) if not (done[task] and self._whole(task))]
 
     def write(self, task: int, columns: Mapping[str, np.ndarray]) -> None:
@@ -106,13 +109,20 @@ class Store:
             each = values.shape[1:]
             if name not in self._arrays:
                 shape, chunks = (*self.layout.shape, *each), (*self.layout.chunk, *each)
-                self._arrays[name] = new_array(self._group, name, values.dtype, shape, chunks, self._labels[name])
+                self._arrays[name] = new_array(self._group, name, shape, chunks, self._labels[name])
+                self._settle(name)
             self._arrays[name][region] = values.reshape(*covered, *each)
-        self._arrays[_DONE][task] = 1
+        self._arrays[DONE][task] = 1
 
     def close(self) -> None:
         """Let others write."""
         self._held.close()
+
+    def _settle(self, *names: str) -> None:
+        """Put the metadata of arrays on the disk: without them all is lost; a torn chunk is noticed and made again."""
+        for folder in (*(self._path / name for name in names), self._path):
+            sync(folder / "zarr.json")
+            sync(folder)
 
     def _whole(self, task: int) -> bool:
         region, block = self.layout.region(task), self.layout.block(task)

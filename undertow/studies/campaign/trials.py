@@ -80,18 +80,24 @@ class Trials(NamedTuple):
         return ""
 
     def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
-        """Key paths that are drawn, with the values by name where those are not numbers."""
-        for key, spread in self.campaign.vary.items():
-            named = spread.choice is not None and not all(map(is_number, spread.choice))
-            yield key, {words(entry): entry for entry in spread.choice or []} if named else None
+        """See `drawn`."""
+        return drawn(self.campaign)
 
 
-def trials(campaign: Campaign, text: Text) -> Trials:
+def drawn(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None]]:
+    """Key paths that are drawn, with the values by name where those are not numbers."""
+    for key, spread in campaign.vary.items():
+        named = spread.choice is not None and not all(map(is_number, spread.choice))
+        yield key, {words(entry): entry for entry in spread.choice or []} if named else None
+
+
+def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
     """The trials of a campaign.
 
     Args:
         campaign: what is asked for.
         text: that says so.
+        allow_code: whether the code that an earlier run.nc names may run, if that is its scenario.
 
     Raises:
         BadInput: no such scenario, or too many trials.
@@ -99,14 +105,14 @@ def trials(campaign: Campaign, text: Text) -> Trials:
     if campaign.number >= 2**31:
         raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", campaign.number)
     combinations = tuple(itertools.product(*(entries.values() for entries in campaign.cross.values())))
-    return Trials(campaign, text, _scenario(campaign, text), Draws(campaign), combinations)
+    return Trials(campaign, text, _scenario(campaign, text, allow_code), Draws(campaign), combinations)
 
 
-def _scenario(campaign: Campaign, text: Text) -> Text:
+def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
     given = campaign.scenario
     if isinstance(given, str):
         try:
-            found = read(text.folder / given, "scenario")
+            found = read(text.folder / given, "scenario", allow_code)
         except BadInput as error:
             raise error.at(where=error.where or text.where(("scenario",))) from error.__cause__
         if "scenario" in found.data:

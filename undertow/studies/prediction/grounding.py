@@ -31,7 +31,11 @@ class Ground(NamedTuple):
 
 
 def ground(built: Built) -> Ground:
-    """Where the loop of a scenario rests under the mean load of its steady window, and its linearisation there."""
+    """Where the loop of a scenario rests under the mean load of its steady window, and its linearisation there.
+
+    Raises:
+        BadInput: its slopes are not finite there.
+    """
     loop, settings = built.closed_loop, built.scenario.loop
     start, stop = built.window()
     position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)

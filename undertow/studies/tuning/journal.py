@@ -5,6 +5,7 @@ journal as far as it goes. The result is the same as without the interruption, b
 """
 
 import json
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from undertow.core.errors import BadInput
+
+_KEYS = ("what", "at", "answer", "elapsed")  # of an answer
 
 
 class OutOfTime(Exception):
@@ -49,14 +52,19 @@ class Journal:
             return self._known[self._asked]["elapsed"]
         return self._spent + time.perf_counter() - self._started
 
-    def ask(self, what: str, at: np.ndarray, compute: Callable[[], Any], last: bool = False) -> Any:
+    @property
+    def is_over(self) -> bool:
+        """Whether the budget is spent."""
+        return self.elapsed > self._budget
+
+    def ask(self, what: str, at: np.ndarray, compute: Callable[[], Any], must: bool = False) -> Any:
         """The answer, from the journal or computed and written down.
 
         Args:
             what: kind of question.
             at: its arguments.
             compute: gives the answer, as JSON holds it.
-            last: whether it must be answered even if time is up.
+            must: whether it must be answered even if time is up.
 
         Raises:
             OutOfTime: it would take longer than there is.
@@ -69,14 +77,24 @@ class Journal:
             self._asked += 1
             return found["answer"]
         begun = self.elapsed
-        if not last and begun + self._longest.get(what, 0.0) > self._budget:
+        if not must and begun + self._longest.get(what, 0.0) > self._budget:
             raise OutOfTime
         answer = compute()
         self._longest[what] = self.elapsed - begun if what in self._longest else 0.0  # the first one is compiled
         line = {"what": what, "at": place, "answer": answer, "elapsed": self.elapsed}
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
+            file.flush()
+            os.fsync(file.fileno())  # an answer takes longer to compute
         return answer
+
+
+def has_answers(path: Path) -> bool:
+    """Whether a journal holds an answer, so that there is something to go on from."""
+    try:
+        return path.read_bytes().count(b"\n") > 1
+    except OSError:
+        return False
 
 
 def _read(path: Path, about: str, resume: bool) -> list[dict[str, Any]]:
@@ -87,9 +105,14 @@ def _read(path: Path, about: str, resume: bool) -> list[dict[str, Any]]:
     if not resume:
         hint = "Add --resume to go on with it, or choose another folder"
         raise BadInput("--out", "be a folder without an unfinished tuning", str(path.parent), hint=hint)
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    entries = [json.loads(line) for line in lines if line.endswith("\n")]  # the last one may be torn
-    if not entries or entries[0].get("about") != about:
+    try:
+        lines = path.read_bytes().decode().splitlines(keepends=True)
+        entries = [json.loads(line) for line in lines if line.endswith("\n")]  # the last one may be torn
+        known = [{key: entry[key] for key in _KEYS} for entry in entries[1:]]
+    except (ValueError, KeyError, TypeError) as error:
+        hint = "Remove it to begin anew"
+        raise BadInput("--resume", "find a journal that can be read", f"{path}: {error!r}", hint=hint) from None
+    if entries[:1] not in ([], [{"about": about}]):  # a process may have been killed while it wrote the first line
         raise BadInput("--resume", "go on with the same scenario and method", "another one")
     path.write_text("".join(line for line in lines if line.endswith("\n")), encoding="utf-8")
-    return entries[1:]
+    return known

@@ -60,9 +60,17 @@ class Objective:
         """The best certified point so far."""
         return self.steps[-1] if self.steps else None
 
-    def costs(self, points: Points) -> np.ndarray:
-        """Cost of each point; one that would be the best, but is not certified, costs infinitely much."""
-        found = np.asarray(self._journal.ask("costs", points, lambda: _finite(self._computes.costs(points))))
+    def costs(self, points: Points, must: bool = False) -> np.ndarray:
+        """Cost of each point; one that would be the best, but is not certified, costs infinitely much.
+
+        Args:
+            points: shape (points, dials).
+            must: whether they are computed even if time is up.
+
+        Raises:
+            OutOfTime: it is.
+        """
+        found = np.asarray(self._journal.ask("costs", points, lambda: _finite(self._computes.costs(points)), must))
         self.evaluations += len(points)
         for i in np.argsort(found, kind="stable"):
             if self.best is not None and not found[i] < self.best.cost:
@@ -84,7 +92,7 @@ class Objective:
 
     def radius(self, point: np.ndarray) -> float:
         """Largest spectral radius of the loop there."""
-        return float(self._journal.ask("radius", point, lambda: min(self._certify(point).worst, 1e300), last=True))
+        return float(self._journal.ask("radius", point, lambda: min(self._certify(point).worst, 1e300), must=True))
 
 
 def _finite(costs: np.ndarray) -> list[float]:

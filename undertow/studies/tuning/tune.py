@@ -52,6 +52,7 @@ class Tuned(NamedTuple):
     refused: int  # points that would have been better, but were not certified
     elapsed: float  # s
     finished: bool  # by itself, not by the budget
+    searched: int  # points that were tried after the first ones
 
     @property
     def scenario(self) -> dict[str, Any]:
@@ -77,7 +78,7 @@ def tune(
         text: the scenario.
         journal: file that an interrupted tuning goes on from.
         method: gradient, downhill by forward differentiation, or search, differential evolution.
-        budget: s, all told; what is begun is finished.
+        budget: s, all told; what is begun is finished, and the first points are tried whatever it takes.
         resume: whether to go on from the journal.
         beside: other choices of options, by name, to be judged like the given and the tuned ones.
         say: told the stage.
@@ -96,14 +97,14 @@ def tune(
     make = lambda point: wanted.law(wanted.options(point))
     first = make(wanted.start)
     evaluation = Evaluation(wanted.bench, make, first, wanted.train)
-    if method == "gradient":
+    if method == "gradient" and not notes.is_over:
         evaluation.foresee_slope(wanted.start)
     certifier = Certifier(wanted.bench, wanted.train, first)
     objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
     say("compiling, and looking for a beginning")
     seed = wanted.built.scenario.seed
     others = spread_points(_BEGINNINGS - 1, len(wanted.dials), seed)
-    objective.costs(np.vstack([wanted.start, others]))
+    objective.costs(np.vstack([wanted.start, others]), must=True)  # however long compiling takes: or nothing is found
     start = objective.best
     if start is None:
         raise refusal(certifier(first), _BEGINNINGS)
@@ -125,7 +126,15 @@ def tune(
     if not judged[-1].certificate.holds:
         raise BadInput("tune", "find gains whose certificate holds after rounding", judged[-1].certificate.worst)
     return Tuned(
-        wanted, method, judged, objective.steps, objective.evaluations, objective.refused, notes.elapsed, finished
+        problem=wanted,
+        method=method,
+        judged=judged,
+        steps=objective.steps,
+        evaluations=objective.evaluations,
+        refused=objective.refused,
+        elapsed=notes.elapsed,
+        finished=finished,
+        searched=objective.evaluations - _BEGINNINGS,
     )
 
 

@@ -1,0 +1,38 @@
+"""Runs whose numbers leave what floating point holds: a status, a table with dashes, and all files; no internal error."""
+
+import jax
+import pytest
+
+from undertow.cli.tables import certificate_table, wide_console
+from undertow.scenario.execute import execute
+from undertow.scenario.labelling import certificate_of
+
+BASE = {
+    "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "rung": "ideal"}},
+    "controller": {"kind": "rcaf", "preset": "paper"},
+    "reference": {"kind": "setpoint", "position": [0.0] * 6},
+    "loop": {"duration": 0.05, "dt": 0.01, "record": 0.01},
+}
+
+
+@pytest.mark.parametrize("preset", ["paper", "robust"])
+@pytest.mark.parametrize(("velocity", "precision"), [(1e200, "float64"), (1e30, "float32")])
+def test_what_is_not_finite_is_a_dash(capsys, preset, velocity, precision):
+    before = jax.config.jax_enable_x64
+    try:
+        initial = {"velocity": [velocity] + [0.0] * 5}
+        done = execute(BASE | {"controller": {"preset": preset}, "initial": initial, "precision": precision})
+    finally:
+        jax.config.update("jax_enable_x64", before)
+    certificate = certificate_of(done.dataset)
+    assert done.status.word == "not_finite"
+    assert certificate is not None and certificate["start"] is None
+    wide_console().print(certificate_table(certificate, (0.025, 0.05)))
+    assert ": - at the start" in capsys.readouterr().out
+
+
+def test_bound_that_is_not_finite_is_a_dash(capsys):
+    known = {"function": "V", "start": 1.0, "end": None, "rising": {"whole": 0.0, "steady": None}, "hypotheses": []}
+    bound = {"estimation_bound": [1.0, None], "estimation_within": {"whole": 0.0, "steady": 0.0}}
+    wide_console().print(certificate_table(known | bound, (0.0, 1.0)))
+    assert "allows (up to -): 0 % of the steady window." in capsys.readouterr().out

@@ -1,0 +1,205 @@
+"""YAML 1.2 as plain data: mappings with words for keys, lists, text, numbers. No tags, and a size that is bounded.
+
+The text is composed from the parser's events, so that a file that stands for too much is refused while it is read:
+aliases let a few lines stand for billions of entries.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import (
+    AliasEvent,
+    DocumentStartEvent,
+    MappingEndEvent,
+    MappingStartEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+)
+from ruamel.yaml.nodes import ScalarNode
+
+from undertow.core.errors import BadInput
+
+Path_ = tuple[str | int, ...]
+
+_MOST, _DEEPEST = 50_000, 20
+
+_PREFIX = "tag:yaml.org,2002:"
+_MERGE = f"{_PREFIX}merge"
+
+
+class Malformed(Exception):
+    """Text that is no YAML, or none that is taken; the sentence of the complaint and its line, from 1."""
+
+    def __init__(self, must: str, got: str, line: int | None, hint: str = ""):
+        self.must, self.got, self.line, self.hint = must, got, line, hint
+        super().__init__(must)
+
+
+class _Node(NamedTuple):
+    """A value with the lines of its keys or entries, how many entries it stands for, and how deep it is."""
+
+    value: Any  # a scalar, or nodes by key, or a list of nodes
+    lines: dict[str | int, int]
+    size: int
+    depth: int
+
+
+def load(text: str, name: str, what: str) -> tuple[Any, dict[Path_, int]]:
+    """The only document of a text as plain data, and the line of every key and entry.
+
+    Args:
+        text: YAML.
+        name: of its file, for messages.
+        what: the argument or key that names it, for messages.
+
+    Raises:
+        BadInput: malformed, tagged, or too large.
+    """
+    try:
+        tree = _Composer(text).document()
+    except Malformed as error:
+        where = f"{name}, line {error.line}" if error.line and name else name
+        raise BadInput(what, error.must, error.got, where=where, hint=error.hint) from None
+    lines: dict[Path_, int] = {}
+    return _plain(tree, (), lines), lines
+
+
+def _plain(node: _Node, path: Path_, lines: dict[Path_, int]) -> Any:
+    """Same data, each alias a copy of its own."""
+    if not isinstance(node.value, dict | list):
+        return node.value
+    items = node.value.items() if isinstance(node.value, dict) else enumerate(node.value)
+    lines |= {(*path, key): line for key, line in node.lines.items()}
+    plain = {key: _plain(value, (*path, key), lines) for key, value in items}
+    return plain if isinstance(node.value, dict) else list(plain.values())
+
+
+class _Composer:
+    """From events to nodes."""
+
+    def __init__(self, text: str):
+        self._yaml = YAML(typ="safe", pure=True)
+        self._events = self._parsed(text)
+        self._anchors: dict[str, _Node] = {}
+        self._count = 0
+
+    def document(self) -> _Node:
+        """The first document, which must be the only one."""
+        nothing, documents = _Node(None, {}, 1, 0), []
+        for event in self._events:
+            if isinstance(event, DocumentStartEvent):
+                if documents:
+                    raise Malformed("be one YAML document", "several", event.start_mark.line + 1)
+                documents.append(self._node(next(self._events), 0))
+        return documents[0] if documents else nothing
+
+    def _parsed(self, text: str) -> Iterator[Any]:
+        try:
+            yield from self._yaml.parse(text)
+        except MarkedYAMLError as error:
+            mark = error.problem_mark or error.context_mark
+            raise _invalid(error.problem or "malformed", mark.line + 1 if mark else None) from None
+        except (YAMLError, ValueError) as error:
+            raise _invalid(str(error), None) from None
+
+    def _node(self, event: Any, depth: int) -> _Node:
+        line = event.start_mark.line + 1
+        if isinstance(event, AliasEvent):
+            if event.anchor not in self._anchors:
+                raise _invalid(f"found undefined alias {event.anchor!r}", line)
+            found = self._anchors[event.anchor]
+            self._counted(found.size, depth + found.depth, line)
+            return found
+        if event.tag is not None and not (isinstance(event, ScalarEvent) and str(event.tag) == "!"):
+            raise Malformed("be YAML without tags", f"tagged {event.tag}", line, "Leave the tag out")
+        self._counted(1, depth, line)
+        node = self._scalar(event) if isinstance(event, ScalarEvent) else self._collection(event, depth)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = node
+        return node
+
+    def _counted(self, size: int, depth: int, line: int) -> None:
+        self._count += size
+        if depth > _DEEPEST:
+            raise Malformed(f"have at most {_DEEPEST} levels", "more deeply nested", line)
+        if self._count > _MOST:
+            hint = "Put tables into CSV files, which parts take as `file`"
+            raise Malformed(f"have at most {_MOST} entries", "larger", line, hint)
+
+    def _collection(self, event: Any, depth: int) -> _Node:
+        if isinstance(event, MappingStartEvent):
+            value, lines = self._mapping(depth)
+        else:
+            assert isinstance(event, SequenceStartEvent)
+            value, lines = self._sequence(depth)
+        nodes = list(value.values()) if isinstance(value, dict) else value
+        return _Node(value, lines, 1 + sum(n.size for n in nodes), 1 + max((n.depth for n in nodes), default=0))
+
+    def _sequence(self, depth: int) -> tuple[list[_Node], dict[str | int, int]]:
+        entries: list[_Node] = []
+        lines: dict[str | int, int] = {}
+        while not isinstance(event := next(self._events), SequenceEndEvent):
+            lines[len(entries)] = event.start_mark.line + 1
+            entries.append(self._node(event, depth + 1))
+        return entries, lines
+
+    def _mapping(self, depth: int) -> tuple[dict[str, _Node], dict[str | int, int]]:
+        own: dict[str, _Node] = {}
+        lines: dict[str | int, int] = {}
+        merged: dict[str, _Node] = {}
+        while not isinstance(event := next(self._events), MappingEndEvent):
+            line = event.start_mark.line + 1
+            merge = self._resolved(event) == _MERGE
+            key = "<<" if merge else self._key(event, depth)
+            node = self._node(next(self._events), depth + 1)
+            if merge:
+                merged = {**_mergeable(node, line), **merged}
+                continue
+            if key in own:
+                said = f'found duplicate key "{key}" with value "{node.value}" (original value: "{own[key].value}")'
+                raise _invalid(said, line)
+            own[key], lines[key] = node, line
+        return {**own, **{key: node for key, node in merged.items() if key not in own}}, lines
+
+    def _key(self, event: Any, depth: int) -> str:
+        node = self._node(event, depth + 1)
+        if isinstance(node.value, dict | list):
+            raise Malformed("have words for keys", "a list or mapping for a key", event.start_mark.line + 1)
+        return str(node.value)
+
+    def _resolved(self, event: Any) -> str:
+        """What a scalar looks like: tag:yaml.org,2002:int, ..."""
+        if not isinstance(event, ScalarEvent):
+            return ""
+        return str(self._yaml.resolver.resolve(ScalarNode, event.value, event.implicit))
+
+    def _scalar(self, event: ScalarEvent) -> _Node:
+        kind = self._resolved(event).removeprefix(_PREFIX)
+        construct = self._yaml.constructor
+        makers = {
+            "int": construct.construct_yaml_int,
+            "float": construct.construct_yaml_float,
+            "bool": construct.construct_yaml_bool,
+            "null": construct.construct_yaml_null,
+        }
+        if kind not in makers:  # dates, too, are text
+            return _Node(event.value, {}, 1, 0)
+        try:
+            return _Node(makers[kind](ScalarNode(kind, event.value)), {}, 1, 0)
+        except ValueError as error:  # an integer of thousands of digits
+            raise _invalid(str(error), event.start_mark.line + 1) from None
+
+
+def _mergeable(node: _Node, line: int) -> dict[str, _Node]:
+    """What `<<` brings in: the keys of a mapping, or of several, of which the first one counts."""
+    several = node.value if isinstance(node.value, list) else [node]
+    if not all(isinstance(one.value, dict) for one in several):
+        raise _invalid("`<<` takes a mapping, or a list of them", line)
+    return {key: value for one in reversed(several) for key, value in one.value.items()}
+
+
+def _invalid(problem: str, line: int | None) -> Malformed:
+    return Malformed("be valid YAML", f"not: {' '.join(problem.split())}", line)
