@@ -1,6 +1,6 @@
 """Two worlds: undertow's vehicles, and the same ones in MuJoCo's C engine. Do they agree, and does one law fly both?
 
-python examples/mujoco_flight.py [FIGURE.png]          needs the extra: pip install "undertow[mujoco]"
+python examples/mujoco_flight.py [FIGURE.png]          needs the extra: pip install ".[mujoco]"
 """
 
 import sys

@@ -35,7 +35,7 @@ def test_predictions_are_written_and_shown(undertow, tmp_path):
     assert found["reach"]["high"] == [8.0, 8.0] and found["reach"]["held"] == 1.0
     assert found["reach"]["demand"] == pytest.approx([1.0, 2.0], rel=1e-3)
     poles = [complex(*row["expected"]) for row in found["closed_forms"]]
-    assert poles == pytest.approx([-30.0, -12.0], rel=1e-6)
+    assert poles == pytest.approx([-30.0, -15.0], rel=1e-6)
     page = (tmp_path / "out" / "prediction.html").read_text()
     assert page.count("<img") == 3 and "undefined" not in page and "nan" not in page.lower().replace("nano", "")
     for title in ("Poles over the operating range", "Error per unit of disturbance", "Actuators"):

@@ -25,7 +25,7 @@ def test_what_is_not_finite_is_a_dash(capsys, preset, velocity, precision):
     finally:
         jax.config.update("jax_enable_x64", before)
     certificate = certificate_of(done.dataset)
-    assert done.status.word == "not_finite"
+    assert done.status.word == "command_not_finite"
     assert certificate is not None and certificate["start"] is None
     wide_console().print(certificate_table(certificate, (0.025, 0.05)))
     assert ": - at the start" in capsys.readouterr().out

@@ -281,7 +281,7 @@ UNKNOWN = {
     "int8": (lambda x: x.astype(jnp.int8), "numbers of type int8"),
     "uint8": (lambda x: x.astype(jnp.uint8), "numbers of type uint8"),
     "float16": (lambda x: x.astype(jnp.float16) * 2, "numbers of type float16"),
-    "complex": (lambda x: jnp.abs(jax.lax.complex(x, x)), "numbers of type complex128"),
+    "complex": (lambda x: jnp.abs(jax.lax.complex(x, x)), "no rule for `complex`"),
     "a long scan": (
         lambda x: jax.lax.scan(lambda total, entry: (total + entry, total), x[0], jnp.arange(100.0)),
         "what is kept of a scan of 100 rounds",

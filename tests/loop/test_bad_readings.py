@@ -33,7 +33,7 @@ NAN, INF = float("nan"), float("inf")
 AMPLITUDE, FREQUENCY = 0.5, 1.0  # of the load, m/s^2 and rad/s
 BACK_ENDS = {"xla": sampled.simulate, "lanes": in_lanes.simulate}
 LAWS = {
-    "robust": lambda model: rcaf(model, preset="robust", sampling_time=DT),
+    "robust": lambda model: rcaf(model, preset="robust", sampling_time=DT, bandwidth=0.35 / DT),
     "pid": lambda model: pid(model, sampling_time=DT, frequency=3.0),
     "paper": lambda model: rcaf(model, pole=20.0, composite=20.0, adaptation=5.0, weights_bound=20.0),
 }

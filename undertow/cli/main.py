@@ -89,7 +89,8 @@ def bench(
 ) -> int:
     """Measure how fast undertow is here, beside plain NumPy.
 
-    Workload W1: a vehicle with eight motors under the paper's law at 1 kHz. Takes about half a minute.
+    Workloads W1 (ODIN with eight whole motors, the paper's law, 1 kHz) and W2 (BlueROV2 Heavy at sea, 100 Hz): some
+    minutes, most of them compiling.
     """
     from undertow.cli.bench import bench
 

@@ -151,7 +151,7 @@ def pid(
         sampling_time: of the loop, s; a scenario gives it.
         velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
             or one per axis; a scenario's sensor gives it.
-        load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s).
+        load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s); counts where there is noise only.
         delay: of measurement and input together, s.
         frequency: natural frequency w of the closed loop without its integral, rad/s; one number or one per axis. None:
             by the rule of preset `robust`, the one of least predicted cost that keeps the margins of

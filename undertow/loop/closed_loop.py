@@ -115,7 +115,7 @@ class Drawn(NamedTuple):
         zero, sensor = jnp.zeros(()), self.loop.sensor
         truth = self.loop.plant.output(zero, x)
         state = sensor.init(self.sensor_path, truth)
-        if sensor.smooth:
+        if sensor.smooth is True:  # traced in a part whose field is not static; guarded then
             return Heard(state, None)
         y, _ = sensor.measure(self.sensor_path, state, zero, truth)
         return Heard(state, at_start(self.loop.controller.model, truth, y))

@@ -77,7 +77,7 @@ class CommandedThrust(AbstractMotorlessThruster):
         return self.power_per_thrust * jnp.abs(voltage)
 
     def speed_term(self, report):
-        hint = "It takes newtons, whatever turns inside. Leave its lag to the estimator"
+        hint = "It takes newtons, whatever turns inside. Preset `robust` knows its lag"
         raise BadInput("speed_sensor", "be false with thruster commanded_thrust", "true", hint=hint)
 
     def drive(self, count: int, measured: bool) -> LaggedDrive:

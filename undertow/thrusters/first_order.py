@@ -46,7 +46,7 @@ class FirstOrderThruster(AbstractMotorlessThruster):
     time_constant: Float[Array, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
     reverse_share: Float[Array, ""] = param("", "thrust in reverse, as a share of that forward")
     current_per_thrust: Float[Array, ""] = param("A/N", "current per steady thrust", symbol="c_I")
-    linear_gain: Float[Array, ""] = param("N/V", "gain the controller's model assumes", symbol="alpha")
+    linear_gain: Float[Array, ""] = param("N/V", "gain that preset `paper` assumes", symbol="alpha")
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
     dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
@@ -78,7 +78,7 @@ class FirstOrderThruster(AbstractMotorlessThruster):
         return self.current_per_thrust * self.steady_thrust(voltage)
 
     def speed_term(self, report):
-        hint = "This thruster has no propeller speed. Describe its motor (DCMotor), or leave its lag to the estimator"
+        hint = "This thruster has no propeller speed. Describe its motor (DCMotor); preset `robust` knows its lag"
         raise BadInput("speed_sensor", "be false with thruster first_order", "true", hint=hint)
 
     def drive(self, count: int, measured: bool) -> LaggedDrive:
@@ -112,7 +112,7 @@ def first_order(
         power: of the voltage in the steady thrust; 1 linear, 2 quadratic.
         reverse_share: thrust in reverse as a share of that forward, at the same voltage.
         current_per_thrust: c_I, A/N, in steady state.
-        linear_gain: alpha that the controller's model assumes, N/V; None for thrust_per_volt, when power is 1.
+        linear_gain: alpha that preset `paper` assumes, N/V; None for thrust_per_volt, when power is 1.
         supply: voltage limit, V.
         dead_zone: voltage below which nothing turns, V.
         dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.

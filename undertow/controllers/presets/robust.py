@@ -68,7 +68,7 @@ def robust(
         robust_gain: w_bar, m/s^2 and rad/s^2.
         layer: boundary layer of the robust term.
         weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that can be estimated.
-        leakage: rate at which the differences between the weights of an axis leak away, 1/s; 0 for none.
+        leakage: rate at which weights of an axis that noise drove apart come together again, 1/s; 0 for none.
         reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of
             `tracking`, 2 at most; 0 for no filter.
         actuator_rate: how fast motors are made to follow, 1/s; None: chosen with the bandwidth, and beside one that

@@ -12,6 +12,8 @@ from undertow.fuzzy.tsk import FuzzySystem
 
 PerAxis = Float[Array, " n"]
 
+_EVEN = 1e-12  # squared size of what makes a basis differ from one that is alike for all rules
+
 
 class EstimatorState(NamedTuple):
     """What is believed of the motion, and what is learnt."""
@@ -35,9 +37,10 @@ class Estimator(eqx.Module):
     exactly as long as the basis does not change; the weights are stepped by what moves d_hat by a given amount,
     whatever |xi|^2 is, and kept in their box.
 
-    Their differences leak away towards their mean. By Eq. (44) they could only grow, with the square of the modelling
-    error (section 3.8 of the theory). Since the weights that a constant load asks for are all alike, the leakage costs
-    no accuracy under it, and adds -leakage |theta - mean(theta)|^2 / gamma to the rate of the Lyapunov function.
+    What of them is orthogonal to the basis and to (1, ..., 1) leaks away. By Eq. (44) it could only grow, with the
+    square of the modelling error (section 3.8 of the theory). The estimate does not show it, and the weights that a
+    constant load asks for are all alike: so the leakage costs no accuracy, and adds -leakage |that part|^2 / gamma to
+    the rate of the Lyapunov function.
 
     Raises:
         BadInput: bandwidth, damping or bound not positive, leakage negative.
@@ -48,7 +51,7 @@ class Estimator(eqx.Module):
     damping: Float[Array, "..."] = param("", "its damping ratio", symbol="zeta", default=1.0)
     bound: Float[Array, "..."] = param("m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=50.0)
     leakage: Float[Array, "..."] = param(
-        "1/s", "rate at which weights approach their mean", symbol="kappa", default=0.01
+        "1/s", "rate at which weights that came apart come together", symbol="kappa", default=0.01
     )
 
     def __check_init__(self):
@@ -87,10 +90,18 @@ class Estimator(eqx.Module):
         moved = of_estimate * (seen.error + tracking)
         weights = state.weights - (moved / (seen.basis**2).sum(-1))[:, None] * seen.basis
         leaked = -jnp.expm1(-jnp.broadcast_to(self.leakage, moved.shape) * dt)[:, None]
-        weights = weights + leaked * (weights.mean(-1, keepdims=True) - weights)
+        weights = weights - leaked * _unseen(weights, seen.basis)
         box = jnp.broadcast_to(self.bound, moved.shape)[:, None]
         rates = state.rates + dt * (known + seen.uncertainty) - of_rates * seen.error
         return EstimatorState(rates, jnp.clip(weights, -box, box))
+
+
+def _unseen(weights: Float[Array, "n rules"], basis: Float[Array, "n rules"]) -> Float[Array, "n rules"]:
+    """The part of the weights that is orthogonal to the basis and to (1, ..., 1)."""
+    apart, lean = (one - one.mean(-1, keepdims=True) for one in (weights, basis))
+    size = (lean**2).sum(-1, keepdims=True)
+    along = (apart * lean).sum(-1, keepdims=True) / jnp.where(size > _EVEN, size, 1.0)
+    return apart - along * lean
 
 
 def _cosine_of_root(x: Float[Array, "..."]) -> Float[Array, "..."]:
