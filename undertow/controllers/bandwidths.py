@@ -166,7 +166,7 @@ def _robust_grid(axis: Axis) -> tuple[np.ndarray, ...]:
 
 
 def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking) -> Law:
-    """The law of `controllers/robust` from y to u: sampled estimator (`estimator.py`), actuators as in `LagDrive`."""
+    """The law of `controllers/robust` from y to u: sampled estimator, actuators as in `LaggedDrive`."""
     dt, z = axis.sampling_time, np.exp(s * axis.sampling_time)
     decay = np.exp(-bandwidth * dt)
     of_rates, of_estimate = 2 - 2 * decay, (1 - decay) ** 2 / dt
