@@ -68,6 +68,11 @@ class Axis(NamedTuple):
     load_rate: float
     authority: float
 
+    @property
+    def response_time(self) -> float:
+        """Of the axis to its input, s: one sampling time, the known delay and the nominal lag."""
+        return self.sampling_time + self.delay + (self.lag or 0.0)
+
 
 class Bandwidths(NamedTuple):
     """Rates in rad/s and 1/s, the inner loop first."""
@@ -139,8 +144,7 @@ def robust_bandwidths(axis: Axis) -> Bandwidths:
     bandwidth, share, faster = (grid.ravel()[:, None] for grid in np.meshgrid(*_robust_grid(axis), indexing="ij"))
     # Actuators at their limits follow with their own lag, whatever is asked of them: the damping, which looks ahead by
     # 2 / tracking, must look beyond it.
-    slow = axis.sampling_time + axis.delay + (axis.lag or 0.0)
-    tracking = np.minimum(share * bandwidth, 1 / slow if np.isfinite(axis.authority) else np.inf)
+    tracking = np.minimum(share * bandwidth, 1 / axis.response_time if np.isfinite(axis.authority) else np.inf)
     bandwidth = np.minimum(bandwidth, tracking / _TRACKING_SHARES[0])
     natural = 1 / axis.lag if axis.lag else 0.0
     actuators = np.minimum(np.maximum(faster * np.maximum(bandwidth, tracking), natural), axis.quickest)
@@ -157,8 +161,7 @@ def pid_frequency(axis: Axis) -> float:
 
 
 def _bandwidth_grid(axis: Axis) -> np.ndarray:
-    slow = axis.sampling_time + axis.delay + (axis.lag or 0.0)
-    return np.geomspace(_SLOWEST / slow, _FASTEST / axis.sampling_time, _CANDIDATES)
+    return np.geomspace(_SLOWEST / axis.response_time, _FASTEST / axis.sampling_time, _CANDIDATES)
 
 
 def _robust_grid(axis: Axis) -> tuple[np.ndarray, ...]:
@@ -210,7 +213,7 @@ def _cost(axis: Axis, frequency: np.ndarray, from_y: Law, held: np.ndarray, open
     sensitivity = 1 / (1 + open_loop * actuator)
     rms = lambda transfer: np.sqrt(np.trapezoid(np.abs(transfer) ** 2, frequency, axis=-1) / np.pi)
     # A random walk, and a swell as large as what the walk covers in one of its periods.
-    swell = np.abs(sensitivity / s**2) @ _weights_at(frequency, _SWELL) * np.sqrt(2 * np.pi / _SWELL)
+    swell = _at(_SWELL, frequency, np.abs(sensitivity / s**2)) * np.sqrt(2 * np.pi / _SWELL)
     by_load = axis.load_rate * np.hypot(rms(sensitivity / s**3), swell)
     noise = axis.velocity_noise * np.sqrt(dt)
     by_noise = noise * rms(from_y.of_velocity * held * actuator * sensitivity / s**2)
@@ -219,9 +222,11 @@ def _cost(axis: Axis, frequency: np.ndarray, from_y: Law, held: np.ndarray, open
     return np.hypot(by_load, by_noise) / _ERROR_SCALE + _VARIATION_PRICE * variation / axis.authority
 
 
-def _weights_at(frequency: np.ndarray, wanted: float) -> np.ndarray:
-    """Weights of a linear interpolation in log frequency."""
-    return np.array([np.interp(np.log(wanted), np.log(frequency), row) for row in np.eye(len(frequency))])
+def _at(wanted: float, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values at one frequency, linear in its logarithm."""
+    above = np.clip(np.searchsorted(frequency, wanted), 1, len(frequency) - 1)
+    share = np.clip(np.log(wanted / frequency[above - 1]) / np.log(frequency[above] / frequency[above - 1]), 0, 1)
+    return (1 - share) * values[..., above - 1] + share * values[..., above]
 
 
 def _keeps(open_loop: np.ndarray, largest: float) -> np.ndarray:

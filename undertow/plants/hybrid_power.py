@@ -18,6 +18,7 @@ from undertow.thrusters.thruster import AbstractThruster
 Scalar = Float[Array, ""]
 
 _AT_LIMIT = 0.005  # share of the largest voltage within which a thruster counts as limited: two steps of a pulse
+_ROUNDING = 1e-6  # share by which a limited voltage may miss its limit: single precision
 
 
 class PowerState(NamedTuple):
@@ -89,7 +90,7 @@ class HybridPower(eqx.Module):
     def saturated(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
         """True where an applied voltage is at the limit of the supply, or of the battery."""
         low, high = thruster.limits()
-        limited = (u <= low) | (u >= high)
+        limited = (u <= low + _ROUNDING * jnp.abs(low)) | (u >= high - _ROUNDING * jnp.abs(high))
         if self.battery is None:
             return limited
         top, more = jnp.abs(u).max(), (1 + _AT_LIMIT) * u

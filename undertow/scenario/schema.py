@@ -77,7 +77,7 @@ class Window(Strict):
     start: float | None = Field(default=None, ge=0, description="s; half of the duration unless given")
     stop: float | None = Field(default=None, gt=0, description="s; the end unless given")
     every_tick: bool = Field(
-        default=False, description="metrics of every tick, as in campaigns, rather than of records (sampled)"
+        default=False, description="count every control step, as campaigns do, and not only the recorded ones (sampled)"
     )
 
     def of_run(self, duration: float) -> "tuple[float, float]":
@@ -232,6 +232,7 @@ def _type_name(annotation: Any) -> str:
         return " or ".join(typing.get_args(annotation))
     words = {
         float: "number",
+        bool: "true or false",
         int: "integer",
         str: "text",
         Numbers: "list of numbers",
