@@ -58,7 +58,9 @@ class Series(Strict):
     """Signals that are kept of every trial."""
 
     signals: list[str] = Field(
-        ["position", "error"], min_length=1, description="names of variables of run.nc, as `undertow simulate` writes them"
+        ["position", "error"],
+        min_length=1,
+        description="names of variables of run.nc, as `undertow simulate` writes them",
     )
     every: float = Field(1.0, gt=0, description="time between records, s")
 
