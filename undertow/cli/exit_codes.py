@@ -8,7 +8,7 @@ from typing import Any
 
 import typer
 
-from undertow.cli.interruptible import interrupted_by
+from undertow.cli.interruptible import interrupted_by, raise_if_interrupted
 
 DONE = 0
 RUN_FAILED = 1
@@ -23,6 +23,7 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
     """Exit code of a command; whatever it raises becomes one line on stderr."""
     try:
         code = command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
+        raise_if_interrupted()
         return _BY_SIGNAL + interrupted_by() if code == INTERRUPTED else code  # as typer makes of KeyboardInterrupt
     except KeyboardInterrupt:
         return _BY_SIGNAL + interrupted_by()

@@ -31,6 +31,13 @@ def interrupted_by() -> int:
     return _asked[0][0] if _asked else signal.SIGINT
 
 
+def raise_if_interrupted() -> None:
+    """Raise KeyboardInterrupt for a signal that still waits for modules to be imported; none comes later."""
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    if _asked:
+        raise KeyboardInterrupt
+
+
 def _handler(number: int, frame: FrameType | None) -> None:
     if number != signal.SIGALRM:
         _asked.append((number, time.monotonic()))
