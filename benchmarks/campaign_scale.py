@@ -27,16 +27,16 @@ from undertow import process
 process.prepare()
 
 from undertow.scenario.reading import dump
-from undertow.studies.campaign import task
-from undertow.studies.campaign.clusters import cluster
-from undertow.studies.campaign.columns import labels
-from undertow.studies.campaign.conduct import STORE, conduct
-from undertow.studies.campaign.engines import by_dask, in_threads
-from undertow.studies.campaign.identity import Identity
-from undertow.studies.campaign.layout import Layout
-from undertow.studies.campaign.prepare import prepare
-from undertow.studies.campaign.store import Store
-from undertow.studies.paper.setup import scenario
+from undertow.campaign import task
+from undertow.campaign.clusters import cluster
+from undertow.campaign.columns import labels
+from undertow.campaign.run_campaign import STORE, conduct
+from undertow.campaign.executors import by_dask, in_threads
+from undertow.campaign.fingerprint import Identity
+from undertow.campaign.layout import Layout
+from undertow.campaign.prepare import prepare
+from undertow.campaign.store import Store
+from undertow.reproduction.setup import scenario
 
 VARY = {
     "initial.position[0]": {"normal": [0.0, 0.1]},

@@ -29,8 +29,8 @@ from undertow.loop.sampled import AbstractAccumulator
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import Tries
-from undertow.studies.tuning.trials import trials
-from undertow.studies.tuning.tune import tune
+from undertow.tuning.training_runs import trials
+from undertow.tuning.tune import tune
 
 SETS = ["vonbenzon2022", "wu2018", "ng2024", "gazebo_box_drag", "px4"]
 DURATION, START = 60.0, 30.0  # s

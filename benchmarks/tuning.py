@@ -10,7 +10,7 @@ from pathlib import Path
 
 import undertow  # noqa: F401  (double precision)
 from undertow.scenario.reading import from_data
-from undertow.studies.tuning.tune import judge, tune
+from undertow.tuning.tune import judge, tune
 
 # The paper's law by hand: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors that lag by 0.1 s.
 BY_HAND = {

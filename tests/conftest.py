@@ -1,10 +1,10 @@
 """Strict arithmetic for every test: double precision, no silent broadcasting of ranks, no silent promotion of types."""
 
-from undertow.process import prepare  # isort: skip  (before JAX is imported)
+from undertow.process import prepare  # isort: skip  (before JAX is imported
 
 prepare()
 
-from undertow.core import runtime  # isort: skip  (sets up JAX before anything else touches it)
+from undertow.core import runtime  # isort: skip  (sets up JAX before anything else touches it
 
 import os
 

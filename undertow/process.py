@@ -7,7 +7,7 @@ import os
 import platform
 from pathlib import Path
 
-from undertow.lanes.cache import private_folder
+from simdjit.cache import private_folder
 
 # Objects before the youngest are looked through. Tracing makes millions that live: Python's 700 cost half a second.
 _YOUNG, _MIDDLE, _OLD = 50_000, 20, 100

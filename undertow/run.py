@@ -10,14 +10,8 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from undertow.analysis.meanings import MEANINGS, unit_of
-from undertow.core.contracts import (
-    AbstractController,
-    AbstractDisturbance,
-    AbstractPlant,
-    AbstractReference,
-    AbstractSensor,
-)
+from undertow.analysis.metric_meanings import MEANINGS, unit_of
+from undertow.core.contracts import (AbstractController, AbstractDisturbance, AbstractPlant, AbstractReference, AbstractSensor)
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.disturbances.adding import Together
@@ -25,12 +19,12 @@ from undertow.disturbances.none import none
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.scenario import execute
-from undertow.scenario.fitting import check_fit, check_times, rounded_times
-from undertow.scenario.labelling import certificate_of, label
+from undertow.scenario.consistency import check_fit, check_times, rounded_times
+from undertow.scenario.results import certificate_of, label
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.schema import Initial, Loop, Window, complaint
-from undertow.scenario.stepping import step_failure
-from undertow.sensors.perfect import perfect
+from undertow.scenario.step_size import step_failure
+from undertow.navigation.perfect import perfect
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

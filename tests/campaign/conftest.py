@@ -4,8 +4,8 @@ import copy
 
 import pytest
 
-from undertow.lanes import batches
-from undertow.studies.campaign.task import site
+from simdjit import batches
+from undertow.campaign.task import site
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},

@@ -10,8 +10,8 @@ from command import VEHICLE, contents
 from undertow.cli.main import run
 from undertow.core.disk import alone
 from undertow.scenario.reading import dump
-from undertow.studies.campaign.conduct import STORE, conduct
-from undertow.studies.campaign.prepare import prepare
+from undertow.campaign.run_campaign import STORE, conduct
+from undertow.campaign.prepare import prepare
 
 
 @pytest.mark.parametrize(

@@ -6,16 +6,16 @@ import pytest
 from lanes.emulated_gpu import EmulatedGpu
 
 from undertow.analysis.metrics import Metrics, results
-from undertow.lanes import nvidia
-from undertow.lanes.cuda import Driver
+from simdjit import nvidia
+from simdjit.cuda import Driver
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign.flying import Hangar
-from undertow.studies.campaign.reading import whole
-from undertow.studies.campaign.schema import validate
-from undertow.studies.campaign.task import REFUSED, fly, site
-from undertow.studies.campaign.trials import Trials, trials
+from undertow.campaign.batch_runner import Hangar
+from undertow.campaign.reading import whole
+from undertow.campaign.campaign_schema import validate
+from undertow.campaign.task import REFUSED, fly, site
+from undertow.campaign.trials import Trials, trials
 
 
 def made(data) -> Trials:

@@ -17,10 +17,10 @@ from command import contents, typed
 from distributed import Client, LocalCluster
 
 from undertow.cli.main import run
-from undertow.studies.campaign.clusters import cluster
-from undertow.studies.campaign.conduct import STORE, conduct
-from undertow.studies.campaign.engines import by_dask
-from undertow.studies.campaign.prepare import prepare
+from undertow.campaign.clusters import cluster
+from undertow.campaign.run_campaign import STORE, conduct
+from undertow.campaign.executors import by_dask
+from undertow.campaign.prepare import prepare
 
 
 def killed(path, out, kills, longest):

@@ -6,8 +6,8 @@ from scipy import stats
 
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign.points import Draws, value
-from undertow.studies.campaign.schema import Spread, validate
+from undertow.campaign.sampling import Draws, value
+from undertow.campaign.campaign_schema import Spread, validate
 
 TWO = {"loop.duration": {"uniform": [1, 2]}, "plant.limit": {"uniform": [0, 1]}}
 

@@ -10,9 +10,9 @@ from command import contents
 
 from undertow.analysis.metrics import OVERALL
 from undertow.cli.main import run
-from undertow.studies.campaign.conduct import STORE
-from undertow.studies.campaign.prepare import prepare
-from undertow.studies.campaign.task import site
+from undertow.campaign.run_campaign import STORE
+from undertow.campaign.prepare import prepare
+from undertow.campaign.task import site
 
 CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant.limit": [1e30]}
 

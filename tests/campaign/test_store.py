@@ -13,11 +13,11 @@ from command import contents
 
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.studies.campaign.conduct import STORE, conduct
-from undertow.studies.campaign.engines import in_threads
-from undertow.studies.campaign.identity import identity
-from undertow.studies.campaign.prepare import prepare
-from undertow.studies.campaign.results import load
+from undertow.campaign.run_campaign import STORE, conduct
+from undertow.campaign.executors import in_threads
+from undertow.campaign.fingerprint import identity
+from undertow.campaign.prepare import prepare
+from undertow.campaign.store_results import load
 
 quiet = lambda tally: None
 threads = partial(in_threads, threads=2)

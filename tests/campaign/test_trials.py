@@ -4,8 +4,8 @@ import pytest
 
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign.schema import validate
-from undertow.studies.campaign.trials import trials
+from undertow.campaign.campaign_schema import validate
+from undertow.campaign.trials import trials
 
 LIST = [{"kind": "current", "velocity": [0.1, 0.2, 0.3]}, "waves"]
 

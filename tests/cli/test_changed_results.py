@@ -6,7 +6,7 @@ from good_scenario import SCENARIO
 from undertow.scenario.execute import execute, save
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
-from undertow.scenario.repetition import compare
+from undertow.scenario.reproducibility import compare
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from undertow.analysis.meanings import MEANINGS
+from undertow.analysis.metric_meanings import MEANINGS
 from undertow.core import catalogue
 from undertow.scenario import describing
 from undertow.scenario.schema import keys

@@ -11,7 +11,7 @@ from undertow.run import simulate_scenario
 from undertow.scenario.execute import execute, save
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
-from undertow.scenario.repetition import compare
+from undertow.scenario.reproducibility import compare
 
 CODE = """
 import pathlib

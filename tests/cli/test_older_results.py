@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from undertow.scenario.provenance import checksum, content_hash
-from undertow.scenario.repetition import compare
+from undertow.scenario.reproducibility import compare
 
 
 def labelled(**columns):

@@ -7,7 +7,7 @@ import xarray as xr
 from good_scenario import SCENARIO
 from ruamel.yaml import YAML
 
-from undertow.analysis.meanings import MEANINGS, PER_AXIS
+from undertow.analysis.metric_meanings import MEANINGS, PER_AXIS
 from undertow.scenario.provenance import checksum, content_hash
 
 NOISY = SCENARIO.replace("seed: 3", "seed: 3\nsensor: white_noise\nsteady: {start: 0.05, stop: 0.1}")

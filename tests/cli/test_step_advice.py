@@ -8,9 +8,9 @@ import undertow as ut
 from undertow.core.status import Status
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
-from undertow.scenario.fitting import rounded_times
+from undertow.scenario.consistency import rounded_times
 from undertow.scenario.schema import Loop
-from undertow.scenario.stepping import fastest_decay, step_advice
+from undertow.scenario.step_size import fastest_decay, step_advice
 from undertow.thrusters import first_order, linear_voltage, t200
 
 SCENARIO = """

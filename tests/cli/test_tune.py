@@ -18,7 +18,7 @@ tune: {parameters: {frequency: [0.5, 8]}, iterations: 3, train: {seeds: 1}, held
 def test_interrupted_and_resumed_its_result_can_be_flown(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("undertow.studies.tuning.tune.descend", interrupted)
+        patch.setattr("undertow.tuning.tune.descend", interrupted)
         said = undertow("tune", "s.yaml", "--out", "out")
     assert said.code == 130 and "--resume" in said.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["tuning.jsonl"]
@@ -107,7 +107,7 @@ def test_a_budget_that_ends_while_compiling_gives_what_was_begun(undertow, tmp_p
 
 def test_an_interrupt_before_the_first_answer_promises_nothing(undertow, tmp_path, monkeypatch):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    monkeypatch.setattr("undertow.studies.tuning.evaluation.Evaluation.costs", interrupted)
+    monkeypatch.setattr("undertow.tuning.evaluator.Evaluation.costs", interrupted)
     said = undertow("tune", "s.yaml", "--out", "out")
     assert said.code == 130 and said.err == ""
     assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]

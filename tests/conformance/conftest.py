@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from undertow.core import catalogue
-from undertow.instruments import compass, depth, dvl, imu, position_fix
+from undertow.sensors import compass, depth, dvl, imu, position_fix
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.scenario.parts import presets_of
+from undertow.scenario.factory import presets_of
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from undertow.core.contracts import Load, Measurement, Place, Target
-from undertow.instruments.estimate import estimate_of, motion_of
+from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.numerics.rotations import rotation_from_euler
 from undertow.power import ESC
 from undertow.thrusters.thruster import PropellerReport

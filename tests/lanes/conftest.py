@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.lanes.program import Program
+from simdjit.program import Program
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import re
 
 from llvmlite import binding
 
-from undertow.lanes import machine
+from simdjit import machine
 
 _KERNEL = ctypes.CFUNCTYPE(None, *[ctypes.c_uint64] * 9)
 _REGISTER = """

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from undertow import process
-from undertow.lanes import cache, machine
+from simdjit import cache, machine
 
 CODE = b"compiled " * 1000
 
@@ -157,7 +157,7 @@ def test_a_write_that_fails_leaves_nothing(folder, made, monkeypatch):
 
 WRITER = """
 import sys
-from undertow.lanes import cache
+from simdjit import cache
 code = sys.argv[1].encode() * 100_000
 for i in range(40):
     for path in (cache.cache_folder() / "native").glob("*.o"):

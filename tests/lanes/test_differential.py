@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from lanes.programs import LARGE, SIZE, STEPS, number, program
 
-from undertow.lanes.beginning import inputs
-from undertow.lanes.graph import Graph
-from undertow.lanes.nodes import flat
-from undertow.lanes.scalarise import evaluate, nodes_of
+from simdjit.beginning import inputs
+from simdjit.graph import Graph
+from simdjit.nodes import flat
+from simdjit.scalarise import evaluate, nodes_of
 
 ROWS = 16
 

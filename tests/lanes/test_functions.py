@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import scipy.special
 
-from undertow.lanes.graph import Graph
-from undertow.lanes.scalarise import evaluate, nodes_of
-from undertow.lanes.tracing import Traced
+from simdjit.graph import Graph
+from simdjit.scalarise import evaluate, nodes_of
+from simdjit.tracing import Traced
 
 # Function, what it must equal, where, and how far it may be off in units of the last place.
 FUNCTIONS = {

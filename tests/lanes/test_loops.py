@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from undertow.analysis.metrics import Metrics, overall
-from undertow.loop import in_lanes, sampled
+from undertow.loop import simd_batch, sampled
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
-from undertow.studies.speed.workload import constant
+from undertow.bench.workload import constant
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 QUICK = ("inverted_pendulum", "recorded_disturbance")
@@ -47,7 +47,7 @@ def example(name, duration=1.0):
 def test_examples_fly_as_they_do_by_xla(name):
     """Every signal, within 1e-10 of its largest; from noisy instruments 1e-8, as JAX rounds normal numbers earlier."""
     loop, how = example(name)
-    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
+    found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
     close = 1e-8 if name == "bluerov2_heavy" else 1e-10
     for signal, here, there in zip(found.samples._fields, found.samples, wanted.samples, strict=True):
         if signal != "books" and there.size:
@@ -64,7 +64,7 @@ def test_a_run_lasts_as_long_however_seldom_it_is_recorded(every):
     loop, how = example("inverted_pendulum", 0.07)
     how |= {"dt": 0.001, "record_every": every}
     odd = how | {"record_every": 32}
-    for simulate in (in_lanes.simulate, sampled.simulate):
+    for simulate in (simd_batch.simulate, sampled.simulate):
         found, wanted = simulate(loop, **odd), simulate(loop, **how)
         np.testing.assert_allclose(found.time, [0.0, 0.032, 0.064], rtol=1e-12)
         assert found.ended == wanted.ended == pytest.approx(0.07)
@@ -76,19 +76,19 @@ def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     """Eleven runs from different places: in one fleet, backwards, one by one, and with nothing built in."""
     loop, how = example("inverted_pendulum")
     start = loop.outputs_at_start(None, None)
-    run = in_lanes.Run(loop, how["accumulators"], start, how["key"])
-    plan = in_lanes.Plan(500, how["dt"], 50, ("position", "voltage"), how["method"], how["substeps"])
+    run = simd_batch.Run(loop, how["accumulators"], start, how["key"])
+    plan = simd_batch.Plan(500, how["dt"], 50, ("position", "voltage"), how["method"], how["substeps"])
     numbers = eqx.filter(run, eqx.is_array)
     leaves = jax.tree.leaves(numbers)
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (11, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(11, *start[0].shape))
     many = many._replace(start=(places, many.start[1]))
     same = constant(run)
-    fleet = in_lanes.Fleet(run, plan, same)
+    fleet = simd_batch.Fleet(run, plan, same)
     found = fleet.fly(many)
     backwards = fleet.fly(jax.tree.map(lambda leaf: leaf[::-1], many))
-    general = in_lanes.Fleet(run, plan, [False] * len(leaves)).fly(many)
-    alone = in_lanes.Fleet(run, plan, same, lanes=1)
+    general = simd_batch.Fleet(run, plan, [False] * len(leaves)).fly(many)
+    alone = simd_batch.Fleet(run, plan, same, lanes=1)
     for i in range(11):
         single = alone.fly(jax.tree.map(lambda leaf, i=i: leaf[i : i + 1], many))
         same = lambda a, b, i=i: np.testing.assert_array_equal(a[0], b[i])
@@ -103,6 +103,6 @@ def test_a_run_that_diverges_ends_where_it_does_by_xla():
     loop, how = example("inverted_pendulum", 3.0)
 
     how |= {"position": np.full(len(loop.plant.outputs), 3.0)}
-    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
+    found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
     assert found.status == int(wanted.status) != 0 and found.ended == float(wanted.ended)
     np.testing.assert_allclose(found.samples.position[-1], wanted.samples.position[-1], rtol=1e-6)

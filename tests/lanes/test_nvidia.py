@@ -10,12 +10,12 @@ import pytest
 from lanes.emulated_gpu import EmulatedGpu
 from lanes.test_loops import example
 
-from undertow.lanes import nvidia
-from undertow.lanes.cuda import Driver
-from undertow.lanes.errors import Unsupported
-from undertow.lanes.program import Program
-from undertow.loop.in_lanes import Fleet, Plan, Run
-from undertow.studies.speed.workload import constant
+from simdjit import nvidia
+from simdjit.cuda import Driver
+from simdjit.errors import Unsupported
+from simdjit.program import Program
+from undertow.loop.simd_batch import Fleet, Plan, Run
+from undertow.bench.workload import constant
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.lanes.errors import Unsupported
-from undertow.lanes.graph import Graph
-from undertow.lanes.rules import Equation, results
-from undertow.lanes.scalarise import nodes_of
+from simdjit.errors import Unsupported
+from simdjit.graph import Graph
+from simdjit.rules import Equation, results
+from simdjit.scalarise import nodes_of
 
 ROWS = np.random.default_rng(6).normal(size=(11, 5))
 MATRICES = np.random.default_rng(7).normal(size=(11, 3, 4))

@@ -11,7 +11,7 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.white_noise import white_noise
+from undertow.navigation.white_noise import white_noise
 
 TICKS, DT = 600, 2e-3
 

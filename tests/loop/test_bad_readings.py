@@ -15,23 +15,23 @@ from undertow.core.contracts import AbstractController, AbstractModel, AbstractS
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.instruments import compass, dvl, imu, position_fix
-from undertow.instruments.depth import Depth
-from undertow.instruments.sampling import Sampling
-from undertow.loop import continuous, in_lanes, sampled
+from undertow.sensors import compass, dvl, imu, position_fix
+from undertow.sensors.depth import Depth
+from undertow.sensors.sampling import Sampling
+from undertow.loop import continuous, simd_batch, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.sensors.navigation import navigation
-from undertow.sensors.perfect import perfect
+from undertow.navigation.observer import navigation
+from undertow.navigation.perfect import perfect
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2_heavy
 
 DT = 0.01
 NAN, INF = float("nan"), float("inf")
 AMPLITUDE, FREQUENCY = 0.5, 1.0  # of the load, m/s^2 and rad/s
-BACK_ENDS = {"xla": sampled.simulate, "lanes": in_lanes.simulate}
+BACK_ENDS = {"xla": sampled.simulate, "lanes": simd_batch.simulate}
 LAWS = {
     "robust": lambda model: rcaf(model, preset="robust", sampling_time=DT, bandwidth=0.35 / DT),
     "pid": lambda model: pid(model, sampling_time=DT, frequency=3.0),
@@ -123,7 +123,7 @@ def test_a_vehicle_in_its_own_axes(law, within):
     entries = np.repeat([0.0, 1.0], [3, 9])
     at = {"duration": 3.0, "dt": DT, "record_every": 1, "velocity": np.array([0.3, 0, 0, 0, 0.2, 0.5])}
     sound, hit = (
-        in_lanes.simulate(
+        simd_batch.simulate(
             ClosedLoop(
                 plant, controller, setpoint([1.0, 0.5, 1.0, 0.1, 0.2, 1.0]), none(), Faulty(entries, NAN, 1, end)
             ),
@@ -168,7 +168,7 @@ def broken(value, after=0.5):
 
 WAYS = {
     "xla": partial(sampled.simulate, duration=1.0, dt=DT),
-    "lanes": partial(in_lanes.simulate, duration=1.0, dt=DT),
+    "lanes": partial(simd_batch.simulate, duration=1.0, dt=DT),
     "continuous": partial(continuous.simulate, duration=1.0, dt=DT, record_step=0.1),
 }
 

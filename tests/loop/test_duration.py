@@ -10,7 +10,7 @@ from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 
 
 @pytest.mark.parametrize("tolerances", [None, (1e-10, 1e-12)], ids=["fixed", "adaptive"])

@@ -15,7 +15,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import health
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 
 
 class Breaks(AbstractDisturbance):

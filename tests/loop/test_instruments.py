@@ -8,10 +8,10 @@ import pytest
 
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
-from undertow.instruments import compass, depth, dvl, imu, position_fix, propeller_speed
-from undertow.instruments.sampling import Sampling
+from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.sensors.sampling import Sampling
 from undertow.numerics.rotations import wrap_angle
-from undertow.sensors import navigation
+from undertow.navigation import observer
 from undertow.thrusters.thruster import PropellerReport
 
 QUIET_IMU = {"angle_noise": 0.0, "rate_noise": 0.0, "force_noise": 0.0}

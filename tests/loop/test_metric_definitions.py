@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.analysis.meanings import MEANINGS, unit_of
+from undertow.analysis.metric_meanings import MEANINGS, unit_of
 from undertow.analysis.metrics import Metrics, overall, results
 from undertow.cli.main import run as command
 from undertow.controllers.pid import pid
@@ -20,7 +20,7 @@ from undertow.references.setpoint import setpoint
 from undertow.references.sine import sine
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 
 DT = 0.01
 

@@ -12,8 +12,8 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
-from undertow.sensors.white_noise import white_noise
+from undertow.navigation.perfect import perfect
+from undertow.navigation.white_noise import white_noise
 
 LIMIT, DT = 3.0, 1e-3
 

@@ -16,7 +16,7 @@ from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.plants.inverted_pendulum import inverted_pendulum
 from undertow.plants.two_link_arm import two_link_arm
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 

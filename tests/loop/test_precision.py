@@ -15,9 +15,9 @@ from undertow.disturbances.u1 import u1
 from undertow.numerics.rotations import cross
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
-from undertow.studies.campaign.layout import layout
-from undertow.studies.campaign.reading import read_text
-from undertow.studies.campaign.task import fly, site
+from undertow.campaign.layout import layout
+from undertow.campaign.reading import read_text
+from undertow.campaign.task import fly, site
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "limit": 20.0},

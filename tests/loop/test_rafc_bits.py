@@ -12,7 +12,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.linear import matvec
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.white_noise import white_noise
+from undertow.navigation.white_noise import white_noise
 
 
 class PlainRAFC(AbstractContinuousController):

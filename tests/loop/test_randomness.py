@@ -10,15 +10,15 @@ from undertow.core import runtime
 from undertow.core.contracts import AbstractDisturbance, AbstractSensor, Measurement
 from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
-from undertow.instruments import compass, depth, dvl, imu, position_fix, propeller_speed
-from undertow.instruments.instrument import AbstractInstrument
-from undertow.loop import in_lanes, sampled
+from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.sensors.sensor import AbstractInstrument
+from undertow.loop import simd_batch, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.randomness import numbered
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.navigation import navigation
-from undertow.sensors.white_noise import white_noise
+from undertow.navigation.observer import navigation
+from undertow.navigation.white_noise import white_noise
 
 DEVIATION = 0.1
 
@@ -68,7 +68,7 @@ def noise_of_a_run(duration, dt, simulate=sampled.simulate):
     return np.asarray(samples.measured_position - samples.position)[:-1, 0]
 
 
-@pytest.mark.parametrize("simulate", [sampled.simulate, in_lanes.simulate], ids=["xla", "lanes"])
+@pytest.mark.parametrize("simulate", [sampled.simulate, simd_batch.simulate], ids=["xla", "lanes"])
 @pytest.mark.parametrize(("duration", "dt"), [(6e3, 1.0), (1e7, 2e3), (5e-4, 1e-7)])
 def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
     """Beyond 2^32 microseconds, to four months, and below a microsecond."""

@@ -7,13 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.numerics.inverses import (
-    partial_inverse,
-    printed_inverse,
-    pseudo_inverse,
-    regularised_inverse,
-    regularised_sharp,
-)
+from undertow.numerics.inverses import (partial_inverse, printed_inverse, pseudo_inverse, regularised_inverse, regularised_sharp)
 from undertow.numerics.rotations import jacobian
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import t200

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from undertow.scenario.execute import execute
-from undertow.studies.paper.setup import CONTROLLERS, scenario
-from undertow.studies.speed import plain_numpy
+from undertow.reproduction.setup import CONTROLLERS, scenario
+from undertow.bench import plain_numpy
 
 # Benchmark definitions, section 4: tracking, estimation, uncertainty and robust rms on rung `ideal`, suite U1.
 REFERENCE = {

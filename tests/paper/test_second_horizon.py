@@ -12,11 +12,11 @@ from undertow.core.status import Status
 from undertow.plants.double_integrator import double_integrator
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
-from undertow.studies.paper import claims, drifting, horizons, lag_map
-from undertow.studies.paper.batches import fly
-from undertow.studies.paper.claims import c05_fuzzy_input, conditions
-from undertow.studies.paper.claims.c04_chattering import perfect_variation
-from undertow.studies.paper.setup import RUNGS, SIX_AXES, law_of, scenario
+from undertow.reproduction import claims, drifting, horizons, lag_map
+from undertow.reproduction.batches import fly
+from undertow.reproduction.claims import c05_fuzzy_input, conditions
+from undertow.reproduction.claims.c04_chattering import perfect_variation
+from undertow.reproduction.setup import RUNGS, SIX_AXES, law_of, scenario
 
 WINDOWS = ((10.0, 20.0), (100.0, 200.0))
 

@@ -12,13 +12,13 @@ from undertow.controllers import pid, rcaf
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
 from undertow.core.errors import BadInput
 from undertow.disturbances import none
-from undertow.loop import in_lanes, sampled
+from undertow.loop import simd_batch, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.integrators import rk4
 from undertow.plants import hybrid_vehicle
 from undertow.power import battery
 from undertow.references import setpoint
-from undertow.sensors import perfect
+from undertow.navigation import perfect
 from undertow.thrusters import commanded_thrust, first_order
 from undertow.vehicles import bluerov2_heavy, odin
 
@@ -208,7 +208,7 @@ def test_batches_and_xla_agree(law):
     controller = LAWS[law](plant.model(), sampling_time=0.02)
     loop = ClosedLoop(plant, controller, setpoint([3.0, 0.0, 1.0, 0.0, 0.0, 0.0]), none(), perfect())
     how = dict(duration=0.6, dt=0.02, record_every=5)
-    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
+    found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
     wrench = lambda samples: np.asarray(samples.voltage) @ np.asarray(plant.thruster_matrix).T
     for pick in (wrench, lambda samples: np.asarray(samples.position)):
         here, there = pick(found.samples), pick(wanted.samples)

@@ -10,13 +10,13 @@ from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
 from undertow.core.errors import BadInput
 from undertow.disturbances import sinusoid
-from undertow.lanes.program import Program
-from undertow.loop import in_lanes, sampled
+from simdjit.program import Program
+from undertow.loop import simd_batch, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.integrators import rk4
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
-from undertow.sensors import perfect
+from undertow.navigation import perfect
 from undertow.thrusters import first_order, linear_voltage, paper_table3, quadratic_voltage, t200, t500
 from undertow.vehicles import bluerov2_heavy
 
@@ -186,7 +186,7 @@ def test_batches_and_xla_agree_where_the_zone_subtracts(law):
     options = {"preset": "robust"} if law is rcaf else {}
     loop = station("subtract", lambda model: law(model, sampling_time=0.02, **options))
     how = dict(duration=0.6, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 0.6),))
-    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
+    found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
     for name in ("position", "voltage", "power"):
         here, there = getattr(found.samples, name), np.asarray(getattr(wanted.samples, name))
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max(), err_msg=name)

@@ -9,7 +9,7 @@ import pytest
 from undertow.core.errors import BadInput
 from undertow.numerics.integrators import rk4
 from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage
-from undertow.thrusters.ladder import RUNGS, on_rung
+from undertow.thrusters.fidelity import RUNGS, on_rung
 
 MOTOR = paper_table3("shaft").motor
 VOLTS = np.array([-24.0, -6.0, 0.5, 3.0, 12.0])

@@ -17,7 +17,7 @@ from undertow.plants import inverted_pendulum, linear_plant, magnetic_levitation
 from undertow.plants.levitation_rig import RIGS
 from undertow.plants.reachability import lost_directions, open_loop_advice
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 
 UNDER = ((1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # pushes x1 and x2 alike
 PLANTS = {

@@ -20,9 +20,9 @@ from undertow.plants import hybrid_vehicle
 from undertow.power import battery, esc
 from undertow.power.ledger import closure
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 from undertow.thrusters import first_order, linear_voltage, paper_table3, t200
-from undertow.thrusters.ladder import RUNGS
+from undertow.thrusters.fidelity import RUNGS
 from undertow.vehicles import odin
 
 THRUSTERS = {"t200": t200, "table3": paper_table3}

@@ -13,9 +13,9 @@ from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, waypoints
-from undertow.scenario import parts
+from undertow.scenario import factory
 from undertow.scenario.execute import execute
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 
 RNG = np.random.default_rng(4)
 SQUARE = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [0, 4, 1], [0, 0, 0.5]], dtype=float)
@@ -248,7 +248,7 @@ def test_recorded_replays_its_rows():
 def test_recorded_comes_from_a_file(tmp_path):
     text = "t,d1,d2\n0,1,2\n1,3,-1\n4,0,0.5\n"
     (tmp_path / "x.csv").write_text(text)
-    part, resolved = parts.make("references", {"kind": "recorded", "file": "x.csv"}, tmp_path)
+    part, resolved = factory.make("references", {"kind": "recorded", "file": "x.csv"}, tmp_path)
     np.testing.assert_allclose(at(part, [1.0, 9.0])[0], [[3, -1], [0, 0.5]], rtol=0, atol=1e-14)
     assert resolved == {"kind": "recorded", "csv": text}
 

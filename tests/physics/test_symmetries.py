@@ -13,7 +13,7 @@ from undertow.loop.sampled import simulate
 from undertow.numerics.integrators import rk4
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
-from undertow.sensors import perfect
+from undertow.navigation import perfect
 from undertow.thrusters import paper_table3
 from undertow.vehicles import odin
 

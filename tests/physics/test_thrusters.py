@@ -10,18 +10,8 @@ import pytest
 
 from undertow.core.errors import BadInput
 from undertow.numerics.integrators import METHODS
-from undertow.thrusters import (
-    DCMotor,
-    axial_flow,
-    commanded_thrust,
-    first_order,
-    linear_voltage,
-    paper_table3,
-    quadratic_voltage,
-    t200,
-    t500,
-)
-from undertow.thrusters.ladder import RUNGS, on_rung
+from undertow.thrusters import (DCMotor, axial_flow, commanded_thrust, first_order, linear_voltage, paper_table3, quadratic_voltage, t200, t500)
+from undertow.thrusters.fidelity import RUNGS, on_rung
 
 # A motor with everything: friction, and a propeller that is another one in reverse.
 UNEVEN = DCMotor(

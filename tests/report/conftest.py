@@ -3,7 +3,7 @@ import pytest
 import xarray as xr
 
 from undertow.report.figures import ladder_figure, run_figures
-from undertow.report.paper_report import write_report
+from undertow.report.reproduction.report import write_report
 
 
 def run_of(controller="rcafc", axes=6, inputs=8, status="ok", ended=20.0, samples=201):

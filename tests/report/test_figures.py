@@ -6,18 +6,10 @@ import pytest
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from PIL import Image
 
-from undertow.report.figures import (
-    ladder_figure,
-    paper_figures,
-    png,
-    run_figures,
-    save,
-    svg,
-    sweep_figure,
-)
+from undertow.report.figures import ladder_figure, paper_figures, png, run_figures, save, svg, sweep_figure
 from undertow.report.figures.effort import effort
 from undertow.report.figures.uncertainty import uncertainty
-from undertow.studies.paper.thruster_response import thruster_response
+from undertow.reproduction.thruster_response import thruster_response
 
 AXES = ["north", "east", "down", "roll", "pitch", "yaw"]
 

@@ -8,7 +8,7 @@ import pytest
 from undertow.report.figures.drifting import drifting_figure
 from undertow.report.figures.horizons import horizons_figure
 from undertow.report.figures.lags import lags_figure
-from undertow.report.paper_report import write_report
+from undertow.report.reproduction.report import write_report
 
 WINDOWS = [[10.0, 20.0], [100.0, 200.0]]
 

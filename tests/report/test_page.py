@@ -6,7 +6,7 @@ import pytest
 from undertow.report.figures import sweep_figure
 from undertow.report.formats import chip, number, percent, prose
 from undertow.report.page import Html, document, join, table, tag, text
-from undertow.report.paper_report import write_report
+from undertow.report.reproduction.report import write_report
 
 VOID = {"meta", "img", "br"}
 

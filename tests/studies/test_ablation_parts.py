@@ -12,13 +12,13 @@ from undertow.controllers.presets.paper import paper
 from undertow.core.contracts import Measurement
 from undertow.disturbances import random_suite
 from undertow.loop import sampled
-from undertow.studies.ablations import gains, on_axes, study
-from undertow.studies.ablations.command_fed import CommandFed
-from undertow.studies.ablations.forgetting import Forgetting
-from undertow.studies.ablations.incremental import Incremental
-from undertow.studies.ablations.linear_observer import LinearObserver
-from undertow.studies.ablations.rough_sensor import RoughSensor
-from undertow.studies.ablations.thruster_loss import ThrusterLoss
+from undertow.reproduction.ablations import gains, on_axes, study
+from undertow.reproduction.ablations.command_fed import CommandFed
+from undertow.reproduction.ablations.forgetting import Forgetting
+from undertow.reproduction.ablations.incremental import Incremental
+from undertow.reproduction.ablations.linear_observer import LinearObserver
+from undertow.reproduction.ablations.rough_sensor import RoughSensor
+from undertow.reproduction.ablations.thruster_loss import ThrusterLoss
 
 LOAD = random_suite(0.5, step=0.3)
 

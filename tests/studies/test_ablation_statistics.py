@@ -11,11 +11,11 @@ from undertow.analysis.metrics import Metrics, results
 from undertow.controllers.presets.paper import paper
 from undertow.disturbances import random_suite
 from undertow.loop import sampled
-from undertow.studies.ablations import on_axes, runner
-from undertow.studies.ablations.ablation import Schedule
-from undertow.studies.ablations.rough_sensor import RoughSensor
-from undertow.studies.ablations.summary import median_rank, spread, summary
-from undertow.studies.ablations.tuning import ERROR, VARIATION, cost, tuned
+from undertow.reproduction.ablations import on_axes, runner
+from undertow.reproduction.ablations.ablation import Schedule
+from undertow.reproduction.ablations.rough_sensor import RoughSensor
+from undertow.reproduction.ablations.summary import median_rank, spread, summary
+from undertow.reproduction.ablations.tuning import ERROR, VARIATION, cost, tuned
 
 SHORT = Schedule(duration=0.4)
 
@@ -88,7 +88,7 @@ def test_search_takes_the_cheapest_of_its_grid(monkeypatch):
         first, second = loop
         return {"tracking_rms": np.full(seeds, ERROR * (first - 3) ** 2), "input_variation": np.full(seeds, second)}
 
-    monkeypatch.setattr("undertow.studies.ablations.tuning.run", pretend)
+    monkeypatch.setattr("undertow.reproduction.ablations.tuning.run", pretend)
     best = tuned(lambda *point: point, ((1.0, 3.0, 9.0), (0.0, VARIATION)), SHORT, seeds=5)
     assert best == ((3.0, 0.0), (3.0, 0.0), 0.0, 6)
     assert {(seeds, family) for _, seeds, family in tried} == {(5, runner.TRAINING)}

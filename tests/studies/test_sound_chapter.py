@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from undertow.report.figures.ablations import ablations_figure
-from undertow.report.figures.sound_ladder import sound_ladder_figure
-from undertow.report.paper_report import write_report
+from undertow.report.figures.robust_fidelity import sound_ladder_figure
+from undertow.report.reproduction.report import write_report
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import validate
-from undertow.studies.sound import ladder
-from undertow.studies.sound.conclusions import conclusions
+from undertow.reproduction.robust_variant import fidelity
+from undertow.reproduction.robust_variant.conclusions import conclusions
 
 
 def spread(median):
@@ -86,13 +86,13 @@ def test_a_win_that_is_none_is_not_told():
 
 @pytest.mark.parametrize("quick", [True, False])
 def test_every_run_of_the_ladder_is_a_scenario(quick):
-    found = ladder.scenarios(quick)
+    found = fidelity.scenarios(quick)
     assert all(validate(from_data(one)).loop.kind == "sampled" for one in found.values())
     assert ("sound_sea_robust" in found) is not quick
 
 
 def test_robust_meets_the_same_as_table_1():
-    for place in ladder.places(False).values():
+    for place in fidelity.places(False).values():
         ours, theirs = (dict(place.runs[law][1]) for law in ("robust", next(iter(place.runs))))
         for key in ("plant", "disturbance", "reference", "loop"):
             assert ours[key] == theirs[key]

@@ -11,13 +11,13 @@ import pytest
 from lanes.emulated_gpu import EmulatedGpu
 
 from undertow.cli.main import run
-from undertow.lanes import nvidia
-from undertow.lanes.cuda import Driver
-from undertow.lanes.program import Program
+from simdjit import nvidia
+from simdjit.cuda import Driver
+from simdjit.program import Program
 from undertow.loop import sampled
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
-from undertow.studies.speed import measure, plain_numpy, workload
+from undertow.bench import measure, plain_numpy, workload
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

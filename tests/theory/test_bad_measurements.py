@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import AbstractSensor, Measurement
 from undertow.disturbances.none import none
@@ -30,7 +30,7 @@ def delay_margin(law):
 
     With the loop cut at the measurement, u = -C(p) x and x = u / p^2: C / p^2 = -exp(p delay).
     """
-    g = linear.gains(law)
+    g = small_signal.gains(law)
     frequency = np.geomspace(1e-2, 1e4, 400_001)
     p = 1j * frequency
     # eps = x_hat_dot - v and z of the law, driven by x and u.

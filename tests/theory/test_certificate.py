@@ -12,10 +12,10 @@ from undertow.controllers.rcaf import rcaf
 from undertow.controllers.robust.estimator import Estimator
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.disturbances.table import table
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.tsk import gaussian_sets
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.linear_plant import linear_plant
-from undertow.sensors.white_noise import white_noise
+from undertow.navigation.white_noise import white_noise
 
 CONSTANTS = np.array([3.0, -20.0, 45.0, 0.5])
 RISE = 1e-10  # of V(0)

@@ -6,7 +6,7 @@ One run per invariant; every axis is one signal.
 import numpy as np
 import pytest
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.disturbances.table import table
 from undertow.loop import continuous
 
@@ -24,7 +24,7 @@ def test_constant_is_learnt_and_ramp_is_followed_at_a_distance(rails):
     d_til = np.asarray(outcome.samples.estimate - outcome.samples.uncertainty)[-1]
     assert (np.abs(d_til[:3]) <= 1e-8).all(), d_til
     assert np.abs(d_til[3:] / ramps) == pytest.approx(0.00712, rel=0.02)
-    assert np.abs(d_til[3:] / ramps) == pytest.approx(linear.ramp_error(loop.controller)[1], rel=1e-3)
+    assert np.abs(d_til[3:] / ramps) == pytest.approx(small_signal.ramp_error(loop.controller)[1], rel=1e-3)
 
 
 def bounded_rate_signals():

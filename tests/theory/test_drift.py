@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from undertow.analysis import drift, linear, noise
+from undertow.analysis import drift, small_signal, noise
 from undertow.controllers.rcaf import rcaf
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.tsk import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
-from undertow.sensors.white_noise import white_noise
+from undertow.navigation.perfect import perfect
+from undertow.navigation.white_noise import white_noise
 
 DT = 1e-3
 # Noise (m/s), distance of the sets, and as printed: c_dot (1/s^2) measured, time of divergence (s).
@@ -117,7 +117,7 @@ def test_ripple_drives_weights_apart_too():
 
 def after_ripple(law, amplitude, frequency, duration):
     """c by its own equation, in which eps = -p d / (p^2 + (a1 + c) p + b2), p = i frequency."""
-    g, p, rate = linear.gains(law), 1j * frequency, drift.drift_rate(law, DT, 1.0)
+    g, p, rate = small_signal.gains(law), 1j * frequency, drift.drift_rate(law, DT, 1.0)
     eps = lambda gain: abs(p / (p**2 + (g.pole + gain) * p + g.b2)) * amplitude
     return solve_ivp(lambda _, gain: rate * eps(gain) ** 2 / 2, (0.0, duration), [0.0], rtol=1e-8).y[0, -1]
 

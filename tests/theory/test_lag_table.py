@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from motor_rail import COUNT, MASS, InnerLoop, MotorRail, ThrustModel
 
-from undertow.analysis import linear, motor_loop
+from undertow.analysis import small_signal, motor_loop
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import Load, Target
 from undertow.core.status import Status
@@ -18,7 +18,7 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.integrators import rk4
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 from undertow.thrusters.electromechanical import ElectromechanicalState
 from undertow.thrusters.paper_table3 import paper_table3
 
@@ -148,7 +148,7 @@ def row(rung="electromechanical", supply=np.inf, speed_sensor=False, inner=None,
 def test_ideal_thrusters(rows):
     status, _, found, law = rows["ideal"]
     assert status == int(Status.OK)
-    assert found["e"] == pytest.approx(0.5 * abs(linear.tracking_response(law, 1.0)) / np.sqrt(2), rel=0.02)
+    assert found["e"] == pytest.approx(0.5 * abs(small_signal.tracking_response(law, 1.0)) / np.sqrt(2), rel=0.02)
     assert found["e"] == pytest.approx(1.8e-5, rel=0.05)
     needed = MASS / COUNT * np.sqrt(0.25 + 0.125) / float(WHOLE.voltage_gain())
     assert found["V"] == pytest.approx(needed, rel=1e-3)

@@ -9,12 +9,12 @@ from undertow.analysis import drift
 from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.estimator import Estimator, EstimatorState
 from undertow.disturbances import none, sinusoid
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.tsk import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants import double_integrator
 from undertow.references import setpoint
-from undertow.sensors import perfect, white_noise
+from undertow.navigation import perfect, white_noise
 
 DT, NOISE, AXES = 1e-3, 0.003, 20  # s, m/s; every axis has noise of its own
 

@@ -4,11 +4,11 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.analysis import linear, motor_loop, noise
-from undertow.analysis.linearised import margins
-from undertow.analysis.linearised.forecast import compare
-from undertow.analysis.linearised.rest import rest
-from undertow.analysis.linearised.surroundings import surroundings
+from undertow.analysis import small_signal, motor_loop, noise
+from undertow.analysis.linearization import margins
+from undertow.analysis.linearization.response import compare
+from undertow.analysis.linearization.equilibrium import rest
+from undertow.analysis.linearization.disturbance_profile import surroundings
 from undertow.controllers import rcaf
 from undertow.disturbances import none, sinusoid
 from undertow.loop.closed_loop import ClosedLoop
@@ -17,8 +17,8 @@ from undertow.plants import double_integrator, hybrid_vehicle
 from undertow.references import setpoint
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
-from undertow.sensors import perfect
-from undertow.studies.prediction.grounding import foretold, ground
+from undertow.navigation import perfect
+from undertow.prediction.operating_point import foretold, ground
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2, odin, remus100
 
@@ -56,20 +56,20 @@ def test_poles_and_responses_are_those_of_the_small_model(name):
     poles = margins.poles(one_ode)
     # In RAFC nothing follows from eps, so its pole is not seen.
     assert len(poles) == (6 if name == "rafc" else 8)
-    assert unlike(linear.poles(law), poles) < 1e-6
+    assert unlike(small_signal.poles(law), poles) < 1e-6
     sampled = margins.closed(found, dt)
-    expected = np.log(np.linalg.eigvals(linear.sampled_matrix(law, dt)).astype(complex)) / dt
+    expected = np.log(np.linalg.eigvals(small_signal.sampled_matrix(law, dt)).astype(complex)) / dt
     assert unlike(expected, margins.poles(sampled)) < 1e-6
     frequency = np.array([0.5, 5.0, 50.0])
     response = margins.response(one_ode, "error", frequency)
-    np.testing.assert_allclose(np.abs(response[:, 1, 1]), np.abs(linear.tracking_response(law, frequency)), rtol=2e-3)
+    np.testing.assert_allclose(np.abs(response[:, 1, 1]), np.abs(small_signal.tracking_response(law, frequency)), rtol=2e-3)
     assert np.abs(response[:, 0, 1]).max() < 1e-12  # axes do not touch each other
 
 
 def test_what_the_loop_bears():
     """Sections 3.6 and 3.9: 7.03 ms of sampling time, 7.2 ms of lag; delays are those of test_bad_measurements."""
     sampled = at_rest(on_axes(LAWS["rcafc"]), 1e-3)
-    longest = linear.largest_sampling_time(sampled.parts.loop.controller)
+    longest = small_signal.largest_sampling_time(sampled.parts.loop.controller)
     assert margins.largest_sampling_time(sampled, 1e-3, 1.0) == pytest.approx(longest, rel=2e-3)
 
     def continuous(bears, name):

@@ -18,7 +18,7 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
-from undertow.sensors import perfect, white_noise
+from undertow.navigation import perfect, white_noise
 from undertow.thrusters import first_order, t200
 from undertow.vehicles import bluerov2_heavy
 

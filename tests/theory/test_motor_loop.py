@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from undertow.analysis import drift, linear, motor_loop
+from undertow.analysis import drift, small_signal, motor_loop
 from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 from undertow.thrusters.electromechanical import ElectromechanicalState
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
@@ -74,7 +74,7 @@ def test_critical_unity_gain_lags(table1):
 
 def test_observer_alone_tolerates_any_lag_or_a_closed_form(table1):
     assert motor_loop.critical_observer_lag(table1()) == np.inf
-    g = linear.gains(table1(sets=1))
+    g = small_signal.gains(table1(sets=1))
     critical = motor_loop.critical_observer_lag(table1(sets=1))
     assert critical * (g.b2 - g.pole**2) == pytest.approx(g.pole)
     for factor, stable in ((0.99, True), (1.01, False)):

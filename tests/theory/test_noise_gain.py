@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from undertow.analysis import drift, linear, noise
+from undertow.analysis import drift, small_signal, noise
 from undertow.controllers.rcaf import rcaf
 from undertow.core.errors import BadInput
 from undertow.disturbances.none import none
@@ -11,7 +11,7 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.white_noise import white_noise
+from undertow.navigation.white_noise import white_noise
 
 SEEDS = 20  # one axis each
 AS_FAST = {"bandwidth": 150.0, "tracking": 30.0}  # rad/s, as Table 1
@@ -72,7 +72,7 @@ def test_noise_of_the_position_counts_too():
 def test_the_matrix_is_that_of_the_sampled_law(table1):
     for law in (table1(), table1(sets=1), table1(composite=0.0)):
         matrix, _ = noise.tick_matrices(noise.steps(law, 2e-3))
-        np.testing.assert_allclose(matrix, linear.sampled_matrix(law, 2e-3), atol=1e-12)
+        np.testing.assert_allclose(matrix, small_signal.sampled_matrix(law, 2e-3), atol=1e-12)
 
 
 def test_numbers_of_section_3_7(table1):

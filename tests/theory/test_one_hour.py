@@ -16,7 +16,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.sensors.white_noise import white_noise
+from undertow.navigation.white_noise import white_noise
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 

@@ -14,7 +14,7 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants import double_integrator, hybrid_vehicle, inverted_pendulum, magnetic_levitation
 from undertow.references import setpoint
-from undertow.sensors import perfect
+from undertow.navigation import perfect
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2_heavy
 

@@ -15,7 +15,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.rotations import rotation_from_euler, wrap_angle
 from undertow.plants import double_integrator, hybrid_vehicle, magnetic_levitation
 from undertow.references import setpoint, sine
-from undertow.sensors import perfect
+from undertow.navigation import perfect
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2_heavy, odin
 

@@ -14,7 +14,7 @@ from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.reference_filter import ReferenceFilter
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.tsk import gaussian_sets
 from undertow.numerics.integrators import rk4
 from undertow.plants import double_integrator, hybrid_vehicle
 from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage, t200

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import AbstractController, AbstractModel
 from undertow.disturbances.none import none
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.tsk import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 
 RHO = float(gaussian_sets(3).gathering())
 LAYOUTS = {"three sets": {"sets": 3}, "one set": {"sets": 1}, "rho = 1/3": {"sets": 3, "adaptation": 100 / (3 * RHO)}}
@@ -68,9 +68,9 @@ def tick_matrix(g, dt, rule, delayed):
 
 def limit(law, rule, delayed):
     """Sampling time, s, at which the spectral radius reaches one."""
-    g = linear.gains(law)
+    g = small_signal.gains(law)
     unstable = lambda dt: bool(np.abs(np.linalg.eigvals(tick_matrix(g, dt, rule, delayed))).max() > 1)
-    return linear.first_crossing(unstable, np.geomspace(1e-3, 3e-2, 61))
+    return small_signal.first_crossing(unstable, np.geomspace(1e-3, 3e-2, 61))
 
 
 @pytest.mark.parametrize("case", TABLE)
@@ -84,9 +84,9 @@ def test_closed_forms(case):
 
 
 def test_without_delay_it_is_the_matrix_of_the_package(table1):
-    for rule in linear.RULES:
-        ours = tick_matrix(linear.gains(table1()), 2e-3, rule, False)
-        np.testing.assert_allclose(ours[:4, :4], linear.sampled_matrix(table1(), 2e-3, rule), atol=1e-12)
+    for rule in small_signal.RULES:
+        ours = tick_matrix(small_signal.gains(table1()), 2e-3, rule, False)
+        np.testing.assert_allclose(ours[:4, :4], small_signal.sampled_matrix(table1(), 2e-3, rule), atol=1e-12)
 
 
 class Stepped(AbstractController):

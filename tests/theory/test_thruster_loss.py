@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis import linear, noise
+from undertow.analysis import small_signal, noise
 from undertow.controllers.rcaf import rcaf
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractPlant
@@ -23,7 +23,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle, hybrid_vehicle
 from undertow.plants.linear_plant import linear_plant
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -187,7 +187,7 @@ def test_a_gain_three_times_too_large(dt, stable):
     loop = ClosedLoop(plant, law, setpoint([1e-6]), none(), perfect())
     eps = np.abs(np.asarray(sampled.simulate(loop, duration=2.0, dt=dt, record_every=1).samples.modelling_error))
     assert (eps[-50:].max() < 1e-2 * eps[:20].max()) == stable
-    g = linear.gains(law)
+    g = small_signal.gains(law)
     assert (dt < g.pole / (3 * g.b2)) == stable
     observer = np.array([[1 - g.pole * dt, dt], [-3 * g.b2 * dt, 1.0]])
     assert (np.abs(np.linalg.eigvals(observer)).max() < 1) == stable

@@ -7,7 +7,7 @@ leaves open); RAFC learns from s alone.
 import numpy as np
 import pytest
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import AbstractController, AbstractModel
 from undertow.disturbances.sinusoid import sinusoid
@@ -15,7 +15,7 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
+from undertow.navigation.perfect import perfect
 
 LIMITS = (np.inf, 5.0, 3.0, 1.5)  # m/s^2
 SURVIVES = {
@@ -94,8 +94,8 @@ def test_static_bias_is_no_bound():
 
 def bound_of(law, load, largest):
     """From d_hat = (b2 d - gamma rho (p + a1) s) / (p^2 + a1 p + b2)."""
-    g = linear.gains(law)
-    damping = linear.observer_damping(law)
+    g = small_signal.gains(law)
+    damping = small_signal.observer_damping(law)
     overshoot = np.exp(-np.pi * damping / np.sqrt(1 - damping**2))
     times = np.linspace(0.0, 60 / g.pole, 200_001)
     decay, swing = g.pole / 2, np.sqrt(g.b2 - g.pole**2 / 4)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.studies.tuning.certifying import Certificate, refusal
-from undertow.studies.tuning.descent import descend
-from undertow.studies.tuning.journal import Journal, OutOfTime
-from undertow.studies.tuning.objective import Objective
-from undertow.studies.tuning.searching import search
+from undertow.tuning.stability import Certificate, refusal
+from undertow.tuning.gradient_descent import descend
+from undertow.tuning.checkpoint import Journal, OutOfTime
+from undertow.tuning.objective import Objective
+from undertow.tuning.evolution import search
 
 RNG = np.random.default_rng(4)
 ROOT = RNG.normal(size=(3, 3))

@@ -5,27 +5,27 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis.linearised.pieces import without
+from undertow.analysis.linearization.jacobians import without
 from undertow.controllers import pid
 from undertow.core.contracts import Load, Place
 from undertow.core.errors import BadInput
 from undertow.disturbances import current, sinusoid, wrench
 from undertow.disturbances.adding import Together
-from undertow.instruments import depth, dvl, imu
+from undertow.sensors import depth, dvl, imu
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
 from undertow.scenario.reading import from_data
-from undertow.sensors import navigation
-from undertow.studies.tuning.certifying import Certifier
-from undertow.studies.tuning.descent import descend
-from undertow.studies.tuning.dials import dials, options
-from undertow.studies.tuning.evaluation import Evaluation
-from undertow.studies.tuning.journal import Journal
-from undertow.studies.tuning.objective import Objective
-from undertow.studies.tuning.problem import problem
-from undertow.studies.tuning.scaled import scaled
-from undertow.studies.tuning.searching import search
+from undertow.navigation import observer
+from undertow.tuning.stability import Certifier
+from undertow.tuning.gradient_descent import descend
+from undertow.tuning.tunable_parameters import dials, options
+from undertow.tuning.evaluator import Evaluation
+from undertow.tuning.checkpoint import Journal
+from undertow.tuning.objective import Objective
+from undertow.tuning.problem import problem
+from undertow.tuning.scaled import scaled
+from undertow.tuning.evolution import search
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2_heavy
 

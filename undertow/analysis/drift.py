@@ -8,10 +8,10 @@ import numpy as np
 from scipy.integrate import quad
 
 from undertow.analysis.noise import Steps, steps
-from undertow.controllers.law import RCAF
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.controllers.composite_law import RCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.errors import BadInput
-from undertow.fuzzy.tsk import FuzzySystem
+from undertow.estimation.tsk import FuzzySystem
 
 
 def basis_slope(fuzzy: FuzzySystem) -> np.ndarray:

@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from undertow.analysis.linear import Gains, first_crossing, gains
-from undertow.controllers.law import RCAF
+from undertow.analysis.small_signal import Gains, first_crossing, gains
+from undertow.controllers.composite_law import RCAF
 from undertow.thrusters.motor import DCMotor
 
 

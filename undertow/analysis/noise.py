@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from undertow.analysis.linear import gains
-from undertow.controllers.law import RCAF
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.analysis.small_signal import gains
+from undertow.controllers.composite_law import RCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.errors import BadInput
 
 _SEEN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0], [0.0, 0.0]])  # S

@@ -14,11 +14,11 @@ from undertow.cli.tables import wide_console
 from undertow.report.prediction_page import write_prediction
 from undertow.report.prediction_tables import Rows, tables
 from undertow.scenario.build import build
-from undertow.scenario.labelling import to_json
+from undertow.scenario.results import to_json
 from undertow.scenario.reading import read
-from undertow.studies.prediction.doubts import advice
-from undertow.studies.prediction.predict import predict
-from undertow.studies.prediction.summary import summary
+from undertow.prediction.warnings import advice
+from undertow.prediction.predict import predict
+from undertow.prediction.prediction_summary import summary
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 

@@ -10,7 +10,7 @@ from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
-from undertow.studies.speed.measure import measure
+from undertow.bench.measure import measure
 
 _ROWS = {
     "single_ns": "one run, in a lane of its own",

@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 
 from undertow.cli.campaign_folder import check_folder, clear_folder
-from undertow.cli.campaign_short import sentences, table
+from undertow.cli.campaign_text import sentences, table
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder
@@ -22,16 +22,16 @@ from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import write_campaign
-from undertow.scenario.labelling import to_json
+from undertow.scenario.results import to_json
 from undertow.scenario.reading import dump
-from undertow.scenario.workshop import Workshop
-from undertow.studies.campaign.clusters import check_cluster, cluster
-from undertow.studies.campaign.conduct import STORE, Engine, Tally, Watch, conduct
-from undertow.studies.campaign.engines import by_dask, in_threads
-from undertow.studies.campaign.prepare import Prepared, prepare
-from undertow.studies.campaign.results import load
-from undertow.studies.campaign.summary import endings, summary
-from undertow.studies.campaign.task import build_trial
+from undertow.scenario.part_cache import Workshop
+from undertow.campaign.clusters import check_cluster, cluster
+from undertow.campaign.run_campaign import STORE, Engine, Tally, Watch, conduct
+from undertow.campaign.executors import by_dask, in_threads
+from undertow.campaign.prepare import Prepared, prepare
+from undertow.campaign.store_results import load
+from undertow.campaign.campaign_summary import endings, summary
+from undertow.campaign.task import build_trial
 
 
 def campaign(

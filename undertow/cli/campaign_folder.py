@@ -6,7 +6,7 @@ from pathlib import Path
 from undertow.cli import results_folder
 from undertow.core.disk import alone
 from undertow.core.errors import BadInput
-from undertow.studies.campaign.conduct import STORE
+from undertow.campaign.run_campaign import STORE
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 

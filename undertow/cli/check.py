@@ -9,13 +9,13 @@ from rich.text import Text
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.tables import wide_console
 from undertow.core.errors import BadInput
-from undertow.scenario import checking
+from undertow.checks import check
 from undertow.scenario.yaml_text import load
 
 
 def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
     """Print what a check finds and what follows from the numbers; exit code."""
-    report = checking.check(thing, dict(map(_option, options)), allow_code)
+    report = check.check(thing, dict(map(_option, options)), allow_code)
     console = wide_console()
     for sentence in report.sentences:
         print(sentence)

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from undertow.analysis.meanings import MEANINGS, PER_AXIS, unit_of
+from undertow.analysis.metric_meanings import MEANINGS, PER_AXIS, unit_of
 from undertow.cli.tables import wide_console
 from undertow.scenario import describing
 from undertow.scenario.schema import keys

@@ -6,7 +6,7 @@ import typer
 from rich.console import Console
 
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
-from undertow.cli.foresight import Foresight, beside, in_results, judgement
+from undertow.cli.prediction_check import Foresight, beside, in_results, judgement
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import Stages
@@ -15,10 +15,10 @@ from undertow.core.status import Status
 from undertow.report.figures import run_drawings, save_all
 from undertow.scenario.build import build
 from undertow.scenario.execute import Executed, execute, save
-from undertow.scenario.labelling import certificate_of, metrics_text
+from undertow.scenario.results import certificate_of, metrics_text
 from undertow.scenario.reading import dump, read
-from undertow.scenario.repetition import Repetition, compare
-from undertow.scenario.vehicle_findings import vehicle_doubts
+from undertow.scenario.reproducibility import Repetition, compare
+from undertow.checks.vehicle_findings import vehicle_doubts
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 

@@ -5,7 +5,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from undertow.analysis.meanings import MEANINGS, unit_of
+from undertow.analysis.metric_meanings import MEANINGS, unit_of
 
 
 def metrics_table(

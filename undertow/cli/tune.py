@@ -17,12 +17,12 @@ from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
-from undertow.scenario.labelling import to_json
+from undertow.scenario.results import to_json
 from undertow.scenario.reading import read
-from undertow.studies.tuning.answer import as_data, as_scenario
-from undertow.studies.tuning.journal import has_answers
-from undertow.studies.tuning.objective import Step
-from undertow.studies.tuning.tune import METHODS, Tuned, tune
+from undertow.tuning.tuned_scenario import as_data, as_scenario
+from undertow.tuning.checkpoint import has_answers
+from undertow.tuning.objective import Step
+from undertow.tuning.tune import METHODS, Tuned, tune
 
 _WRITTEN = ("tuned.yaml", "tuning.json", "figures")
 _JOURNAL = "tuning.jsonl"

@@ -1,6 +1,6 @@
 """Controllers: they know a model, never the plant."""
 
-from undertow.controllers.law import RCAF as RCAF
+from undertow.controllers.composite_law import RCAF as RCAF
 from undertow.core.catalogue import publish
 
 __getattr__ = publish(__name__)

@@ -18,7 +18,7 @@ import numpy as np
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel, Measurement
-from undertow.core.drive import AbstractDrive, Forces
+from undertow.core.actuator_model import AbstractDrive, Forces
 from undertow.numerics.linear import matvec
 
 # Largest sensitivity |1 / (1 + L)| that is allowed with a lag that is so many times the nominal one, an actuator that

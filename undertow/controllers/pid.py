@@ -13,7 +13,7 @@ from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
-from undertow.core.drive import AbstractDrive
+from undertow.core.actuator_model import AbstractDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.linear import matvec

@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.core.foreign import MODULE_PREFIX, python_says
+from undertow.core.user_code import MODULE_PREFIX, python_says
 
 KINDS = (
     "vehicles",

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.arrays import as_array
-from undertow.core.drive import AbstractDrive, DirectDrive
+from undertow.core.actuator_model import AbstractDrive, DirectDrive
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 

@@ -9,20 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.arrays import as_array
-from undertow.core.contracts import (
-    AbstractController,
-    AbstractDisturbance,
-    AbstractPlant,
-    AbstractReference,
-    AbstractSensor,
-    Inputs,
-    Load,
-    Measurement,
-    Outputs,
-    Target,
-    Telemetry,
-    Time,
-)
+from undertow.core.contracts import (AbstractController, AbstractDisturbance, AbstractPlant, AbstractReference, AbstractSensor, Inputs, Load, Measurement, Outputs, Target, Telemetry, Time)
 from undertow.loop.readings import Expected, at_start
 
 

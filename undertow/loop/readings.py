@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Int
 
-from undertow.core.contracts import AbstractController, AbstractModel, Inputs, Measurement, Outputs, Telemetry, Time
+from undertow.core.contracts import (AbstractController, AbstractModel, Inputs, Measurement, Outputs, Telemetry, Time)
 
 
 def sound(numbers: Array) -> Bool[Array, "..."]:

@@ -5,16 +5,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractModel, Measurement, Target
-from undertow.core.drive import AbstractDrive
+from undertow.core.actuator_model import AbstractDrive
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import (
-    attitude_error,
-    cross,
-    kinematics_from_euler,
-    quaternion_from_euler,
-    rotation_from_quaternion,
-)
+from undertow.numerics.rotations import (attitude_error, cross, kinematics_from_euler, quaternion_from_euler, rotation_from_quaternion)
 from undertow.vehicles.body import Body
 
 Vector6 = Float[Array, "6"]

@@ -11,12 +11,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Place
 from undertow.core.errors import BadInput
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import (
-    Kinematics,
-    euler_from_rotation,
-    quaternion_rate,
-    rotation_from_quaternion,
-)
+from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_rate, rotation_from_quaternion
 from undertow.plants.hybrid_model import HybridModel
 from undertow.plants.hybrid_power import HybridPower, has_motor
 from undertow.plants.hybrid_state import VehicleState, state_at

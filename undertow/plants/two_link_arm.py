@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.drive import DirectDrive
+from undertow.core.actuator_model import DirectDrive
 from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from undertow.report.campaign_tables import asked, by_choice, by_xla, distributions, endings, named, requirements, worst
+from undertow.report.campaign_tables import (asked, by_choice, by_xla, distributions, endings, named, requirements, worst)
 from undertow.report.figures.campaign import distributions_figure, sensitivity_figure
 from undertow.report.figures.writing import Drawings, Saved, save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, tag
-from undertow.studies.campaign.results import Results
+from undertow.campaign.store_results import Results
 
 _CAPTIONS = {
     "distributions": "Every trial that was flown, one step each; a curve that ends below 1 lacks those that failed. "

@@ -8,7 +8,7 @@ from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import bullets, document, figure, section, table, tag
 from undertow.report.prediction_tables import Rows, tables
-from undertow.studies.prediction.predict import Prediction
+from undertow.prediction.predict import Prediction
 
 _CAPTIONS = {
     "poles": "Poles that control can move, of the sampled loop as rates, motors and coupling included; both axes are "

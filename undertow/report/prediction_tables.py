@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.analysis.meanings import unit_of
-from undertow.studies.prediction.predict import Prediction
+from undertow.analysis.metric_meanings import unit_of
+from undertow.prediction.predict import Prediction
 
 
 class Rows(NamedTuple):

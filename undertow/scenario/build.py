@@ -12,12 +12,12 @@ from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.scenario import parts
-from undertow.scenario.fitting import check_fit, check_times, placed, rounded_times
+from undertow.scenario import factory
+from undertow.scenario.consistency import check_fit, check_times, placed, rounded_times
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
-from undertow.scenario.stepping import step_advice
-from undertow.scenario.workshop import Workshop
+from undertow.scenario.step_size import step_advice
+from undertow.scenario.part_cache import Workshop
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -94,7 +94,7 @@ def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
         told = {"part": part.model_dump(), "circumstances": circumstances}
-        new = lambda: parts.make(f"{key}s", told["part"], text.folder, given, circumstances)
+        new = lambda: factory.make(f"{key}s", told["part"], text.folder, given, circumstances)
         return placed(text, where, lambda: workshop.part(where, told, given, new))
 
     def disturbance() -> AbstractDisturbance:
@@ -105,7 +105,7 @@ def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
         return Together(tuple(member for member, _ in pairs))
 
     plant = make("plant")
-    known = lambda: parts.call(plant.model, scenario.model, folder=text.folder)
+    known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
     model, resolved["model"] = placed(text, "model", lambda: workshop.part("model", scenario.model, (plant,), known))
     sensor = make("sensor")
     circumstances["velocity_noise"] = np.asarray(sensor.velocity_noise(scenario.loop.dt)).tolist()

@@ -11,7 +11,7 @@ import equinox as eqx
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.param import Parameter, parameters
-from undertow.scenario import parts
+from undertow.scenario import factory
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 
 
@@ -69,7 +69,7 @@ def summary(part: Any) -> str:
 
 def _presets(kind: str, name: str, part: Any) -> tuple[Description, ...]:
     """The part, or each of its presets."""
-    presets = parts.presets_of(part)
+    presets = factory.presets_of(part)
     if not presets:
         return (_describe(kind, name, part),)
     each = []
@@ -98,7 +98,7 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
 def _instance(kind: str, name: Any, part: Any) -> Any:
     """The part with all its defaults; None when it cannot be made of them."""
     try:
-        return parts.make(kind, name, Path())[0] if kind else part()
+        return factory.make(kind, name, Path())[0] if kind else part()
     except Exception:
         return None
 
@@ -113,8 +113,8 @@ def _options(kind: str, part: Any) -> tuple[Option, ...]:
     options = []
     for name, parameter in inspect.signature(part).parameters.items():
         default = "required" if parameter.default is inspect.Parameter.empty else parameter.default
-        if name in parts.INNER:
-            default = parts.inner_default(name, parameter)
+        if name in factory.INNER:
+            default = factory.inner_default(name, parameter)
         if not (kind == "controllers" and name == "model"):  # comes from the plant, not from the user
             options.append(Option(name, default, meanings.get(name, "")))
     return tuple(options)

@@ -13,17 +13,17 @@ import xarray as xr
 from undertow.analysis.metrics import Metrics
 from undertow.core import runtime
 from undertow.core.status import Status
-from undertow.lanes.errors import Unsupported
-from undertow.loop import continuous, in_lanes, sampled
+from simdjit.errors import Unsupported
+from undertow.loop import continuous, simd_batch, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.foreign_code import code_hashes
-from undertow.scenario.labelling import label
+from undertow.scenario.results import label
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Initial, Loop
-from undertow.scenario.stepping import step_failure
+from undertow.scenario.step_size import step_failure
 
 
 class Executed(NamedTuple):
@@ -99,7 +99,7 @@ def run_loop(
     lacking = {}
     if settings.engine == "lanes":
         try:
-            return in_lanes.simulate(loop, **common), {}
+            return simd_batch.simulate(loop, **common), {}
         except Unsupported as error:
             lacking = {"left_to_xla": str(error)}
     return jax.block_until_ready(sampled.simulate(loop, **common)), lacking

@@ -10,7 +10,7 @@ import xarray as xr
 from ruamel.yaml import YAML
 
 from undertow.core.errors import BadInput
-from undertow.core.foreign import python_says
+from undertow.core.user_code import python_says
 from undertow.scenario.foreign_code import check_allowed
 from undertow.scenario.provenance import checksum
 from undertow.scenario.yaml_text import Path_, load

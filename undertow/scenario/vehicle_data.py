@@ -6,21 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from undertow.analysis.vehicle_lint.facts import Facts
+from undertow.checks.vehicle_lint.facts import Facts
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.scenario.thruster_poses import poses
-from undertow.scenario.vehicle_keys import (
-    MATRICES,
-    SCALARS,
-    VECTORS,
-    check_keys,
-    matrix_at,
-    number_at,
-    printed_matrix,
-    text_at,
-    vector_at,
-)
+from undertow.scenario.vehicle_keys import (MATRICES, SCALARS, VECTORS, check_keys, matrix_at, number_at, printed_matrix, text_at, vector_at)
 from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
 from undertow.vehicles.vehicle import Vehicle
 

@@ -1,4 +1,4 @@
-"""Sensors: what stands between the truth and the measurement. One file each."""
+"""Instruments: what a vehicle carries to know where it is. One file each; `navigation` makes a sensor of them."""
 
 from undertow.core.catalogue import publish
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.drive import DirectDrive, LaggedDrive
+from undertow.core.actuator_model import DirectDrive, LaggedDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.first_order import LaggedThrust

@@ -8,12 +8,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.drive import LaggedDrive
+from undertow.core.actuator_model import LaggedDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.memoryless import MemorylessThruster
 from undertow.thrusters.motorless import AbstractMotorlessThruster
-from undertow.thrusters.steady_drive import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import SteadyDrive
 from undertow.thrusters.thruster import PerThruster
 
 _OF_STEADY_STATE = (

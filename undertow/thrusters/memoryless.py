@@ -8,7 +8,7 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motorless import AbstractMotorlessThruster
-from undertow.thrusters.steady_drive import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import SteadyDrive
 from undertow.thrusters.thruster import PerThruster
 
 _LEAST = 1e-30  # stands for 0, where a power has no slope

@@ -2,7 +2,7 @@
 
 import math
 
-from undertow.thrusters.ladder import on_rung
+from undertow.thrusters.fidelity import on_rung
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import AbstractThruster
 

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.steady_drive import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import SteadyDrive
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 

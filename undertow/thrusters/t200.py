@@ -1,7 +1,7 @@
 """Blue Robotics T200: one brushed-DC equivalent for the manufacturer's whole table, 10-20 V."""
 
 from undertow.core import checks
-from undertow.thrusters.ladder import on_rung
+from undertow.thrusters.fidelity import on_rung
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import DEAD_ZONES, AbstractThruster
 

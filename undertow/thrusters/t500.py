@@ -1,7 +1,7 @@
 """Blue Robotics T500: one brushed-DC equivalent for the manufacturer's plot data at 16 V and 24 V."""
 
 from undertow.core import checks
-from undertow.thrusters.ladder import on_rung
+from undertow.thrusters.fidelity import on_rung
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import DEAD_ZONES, AbstractThruster
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.drive import AbstractDrive, DirectDrive
+from undertow.core.actuator_model import AbstractDrive, DirectDrive
 
 PerThruster = Float[Array, " N"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.certificate.function import transition
-from undertow.controllers.law import RCAF
+from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.estimator import Estimator
 
 # max over s of s (1 - tanh s).

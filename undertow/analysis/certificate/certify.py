@@ -8,8 +8,8 @@ import xarray as xr
 from undertow.analysis.certificate import bounds, hypotheses
 from undertow.analysis.certificate.function import Lyapunov, of_paper, of_robust
 from undertow.analysis.certificate.hypotheses import Hypothesis
-from undertow.controllers.law import RCAF
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.controllers.composite_law import RCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.contracts import AbstractController
 from undertow.loop.record import series
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from undertow.controllers.law import RCAF
+from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 
 PerRecord = np.ndarray  # (time,)
 

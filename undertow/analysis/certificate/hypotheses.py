@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.certificate.set_point import minimax_weight
-from undertow.controllers.law import RCAF
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.controllers.composite_law import RCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.contracts import AbstractModel, Measurement
 
 # Smaller departures are rounding: shares, or m/s^2 and rad/s^2.

@@ -7,7 +7,7 @@ are known in closed form.
 import numpy as np
 import xarray as xr
 
-from undertow.controllers.law import RCAF
+from undertow.controllers.composite_law import RCAF
 
 
 def lyapunov_function(law: RCAF, run: xr.Dataset, best_weight: np.ndarray) -> np.ndarray:

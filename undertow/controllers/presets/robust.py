@@ -6,13 +6,13 @@ from jax.core import Tracer
 
 from undertow.controllers.bandwidths import Axis, Bandwidths, alike, axes_of, robust_bandwidths
 from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.controllers.robust.reference_filter import ReferenceFilter
-from undertow.controllers.robust.sets import widened
+from undertow.controllers.robust.fuzzy_sets import widened
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel
 from undertow.core.errors import BadInput
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.tsk import gaussian_sets
 
 # Beside a bandwidth that is given: the range of tracking bandwidths as shares of it, and the rate of the actuators.
 _TRACKING_SHARES, _ACTUATORS_FASTER = (0.25, 0.5), 3.0

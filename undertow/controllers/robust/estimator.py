@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.param import param
-from undertow.fuzzy.tsk import FuzzySystem
+from undertow.estimation.tsk import FuzzySystem
 
 PerAxis = Float[Array, " n"]
 

@@ -11,7 +11,7 @@ from undertow.report.figures.robust_term import robust_term
 from undertow.report.figures.thruster_laws import thruster_laws
 from undertow.report.figures.tracking import tracking
 from undertow.report.figures.uncertainty import uncertainty
-from undertow.studies.paper.thruster_response import ThrusterResponse
+from undertow.reproduction.thruster_response import ThrusterResponse
 
 
 def paper_figures(

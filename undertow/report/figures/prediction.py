@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from undertow.report.figures import style
-from undertow.studies.prediction.predict import Prediction
+from undertow.prediction.predict import Prediction
 
 _MARKS = ("o", "s", "^")
 _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#7a5c00")

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from undertow.report.figures import style
-from undertow.studies.paper.thruster_response import Law, ThrusterResponse
+from undertow.reproduction.thruster_response import Law, ThrusterResponse
 
 LOOKS = {"long": style.SOLID, "short": style.DASHED}
 LAWS = style.Look("#555555", (0, (1, 1.2)), 1.2, 4)

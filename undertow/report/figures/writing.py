@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from undertow.core.foreign import python_says
+from undertow.core.user_code import python_says
 
 DOTS_PER_INCH = 150
 

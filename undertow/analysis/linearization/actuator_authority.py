@@ -1,0 +1,71 @@
+"""What the actuators can hold for ever, against what the surroundings and the model demand."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.linearization.equilibrium import Rest
+from undertow.controllers.robust.allocation import allocate, attained
+from undertow.loop.closed_loop import ClosedLoop
+
+_SETTLING, _STEP = 800, 5e-3  # ticks and s that an actuator is given to come to its limit
+_WHOLE = 1e6  # weight of the direction: what is held is held in full proportion
+_LOOKED_AT = 400  # loads, evenly over the run
+
+
+class Reach(NamedTuple):
+    """Demand against what there is.
+
+    Attributes:
+        low, high: forces of the actuators at the limits of their input, settled; in the unit of the force.
+        demand: largest force of each actuator that a load asks for, as if there were no limits.
+        share: of the demanded acceleration that is given, one entry per load that was looked at.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    demand: np.ndarray
+    share: np.ndarray
+
+    @property
+    def held(self) -> float:
+        """Share of the loads that are held whole."""
+        return float((self.share > 1 - 1e-6).mean())
+
+
+def reach(loop: ClosedLoop, at: Rest, loads: np.ndarray) -> Reach:
+    """What the loads (accelerations of the outputs, one per row) ask of the actuators where the loop rests."""
+    x, _ = at.parts.states(at.at)
+    chosen = loads[np.unique(np.linspace(0, len(loads) - 1, _LOOKED_AT).round().astype(int))]
+    found = _reach(loop, x, jnp.asarray(chosen))
+    return Reach(*map(np.asarray, found))
+
+
+@eqx.filter_jit
+def _reach(loop: ClosedLoop, x, loads):
+    plant, model = loop.plant, loop.controller.model.own_axes()
+    y, drive = plant.output(jnp.zeros(()), x), model.drive()
+    effect = model.effect(y)
+    inputs = jnp.zeros(plant.inputs())
+
+    def at_limit(side):
+        limit = plant.admissible(x, side * jnp.full_like(inputs, 1e9))
+        bounded = jnp.abs(limit) < 1e8
+        u = jnp.where(bounded, limit, 0.0)
+        state = jax.lax.fori_loop(
+            0, _SETTLING, lambda _, state: drive.advance(state, u, jnp.asarray(_STEP)), drive.init()
+        )
+        return jnp.where(bounded, drive.force(state, u), side * jnp.inf)
+
+    low, high = at_limit(-1.0), at_limit(1.0)
+
+    def wanted(load):
+        return model.spread(y, -model.drift(y) - model.seen(y, load) + model.seen(y, jnp.zeros_like(load)))
+
+    forces = jax.vmap(wanted)(loads)
+    given = jax.vmap(lambda force: allocate(effect, force, low, high, jnp.asarray(_WHOLE)))(forces)
+    share = jax.vmap(lambda force, given: attained(effect, force, given))(forces, given)
+    return low, high, jnp.abs(forces).max(axis=0), share

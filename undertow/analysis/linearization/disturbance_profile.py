@@ -1,0 +1,77 @@
+"""What a run will be exposed to: load and errors of measurement along the reference, before anything is flown."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import PRNGKeyArray
+
+from undertow.analysis.linearization.equilibrium import Rest
+from undertow.loop.closed_loop import ClosedLoop
+
+
+class Surroundings(NamedTuple):
+    """Along the reference, one row per tick.
+
+    Attributes:
+        time: s.
+        load: what the model does not know of the acceleration, as an acceleration of the outputs where the loop
+            rests, m/s^2 and rad/s^2: disturbances, and what moving along the reference takes beyond the model.
+        noise: measured minus true position and velocity, m, rad, m/s, rad/s.
+    """
+
+    time: np.ndarray
+    load: np.ndarray
+    noise: np.ndarray
+
+    def operating_loads(self, shares: tuple[float, ...]) -> np.ndarray:
+        """The loads that are larger than given shares of all, one row each; sizes in units of each axis' rms."""
+        scale = np.sqrt((self.load**2).mean(axis=0))
+        size = np.linalg.norm(self.load / np.where(scale > 0, scale, 1.0), axis=1)
+        order = np.argsort(size, kind="stable")
+        return self.load[order[[round(share * (len(order) - 1)) for share in shares]]]
+
+
+def surroundings(loop: ClosedLoop, at: Rest, key: PRNGKeyArray, ticks: int, dt: float) -> Surroundings:
+    """What acts along the reference, with the same chances as in a run with this key.
+
+    Args:
+        loop: the five roles.
+        at: the loop at rest; what is unknown is told as seen from there.
+        key: of everything random in the run.
+        ticks: how many, from t = 0.
+        dt: s.
+    """
+    x, _ = at.parts.states(at.at)
+    unknown, noise = _along(loop, key, x, jnp.asarray(at.at["u"]), jnp.asarray(dt, dtype=float), ticks)
+    return Surroundings(np.arange(ticks) * dt, np.asarray(unknown), np.asarray(noise))
+
+
+@eqx.filter_jit
+def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, ticks: int):
+    drawn, plant, model, zero = loop.draw(key), loop.plant, loop.controller.model, jnp.zeros(())
+
+    def unknown(t, x, load):
+        y = plant.output(t, x)
+        return model.seen(y, plant.acceleration(t, x, u, load)) - model.drift(y) - model.gain(y) @ u
+
+    y_rest = plant.output(zero, x_rest)
+    at_rest = unknown(zero, x_rest, plant.no_load())
+    still = jnp.zeros_like(y_rest.position)
+    scale = jax.jacfwd(lambda a: model.seen(y_rest, a))(still)  # outputs -> axes of the law, where the loop rests
+
+    def look(heard, k):
+        t = k * dt
+        r = loop.reference.at(t)
+        x = plant.initial_state(r.position, r.velocity)
+        truth = plant.output(t, x)
+        y, heard = loop.sensor.measure(drawn.sensor_path, heard, t, truth)
+        wrong = jnp.concatenate([model.difference(y.position, truth.position), y.velocity - truth.velocity])
+        wrong = jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
+        return heard, (jnp.linalg.solve(scale, unknown(t, x, drawn.load(t, x)) - at_rest), wrong)
+
+    start = loop.reference.at(zero)
+    heard = loop.sensor.init(drawn.sensor_path, plant.output(zero, plant.initial_state(start.position, start.velocity)))
+    return jax.lax.scan(look, heard, jnp.arange(ticks, dtype=float))[1]

@@ -1,0 +1,130 @@
+"""Where a closed loop rests under a constant load: found by Newton's method, whether the loop is stable or not."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.linearization.newton import Balance
+from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
+from undertow.core.contracts import AbstractModel, Measurement
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.reachability import lost_directions
+
+_FIRST_SHARE, _SMALLEST_SHARE = 0.25, 0.02  # of a load that is put on little by little
+_SETTLING = 400  # sampling times that an actuator is given to come to a force
+
+
+class Rest(NamedTuple):
+    """A loop at rest.
+
+    Attributes:
+        parts: the loop.
+        at: vectors of states, input, load; see `Parts.differentiate`.
+        local: values and slopes there.
+        moving: what still moves, largest rate in SI units; not small where no input can hold the load.
+        acting: which entries of the plant's state act on anything; the others (counters of energy) only follow.
+    """
+
+    parts: Parts
+    at: dict[str, np.ndarray]
+    local: Local
+    moving: float
+    acting: np.ndarray
+
+    @property
+    def found(self) -> bool:
+        """Whether it rests."""
+        return self.moving < 1e-5
+
+
+def rest(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Rest:
+    """The loop at rest at a reference, under a constant load.
+
+    Args:
+        loop: the five roles; reference, disturbance and sensor are left out.
+        dt: sampling time, s.
+        position: of the reference, m and rad.
+        load: acceleration of the outputs, m/s^2 and rad/s^2.
+    """
+    parts, start = take_apart(loop, position)
+    load, model, y = np.asarray(load, dtype=float), parts.loop.controller.model.own_axes(), _output(parts, start)
+    balance = Balance(parts, dt, _acting(parts.differentiate(start, dt)), _steered(model, y))
+    from_afar = lambda load: _from_afar(balance, start | {"load": load, "u": _holding_input(model, y, load)})
+    found = from_afar(load)
+    # Where that fails, the load is put on little by little, from a share that can be held.
+    share, step = 0.0, _FIRST_SHARE
+    held = found if found.found else from_afar(share * load)
+    while not found.found and held.found and step > _SMALLEST_SHARE:
+        further = _together(balance, held.at | {"load": min(1.0, share + step) * load})
+        if further.found:
+            share, held = min(1.0, share + step), further
+            found = held if share == 1.0 else found
+        else:
+            step /= 2
+    return found
+
+
+def _from_afar(balance: Balance, at: dict) -> Rest:
+    """Rest from actuators that stand still, with an input that is about right.
+
+    The plant first, so that actuators turn (with the input held, else the shortest way to rest is to switch them off);
+    then what the law learns and believes at that plant; then both together.
+    """
+    at = balance.solve(at, unknown=("plant",), still=("plant", "outputs"))
+    at = balance.solve(at, unknown=("plant", "u"), still=("plant", "outputs"))
+    at = balance.solve(at, unknown=("law",), still=("law",))
+    return _together(balance, at)
+
+
+def _together(balance: Balance, at: dict) -> Rest:
+    """Rest of plant and law from a point near it."""
+    unknown, still = ("plant", "law", "u"), ("plant", "law", "command")
+    at = balance.solve(at, unknown, still)
+    local = balance.parts.differentiate(at, balance.dt)
+    remaining = balance.residual(local, at, unknown, still)[0]
+    return Rest(balance.parts, at, local, float(np.abs(remaining).max(initial=0.0)), balance.acting)
+
+
+def _output(parts: Parts, start: dict) -> Measurement:
+    return parts.loop.plant.output(jnp.zeros(()), parts.plant_state(jnp.asarray(start["plant"])))
+
+
+def _steered(model: AbstractModel, y: Measurement) -> np.ndarray:
+    """Projection of the outputs on what some input accelerates; one where that is everything."""
+    into_axes, effect = _reach(model, y)
+    lost = lost_directions(np.linalg.solve(np.asarray(into_axes), np.asarray(effect)))
+    return np.eye(len(into_axes)) - np.linalg.pinv(lost) @ lost
+
+
+@jax.jit
+def _reach(model: AbstractModel, y: Measurement):
+    """From accelerations of the outputs to the axes of the law; and what the forces give there."""
+    return jax.jacfwd(lambda a: model.seen(y, a))(jnp.zeros_like(y.position)), model.effect(y)
+
+
+def _holding_input(model: AbstractModel, y: Measurement, load: np.ndarray) -> np.ndarray:
+    return np.asarray(_settled_input(model, y, jnp.asarray(load)))
+
+
+@jax.jit
+def _settled_input(model: AbstractModel, y: Measurement, load):
+    """Input that gives the forces against drift and load, once the actuators have come to them."""
+    needed = -model.drift(y) - (model.seen(y, load) - model.seen(y, jnp.zeros_like(load)))
+    drive, forces = model.drive(), model.spread(y, needed)
+    rate, step = jnp.asarray(20.0), jnp.asarray(5e-3)
+    settle = lambda _, state: drive.advance(state, drive.command(state, forces, rate), step)
+    return drive.command(jax.lax.fori_loop(0, _SETTLING, settle, drive.init()), forces, rate)
+
+
+def _acting(local: Local) -> np.ndarray:
+    """Entries of the plant's state that something else depends on."""
+    acts = np.ones(len(local.values["plant"]), dtype=bool)
+    others = [slopes["plant"] for name, slopes in local.slopes.items() if name not in ("plant", "law", "flow")]
+    while True:
+        rows = np.vstack([local.slopes["plant"]["plant"][acts], local.slopes["law"]["plant"], *others])
+        now = acts & (rows != 0).any(axis=0)
+        if (now == acts).all():
+            return acts
+        acts = now

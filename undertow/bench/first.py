@@ -1,0 +1,18 @@
+"""What a new process does until it has its first result: python -m undertow.bench.first"""
+
+from undertow.process import prepare
+
+prepare()
+
+from undertow.scenario.execute import execute
+from undertow.bench.workload import W1
+
+
+def main() -> None:
+    """Run W1 and print its tracking rms."""
+    steady = execute(W1).steady
+    print(steady and steady["tracking_rms"])
+
+
+if __name__ == "__main__":
+    main()

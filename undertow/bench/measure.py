@@ -1,0 +1,168 @@
+"""Times of workloads W1 and W2, taken one after another on one machine, so that their ratios mean something."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core import runtime
+from simdjit import nvidia
+from simdjit.cuda import Driver
+from simdjit.machine import lanes_of
+from undertow.loop import sampled
+from undertow.loop.vmap_batch import Fleet as Vmapped
+from undertow.bench import plain_numpy, workload
+from undertow.bench.workload import W1, W2, Workload
+
+# Runs of a batch, and how often everything is done; the shortest time counts.
+_BATCH, _BATCH_W2 = 64, 16
+_REPETITIONS, _REPETITIONS_W2 = 7, 3
+_ON_GPU = 65_536
+# Ticks of the yardstick, which is slow.
+_NUMPY_TICKS = 2_000
+
+Watch = Callable[[str, float], None]
+
+
+def measure(watch: Watch) -> dict[str, Any]:
+    """Nanoseconds per step, and per run where several fly at once; seconds of compiling; operations of one step.
+
+    Args:
+        watch: told what is being done, and the share done.
+
+    Returns:
+        Figures of W1 by their names, those of W2 under names that begin with `w2_`.
+    """
+    threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    found: dict[str, Any] = {"threads": threads, "lanes": lanes_of(64)}
+    watch("first results", 0.0)
+    found["first_cold_s"], found["first_kept_s"] = _first_results()
+    with runtime.on_processor():
+        watch("W1, one run", 0.1)
+        one = workload.workload(W1)
+        found |= {"ticks": one.ticks} | _in_a_lane(one)
+        watch("W1, one run, by XLA", 0.2)
+        found |= _by_xla(one)
+        watch("W2, one run", 0.3)
+        other = workload.workload(W2)
+        second = {"ticks": other.ticks} | _in_a_lane(other, _REPETITIONS_W2)
+        second |= _prefixed("batch_float64_", _batch(other, threads, _BATCH_W2, _REPETITIONS_W2))
+        found |= _prefixed("w2_", second)
+    for i, kind in enumerate(("float64", "float32")):
+        watch(f"W1, many runs, {kind}", 0.5 + 0.2 * i)
+        with runtime.in_precision(kind):
+            found |= _many(kind, threads)
+    watch("W1 in plain NumPy", 0.9)
+    found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_TICKS), 1) / _NUMPY_TICKS
+    found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
+    found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
+    watch("", 1.0)
+    return found
+
+
+def _first_results() -> tuple[float, float]:
+    """Seconds from the start of a process to its first result: without compiled code from before, and with it."""
+    with tempfile.TemporaryDirectory() as folder:
+        settings = {**os.environ, "UNDERTOW_CACHE": folder}
+        settings.pop("JAX_COMPILATION_CACHE_DIR", None)
+        command = [sys.executable, "-W", "ignore", "-m", "undertow.bench.first"]
+        work = lambda: subprocess.run(command, env=settings, check=True, capture_output=True)
+        return _timed(work)[1], _timed(work)[1]
+
+
+def _in_a_lane(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:
+    single, compiling = _timed(lambda: workload.fleet(one, lanes=1))
+    numbers = workload.alone(one.run)
+    tracking = float(workload.tracking(single.fly(numbers).accumulated)[0])
+    each = _shortest(lambda: single.fly(numbers), repetitions) / one.ticks
+    figures = {"single_compile_s": compiling, "single_ns": each, "tracking_rms": tracking}
+    return figures | {"operations": single.operations}
+
+
+def _by_xla(one: Workload) -> dict[str, float]:
+    run, plan = one
+
+    def fly():
+        at = dict(zip(("position", "velocity"), run.start, strict=True))
+        return jax.block_until_ready(
+            sampled.simulate(
+                run.loop,
+                duration=plan.ticks * plan.dt,
+                dt=plan.dt,
+                record_every=0,
+                accumulators=run.accumulators,
+                **at,
+            )
+        )
+
+    _, first = _timed(fly)
+    shortest = _shortest(fly)
+    return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / plan.ticks}
+
+
+def _many(kind: str, threads: int) -> dict[str, Any]:
+    """Many runs, on this machine's processor and on its GPU if it has one."""
+    with runtime.on_processor():
+        one = workload.workload(W1 | {"precision": kind})
+        found = _prefixed(f"batch_{kind}_", _batch(one, threads, _BATCH))
+    if jax.default_backend() == "gpu":
+        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(_short(one, 200), _ON_GPU)}
+    driver = nvidia.gpu()
+    if driver is not None:
+        found |= _prefixed(f"gpu_{kind}_", on_gpu(one, driver, _ON_GPU))
+    return found
+
+
+def _batch(one: Workload, threads: int, runs: int, repetitions: int = _REPETITIONS) -> dict[str, float]:
+    """Several runs per thread, all threads at once and one alone."""
+    program, compiling = _timed(lambda: workload.fleet(one))
+    numbers = workload.several(one.run, runs)
+
+    def together(count: int) -> float:
+        with runtime.workers(count) as pool:
+            work = lambda: list(pool.map(lambda _: program.fly(numbers), range(count)))
+            return _shortest(work, repetitions) / count
+
+    each = one.ticks * runs
+    return {"compile_s": compiling, "one_thread_ns": together(1) / each, "ns": together(threads) / each}
+
+
+def on_gpu(one: Workload, driver: Driver, runs: int) -> dict[str, float]:
+    """Many runs on a GPU, a thread each; copying to and fro is counted."""
+    program, compiling = _timed(lambda: workload.fleet(one, driver=driver))
+    numbers = workload.several(one.run, runs)
+    each = _shortest(lambda: program.fly(numbers), 3) / (one.ticks * runs)
+    return {"compile_s": compiling, "ns": each, "ticks_per_second": 1e9 / each}
+
+
+def vmapped_ns(one: Workload, runs: int) -> float:
+    """Nanoseconds per step and run by `jax.vmap` on the device that JAX uses."""
+    program = Vmapped(one.run, one.plan, width=runs)
+    numbers = jax.tree.map(jnp.asarray, workload.several(one.run, runs))
+    return _shortest(lambda: program.fly(numbers), 3) / (one.ticks * runs)
+
+
+def _short(one: Workload, ticks: int) -> Workload:
+    return one._replace(plan=one.plan._replace(ticks=ticks))
+
+
+def _prefixed(prefix: str, figures: dict[str, Any]) -> dict[str, Any]:
+    return {f"{prefix}{key}": value for key, value in figures.items()}
+
+
+def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    start = time.perf_counter()
+    return work(), time.perf_counter() - start
+
+
+def _shortest(work: Callable[[], Any], repetitions: int = _REPETITIONS) -> float:
+    """Nanoseconds."""
+    work()
+    return float(np.min([_timed(work)[1] for _ in range(repetitions)])) * 1e9

@@ -1,0 +1,76 @@
+"""The speed workloads: W1, ODIN with the paper's whole motors at 1 kHz, and W2, BlueROV2 Heavy at sea at 100 Hz."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.metrics import overall
+from simdjit.cuda import Driver
+from undertow.loop.simd_batch import Fleet, Plan, Run
+from undertow.scenario.build import build
+from undertow.campaign.runs import planned, run_of
+from undertow.reproduction.setup import scenario
+from undertow.reproduction.robust_variant.fidelity import at_sea
+
+# Table 1 but for gamma_eps and the bound: without it the weights drift until the loop is lost after 139 s.
+W1 = scenario(
+    "W1",
+    rung="electromechanical",
+    composite=20.0,
+    controller={"weights_bound": 20.0},
+    loop={"kind": "sampled", "duration": 20.0},
+)
+
+# What users run: examples/bluerov2_heavy.yaml.
+W2 = at_sea("W2", {"kind": "rcaf", "preset": "robust"})
+
+
+class Workload(NamedTuple):
+    """One of them, metrics only."""
+
+    run: Run
+    plan: Plan
+
+    @property
+    def ticks(self) -> int:
+        """Steps of one run."""
+        return self.plan.ticks
+
+
+def workload(data: Mapping[str, Any]) -> Workload:
+    """A scenario of the sampled loop as a workload."""
+    built = build(data)
+    return Workload(run_of(built), planned(built, None))
+
+
+def constant(run: Run) -> list[bool]:
+    """Which of its numbers are the same in `several`: all but where they start."""
+    same = jax.tree.map(lambda leaf: True, eqx.filter(run, eqx.is_array))
+    return jax.tree.leaves(same._replace(start=(False, True)))
+
+
+def several(run: Run, count: int) -> Any:
+    """Numbers of so many runs, from different places."""
+    numbers = eqx.filter(run, eqx.is_array)
+    stacked = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (count, *leaf.shape)), numbers)
+    places = np.random.default_rng(0).normal(scale=0.1, size=(count, *run.start[0].shape))
+    return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
+
+
+def fleet(one: Workload, lanes: int = 0, driver: Driver | None = None) -> Fleet:
+    """Its program; arguments as of `Fleet`."""
+    return Fleet(one.run, one.plan, constant(one.run), lanes, driver)
+
+
+def tracking(accumulated: Any) -> np.ndarray:
+    """rms of the error of runs, m and rad."""
+    return overall(accumulated[0])["tracking_rms"]
+
+
+def alone(run: Run) -> Any:
+    """Numbers of the run itself."""
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], eqx.filter(run, eqx.is_array))

@@ -1,0 +1,139 @@
+"""Trials flown many at once: those that differ in their numbers only share a compiled program."""
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from undertow.analysis.metrics import overall
+from undertow.core import runtime
+from undertow.core.status import Status
+from simdjit import nvidia
+from simdjit.errors import Unsupported
+from undertow.loop import simd_batch, vmap_batch
+from undertow.loop.simd_batch import Plan, Run
+from undertow.scenario.build import Built
+from undertow.scenario.schema import Scenario
+from undertow.scenario.part_cache import structure
+from undertow.campaign.runs import leaves, planned, run_of, shared_numbers
+from undertow.campaign.campaign_schema import Series
+
+# What flies a trial. By XLA it takes longer, and alone it is repeated to rounding only.
+LANES, XLA = 0, 1
+
+
+class Flown(NamedTuple):
+    """What is kept of trials, one entry each."""
+
+    metrics: dict[str, np.ndarray]  # over the steady window; NaN where a run did not last
+    status: np.ndarray
+    ended: np.ndarray  # s
+    engine: np.ndarray  # LANES or XLA
+    series: dict[str, np.ndarray]  # (trials, records, ...)
+
+
+class _Kind(NamedTuple):
+    """What trials of one program have in common."""
+
+    structure: Any
+    plan: Plan
+    usual: bool  # numbers that were the same in all probes are the same here
+    engine: str
+    precision: str
+
+
+class _Crew(NamedTuple):
+    """Trials of one kind in a task."""
+
+    first: Run
+    members: list[int]  # their places in the task
+    numbers: list[list[np.ndarray]]  # of each what is not the same in all
+
+
+class Hangar:
+    """Programs that were compiled, for any number of threads.
+
+    Args:
+        probes: some trials; numbers that are the same in all of one structure are built into its program. Which
+            program flies a trial is then a matter of the campaign, not of the task that it is in.
+    """
+
+    def __init__(self, probes: Callable[[], Sequence[Built]]):
+        self._probes = probes
+        self._shared: dict[Any, list[np.ndarray | None]] | None = None
+        self._programs: dict[_Kind, Any] = {}
+        self._lock = threading.Lock()
+
+    def fly(self, built: Iterable[Built], asked: Series | None = None) -> Flown:
+        """Run trials; those of one kind together.
+
+        Args:
+            built: the trials, sampled loops; only numbers that differ are kept of each.
+            asked: series that are kept.
+        """
+        crews: dict[_Kind, _Crew] = {}
+        for i, one in enumerate(built):
+            run = run_of(one)
+            numbers = leaves(run)
+            kind = self._kind(run, numbers, planned(one, asked), one.scenario)
+            crew = crews.setdefault(kind, _Crew(run, [], []))
+            crew.members.append(i)
+            pairs = zip(numbers, self._common(kind, len(numbers)), strict=True)
+            # Copies: views would keep JAX's arrays, and those ten times the memory.
+            crew.numbers.append([np.array(leaf) for leaf, shared in pairs if shared is None])
+        if not crews:  # none of them, as one would be
+            return jax.tree.map(lambda kept: kept[:0], self.fly(self._probes()[:1], asked))
+        pieces = []
+        for kind, crew in crews.items():
+            with runtime.in_precision(kind.precision):
+                pieces.append(self._together(kind, crew))
+        back = np.argsort([i for crew in crews.values() for i in crew.members])
+        return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
+
+    def _together(self, kind: _Kind, crew: _Crew) -> Flown:
+        common = self._common(kind, len(leaves(crew.first)))
+        with self._lock:
+            if kind not in self._programs:
+                self._programs[kind] = _program(crew.first, kind, [shared is not None for shared in common])
+        count, own = len(crew.members), map(np.stack, zip(*crew.numbers, strict=True))
+        repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
+        numbers = [next(own) if shared is None else repeated(shared) for shared in common]
+        tree = jax.tree.structure(eqx.filter(crew.first, eqx.is_array))
+        flown = self._programs[kind].fly(jax.tree.unflatten(tree, numbers))
+        lasted = flown.status == int(Status.OK)
+        metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(flown.accumulated[0]).items()}
+        engine = np.full(count, LANES if isinstance(self._programs[kind], simd_batch.Fleet) else XLA, dtype=np.int8)
+        return Flown(metrics, flown.status.astype(np.int8), flown.ended, engine, flown.series)
+
+    def _common(self, kind: _Kind, count: int) -> list[np.ndarray | None]:
+        """Numbers that are built into the program of a kind, in the order of the leaves of its runs; None elsewhere."""
+        found = self._commons().get(kind.structure) if kind.usual else None
+        return [None] * count if found is None else found
+
+    def _kind(self, run: Run, numbers: list[Any], plan: Plan, scenario: Scenario) -> _Kind:
+        form = structure(run)
+        common = self._commons().get(form)
+        usual = common is not None and all(
+            shared is None or leaf is shared or np.array_equal(leaf, shared)
+            for leaf, shared in zip(numbers, common, strict=True)
+        )
+        return _Kind(form, plan, usual, scenario.loop.engine, scenario.precision)
+
+    def _commons(self) -> dict[Any, list[np.ndarray | None]]:
+        """Numbers that all probes of a structure share, by structure: None for those that differ."""
+        with self._lock:
+            if self._shared is None:
+                self._shared = shared_numbers(self._probes())
+            return self._shared
+
+
+def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.Fleet | vmap_batch.Fleet:
+    if kind.engine == "lanes":
+        for driver in dict.fromkeys((nvidia.gpu(), None)):
+            with contextlib.suppress(Unsupported):
+                return simd_batch.Fleet(run, kind.plan, constant, driver=driver)
+    return vmap_batch.Fleet(run, kind.plan)

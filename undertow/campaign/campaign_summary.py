@@ -1,0 +1,71 @@
+"""What the results of a campaign say: distributions, what they depend on, requirements, failures, the worst trials."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from undertow.campaign.columns import ENDINGS
+from undertow.campaign.sensitivity import by_choice, correlations, quantiles
+from undertow.campaign.batch_runner import XLA
+from undertow.campaign.invalid_trials import refusals
+from undertow.campaign.requirements import verdict
+from undertow.campaign.store_results import Results
+from undertow.campaign.trials import Trials
+
+_WORST = 5
+
+# Trials are ranked by this; those that failed come first.
+_RANKED_BY = "tracking_rms"
+
+
+def summary(results: Results, several: Trials) -> dict[str, Any]:
+    """Everything that stands in summary.json.
+
+    Args:
+        results: of the campaign.
+        several: its trials, to say why some were refused.
+    """
+    refused = results.rows["trial"].values[~results.flown]
+    return {
+        "trials": results.total,
+        "done": results.rows.sizes["trial"],
+        "status": endings(results.rows),
+        "by_xla": int((results.rows["engine"].values == XLA).sum()),
+        "refused": [one._asdict() for one in refusals(several, refused)],
+        "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
+        "sensitivity": correlations(results),
+        "choices": by_choice(results),
+        "worst": [int(trial) for trial in _worst(results)],
+    }
+
+
+def endings(rows: xr.Dataset) -> dict[str, int]:
+    """How many trials ended how; empty before the first is done."""
+    codes = rows["status"].values if "status" in rows else np.zeros(0)
+    return {word: int((codes == code).sum()) for code, word in ENDINGS.items() if (codes == code).any()}
+
+
+def _combination(results: Results, number: int) -> dict[str, Any]:
+    """Distributions and requirements of one combination of `cross`."""
+    own = results.combinations == number
+    rows, lasted, flown = results.rows.isel(trial=own), results.lasted[own], results.flown[own]
+    return {
+        "values": dict(zip(results.campaign.cross, results.named(number), strict=True)),
+        "trials": int(lasted.size),
+        "status": endings(rows),
+        "failed": int((flown & ~lasted).sum()),
+        "refused": int((~flown).sum()),
+        "metrics": {name: quantiles(rows[name].values[lasted]) for name in results.metrics} if lasted.any() else {},
+        "requirements": [
+            verdict(rows.isel(trial=flown), name, wanted) for name, wanted in results.campaign.requirements.items()
+        ],
+    }
+
+
+def _worst(results: Results) -> np.ndarray:
+    """Trials that failed, the earliest first; then those with the largest error. What was refused was not flown."""
+    rows, lasted = results.rows.isel(trial=results.flown), results.lasted[results.flown]
+    error = np.where(lasted, rows[_RANKED_BY].values, np.inf)
+    order = np.lexsort((rows["ended"].values, -error))
+    return rows["trial"].values[order[:_WORST]]

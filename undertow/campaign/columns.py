@@ -1,0 +1,114 @@
+"""What stands in the columns of a store: names of dimensions, meanings, units, codes."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from undertow.analysis.metric_meanings import MEANINGS, unit_of
+from undertow.analysis.metrics import OVERALL
+from undertow.core.status import Status
+from undertow.loop import record
+from undertow.scenario.build import Built
+from undertow.campaign.batch_runner import LANES, XLA
+from undertow.campaign.layout import DRAWS
+from undertow.campaign.labels import is_number, words
+from undertow.campaign.runs import planned
+from undertow.campaign.campaign_schema import Campaign
+from undertow.campaign.task import REFUSED
+from undertow.campaign.trials import Trials, drawn
+
+# Codes of the columns `status` and `engine`, and their words.
+ENDINGS = {int(status): status.word for status in Status} | {REFUSED: "refused"}
+ENGINES = {LANES: "lanes", XLA: "xla", REFUSED: "none"}
+
+_AFTER = "a run that failed stays where it was: see `ended`"
+
+
+def _said(meaning: str, unit: str) -> dict[str, Any]:
+    return {"long_name": meaning, "units": unit or "1"}
+
+
+def _codes(name: str, words: dict[int, str]) -> dict[str, Any]:
+    """Codes and their words as the CF conventions have them."""
+    return {"long_name": name, "flag_values": list(words), "flag_meanings": " ".join(words.values())}
+
+
+# Columns of every campaign, with their attributes; those of inputs get the unit of the plant's.
+ALWAYS: dict[str, dict[str, Any]] = {
+    "trial": {"long_name": "number, as in the names of files of the worst"},
+    "seed": {"long_name": "seed of everything random"},
+    "status": _codes("how the run ended", ENDINGS),
+    "engine": _codes("what flew it", ENGINES),
+    "ended": {"long_name": "when the run ended", "units": "s"},
+} | {name: _said(*MEANINGS[name]) for name in OVERALL}
+
+
+# Flag of a task that is done, and its attributes.
+DONE = "done"
+
+INPUT_UNIT = "input_unit"  # attribute of the store
+
+
+class Label(NamedTuple):
+    """Of one array of the store."""
+
+    dimensions: tuple[str, ...]
+    attributes: dict[str, Any]
+    dtype: str = "float64"  # whatever the precision of the runs: a campaign may cross it
+
+
+FLAGS = Label(("task",), {"long_name": "1 for what is written"}, "uint8")
+_DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "engine": "int8"}
+
+
+def labels(several: Trials, built: Built) -> dict[str, Label]:
+    """Labels of all columns, by name.
+
+    Args:
+        several: the trials.
+        built: one of them.
+    """
+    of_input = built.closed_loop.plant.input_unit
+    found, along = trial_labels(several.campaign, of_input), (*several.campaign.cross, DRAWS)
+    for name in several.campaign.series.signals if several.campaign.series else ():
+        said = _said(*record.meaning(name, built.closed_loop.plant)) | {"comment": _AFTER}
+        found[f"series:{name}"] = Label((*along, *record.dimensions(name)), said)
+    return found
+
+
+def trial_labels(campaign: Campaign, input_unit: str = "") -> dict[str, Label]:
+    """Labels of the columns that hold a number for each trial, by name; for a plant whose input has a unit."""
+    of_metrics = {name: _said(MEANINGS[name].meaning, unit_of(name, input_unit)) for name in OVERALL}
+    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in drawn(campaign)} | ALWAYS | of_metrics
+    along = (*campaign.cross, DRAWS)
+    return {name: Label(along, said, _DTYPES.get(name, "float64")) for name, said in of_trials.items()}
+
+
+def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
+    """What stands along dimensions: values of `cross`, or their names; and what series need.
+
+    Args:
+        several: the trials.
+        built: one of them.
+    """
+    cross = several.campaign.cross
+    found = {key: xr.Variable((key,), _crossed(entries), {"long_name": key}) for key, entries in cross.items()}
+    if several.campaign.series is None:
+        return found
+    plan = planned(built, several.campaign.series)
+    return found | record.coordinates(plan.times(), built.closed_loop.plant)
+
+
+def _crossed(entries: dict[str, Any]) -> np.ndarray:
+    """Values where they are numbers, or true and false, and have no other names; else these."""
+    values, named = list(entries.values()), any(name != words(value) for name, value in entries.items())
+    if not named and all(isinstance(value, bool) for value in values):
+        return np.array(values)
+    return np.array(values, dtype=float) if not named and all(map(is_number, values)) else np.array(list(entries))
+
+
+def _varied(key: str, entries: dict[str, Any] | None) -> dict[str, Any]:
+    """Of what is drawn; numbers that stand for a choice say which."""
+    said = {"long_name": key}
+    return said if entries is None else said | {"choices": list(entries)}

@@ -1,0 +1,119 @@
+"""A campaign from its file, with the first trials built: mistakes are told before anything is flown."""
+
+import contextlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.analysis.metrics import OVERALL
+from undertow.core import checks
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.loop.closed_loop import Sample
+from undertow.scenario.build import Built
+from undertow.scenario.consistency import whole_steps
+from undertow.scenario.results import rules
+from undertow.scenario.schema import Loop
+from undertow.checks.vehicle_findings import vehicle_doubts
+from undertow.campaign import task as tasks
+from undertow.campaign.reading import read_campaign, whole
+from undertow.campaign.invalid_trials import refusals
+from undertow.campaign.requirements import too_few
+from undertow.campaign.campaign_schema import Campaign
+from undertow.campaign.trials import Trials, trials
+
+
+class Prepared(NamedTuple):
+    """A campaign that could be flown."""
+
+    trials: Trials
+    text: str
+    folder: Path
+    first: Built  # a trial
+    named: tuple[dict[str, Any], ...]  # scenarios in which all files that trials name stand with their contents
+    advice: tuple[str, ...]  # what is odd about it, or about the first trials
+
+
+def prepare(path: Path, allow_code: bool = False) -> Prepared:
+    """Read a campaign, and build the first trials of every combination, so that mistakes are told before anything runs.
+
+    Args:
+        path: of its file.
+        allow_code: whether the code that an earlier run.nc names may run, if that is its scenario.
+
+    Raises:
+        BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
+    """
+    campaign, source = read_campaign(path)
+    several = trials(campaign, source, allow_code)
+    text, folder = whole(campaign, several.scenario.data), several.scenario.folder
+    here = tasks.site(text, str(folder))
+    firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]
+    _check_shapes(campaign, here.probes().values())
+    advice: dict[str, str] = {}
+    for row, built in firsts:
+        _check(campaign, built.scenario.loop)
+        for sentence in (*built.advice(), *vehicle_doubts(built)):
+            advice.setdefault(sentence, f"trial {row}: {sentence}")
+    told = (*too_few(campaign), *_refused(several, here), *advice.values())
+    named = (*(built.resolved for _, built in firsts), *_chosen(several, here))
+    return Prepared(several, text, folder, firsts[0][1], named, told)
+
+
+def _chosen(several: Trials, here: tasks.Site) -> Iterator[dict[str, Any]]:
+    """The first trial with each entry of what is chosen, where it can be built: it may name another file."""
+    for data in several.alternatives():
+        with contextlib.suppress(BadInput):
+            yield tasks.build_data(several, here.workshop, data).resolved
+
+
+def _refused(several: Trials, here: tasks.Site) -> tuple[str, ...]:
+    """Why some of the first trials cannot be built: rather now than after a night."""
+    rows = several.probes()
+    found = refusals(several, [row for row in rows if row not in here.probes()])
+    return tuple(f"{one.trials} of the first {len(rows)} trials are refused: {one.why}" for one in found)
+
+
+def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Built]:
+    """A trial of a combination that can be built.
+
+    Raises:
+        BadInput: none of the first can; what is wrong with the very first.
+    """
+    rows = several.first(combination)
+    for row in rows:
+        if row in here.probes():
+            return row, here.probes()[row]
+    return rows[0], tasks.build_trial(several, here.workshop, rows[0])
+
+
+def _check(campaign: Campaign, loop: Loop) -> None:
+    """What a campaign asks of its runs."""
+    if loop.kind != "sampled":
+        raise BadInput("scenario.loop.kind", "be sampled in a campaign", loop.kind)
+    for name in campaign.requirements:
+        if name not in OVERALL:
+            raise BadInput(f"requirements.{name}", "be a metric", "unknown", hint=did_you_mean(name, OVERALL))
+    if campaign.series is None:
+        return
+    for key in (*campaign.vary, *campaign.cross):
+        if key in ("loop", "loop.dt", "loop.duration"):
+            raise BadInput("series", "be of runs of one length and sampling time", f"beside {key}, which differs")
+    for i, name in enumerate(campaign.series.signals):
+        checks.choice(f"series.signals[{i}]", name, [field for field in Sample._fields if field != "books"])
+    if not whole_steps(campaign.series.every, loop.dt):
+        must = f"be a whole number of sampling times ({loop.dt:g} s)"
+        raise BadInput("series.every", must, f"{campaign.series.every:g} s")
+    if campaign.series.every > loop.duration:
+        raise BadInput("series.every", f"be at most the duration ({loop.duration:g} s)", f"{campaign.series.every:g} s")
+
+
+def _check_shapes(campaign: Campaign, several: Iterable[Built]) -> None:
+    """That series have the same shape in all trials, as one array holds them."""
+    if campaign.series is None:
+        return
+    hint = "Leave it out, or make a campaign for each of them"
+    loops = [built.closed_loop for built in several]
+    if len({(loop.plant.outputs, loop.plant.inputs()) for loop in loops}) > 1:
+        raise BadInput("series", "be of plants with the same outputs and inputs", "of several", hint=hint)
+    if "weights" in campaign.series.signals and len({rules(loop) for loop in loops}) > 1:
+        raise BadInput("series.signals", "be without weights where laws have different rules", "with", hint=hint)

@@ -1,0 +1,50 @@
+"""What is flown of a trial: its numbers, and how."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from undertow.analysis.metrics import Metrics
+from undertow.loop.simd_batch import Plan, Run
+from undertow.scenario.build import Built, in_its_precision
+from undertow.scenario.part_cache import structure
+from undertow.campaign.campaign_schema import Series
+
+_STARTS = ("position", "velocity")
+
+
+@in_its_precision
+def run_of(built: Built) -> Run:
+    """Loop, accumulators, start and key of a trial."""
+    scenario = built.scenario
+    start = built.closed_loop.outputs_at_start(*(getattr(scenario.initial, name) for name in _STARTS))
+    return Run(built.closed_loop, (Metrics(*built.window()),), start, jax.random.PRNGKey(scenario.seed))
+
+
+def planned(built: Built, asked: Series | None) -> Plan:
+    """How a trial is flown, and what is kept of it."""
+    loop = built.scenario.loop
+    every, signals = (round(asked.every / loop.dt), tuple(asked.signals)) if asked else (0, ())
+    return Plan(round(loop.duration / loop.dt), loop.dt, every, signals, loop.method, loop.substeps)
+
+
+def leaves(run: Run) -> list[Any]:
+    """The numbers of a trial, in an order of their own."""
+    return [leaf for leaf in jax.tree.leaves(run) if eqx.is_array(leaf)]
+
+
+def shared_numbers(several: Sequence[Built]) -> dict[Any, list[np.ndarray | None]]:
+    """Numbers that are the same in all of a structure, of which there are two at least; None for the others."""
+    probes: dict[Any, list[list[Any]]] = {}
+    for built in several:
+        run = run_of(built)
+        probes.setdefault(structure(run), []).append(leaves(run))
+    same = lambda column: all(np.array_equal(column[0], other) for other in column[1:])
+    return {
+        form: [column[0] if same(column) else None for column in zip(*members, strict=True)]
+        for form, members in probes.items()
+        if len(members) > 1
+    }

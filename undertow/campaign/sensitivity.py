@@ -1,0 +1,52 @@
+"""What the metrics of a campaign depend on: rank correlations with numbers, distributions by choice."""
+
+from typing import Any
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from undertow.campaign.store_results import Results
+
+QUANTILES = (0.05, 0.5, 0.95)
+
+
+def quantiles(values: np.ndarray) -> dict[str, float]:
+    """5 %, median and 95 % of some numbers, those that are not defined left out; some may be infinite."""
+    known = values[~np.isnan(values)]
+    method: Any = "linear" if np.isfinite(known).all() else "higher"
+    found = np.quantile(known, QUANTILES, method=method) if known.size else np.full(len(QUANTILES), np.nan)
+    return dict(zip(map(str, QUANTILES), found.tolist(), strict=True))
+
+
+def correlations(results: Results) -> dict[str, dict[str, float]]:
+    """Rank correlation (Spearman) of every metric with every number that is drawn: mean over the combinations."""
+    found: dict[str, dict[str, float]] = {}
+    groups = [results.lasted & (results.combinations == number) for number in np.unique(results.combinations)]
+    for key in results.campaign.vary:
+        column = results.rows[f"vary:{key}"]
+        if "choices" in column.attrs:
+            continue
+        for name in results.metrics:
+            values = results.rows[name].values
+            finite = [group & np.isfinite(values) for group in groups]
+            pairs = [(column.values[group], values[group]) for group in finite]
+            known = [
+                float(spearmanr(*pair)[0]) for pair in pairs if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
+            ]
+            if known:
+                found.setdefault(key, {})[name] = sum(known) / len(known)
+    return found
+
+
+def by_choice(results: Results) -> dict[str, dict[str, Any]]:
+    """For what is drawn from words or parts: trials, failures and metrics with each, over all combinations."""
+    found: dict[str, dict[str, Any]] = {}
+    for key in results.campaign.vary:
+        column = results.rows[f"vary:{key}"]
+        for i, word in enumerate(column.attrs.get("choices", ())):
+            chosen = column.values == i
+            lasted, failed = chosen & results.lasted, chosen & results.flown & ~results.lasted
+            metrics = {name: quantiles(results.rows[name].values[lasted]) for name in results.metrics if lasted.any()}
+            counts = {"trials": int(chosen.sum()), "failed": int(failed.sum())}
+            found.setdefault(key, {})[word] = counts | {"metrics": metrics}
+    return found

@@ -1,0 +1,124 @@
+"""The results of a campaign as they stand in its store."""
+
+import itertools
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from undertow.analysis.metric_meanings import MEANINGS
+from undertow.core.errors import BadInput
+from undertow.core.status import Status
+from undertow.campaign.arrays import check_array, chunk_file, flags, to_be_read
+from undertow.campaign.columns import DONE, FLAGS, INPUT_UNIT, trial_labels
+from undertow.campaign.run_campaign import STORE
+from undertow.campaign.layout import DRAWS, Layout, layout
+from undertow.campaign.reading import read_text
+from undertow.campaign.campaign_schema import Campaign
+from undertow.campaign.task import REFUSED
+
+
+class Results(NamedTuple):
+    """A campaign's rows, and what they were asked for."""
+
+    campaign: Campaign
+    rows: xr.Dataset  # of the tasks that are done
+
+    @property
+    def total(self) -> int:
+        """Trials that were asked for."""
+        return self.campaign.number
+
+    @property
+    def metrics(self) -> list[str]:
+        """Names of those that are defined for any trial that lasted, in the order of tables."""
+        known = lambda name: name in self.rows and not np.isnan(self.rows[name].values[self.lasted]).all()
+        return [name for name in MEANINGS if known(name)]
+
+    def unit(self, metric: str) -> str:
+        """Of a metric; nothing for a plain number."""
+        return self.rows[metric].attrs["units"].removesuffix("1") if metric in self.rows else ""
+
+    @property
+    def combinations(self) -> np.ndarray:
+        """Which combination of `cross` each row belongs to."""
+        return self._combination(self.rows["trial"].values)
+
+    @property
+    def lasted(self) -> np.ndarray:
+        """Which rows are of runs that reached their end."""
+        return self.rows["status"].values == int(Status.OK)
+
+    @property
+    def flown(self) -> np.ndarray:
+        """Which rows are of runs that began: their scenario could be built."""
+        return self.rows["status"].values != REFUSED
+
+    def crossed(self, trial: int) -> tuple[str, ...]:
+        """Names of the values of `cross` in a trial."""
+        return self.named(self._combination(trial))
+
+    def named(self, combination: int) -> tuple[str, ...]:
+        """Those in a combination."""
+        return list(itertools.product(*self.campaign.cross.values()))[combination]
+
+    def _combination(self, trial: Any) -> Any:
+        """Of one trial or several, as `Trials` numbers them."""
+        return trial % (self.campaign.number // self.campaign.trials)
+
+    def drawn(self, trial: int) -> dict[str, Any]:
+        """What is drawn for a trial, by key path: numbers, or words for choices that are none."""
+        row = self.rows.sel(trial=trial)
+        found = {}
+        for key in self.campaign.vary:
+            column = row[f"vary:{key}"]
+            choices = column.attrs.get("choices")
+            found[key] = choices[int(column)] if choices else float(column)
+        return found
+
+
+def load(folder: Path) -> Results:
+    """The results in the folder of a campaign.
+
+    Raises:
+        FileNotFoundError: there are none.
+        BadInput: its metadata are not those that it was written with.
+        OSError: they are damaged.
+    """
+    path = folder / STORE
+    try:
+        group = to_be_read(path)
+        if "campaign" not in group.attrs:
+            raise FileNotFoundError(path)  # of a process that was killed before anything stood there
+        campaign, _ = read_text(str(group.attrs["campaign"]), Path())
+        stored = layout(campaign)._replace(chunk=tuple(group.attrs["chunk"]))
+        labels = trial_labels(campaign, str(group.attrs.get(INPUT_UNIT, "")))
+        for name, label in {**labels, DONE: FLAGS}.items():
+            if name in group:
+                check_array(group[name], label, (1,) if name == DONE else stored.chunk, path)
+        return Results(campaign, _rows(group, campaign, stored).isel(trial=_done(group, campaign, stored, path)))
+    except (FileNotFoundError, BadInput):
+        raise
+    except Exception as error:  # zarr's words for what is not as it was written
+        raise OSError(f"{path} is damaged ({error}); `undertow campaign --resume` mends what can be mended") from error
+
+
+def _rows(group: Any, campaign: Campaign, stored: Layout) -> xr.Dataset:
+    """All of the store by trial, without series. While room for further draws is made, arrays may be longer."""
+    axes, region = (*campaign.cross, DRAWS), tuple(slice(0, size) for size in stored.shape)
+    arrays = {name: group[name] for name in trial_labels(campaign) if name in group and name != "trial"}
+    rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})
+    if arrays:
+        rows = rows.stack({"trial": (DRAWS, *campaign.cross)}, create_index=False)  # as they are numbered
+    return rows.assign_coords(trial=np.arange(campaign.number)).assign_attrs(group.attrs)
+
+
+def _done(group: Any, campaign: Campaign, stored: Layout, path: Path) -> np.ndarray:
+    """Which trials are of tasks that are done."""
+    done, names = np.zeros(campaign.number, dtype=bool), trial_labels(campaign)
+    for task in np.flatnonzero(flags(group[DONE], stored.tasks)) if DONE in group else ():
+        block = stored.block(task)
+        if all(chunk_file(path, name, block, len(block)).exists() for name in names):
+            done[stored.trials(task)] = True
+    return done

@@ -1,0 +1,172 @@
+"""`undertow check`: from what the user names to everything that can be said against it."""
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.checks.finding import Finding
+from undertow.checks.part_check import check_contract, of_plant
+from undertow.checks.plant_check import derived_of_plant
+from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
+from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint
+from undertow.core import catalogue
+from undertow.core.contracts import AbstractPlant
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.scenario import factory
+from undertow.scenario.build import build, in_its_precision
+from undertow.scenario.reading import Text, key_path, read
+from undertow.scenario.schema import Scenario
+from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
+from undertow.checks.vehicle_findings import vehicle_facts
+from undertow.scenario.vehicle_keys import KEYS
+from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.vehicle import Vehicle
+
+Rows = tuple[tuple[str, str, str], ...]
+
+
+class Report(NamedTuple):
+    """What a check found."""
+
+    found: tuple[tuple[Finding, str], ...]  # with its place, when known
+    tables: tuple[tuple[str, Rows], ...]  # title, and what follows from the numbers
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """One line each, errors first."""
+        ordered = sorted(self.found, key=lambda pair: pair[0].level != "error")
+        return tuple(finding.sentence(where) for finding, where in ordered)
+
+    @property
+    def errors(self) -> int:
+        """Number of errors."""
+        return sum(finding.level == "error" for finding, _ in self.found)
+
+
+def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> Report:
+    """Check a vehicle file, a scenario, a result file, a part by name, or `./file.py:function`.
+
+    Args:
+        thing: what to check.
+        options: of the part, or keys of the vehicle file to change.
+        allow_code: whether code that a result file names may run.
+
+    Raises:
+        BadInput: it cannot be read or made at all.
+    """
+    if Path(thing).suffix == ".nc" or is_vehicle_file(thing):
+        return _check_file(Path(thing), options, allow_code)
+    return _joined([_of_part(*_named(thing, options))])
+
+
+def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Report:
+    text = read(path, "THING", allow_code)
+    if "scenario" in text.data:
+        hint = "`undertow campaign` checks one before it flies it; check its scenario in a file of its own"
+        raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, a campaign", hint=hint)
+    own, scenario = (sum(key in known for key in text.data) for known in (KEYS, Scenario.model_fields))
+    if not own and not scenario:
+        hint = did_you_mean(next(iter(text.data), ""), {*KEYS, *Scenario.model_fields})
+        raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, without a key of either", hint=hint)
+    if own >= scenario:
+        return _joined([_of_vehicle_file(path, options)])
+    if options:
+        raise BadInput("--option", "be left out for a scenario", next(iter(options)))
+    return _joined(_of_scenario(text))
+
+
+def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
+    found = read_vehicle(path, options, "THING")
+    report = _of_vehicle(found.data.facts(), lambda key: found.text.where(key_path(key)))
+    if not report.errors:
+        found.vehicle()  # whatever it refuses and no rule has seen
+    return report
+
+
+def _of_vehicle(facts: Facts, where: Callable[[str], str] = lambda key: "") -> Report:
+    return _report(lint(facts), where, f"{facts.name} (vehicle)", derived(facts))
+
+
+def _of_part(name: str, part: Any) -> Report:
+    if isinstance(part, Vehicle):
+        return _of_vehicle(facts_of(part))
+    if isinstance(part, AbstractThruster):
+        return _of_thruster(part, f"{name} (thruster)")
+    found = check_contract(part)
+    said = () if found else getattr(part, "advice", tuple)()
+    rows = derived_of_plant(part) if isinstance(part, AbstractPlant) and not found else ()
+    own = [Finding("advice", "own", name, sentence.rstrip(".")) for sentence in said]
+    return _report([*found, *own], title=f"{name} (plant)", rows=rows)
+
+
+def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
+    findings = lint_thruster(thruster)
+    broken = any(finding.level == "error" for finding in findings)
+    return _report(findings, title=title, rows=() if broken else derived_of_thruster(thruster))
+
+
+@in_its_precision
+def _of_scenario(text: Text) -> list[Report]:
+    """The scenario itself, the vehicle and the thruster in it, and the plant and its references."""
+    built = build(text)
+    loop = built.closed_loop
+    said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
+    reports = [_report(said, title="scenario")]
+    if (facts := vehicle_facts(built)) is not None:
+        reports.append(_of_vehicle(facts, lambda key: text.where(("plant", "vehicle"))))
+    if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
+        reports.append(_of_thruster(thruster, "thruster"))
+    if any(report.errors for report in reports):
+        return reports  # whatever contains these parts would only stumble over them
+    reports.append(_report(check_contract(loop.plant)))
+    if not reports[-1].errors:
+        around = of_plant(loop.plant)
+        reports += [
+            _report(check_contract(part, around))
+            for part in (loop.reference, loop.disturbance, loop.sensor, loop.controller)
+        ]
+    return reports
+
+
+def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any]:
+    """Name and instance of a part."""
+    if ".py:" in thing:
+        try:
+            function = catalogue.find("", thing)
+        except BadInput as error:
+            raise BadInput("THING", error.must, error.got, hint=error.hint) from error.__cause__
+        try:
+            part = factory.call(function, options, _leading(function), Path())[0]
+        except BadInput as error:
+            raise (error if error.name else error.at("THING")) from error.__cause__
+        if not factory.is_part(part):
+            raise BadInput("THING", "return a vehicle, thruster, plant or other part", f"{thing}: {part!r}")
+        return thing.rpartition(":")[2], part
+    wanted, _, short = thing.rpartition("/")
+    known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if wanted in ("", kind)}
+    for kind, names in known.items():
+        if short in names:
+            return short, factory.make(kind, {"kind": short, **options}, Path(), _leading(names[short]))[0]
+    every = {name for names in known.values() for name in names}
+    raise BadInput("THING", "be a file or the name of a part", thing, hint=did_you_mean(short, every))
+
+
+def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:
+    """The model that a controller starts from: that of the default vehicle."""
+    if next(iter(inspect.signature(function).parameters), "") != "model":
+        return ()
+    return (factory.make("plants", "hybrid_vehicle", Path())[0].model(),)
+
+
+def _report(
+    findings: Iterable[Finding], where: Callable[[str], str] = lambda key: "", title: str = "", rows: Rows = ()
+) -> Report:
+    found = tuple((finding, where(finding.key)) for finding in findings)
+    return Report(found, ((title, rows),) if rows else ())
+
+
+def _joined(reports: list[Report]) -> Report:
+    """All of them; what two say in the same words is said once, by the later one, which knows the place."""
+    found = {finding.says: (finding, where) for report in reports for finding, where in report.found}
+    return Report(tuple(found.values()), tuple(table for report in reports for table in report.tables))

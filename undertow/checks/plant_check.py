@@ -1,0 +1,140 @@
+"""Does a plant keep its contract, and does its model tell the same story?"""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, PyTree
+
+from undertow.checks.answers import agree, alike, is_a, shaped
+from undertow.checks.finding import Finding, error
+from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Measurement
+
+_GRIP = 1e-9  # of the largest entry: below it an input does not act at once
+
+
+def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
+    """Every method once, near the origin; and each answer against another way to the same number."""
+    wrong = [*_forms(plant), *is_a("advice", plant.advice(), tuple)]
+    wrong = wrong or list(_forms_of_model(plant))
+    if wrong:
+        yield from wrong
+        return
+    found = jax.jit(partial(_numbers, plant))(_trial(plant))
+    yield from agree("output", found.velocity, found.position_rate, "the rate of its position")
+    yield from agree("acceleration", found.acceleration, found.velocity_rate, "the rate of the output")
+    added = "the lumped acceleration of the load, which adds to it"
+    yield from agree("acceleration", found.gained, _extra(plant), added)
+    if not (found.held < 0).all():
+        i = int(np.argmax(found.held))
+        got = f"{found.held[i]:.4g} for a unit of it on {plant.outputs[i]}"
+        hint = "It stands on the left side of Eq. (2): subtract it from the forces"
+        yield error("contract", "acceleration", "fall with the wrench of the load", got, hint)
+    yield from agree("model.invert", found.reached, found.reachable, "`model.gain`: G G# a = a")
+    if np.abs(found.true_gain).max() > _GRIP and float((found.true_gain * found.gain).sum()) < 0:
+        i, j = np.unravel_index(np.abs(found.gain).argmax(), found.gain.shape)
+        got = f"{found.gain[i, j]:.4g} where x_ddot changes by {found.true_gain[i, j]:.4g} per unit"
+        yield error("contract", "model.gain", "push where the plant does", got)
+
+
+def derived_of_plant(plant: AbstractPlant) -> tuple[tuple[str, str, str], ...]:
+    """(what, value, unit), a row each: at the point where `check_plant` tries it."""
+    n, m, t, calm = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
+    x, model = _trial(plant), plant.model()
+    y, u = plant.output(t, x), plant.admissible(x, jnp.zeros(m))
+    gain = np.asarray(model.gain(y))
+    true = np.asarray(plant.acceleration(t, x, u, calm))
+    rows = [("outputs, inputs, rank of G", f"{n}, {m}, {np.linalg.matrix_rank(gain, tol=1e-9)}", "")]
+    for i, (name, unit, told) in enumerate(zip(plant.outputs, plant.output_units, model.drift(y), strict=True)):
+        at = f"{name} {float(y.position[i]):.3g} {unit}, {float(y.velocity[i]):.3g} {unit}/s"
+        rows.append((f"{at}: x_ddot without input, F of the model", f"{true[i]:.4g}, {told:.4g}", f"{unit}/s^2"))
+    return tuple(rows)
+
+
+def _trial(plant: AbstractPlant):
+    """A state near the origin, at rest in nothing."""
+    n = len(plant.outputs)
+    return plant.initial_state(jnp.linspace(0.1, 0.5, n), jnp.linspace(0.2, -0.1, n))
+
+
+def _extra(plant: AbstractPlant):
+    """A lumped acceleration to try."""
+    return jnp.linspace(1.0, 2.0, len(plant.outputs))
+
+
+def _forms(plant: AbstractPlant) -> Iterator[Finding]:
+    """Types and shapes; traced, so that nothing is computed, and what does not compile complains."""
+    n, m, t, calm = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
+    if len(plant.output_units) != n:
+        yield error("contract", "output_units", f"have {n} entries, one per output", f"{len(plant.output_units)} long")
+    x = _trial(plant)
+    u = jax.eval_shape(plant.admissible, x, jnp.zeros(m))
+    wrong = [*shaped("admissible", u, (m,))]
+    if wrong:
+        yield from wrong
+        return
+    y = jax.eval_shape(plant.output, t, x)
+    effort = jax.eval_shape(plant.effort, x, u)
+    yield from is_a("output", y, Measurement)
+    yield from is_a("effort", effort, Effort)
+    if isinstance(y, Measurement):
+        yield from shaped("output", y.position, (n,))
+        yield from shaped("output", y.velocity, (n,))
+    if isinstance(effort, Effort):
+        yield from (finding for value in effort for finding in shaped("effort", value, (m,)))
+    yield from alike("dynamics", jax.eval_shape(plant.dynamics, t, x, u, calm), x, "have the form of the state")
+    yield from shaped("acceleration", jax.eval_shape(plant.acceleration, t, x, u, calm), (n,))
+    yield from shaped("health", jax.eval_shape(plant.health, x), ())
+
+
+def _forms_of_model(plant: AbstractPlant) -> Iterator[Finding]:
+    n, m = len(plant.outputs), plant.inputs()
+    model, y = plant.model(), jax.eval_shape(plant.output, jnp.zeros(()), _trial(plant))
+    wrong = list(is_a("model", model, AbstractModel))
+    yield from wrong
+    if not wrong:
+        yield from shaped("model.angles", np.asarray(model.angles, dtype=float), (n,))
+        yield from shaped("model.drift", jax.eval_shape(model.drift, y), (n,))
+        yield from shaped("model.gain", jax.eval_shape(model.gain, y), (n, m))
+        yield from shaped("model.invert", jax.eval_shape(model.invert, y, jnp.zeros(n)), (m,))
+
+
+class _Numbers(NamedTuple):
+    """What the plant answers, in two ways each."""
+
+    velocity: Array
+    position_rate: Array
+    acceleration: Array
+    velocity_rate: Array
+    gained: Array  # from a lumped acceleration
+    held: Array  # from a unit of wrench on each axis
+    gain: Array
+    true_gain: Array
+    reachable: Array
+    reached: Array
+
+
+def _numbers(plant: AbstractPlant, x: PyTree) -> _Numbers:
+    m, t, calm = plant.inputs(), jnp.zeros(()), plant.no_load()
+    u = plant.admissible(x, jnp.full(m, 0.1))
+    y, rate = jax.jvp(lambda x: plant.output(t, x)[:2], (x,), (plant.dynamics(t, x, u, calm),))
+    moved = lambda u, load: plant.acceleration(t, x, u, load)
+    at_rest = moved(u, calm)
+    model, measured = plant.model(), plant.output(t, x)
+    gain = model.gain(measured)
+    reachable = gain @ jnp.linspace(1.0, 2.0, m)
+    return _Numbers(
+        velocity=y[1],
+        position_rate=rate[0],
+        acceleration=at_rest,
+        velocity_rate=rate[1],
+        gained=moved(u, calm._replace(acceleration=_extra(plant))) - at_rest,
+        held=jnp.diagonal(jax.jacfwd(lambda w: moved(u, calm._replace(wrench=w)))(calm.wrench)),
+        gain=gain,
+        true_gain=jax.jacfwd(lambda u: moved(u, calm))(u),
+        reachable=reachable,
+        reached=gain @ model.invert(measured, reachable),
+    )

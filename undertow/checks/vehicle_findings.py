@@ -1,0 +1,34 @@
+"""What is wrong with the vehicle of a scenario, though it can be run."""
+
+from undertow.checks.vehicle_lint import Facts, facts_of, lint
+from undertow.scenario.build import Built
+from undertow.scenario.vehicle_data import parse
+from undertow.vehicles.vehicle import Vehicle
+
+
+def vehicle_facts(built: Built) -> Facts | None:
+    """What is known of the vehicle of a scenario; None where its plant is no vehicle."""
+    vehicle = getattr(built.closed_loop.plant, "vehicle", None)
+    if not isinstance(vehicle, Vehicle):
+        return None
+    description = built.resolved["plant"].get("vehicle", {})
+    return parse(description["contents"]).facts() if "contents" in description else facts_of(vehicle)
+
+
+def vehicle_doubts(built: Built) -> tuple[str, ...]:
+    """A sentence for each thing that no vehicle can be, and for a weight that is not that of its mass.
+
+    The latter is what comes of changing the mass alone, in a scenario or from trial to trial.
+    """
+    facts = vehicle_facts(built)
+    findings = () if facts is None else lint(facts)
+    shown = [finding for finding in findings if finding.level == "error" or finding.rule == "gravity"]
+    if _mass_alone(built):
+        stays = "With `mass` alone changed, weight and buoyancy stay: give `weight` and `buoyancy`, too"
+        shown = [finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in shown]
+    return tuple(f"{finding.says}. {finding.hint}".rstrip(". ") for finding in shown)
+
+
+def _mass_alone(built: Built) -> bool:
+    description = built.resolved["plant"].get("vehicle", {})
+    return "mass" in description and "weight" not in description

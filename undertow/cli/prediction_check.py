@@ -1,0 +1,85 @@
+"""What was foretold of a run, beside what came of it."""
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, NamedTuple, TypeVar
+
+from undertow.analysis.linearization.response import Comparison, compare
+from undertow.core.user_code import python_says
+from undertow.scenario.build import Built, in_its_precision
+from undertow.scenario.execute import Executed
+from undertow.prediction.operating_point import foretold, ground
+
+Result = TypeVar("Result")
+
+# A measured metric that departs from the predicted one by more than this share is named.
+_DEPARTS = 0.10
+
+# Metrics that tell more about the hardest moment than about the law: shown, not judged.
+_PEAKS = ("tracking_max", "input_peak")
+
+# Of the wanted: numbers below this share of the largest of their kind are zero.
+_NOTHING = 1e-9
+
+
+class Foresight(NamedTuple):
+    """Metrics of the steady window by the linearised loop, or why there are none."""
+
+    metrics: dict[str, float] | None
+    why_not: str
+
+
+def beside(work: Callable[[], Result], built: Built, wanted: bool) -> tuple[Result, Foresight | None]:
+    """Result of `work`, and what is foretold of the scenario meanwhile: compiling takes most of the time of both."""
+    if not wanted:
+        return work(), None
+    with ThreadPoolExecutor(1) as other:
+        foreseen: Future[Foresight] = other.submit(_foresee, built)
+        return work(), foreseen.result()
+
+
+def departures(foresight: Foresight, executed: Executed) -> list[Comparison]:
+    """Metrics that depart by more than a tenth from what was foretold."""
+    return [one for one in _compared(foresight, executed) if one.name not in _PEAKS and one.departure > _DEPARTS]
+
+
+def judgement(foresight: Foresight, executed: Executed) -> str:
+    """One sentence on how the run compares with its prediction."""
+    if foresight.metrics is None:
+        return f"No prediction: {foresight.why_not}"
+    if executed.steady is None:
+        return "The prediction is for the steady window, which the run did not reach"
+    departing = departures(foresight, executed)
+    if not departing:
+        return "As predicted: no metric departs by more than 10 %"
+    named = ", ".join(f"{one.name} by {one.departure:.0%}" for one in departing)
+    return f"Departs from the linear prediction by more than 10 %: {named}{_because(executed.steady)}"
+
+
+def in_results(foresight: Foresight | None) -> dict[str, Any]:
+    """What metrics.json says of it."""
+    if foresight is None:
+        return {}
+    return {"predicted": foresight.metrics} | ({"not_predicted": foresight.why_not} if foresight.why_not else {})
+
+
+@in_its_precision
+def _foresee(built: Built) -> Foresight:
+    try:
+        return Foresight(*foretold(ground(built)))
+    except Exception as error:  # a part of the user's own may be run, and yet not be differentiated
+        return Foresight(None, f"this loop cannot be linearised: {python_says(error)}")
+
+
+def _compared(foresight: Foresight, executed: Executed) -> list[Comparison]:
+    if foresight.metrics is None or executed.steady is None:
+        return []
+    largest = max(foresight.metrics.values())
+    return [one for one in compare(foresight.metrics, executed.steady) if one.measured > _NOTHING * largest]
+
+
+def _because(steady: dict[str, Any]) -> str:
+    limited = steady.get("saturated_fraction", 0.0)
+    if limited > 0:
+        return f". Inputs were at a limit for {limited:.1%} of the time, which no linear prediction knows"
+    return ". What is not linear counts here: large motions, dead zones, motors far from their mean speed"

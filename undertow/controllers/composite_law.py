@@ -1,0 +1,151 @@
+"""The law: robust composite adaptive fuzzy control (RCAFC), and RAFC as its case gamma_eps = 0.
+
+Eqs. (18)-(29), (39)-(44) and (61).
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.controllers.diagnostics import COLUMNS, share_given, tracking_books, weight_books
+from undertow.controllers.tracking_error import Tracking, check_gains, tracking
+from undertow.core import checks
+from undertow.core.continuous import AbstractContinuousController
+from undertow.core.contracts import AbstractModel, Measurement, Target, Telemetry
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.estimation.tsk import FuzzySystem
+from undertow.estimation.series_parallel import SeriesParallel
+from undertow.numerics.linear import matvec
+from undertow.numerics.lyapunov import companion_lyapunov
+from undertow.numerics.projection import projected_rate
+from undertow.numerics.smoothing import SWITCHES, switch
+
+PerAxis = Float[Array, " n"]
+
+FUZZY_INPUTS = ("error", "state")
+
+_PER_AXIS = ("adaptation", "composite", "robust_gain", "layer", "weights_bound")
+_PER_AXIS_IDENTIFICATION = ("pole", "compensation_gain", "layer")
+
+
+class RCAFState(NamedTuple):
+    """State z of the law."""
+
+    predicted_position: PerAxis  # x_hat, m, rad
+    predicted_velocity: PerAxis  # x_hat_dot, m/s, rad/s
+    weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2
+
+
+class RCAF(AbstractContinuousController):
+    """The law. Gains are one number for all axes or one per axis; `feedback` (2,) or (n, 2), `weight` likewise.
+
+    Raises:
+        BadInput: a gain of the wrong sign, feedback not Hurwitz, weight not positive definite, or a fuzzy
+            system whose number of inputs does not fit `fuzzy_input`.
+    """
+
+    model: AbstractModel
+    fuzzy: FuzzySystem
+    identification: SeriesParallel
+    feedback: Float[Array, "*n 2"] = param(
+        "1/s^2, 1/s", "state feedback", symbol="K", default=(1.0, 2.0), source="Table 1"
+    )
+    weight: Float[Array, "*n 2 2"] = param(
+        "", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)), source="Table 1"
+    )
+    adaptation: Float[Array, "..."] = param("1/s^2", "adaptation gain", symbol="gamma", default=100.0, source="Table 1")
+    composite: Float[Array, "..."] = param(
+        "", "share of the modelling error; 0 is RAFC, Eq. (61)", symbol="gamma_eps", default=500.0, source="Table 1"
+    )
+    robust_gain: Float[Array, "..."] = param(
+        "m/s^2, rad/s^2", "amplitude of the robust term", symbol="w_bar", default=10.0, source="Table 1"
+    )
+    layer: Float[Array, "..."] = param(
+        "unit of s", "boundary layer of the robust term", symbol="phi", default=0.5, source="Table 1"
+    )
+    weights_bound: Float[Array, "..."] = param(
+        "m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=jnp.inf
+    )
+    switching: str = eqx.field(static=True, default="tanh")
+    fuzzy_input: str = eqx.field(static=True, default="error")
+    method: str = eqx.field(static=True, default="euler")
+    substeps: int = eqx.field(static=True, default=1)
+
+    def __check_init__(self):
+        for name in ("adaptation", "composite", "robust_gain"):
+            checks.not_negative(name, getattr(self, name))
+        checks.positive("layer", self.layer)
+        checks.positive("weights_bound", self.weights_bound, finite=False)
+        checks.choice("switching", self.switching, SWITCHES)
+        checks.choice("fuzzy_input", self.fuzzy_input, FUZZY_INPUTS)
+        if self.fuzzy.inputs != 1 + FUZZY_INPUTS.index(self.fuzzy_input):
+            raise BadInput("fuzzy", f"have the inputs of `{self.fuzzy_input}`", f"of {self.fuzzy.inputs} input(s)")
+        axes = len(self.model.angles)
+        for name in _PER_AXIS_IDENTIFICATION:
+            checks.per_axis(name, getattr(self.identification, name), axes)
+        check_gains(self.feedback, self.weight, {name: getattr(self, name) for name in _PER_AXIS}, axes)
+
+    def init(self, y: Measurement, r: Target) -> RCAFState:
+        axes = y.position.shape[0]
+        return RCAFState(y.position, self.model.rates(y), jnp.zeros((axes, self.fuzzy.rules)))
+
+    def command(self, z: RCAFState, y: Measurement, r: Target):
+        """V of Eq. (23), with d_hat of Eq. (42) and u_r of Eq. (43)."""
+        off = self._tracking(y, r)
+        eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
+        d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
+        u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
+        wanted = -self.model.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
+        u = self.model.invert(y, wanted)
+        telemetry = Telemetry(
+            estimate=d_hat,
+            robust=u_r,
+            modelling_error=eps,
+            predicted_position=z.predicted_position,
+            predicted_velocity=z.predicted_velocity,
+            weights=z.weights,
+            books=tracking_books(off, self.lyapunov(), self.weight)
+            | weight_books(z.weights, self.weights_bound)
+            | {"attained_share": share_given(wanted, matvec(self.model.gain(y), u))},
+        )
+        return u, telemetry
+
+    def flow(self, z: RCAFState, y: Measurement, r: Target, u_applied) -> RCAFState:
+        """Identification model, Eq. (32), and composite adaptive law, Eq. (44)."""
+        s = self._tracking(y, r).filtered
+        eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
+        xi = self._basis(eps, y)
+        d_hat = self.fuzzy.output(z.weights, xi)
+        known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)
+        theta_rate = -(self.adaptation * (s + self.composite * eps))[:, None] * xi
+        return RCAFState(
+            predicted_position=z.predicted_velocity,
+            predicted_velocity=self.identification.acceleration(eps, known, d_hat),
+            weights=projected_rate(z.weights, theta_rate, self._box()),
+        )
+
+    def project(self, z: RCAFState) -> RCAFState:
+        """Weights back inside their box: |d_hat| stays below `weights_bound`, and no weight drifts away."""
+        return z._replace(weights=jnp.clip(z.weights, -self._box(), self._box()))
+
+    def columns(self):
+        return COLUMNS
+
+    def lyapunov(self) -> Float[Array, "*n 2 2"]:
+        """P of Eq. (21)."""
+        return companion_lyapunov(self.feedback, self.weight)
+
+    def _box(self) -> Float[Array, "..."]:
+        """theta_max, shaped to stand beside theta."""
+        return self.weights_bound[..., None]
+
+    def _tracking(self, y: Measurement, r: Target) -> Tracking:
+        return tracking(self.model, self.lyapunov(), y, r)
+
+    def _basis(self, eps: PerAxis, y: Measurement) -> Float[Array, "n rules"]:
+        """xi of the chosen input: eps (the paper's), or (x_i, x_i_dot) (what Table 2 compares it with)."""
+        inputs = eps[:, None] if self.fuzzy_input == "error" else jnp.stack([y.position, y.velocity], -1)
+        return self.fuzzy.basis(inputs)

@@ -1,0 +1,162 @@
+"""The sound law: Eqs. (18)-(44) with what makes them hold on a real vehicle. Sections 3.12, 6 and 7 of the theory."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.controllers.bandwidths import largest_forces
+from undertow.controllers.diagnostics import COLUMNS, tracking_books, weight_books
+from undertow.controllers.robust.allocation import allocate, attained
+from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
+from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter, Room
+from undertow.controllers.tracking_error import Tracking, check_gains, tracking
+from undertow.core import checks
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.param import param
+from undertow.estimation.tsk import FuzzySystem
+from undertow.numerics.linear import matvec
+from undertow.numerics.lyapunov import companion_lyapunov
+
+PerAxis = Float[Array, " n"]
+
+# A smaller share than this of what is wanted says that limits bind, not that numbers are rounded.
+_WHOLE = 0.999
+
+# Times what the actuators can do for an axis over its position gain: from up to 16 of these, full force on both sides
+# of the way home does not overshoot. From further away the target comes to meet the vehicle.
+_FAR = 4.0
+
+
+class RobustState(NamedTuple):
+    """State z of the law."""
+
+    estimator: EstimatorState
+    drive: Any  # what is believed of the actuators
+    filter: FilterState | None
+
+
+class Plan(NamedTuple):
+    """All that is decided at one instant."""
+
+    drive: Any
+    seen: Estimate
+    off: Tracking  # from the target, smoothed if there is a filter
+    robust: PerAxis  # u_r
+    forces: Float[Array, " m"]  # that would give what is wanted
+
+
+class RobustRCAF(AbstractController):
+    """The paper's structure, in the model's own axes, fed with what was applied, within the actuators' limits.
+
+    Gains are one number for all axes or one per axis. With `tracking_share` 0 the estimator is a pure observer: it
+    depends on neither the controller nor its limits.
+
+    Raises:
+        BadInput: a gain of the wrong sign, feedback not Hurwitz or weight not positive definite.
+    """
+
+    model: AbstractModel
+    estimator: Estimator
+    filter: ReferenceFilter | None
+    feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
+    weight: Float[Array, "*n 2 2"] = param("", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)))
+    tracking_share: Float[Array, "..."] = param(
+        "", "share of the filtered tracking error in the adaptation, 1 / gamma_eps", symbol="mu", default=0.0
+    )
+    robust_gain: Float[Array, "..."] = param(
+        "m/s^2, rad/s^2", "amplitude of the robust term", symbol="w_bar", default=0.0
+    )
+    layer: Float[Array, "..."] = param("unit of s", "boundary layer of the robust term", symbol="phi", default=0.5)
+    actuator_rate: Float[Array, ""] = param(
+        "1/s", "how fast actuators are made to follow", symbol="lambda", default=100.0
+    )
+
+    direction: Float[Array, ""] = param(
+        "", "what departing from the wanted direction costs, where limits bind, beside losing size", default=1.0
+    )
+
+    def __check_init__(self):
+        for name in ("tracking_share", "robust_gain"):
+            checks.not_negative(name, getattr(self, name))
+        for name in ("layer", "actuator_rate", "direction"):
+            checks.positive(name, getattr(self, name))
+        own = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
+        estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound", "leakage")}
+        check_gains(self.feedback, self.weight, own | estimators, len(self.model.angles))
+
+    @property
+    def fuzzy(self) -> FuzzySystem:
+        """That of the estimator."""
+        return self.estimator.fuzzy
+
+    def init(self, y: Measurement, r: Target) -> RobustState:
+        smoothing = None if self.filter is None else self.filter.init(y.position)
+        return RobustState(self.estimator.init(self.model.rates(y)), self.model.drive().init(), smoothing)
+
+    def command(self, z: RobustState, y: Measurement, r: Target):
+        plan = self._plan(z, y, r)
+        drive, effect = self.model.drive(), self.model.effect(y)
+        forces = allocate(effect, plan.forces, *drive.range(plan.drive, self.actuator_rate), self.direction)
+        u = drive.command(plan.drive, forces, self.actuator_rate)
+        telemetry = Telemetry(
+            estimate=plan.seen.uncertainty,
+            robust=plan.robust,
+            modelling_error=plan.seen.error,
+            predicted_position=y.position,
+            predicted_velocity=z.estimator.rates,
+            weights=z.estimator.weights,
+            books=tracking_books(plan.off, self.lyapunov(), self.weight)
+            | weight_books(z.estimator.weights, self.estimator.bound)
+            | {"attained_share": attained(effect, plan.forces, forces)},
+        )
+        return u, telemetry
+
+    def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
+        plan, drive = self._plan(z, y, r), self.model.drive()
+        # While limits bind, the reference waits, and the tracking error says nothing about d.
+        going, effect = drive.aim(plan.drive, u_applied, self.actuator_rate), self.model.effect(y)
+        share = attained(effect, plan.forces, going)
+        learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
+        known = self._known(plan.drive, y, u_applied)
+        return RobustState(
+            estimator=self.estimator.advance(z.estimator, plan.seen, known, learnt, dt),
+            drive=drive.advance(plan.drive, u_applied, dt),
+            filter=self.filter and self.filter.advance(z.filter, r, self.model, share, dt, self._room(y, plan.off)),
+        )
+
+    def _room(self, y: Measurement, off: Tracking) -> Room:
+        """What the actuators can do for each output, and what of the error is out of their reach."""
+        force, effect = largest_forces(self.model.drive()), self.model.effect(y)
+        reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
+        away = jnp.abs(off.error) > reach
+        outward = lambda motion: self.model.outward(y, motion)
+        return Room(
+            most=matvec(jnp.abs(jax.vmap(outward, 1, 1)(effect)), force),
+            excess=outward(off.error - jnp.clip(off.error, -reach, reach)),
+            pace=outward(jnp.where(away, off.rate, 0.0)),
+        )
+
+    def known(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:
+        return self._known(self.model.drive().heard(z.drive, y.actuator), y, u_applied)
+
+    def columns(self):
+        return COLUMNS
+
+    def lyapunov(self) -> Float[Array, "*n 2 2"]:
+        """P of Eq. (21)."""
+        return companion_lyapunov(self.feedback, self.weight)
+
+    def _known(self, drive: Any, y: Measurement, u_applied) -> PerAxis:
+        return self.model.drift(y) + matvec(self.model.effect(y), self.model.drive().force(drive, u_applied))
+
+    def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
+        model = self.model
+        drive = model.drive().heard(z.drive, y.actuator)
+        target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
+        off = tracking(model, self.lyapunov(), y, target)
+        u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
+        seen = self.estimator.look(z.estimator, model.rates(y))
+        demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - model.drift(y)
+        return Plan(drive, seen, off, u_r, model.spread(y, demand))

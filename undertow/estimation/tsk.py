@@ -1,0 +1,87 @@
+"""Zero-order Takagi-Sugeno-Kang fuzzy system with Gaussian sets: Eqs. (35)-(37), (39), (42)."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.estimation.memberships import even_memberships, is_even, memberships
+
+
+class FuzzySystem(eqx.Module):
+    """Rule base over p inputs with M Gaussian sets each: one rule per combination, M^p rules.
+
+    The same sets serve every axis. Set l of input j is exp(-((x_j - centre_jl) / width_jl)^2). `evenly_spaced`
+    promises equal spacing and widths on every input; it only makes the evaluation quicker.
+
+    Raises:
+        BadInput: widths not positive, or shapes that do not match.
+    """
+
+    centres: Float[Array, "p M"] = param("unit of the input", "centres of the sets", symbol="c")
+    widths: Float[Array, "p M"] = param("unit of the input", "widths of the sets", symbol="sigma")
+    evenly_spaced: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self):
+        shapes = np.shape(self.centres), np.shape(self.widths)
+        if len(shapes[0]) != 2 or shapes[0] != shapes[1] or 0 in shapes[0]:
+            raise BadInput("centres", "have one row of sets per input, like widths", shapes)
+        checks.finite("centres", self.centres)
+        checks.positive("widths", self.widths)
+
+    @property
+    def inputs(self) -> int:
+        """Number p of inputs."""
+        return self.centres.shape[0]
+
+    @property
+    def rules(self) -> int:
+        """Number M^p of rules."""
+        return self.centres.shape[1] ** self.inputs
+
+    def basis(self, inputs: Float[Array, "n p"]) -> Float[Array, "n rules"]:
+        """Fuzzy basis functions xi of Eq. (37): positive, summing to one, for each of n axes.
+
+        A product of Gaussians, normalised, is an outer product of normalised Gaussians: never 0/0, however far
+        the input lies from every set.
+        """
+        degrees = even_memberships if self.evenly_spaced else memberships
+        basis = degrees(inputs[:, 0], self.centres[0], self.widths[0])
+        for j in range(1, self.inputs):
+            other = degrees(inputs[:, j], self.centres[j], self.widths[j])
+            basis = (basis[:, :, None] * other[:, None, :]).reshape(basis.shape[0], -1)
+        return basis
+
+    def output(self, weights: Float[Array, "n rules"], basis: Float[Array, "n rules"]) -> Float[Array, " n"]:
+        """theta^T xi of Eqs. (36) and (42); between the smallest and the largest weight."""
+        return (weights * basis).sum(-1)
+
+    def gathering(self) -> Float[Array, ""]:
+        """|xi(0)|^2: all that is left of the fuzzy design in small signal; between 1/rules and 1."""
+        return (self.basis(jnp.zeros((1, self.inputs))) ** 2).sum()
+
+
+def gaussian_sets(count: int = 5, reach: tuple[float, ...] = (1.0,), width: float | None = None) -> FuzzySystem:
+    """Equally spaced sets from -reach to reach on every input.
+
+    Args:
+        count: sets per input; one set is the constant 1.
+        reach: outermost centre of each input, in its unit; one entry per input.
+        width: of each set as a share of `reach`; default: the spacing.
+
+    Raises:
+        BadInput: count < 1, reach or width not positive.
+    """
+    if count < 1:
+        raise BadInput("sets", "be 1 or more", count)
+    checks.positive("reach", np.asarray(reach))
+    spacing = 2.0 / (count - 1) if count > 1 else 1.0
+    share = spacing if width is None else width
+    checks.positive("width", share)
+    centres = np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1)
+    rows = np.asarray(reach, dtype=float)[:, None]
+    widths = np.full(count, share)
+    return FuzzySystem(rows * centres, rows * widths, evenly_spaced=is_even(centres, widths))

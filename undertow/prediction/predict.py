@@ -1,0 +1,167 @@
+"""What will happen, before anything is run: a scenario's loop linearised about where it rests, and driven."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.analysis.linearization import margins
+from undertow.analysis.linearization.closed_forms import (ClosedForm, closed_form_poles, drift_bound, estimator, ramp_error)
+from undertow.analysis.linearization.closed_loop import LinearLoop
+from undertow.analysis.linearization.actuator_authority import Reach, reach
+from undertow.analysis.linearization.equilibrium import Rest, rest
+from undertow.plants.reachability import open_loop_advice
+from undertow.scenario.build import Built, in_its_precision
+from undertow.prediction.operating_point import Ground, foretold, ground
+
+# Loads at which the loop is looked at: larger than these shares of all that act along the reference.
+SHARES = (0.1, 0.5, 0.9)
+
+_SLOWEST, _LONGEST = 1e-2, 10.0  # rad/s and s: how far frequencies and margins are searched
+_HIGHEST = 1.0  # frequency times sampling time: a third of what sampling can tell apart
+_NOISE = 0.01  # m/s and rad/s, for gains per unit of noise
+_DEVIATIONS = 3.0  # of noise that must fit between the input at rest and its limit
+
+Progress = Callable[[str, float], None]
+
+
+class Point(NamedTuple):
+    """One operating point."""
+
+    share: float  # of all loads that are smaller
+    at: Rest
+    used: float  # largest |u| as a share of its limit; 0 without a limit
+    poles: np.ndarray  # 1/s
+    radius: float  # spectral radius from tick to tick; below 1 it is stable
+
+    @property
+    def load(self) -> np.ndarray:
+        """m/s^2, rad/s^2."""
+        return self.at.at["load"]
+
+    @property
+    def u(self) -> np.ndarray:
+        """Input that holds it."""
+        return self.at.at["u"]
+
+    @property
+    def found(self) -> bool:
+        """Whether there is such an input."""
+        return self.at.found
+
+
+class Noise(NamedTuple):
+    """White noise on the measured velocities, new at every tick."""
+
+    of_input: np.ndarray  # standard deviation per m/s or rad/s of noise
+    of_estimate: np.ndarray  # 1/s
+    largest: float  # noise, m/s and rad/s, whose threefold effect still fits into the limits of the input
+
+
+class Prediction(NamedTuple):
+    """All that `undertow analyze` says."""
+
+    ground: Ground
+    points: tuple[Point, ...]
+    margins: dict[str, float]  # of the point that is nearest to instability
+    noise: Noise
+    frequency: np.ndarray  # rad/s
+    error: np.ndarray  # |e / d| of each axis, (frequencies, axes); s^2
+    estimation: np.ndarray  # |d_hat - d| / |d|, likewise
+    forms: list[ClosedForm]
+    estimators: list[tuple[str, float, float, float | None]]  # axis, w_o rad/s, zeta, |d_til| per |d_dot| s
+    drift: tuple[float, float] | None  # largest gain that weights in their box add, and the one that breaks, 1/s
+    reach: Reach
+    lost: tuple[str, ...]
+    metrics: dict[str, float] | None  # of the steady window
+    why_not: str  # a sentence where there are none
+
+
+@in_its_precision
+def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
+    """Everything that can be said of a scenario before it is run.
+
+    Args:
+        built: the scenario.
+        progress: told a message and the share done.
+    """
+    progress("where the loop rests", 0.0)
+    known = ground(built)
+    loop, settings = built.closed_loop, built.scenario.loop
+    progress("poles at its operating points", 0.5)
+    points = tuple(_point(known, *each) for each in zip(SHARES, known.around.operating_loads(SHARES), strict=True))
+    worst = max(points, key=lambda point: point.radius).at
+    progress("margins", 0.6)
+    bears = _margins(worst, settings.dt)
+    progress("noise and disturbances", 0.9)
+    frequency = np.geomspace(_SLOWEST, _HIGHEST / settings.dt, 300)
+    error, estimation = _responses(known.linear, frequency)
+    law, names = loop.controller, loop.plant.outputs
+    metrics, why_not = foretold(known)
+    axes = range(len(names))
+    gains = np.asarray(law.model.gain(loop.plant.output(0.0, worst.parts.states(worst.at)[0])))
+    return Prediction(
+        ground=known,
+        points=points,
+        margins=bears,
+        noise=_noise(known),
+        frequency=frequency,
+        error=error,
+        estimation=estimation,
+        forms=closed_form_poles(law, margins.poles(known.linear), names),
+        estimators=[(names[i], *found, ramp_error(law, i)) for i in axes if (found := estimator(law, i))],
+        drift=max((found for i in axes if (found := drift_bound(law, i, settings.dt))), default=None),
+        reach=reach(loop, known.mean, known.around.load),
+        lost=open_loop_advice("the gain matrix", gains, names),
+        metrics=metrics,
+        why_not=why_not,
+    )
+
+
+def _point(known: Ground, share: float, load: np.ndarray) -> Point:
+    loop, settings = known.built.closed_loop, known.built.scenario.loop
+    at = rest(loop, settings.dt, known.mean.parts.target.position, load)
+    linear = margins.closed(at, settings.dt, settings.kind)
+    low, high = _limits(known.built, at)
+    used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
+    return Point(share, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear))
+
+
+def _margins(at: Rest, dt: float) -> dict[str, float]:
+    low, high = margins.gain_range(at, dt)
+    return {
+        "sampling_time": margins.largest_sampling_time(at, dt, _LONGEST),
+        "delay": margins.largest_delay(at, dt, _LONGEST),
+        "lag": margins.largest_lag(at, dt, _LONGEST),
+        "gain_low": low,
+        "gain_high": high,
+    }
+
+
+def _noise(known: Ground) -> Noise:
+    dt, axes = known.linear.dt, known.around.load.shape[1]
+    sampled = margins.closed(known.mean, dt)
+    one = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
+    of_input, of_estimate = (margins.noise_gain(sampled, name, one) / _NOISE for name in ("u", "estimate"))
+    low, high = _limits(known.built, known.mean)
+    room = np.minimum(high - known.mean.at["u"], known.mean.at["u"] - low)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        largest = float(np.maximum(room / (_DEVIATIONS * of_input), 0.0).min())
+    return Noise(of_input, of_estimate, largest)
+
+
+def _limits(built: Built, at: Rest) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest input that reaches the actuators."""
+    plant, (x, _) = built.closed_loop.plant, at.parts.states(at.at)
+    ask = np.full(plant.inputs(), 1e9)
+    low, high = (np.asarray(plant.admissible(x, side * ask)) for side in (-1, 1))
+    return np.where(low < -1e8, -np.inf, low), np.where(high > 1e8, np.inf, high)
+
+
+def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """|e / d| of each output, and |d_hat - d| / |d| of each axis of the law, under a load on the same axis."""
+    answer = {name: margins.response(linear, name, frequency) for name in ("error", "estimate", "uncertainty")}
+    into_axes = linear.direct["uncertainty"]["load"]  # a load on the outputs as the law sees it
+    missed = (answer["estimate"] - answer["uncertainty"]) @ np.linalg.inv(into_axes)
+    own = lambda matrices: np.abs(np.diagonal(matrices, axis1=1, axis2=2))
+    return own(answer["error"]), own(missed)

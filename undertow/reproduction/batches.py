@@ -1,0 +1,111 @@
+"""Scenarios flown in batches, for horizons at which a series of every sample is too long to keep."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from undertow.analysis.metrics import Metrics, results
+from undertow.core.status import Status
+from simdjit.machine import lanes_of
+from undertow.loop.simd_batch import Ended, Fleet, Plan, Run
+from undertow.scenario.build import Built, build
+from undertow.scenario.part_cache import Workshop, structure
+from undertow.campaign.runs import leaves, planned, run_of
+from undertow.campaign.campaign_schema import Series
+
+Window = tuple[float, float]  # s
+
+
+class Flown(NamedTuple):
+    """One run."""
+
+    built: Built
+    status: Status
+    ended: float  # s
+    windows: list[dict[str, Any] | None]  # metrics over each window; None where the run was over before its end
+    series: dict[str, np.ndarray]  # (records, ...), of the run as long as it lasted
+    time: np.ndarray  # s, of the records
+
+    @property
+    def lasted(self) -> bool:
+        """Whether it reached its end."""
+        return self.status is Status.OK
+
+
+def fly(
+    scenarios: Mapping[str, dict[str, Any]], windows: Sequence[Window], every: float, signals: Sequence[str]
+) -> dict[str, Flown]:
+    """Run sampled scenarios, those whose programs are equal side by side; arguments and errors of `start`."""
+    with ThreadPoolExecutor(1) as pool:
+        return start(scenarios, windows, every, signals, pool)()
+
+
+def start(
+    scenarios: Mapping[str, dict[str, Any]],
+    windows: Sequence[Window],
+    every: float,
+    signals: Sequence[str],
+    pool: Executor,
+) -> Callable[[], dict[str, Flown]]:
+    """Start to run sampled scenarios, one piece of work for each program.
+
+    Args:
+        scenarios: by name; all of them scenarios of the sampled loop.
+        windows: over which metrics are taken at every sample, s.
+        every: time between records, s.
+        signals: that are recorded.
+        pool: what the work is given to.
+
+    Returns:
+        What waits for all of it; it raises Unsupported where a part needs something that the batch compiler cannot do.
+    """
+    workshop = Workshop()
+    built = {name: build(scenario, workshop=workshop) for name, scenario in scenarios.items()}
+    accumulators = tuple(Metrics(*window) for window in windows)
+    groups: dict[Any, dict[str, tuple[Run, int]]] = {}
+    for name, one in built.items():
+        run = run_of(one)._replace(accumulators=accumulators)
+        plan = planned(one, Series(signals=list(signals), every=every))
+        groups.setdefault((structure(run), plan._replace(ticks=0)), {})[name] = (run, plan.ticks)
+    pieces = [pool.submit(_together, plan, runs) for (_, plan), runs in groups.items()]
+
+    def flown() -> dict[str, Flown]:
+        ended = {name: one for piece in pieces for name, one in piece.result().items()}
+        return {name: _flown(one, ended[name], windows) for name, one in built.items()}
+
+    return flown
+
+
+def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ended]:
+    """Runs of one program, by name with their numbers of ticks; those of one length side by side."""
+    first = next(iter(runs.values()))[0]
+    numbers = {name: leaves(run) for name, (run, _) in runs.items()}
+    constant = [
+        all(np.array_equal(column[0], other) for other in column[1:]) for column in zip(*numbers.values(), strict=True)
+    ]
+    lengths = {ticks: [name for name in runs if runs[name][1] == ticks] for _, ticks in runs.values()}
+    # A program for one run is faster than one for eight that flies one.
+    width = min(lanes_of(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
+    fleet = Fleet(first, plan, constant, width)
+    tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}
+    for ticks, names in lengths.items():
+        stacked = [np.stack(column) for column in zip(*(numbers[name] for name in names), strict=True)]
+        flown = fleet.fly(jax.tree.unflatten(tree, stacked), ticks)
+        for i, name in enumerate(names):
+            found[name] = jax.tree.map(lambda leaf, i=i: leaf[i] if isinstance(leaf, np.ndarray) else leaf, flown)
+    return found
+
+
+def _flown(built: Built, ended: Ended, windows: Sequence[Window]) -> Flown:
+    status, end = Status(int(ended.status)), float(ended.ended)
+    metrics = [
+        results(state) if end >= stop else None for state, (_, stop) in zip(ended.accumulated, windows, strict=True)
+    ]
+    time = np.asarray(ended.time)
+    kept = time <= end
+    series = {name: np.asarray(values)[kept] for name, values in ended.series.items()}
+    return Flown(built, status, end, metrics, series, time[kept])

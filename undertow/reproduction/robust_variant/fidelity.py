@@ -1,0 +1,175 @@
+"""The ladder again: preset `robust` beside the paper's laws on every rung, and at sea beside a PID too; all sampled."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from undertow.core.status import Status
+from undertow.scenario.execute import Executed
+from undertow.reproduction.setup import HAND_TUNED, RAFC, RCAFC, RUNGS, scenario
+from undertow.reproduction.robust_variant import station_keeping
+
+LAWS = {
+    "rcafc": ("RCAFC, Table 1", {"kind": "rcaf", "composite": RCAFC}),
+    "rafc": ("RAFC, Table 1", {"kind": "rcaf", "composite": RAFC}),
+    "robust": ("robust", {"kind": "rcaf", "preset": "robust"}),
+    "measured": ("robust, speeds measured", {"kind": "rcaf", "preset": "robust"}),
+}
+
+WHOLE = RUNGS[-1]
+_SAMPLED = {"kind": "sampled", "duration": 20.0}
+
+# What the thrusters get, and what they have to bear: name -> words, supply in V, factor on suite U1.
+_SUPPLIES = {
+    "24V_03": ("whole motor, 24 V, U1 x 0.3", 24.0, 0.3),
+    "24V": ("whole motor, 24 V, U1: beyond the motors", 24.0, 1.0),
+}
+
+# Suite U1 at 0.3 of its size, and for 1.5 s a push that 24 V cannot hold: t, then m/s^2 and rad/s^2.
+_PUSHED, _LET_GO, _JUDGED = 8.0, 9.5, 17.0  # s
+_PUSH, _REST = [4.0, 4.0, -4.0, 2.0, 2.0, 2.0], [0.0] * 6
+_SAMPLES = [(0.0, _REST), (_PUSHED, _REST), (_PUSHED + 0.01, _PUSH), (_LET_GO, _PUSH), (_LET_GO + 0.01, _REST)]
+_OVERLOAD = [
+    {"kind": "u1", "scale": 0.3},
+    {"kind": "table", "samples": [[t, *size] for t, size in _SAMPLES]},
+]
+
+# All of it with one number per axis, so that the two sets of gains are one program.
+_TABLE1: dict[str, Any] = {
+    "feedback": [[1, 2]] * 6,
+    "pole": [150] * 6,
+    "adaptation": [100] * 6,
+    "composite": [500] * 6,
+    "robust_gain": 10,
+    "compensation_gain": 0.1,
+    "weights_bound": float("inf"),
+}
+_AT_SEA: dict[str, tuple[str, dict[str, Any]]] = {
+    "table1": ("Table 1", {"kind": "rcaf", **_TABLE1}),
+    "hand_tuned": ("paper's law, tuned by hand", {"kind": "rcaf", **HAND_TUNED}),
+    "robust": ("robust, no gain given", {"kind": "rcaf", "preset": "robust"}),
+}
+
+
+class Place(NamedTuple):
+    """Where laws are compared."""
+
+    words: str
+    runs: dict[str, tuple[str, dict[str, Any]]]  # law -> its name, and the scenario
+
+
+def places(quick: bool) -> dict[str, Place]:
+    """Every place, from the easiest to the most real; quick: the whole motor only."""
+    found = {}
+    for rung in (WHOLE,) if quick else RUNGS:
+        words = "whole motor, no limit" if rung == WHOLE else rung
+        found[rung] = Place(words, _laws(words, rung, {"kind": "u1"}, quick=quick))
+    for name, (words, volts, scale) in _SUPPLIES.items():
+        found[name] = Place(words, _laws(words, WHOLE, {"kind": "u1", "scale": scale}, volts, quick))
+    if not quick:
+        words = "whole motor, 24 V, U1 x 0.3, 1.5 s of too much"
+        two = {key: one for key, one in _laws(words, WHOLE, _OVERLOAD, 24.0).items() if key in ("rcafc", "robust")}
+        two = {key: (name, one | {"steady": {"start": _JUDGED}}) for key, (name, one) in two.items()}
+        found["overload"] = Place(words, two)
+        words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own instruments"
+        found["sea"] = Place(
+            words,
+            {
+                key: (name, at_sea(f"{name}: BlueROV2 Heavy at sea, from its own instruments", law))
+                for key, (name, law) in _AT_SEA.items()
+            },
+        )
+        found |= {place: Place(*each) for place, each in station_keeping.places().items()}
+    return found
+
+
+def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
+    """Every run, by name."""
+    return {
+        _name(place, law): one for place, compared in places(quick).items() for law, (_, one) in compared.runs.items()
+    }
+
+
+def table(runs: Mapping[str, Executed], quick: bool) -> list[dict[str, Any]]:
+    """One row per place and law: how it ended, and the steady metrics."""
+    return [
+        {
+            "place": place,
+            "words": compared.words,
+            "law": law,
+            "name": name,
+            "scenario": f"scenarios/{_name(place, law)}.yaml",
+            **_row(runs[_name(place, law)]),
+        }
+        for place, compared in places(quick).items()
+        for law, (name, _) in compared.runs.items()
+    ]
+
+
+def _name(place: str, law: str) -> str:
+    return f"sound_{place}_{law}"
+
+
+def _laws(
+    words: str, rung: str, load: Any, supply: float | None = None, quick: bool = False
+) -> dict[str, tuple[str, dict]]:
+    found = {}
+    for key, (name, law) in LAWS.items():
+        if key == "measured" and (quick or rung != WHOLE):
+            continue
+        sensor = {"speed_sensor": rung == "ideal" or key == "measured"}
+        one = scenario(f"{name}: {words}", rung=rung, loop=_SAMPLED, disturbance=load, model=sensor)
+        one["controller"] = law
+        if supply is not None:
+            one["plant"]["thruster"]["supply"] = supply
+        found[key] = (name, one)
+    return found
+
+
+def at_sea(description: str, law: dict[str, Any]) -> dict[str, Any]:
+    """As examples/bluerov2_heavy.yaml, with a law to be compared; speed workload W2, too."""
+    instruments = [
+        "imu",
+        {"kind": "dvl", "period": 0.125, "noise": 0.005, "delay": 0.05},
+        "depth",
+        "compass",
+        {"kind": "position_fix", "period": 1, "noise": 0.05, "delay": 0.2},
+    ]
+    return {
+        "description": description,
+        "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
+        "model": {"rate_term": True},
+        "controller": law,
+        "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 20},
+        "disturbance": [
+            {"kind": "current", "velocity": [0.3, 0.2, 0]},
+            {"kind": "waves", "height": 0.5, "period": 5},
+        ],
+        "sensor": {"kind": "navigation", "instruments": instruments},
+        "loop": {"kind": "sampled", "dt": 0.01, "duration": 120, "record": 0.05},
+    }
+
+
+def _row(run: Executed) -> dict[str, Any]:
+    return {
+        "status": run.status.word,
+        "diverged_at": None if run.status is Status.OK else float(run.outcome.ended),
+        "steady": run.steady,
+        "largest_after": _largest_after(run, _PUSHED),
+        "position_rms": _late_rms(run, run.dataset["error"]),
+        "navigation_rms": _late_rms(run, run.dataset["measured_position"] - run.dataset["position"]),
+    }
+
+
+def _late_rms(run: Executed, series: xr.DataArray) -> float | None:
+    """Of the first three outputs over the steady window, m for a vehicle."""
+    late = series.sel(time=slice(*run.built.window())).values[:, :3]
+    return float(np.sqrt((late**2).mean())) if run.steady else None
+
+
+def _largest_after(run: Executed, start: float) -> float | None:
+    """Largest tracking error from a time (s) on: what an overload does."""
+    late = run.dataset["error"].sel(time=slice(start, None)).values
+    return float(np.abs(late).max()) if late.size and run.status is Status.OK else None

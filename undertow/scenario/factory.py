@@ -1,0 +1,266 @@
+"""Building parts from their descriptions: a part's own signature says what may be given."""
+
+import functools
+import inspect
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+
+from undertow.core import catalogue, checks, contracts
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.user_code import python_says
+from undertow.sensors.sensor import AbstractInstrument
+from undertow.power import ESC, Battery
+from undertow.scenario.csv_table import read_csv, samples_of
+from undertow.scenario.values import checked
+from undertow.scenario.vehicle_file import is_vehicle_file, make_vehicle
+from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.vehicle import Vehicle
+
+# Arguments that are parts themselves: their kind, and which one when no `kind` is said; a tuple for a list of parts.
+INNER = {
+    "vehicle": ("vehicles", "odin"),
+    "thruster": ("thrusters", "paper_table3"),
+    "battery": ("power", "battery"),
+    "esc": ("power", "esc"),
+    "instruments": ("instruments", ("imu", "dvl", "depth", "compass", "position_fix")),
+}
+
+# Kinds that are data: every declared parameter of theirs may be changed by name.
+_ADJUSTABLE = ("vehicles", "thrusters")
+
+_CONTRACTS = {
+    "vehicles": Vehicle,
+    "thrusters": AbstractThruster,
+    "power": Battery | ESC,
+    "plants": contracts.AbstractPlant,
+    "controllers": contracts.AbstractController,
+    "disturbances": contracts.AbstractDisturbance,
+    "references": contracts.AbstractReference,
+    "instruments": AbstractInstrument,
+    "sensors": contracts.AbstractSensor,
+}
+
+_VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+
+
+def make(
+    kind: str,
+    description: str | Mapping[str, Any],
+    folder: Path,
+    given: tuple[Any, ...] = (),
+    circumstances: Mapping[str, Any] | None = None,
+) -> tuple[Any, dict[str, Any]]:
+    """A part, and its description with every default filled in.
+
+    Args:
+        kind: folder of the catalogue.
+        description: name, or mapping of `kind` (the name) and options; a vehicle's name may be that of a YAML file.
+        folder: where relative file names start.
+        given: leading arguments that are not the user's.
+        circumstances: options that follow from the rest of a scenario where the user says nothing about them.
+
+    Raises:
+        BadInput: anything wrong with the description; key names start at the part.
+    """
+    options: dict[str, Any] = {"kind": description} if isinstance(description, str) else dict(description)
+    name = options.pop("kind", None)
+    if not isinstance(name, str):
+        raise BadInput("kind", f"name one of the {kind}", name)
+    if kind == "vehicles" and is_vehicle_file(name):
+        return make_vehicle(name, options, folder)
+    try:
+        function = catalogue.find(kind, name, folder)
+    except BadInput as error:
+        raise BadInput("kind", error.must, error.got, hint=error.hint) from error.__cause__
+    function, preset = _preset(function, options)
+    own = inspect.signature(function).parameters
+    options = {key: value for key, value in (circumstances or {}).items() if key in own} | options
+    changes, table = {}, {}
+    if kind in _ADJUSTABLE:
+        changes = {key: options.pop(key) for key in list(options) if key not in own}
+    if "samples" in own:
+        table = _samples(options, folder)
+    part, resolved = call(function, options, given, folder)
+    if not isinstance(part, _CONTRACTS[kind]):
+        raise BadInput("kind", f"name a function that returns {_title(_CONTRACTS[kind])}", f"{name}: {part!r}")
+    if table:
+        del resolved["samples"]
+    part = adjust(part, changes, tuple(own)) if changes else part
+    return part, {"kind": _portable(name, folder), **preset, **resolved, **changes, **table}
+
+
+def presets_of(function: Callable[..., Any]) -> Mapping[str, Callable[..., Any]]:
+    """Ready-made settings that a part has, each with options of its own; none for most."""
+    return getattr(function, "presets", {})
+
+
+def call(
+    function: Callable[..., Any], options: Mapping[str, Any], given: tuple[Any, ...] = (), folder: Path | None = None
+) -> tuple[Any, dict[str, Any]]:
+    """Result of a function called with checked options, and all options with their defaults.
+
+    Raises:
+        BadInput: unknown, missing or mistyped option, or the function's own complaint.
+    """
+    declared = _declared_once if inspect.isfunction(function) else _declared
+    signature, hints = declared(function)
+    known = {name: option for name, option in signature[len(given) :] if option.kind not in _VARIABLE}
+    for key in options:
+        if key not in known:
+            raise BadInput(key, "be an option here", "unknown", hint=did_you_mean(key, known) if known else "")
+    arguments, resolved = {}, {}
+    for name, parameter in known.items():
+        if name in INNER:
+            description = options.get(name, inner_default(name, parameter))
+            made = (None, None) if description is parameter.default is None else _inner(name, description, folder)
+            arguments[name], resolved[name] = made
+        elif name in options:
+            arguments[name] = resolved[name] = checked(name, options[name], hints.get(name), parameter.default)
+        elif parameter.default is inspect.Parameter.empty:
+            raise BadInput(name, "be given")
+        else:
+            arguments[name], resolved[name] = parameter.default, _listed(parameter.default)
+    return _made(lambda: function(*given, **arguments)), resolved
+
+
+def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -> Any:
+    """Same part with some declared parameters replaced; those of parts inside it as nested mappings.
+
+    Args:
+        part: to be changed.
+        changes: new values by name.
+        options: other names that could have been meant.
+
+    Raises:
+        BadInput: unknown parameter, wrong type or shape, or the part's own complaint.
+    """
+    fields = type(part).__dataclass_fields__
+    values = {name: getattr(part, name) for name in fields}
+    adjustable = [n for n, f in fields.items() if "unit" in f.metadata or isinstance(values[n], eqx.Module)]
+    for key, change in changes.items():
+        if key not in adjustable:
+            raise BadInput(
+                key, "be an option or parameter here", "unknown", hint=did_you_mean(key, [*options, *adjustable])
+            )
+        if isinstance(values[key], eqx.Module):
+            if not isinstance(change, Mapping):
+                raise BadInput(key, "be a mapping of parameters", change)
+            try:
+                values[key] = adjust(values[key], change)
+            except BadInput as error:
+                raise error.at(key) from error.__cause__
+        else:
+            number = np.asarray(checked(key, change, None, 0.0), dtype=float)
+            if number.shape != np.shape(values[key]):
+                raise BadInput(
+                    key, _sized(np.shape(values[key])), f"of shape {number.shape}" if number.shape else change
+                )
+            values[key] = number
+    return _made(lambda: type(part)(**values))
+
+
+def is_part(thing: Any) -> bool:
+    """Whether it keeps the contract of some kind of part."""
+    return isinstance(thing, tuple(_CONTRACTS.values()))
+
+
+def _preset(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Callable[..., Any], dict[str, str]]:
+    """The function of the preset that the options name, the first where they name none; and that name."""
+    presets = presets_of(function)
+    if not presets:
+        return function, {}
+    name = options.pop("preset", next(iter(presets)))
+    checks.choice("preset", name, tuple(presets))
+    return presets[name], {"preset": name}
+
+
+def _title(contract: Any) -> str:
+    names = [kind.__name__ for kind in typing.get_args(contract) or (contract,)]
+    return " or ".join(f"an {name}" if name[0] in "AEIO" else f"a {name}" for name in names)
+
+
+def _sized(shape: tuple[int, ...]) -> str:
+    return {0: "be one number", 1: f"be a list of {sum(shape)} numbers"}.get(len(shape), f"have shape {shape}")
+
+
+def _declared(function: Callable[..., Any]) -> tuple[list[tuple[str, inspect.Parameter]], dict[str, Any]]:
+    """Options of a function, and their annotations."""
+    return list(inspect.signature(function).parameters.items()), typing.get_type_hints(function)
+
+
+_declared_once = functools.cache(_declared)  # of thousands of trials; methods are of parts that come and go
+
+
+def _made(make: Callable[[], Any]) -> Any:
+    """What `make` makes; whatever it raises is about the options, which are all it was given."""
+    try:
+        return make()
+    except BadInput:
+        raise
+    except Exception as error:
+        raise BadInput("", "be something that can be made", f"not: {python_says(error)}") from error
+
+
+def inner_default(name: str, parameter: inspect.Parameter) -> Any:
+    """Which part an argument of INNER is when nothing is said about it; None for none."""
+    return INNER[name][1] if parameter.default is inspect.Parameter.empty else parameter.default
+
+
+def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[str, Any]]:
+    kind, default = INNER[name]
+    if isinstance(default, tuple):
+        if not isinstance(description, list | tuple):
+            raise BadInput(name, "be a list of parts", description)
+        pairs = [_at(f"{name}[{i}]", kind, {}, entry, folder) for i, entry in enumerate(description)]
+        return [part for part, _ in pairs], [resolved for _, resolved in pairs]
+    return _at(name, kind, {"kind": default}, description, folder)
+
+
+def _at(
+    name: str, kind: str, default: Mapping[str, str], description: Any, folder: Path | None
+) -> tuple[Any, dict[str, Any]]:
+    """The part that stands at a key."""
+    if isinstance(description, Mapping):
+        description = {**default, **description}
+    elif not isinstance(description, str):
+        raise BadInput(name, "be a name, or a mapping with `kind` and options", description)
+    try:
+        return make(kind, description, folder or Path())
+    except BadInput as error:
+        raise error.at(name) from error.__cause__
+
+
+def _samples(options: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Turn `file` (a CSV file) or `csv` (its text, as results keep it) into `samples`; returns what results keep."""
+    given = [key for key in ("file", "csv", "samples") if key in options]
+    if len(given) > 1:
+        raise BadInput(given[1], "be left out when there is another source of samples", f"beside `{given[0]}`")
+    for key in ("file", "csv"):
+        if key in options and not isinstance(options[key], str):
+            raise BadInput(key, "be text", repr(options[key]))
+    if "file" in options:
+        name = options.pop("file")
+        options["csv"] = read_csv(folder / name)
+    else:
+        name = "csv"
+    if "csv" not in options:
+        return {}
+    text = options.pop("csv")
+    options["samples"] = samples_of(text, Path(name).name)
+    return {"csv": text}
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(entry) for entry in value] if isinstance(value, tuple) else value
+
+
+def _portable(name: str, folder: Path) -> str:
+    if ".py:" not in name:
+        return name
+    path, attribute = name.rsplit(":", 1)
+    return f"{(folder / path).resolve()}:{attribute}"

@@ -1,0 +1,108 @@
+"""What the vehicle really does, as instruments feel it, and what the observer believes of it."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.arrays import as_array
+from undertow.core.contracts import Measurement
+from undertow.sensors.sampling import Sampling
+from undertow.numerics.linear import matvec
+from undertow.numerics.rotations import (Kinematics, Matrix3, Quaternion, Vector3, euler_from_rotation, quaternion_from_euler, quaternion_rate, rotation_from_euler, rotation_from_quaternion)
+
+
+def gravity() -> Vector3:
+    """What an accelerometer adds and the observer takes away again, m/s^2, world."""
+    return as_array((0.0, 0.0, 9.81))  # made when it is needed, in the precision of the moment
+
+
+class Motion(NamedTuple):
+    """The truth at one instant."""
+
+    position: Vector3  # m, world
+    angles: Vector3  # rad, Euler
+    rotation: Matrix3  # body -> world
+    velocity: Vector3  # m/s, world
+    rates: Vector3  # rad/s, body
+    specific_force: Vector3  # m/s^2, body: what an accelerometer feels, the mean since the instant before
+    actuator: Any  # report of the thrusters, or None
+
+
+class Estimate(NamedTuple):
+    """What the observer believes."""
+
+    position: Vector3  # m, world
+    attitude: Quaternion  # body -> world
+    velocity: Vector3  # m/s, world
+    rates: Vector3  # rad/s, body
+    acceleration: Vector3  # m/s^2, world
+    actuator: Any
+
+    def measurement(self) -> Measurement:
+        """Outputs of the plant and their rates, as a controller wants them."""
+        rotation = self.rotation()
+        nu = jnp.concatenate([matvec(rotation.T, self.velocity), self.rates])
+        position = jnp.concatenate([self.position, euler_from_rotation(rotation)])
+        return Measurement(position, Kinematics(rotation).to_world(nu), self.actuator)
+
+    def predicted(self, elapsed: Float[Array, ""]) -> "Estimate":
+        """The same a while later (s), with rates and acceleration as they are."""
+        turned = self.attitude + elapsed * quaternion_rate(self.attitude, self.rates)
+        return self._replace(
+            position=self.position + elapsed * self.velocity + elapsed**2 / 2 * self.acceleration,
+            attitude=turned / jnp.sqrt((turned * turned).sum()),
+            velocity=self.velocity + elapsed * self.acceleration,
+        )
+
+    def turned(self, angles: Vector3, share) -> "Estimate":
+        """With the attitude moved by a share of the way towards Euler angles (rad)."""
+        there = quaternion_from_euler(angles)
+        aligned = jnp.where((there * self.attitude).sum() < 0, -there, there)
+        between = (1 - share) * self.attitude + share * aligned
+        return self._replace(attitude=between / jnp.sqrt((between * between).sum()))
+
+    def angles(self) -> Vector3:
+        """Euler angles, rad."""
+        return euler_from_rotation(self.rotation())
+
+    def rotation(self) -> Matrix3:
+        """Body -> world."""
+        return rotation_from_quaternion(self.attitude)
+
+    def fixed(self, axes: slice, reading: Float[Array, " k"], sampling: Sampling, share) -> "Estimate":
+        """`moved` on some axes by a position that was read `sampling.delay` ago."""
+        then = self.position[axes] - sampling.delay * self.velocity[axes]
+        return self.moved(jnp.zeros(3).at[axes].set(reading - then), share, sampling.period)
+
+    def moved(self, error: Vector3, share, period) -> "Estimate":
+        """Position and velocity corrected by an error of position (m): an alpha-beta filter.
+
+        beta = alpha^2 / (2 - alpha) is Benedict and Bordner's (1962), best for a given noise.
+        """
+        beta = share**2 / (2 - share)
+        return self._replace(position=self.position + share * error, velocity=self.velocity + beta / period * error)
+
+
+def motion_of(truth: Measurement, velocity_before: Vector3, elapsed) -> Motion:
+    """What instruments feel.
+
+    Args:
+        truth: outputs (m, rad) of a body and their rates.
+        velocity_before: of the body in the world at the instant before, m/s.
+        elapsed: since then, s; zero at the start.
+    """
+    angles = truth.position[3:]
+    rotation = rotation_from_euler(angles)
+    rates = Kinematics(rotation).to_body(truth.velocity)[3:]
+    velocity = truth.velocity[:3]
+    acceleration = jnp.where(elapsed > 0, (velocity - velocity_before) / jnp.where(elapsed > 0, elapsed, 1.0), 0.0)
+    force = matvec(rotation.T, acceleration - gravity())
+    return Motion(truth.position[:3], angles, rotation, velocity, rates, force, truth.actuator)
+
+
+def estimate_of(truth: Measurement) -> Estimate:
+    """The truth as a belief: what a vehicle knows when it is put into the water."""
+    motion = motion_of(truth, truth.velocity[:3], jnp.zeros(()))
+    attitude = quaternion_from_euler(motion.angles)
+    return Estimate(motion.position, attitude, motion.velocity, motion.rates, jnp.zeros(3), motion.actuator)

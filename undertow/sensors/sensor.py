@@ -1,0 +1,45 @@
+"""The contract of an instrument."""
+
+import abc
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.param import param
+from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.sampling import Reading, Sampling
+
+
+class AbstractInstrument(eqx.Module):
+    """Reads something of the motion, and knows how a reading corrects what the observer believes.
+
+    Raises:
+        BadInput: a blend outside (0, 1].
+    """
+
+    sampling: Sampling
+    blend: Float[Array, ""] = param("", "share of each new reading in the estimate")
+
+    def __check_init__(self):
+        checks.positive("blend", self.blend)
+        if (self.blend > 1).any():
+            raise BadInput("blend", "be at most 1", f"{float(self.blend):g}")
+
+    @abc.abstractmethod
+    def reading(self, motion: Motion) -> Reading:
+        """What it would read without any error."""
+
+    def velocity_noise(self) -> Float[Array, "6"]:
+        """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for what it does not read."""
+        return jnp.full(6, jnp.inf)
+
+    def foretell(self, estimate: Estimate, reading: Reading) -> Estimate:
+        """Estimate with what this reading says about the time since the last one; before the prediction."""
+        return estimate
+
+    @abc.abstractmethod
+    def correct(self, estimate: Estimate, reading: Reading) -> Estimate:
+        """Estimate after a reading that was taken `sampling.delay` ago; after the prediction."""

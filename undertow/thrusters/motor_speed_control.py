@@ -1,0 +1,122 @@
+"""Speed control of motors by computed voltage: what makes a thruster obey a thrust."""
+
+from typing import NamedTuple, Protocol
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from undertow.core.actuator_model import AbstractDrive
+from undertow.numerics.integrators import rk4
+from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.static import StaticThruster
+from undertow.thrusters.quasi_static_actuator import SteadyDrive
+from undertow.thrusters.thruster import PerThruster
+
+# How much faster the current is made to follow than the speed that it drives.
+_CURRENT_FASTER = 3.0
+
+# Where the winding is slow, the current has to be driven, and that is sampled, too: so much of the rate is left.
+_DRIVEN = 0.43
+
+
+class MotorState(NamedTuple):
+    """What the controller believes of its motors."""
+
+    speed: PerThruster  # rad/s
+    current: PerThruster  # A
+
+
+class WithMotor(Protocol):
+    """A thruster with a motor behind it."""
+
+    motor: DCMotor
+    supply: PerThruster
+    dead_zone: PerThruster
+    dead_zone_kind: str
+
+    def terminal(self, voltage: PerThruster) -> PerThruster:
+        """Voltage that turns the motor."""
+        ...
+
+    def commanded(self, terminal: PerThruster) -> PerThruster:
+        """`terminal` solved."""
+        ...
+
+
+class MotorDrive(AbstractDrive):
+    """The current for a wanted torque, Eq. (8), and the voltage for that current, Eq. (9). Section X9 of the theory.
+
+    Speeds are the reported ones where they are measured, else those that the same equations predict from the voltages
+    that were applied; currents are predicted.
+    """
+
+    thruster: WithMotor
+    count: int = eqx.field(static=True)
+    measured: bool = eqx.field(static=True)
+
+    def quickest(self, sampled):
+        motor = self.thruster.motor
+        winding = jnp.min(motor.resistance / jnp.maximum(motor.inductance, 1e-12))
+        driven = jnp.where(winding > _CURRENT_FASTER * sampled, 1.0, _DRIVEN) * sampled
+        return jnp.maximum(driven, 1 / jnp.max(self.time_constant()))  # what it does by itself costs nothing
+
+    def time_constant(self):
+        """k_1 / (k_2 + 2 k_3 c_q |Om|) at half of the largest speed; at rest, where it is largest, without a limit."""
+        motor, supply = self.thruster.motor, jnp.asarray(self.thruster.supply)
+        limited = jnp.isfinite(supply)
+        fastest = motor.steady_speed(jnp.where(limited, supply, 0.0))
+        return motor.k1 / (motor.k2 + motor.k3 * motor.torque_coefficient * jnp.abs(fastest))
+
+    def init(self) -> MotorState:
+        return MotorState(jnp.zeros(self.count), jnp.zeros(self.count))
+
+    def heard(self, state: MotorState, report) -> MotorState:
+        return state._replace(speed=report.speed) if self.measured else state
+
+    def range(self, state: MotorState, rate) -> tuple[PerThruster, PerThruster]:
+        """Thrusts at the speeds towards which -supply and supply turn the motor within 1 / rate, N."""
+        motor = self.thruster.motor
+        resisted = motor.steady_voltage(state.speed)
+        limited = jnp.isfinite(self.thruster.supply)
+        volts = self.thruster.terminal(
+            jnp.where(limited, self.thruster.supply, 0.0)
+        )  # so that what is unlimited has gradients, too
+        low, high = (state.speed + (side * volts - resisted) / (motor.k1 * rate) for side in (-1, 1))
+        return jnp.where(limited, motor.thrust(low), -jnp.inf), jnp.where(limited, motor.thrust(high), jnp.inf)
+
+    def force(self, state: MotorState, u) -> PerThruster:
+        return self.thruster.motor.thrust(state.speed)
+
+    def command(self, state: MotorState, force, rate) -> PerThruster:
+        motor = self.thruster.motor
+        pull = motor.rotor_inertia * rate * (motor.speed_at(force) - state.speed)
+        wanted = motor.steady_current(state.speed) + pull / motor.torque_constant
+        held = motor.resistance * wanted + motor.back_emf_constant * state.speed
+        return self.thruster.commanded(held + self._boost(rate) * (wanted - state.current))
+
+    def aim(self, state: MotorState, u, rate) -> PerThruster:
+        motor, boost = self.thruster.motor, self._boost(rate)
+        free = self.thruster.terminal(u) - motor.back_emf_constant * state.speed + boost * state.current
+        pull = (free / (motor.resistance + boost) - motor.steady_current(state.speed)) * motor.torque_constant
+        return motor.thrust(state.speed + pull / (motor.rotor_inertia * rate))
+
+    def advance(self, state: MotorState, u, dt) -> MotorState:
+        """The current exactly for a held back-EMF, however fast the winding; the speed under its mean."""
+        motor = self.thruster.motor
+        settled = (self.thruster.terminal(u) - motor.back_emf_constant * state.speed) / motor.resistance
+        fading = motor.resistance * dt / jnp.maximum(motor.inductance, 1e-12)
+        mean = settled + (state.current - settled) * -jnp.expm1(-fading) / fading
+        pull = lambda speed: motor.torque_constant * (mean - motor.steady_current(speed))
+        turning = lambda t, speed: pull(speed) / motor.rotor_inertia
+        speed = rk4(turning, jnp.zeros(()), state.speed, dt)
+        return MotorState(speed, settled + (state.current - settled) * jnp.exp(-fading))
+
+    def steady(self) -> SteadyDrive:
+        names = ("motor", "supply", "dead_zone", "dead_zone_kind")
+        return SteadyDrive(StaticThruster(**{name: getattr(self.thruster, name) for name in names}))
+
+    def _boost(self, rate) -> PerThruster:
+        """By itself the current comes at R / L; where that is too slow, more voltage makes it faster, ohm."""
+        return jnp.maximum(
+            self.thruster.motor.inductance * _CURRENT_FASTER * rate - self.thruster.motor.resistance, 0.0
+        )

@@ -1,0 +1,59 @@
+"""Thrusters without a state of their own: the voltage for a thrust is the inverse of a curve."""
+
+from typing import Protocol
+
+import jax.numpy as jnp
+
+from undertow.core.actuator_model import AbstractDrive
+from undertow.thrusters.thruster import PerThruster
+
+
+class Invertible(Protocol):
+    """A thruster whose thrust depends on the voltage alone."""
+
+    supply: PerThruster
+
+    def thrust(self, state, voltage: PerThruster) -> PerThruster:
+        """T, N."""
+        ...
+
+    def voltage_for(self, thrust: PerThruster) -> PerThruster:
+        """V, V."""
+        ...
+
+
+class SteadyDrive(AbstractDrive):
+    """Thrust at once, by the curve that the thruster itself has."""
+
+    thruster: Invertible
+
+    def quickest(self, sampled):
+        return sampled
+
+    def time_constant(self):
+        return jnp.zeros(())
+
+    def init(self) -> tuple[()]:
+        return ()
+
+    def heard(self, state, report) -> tuple[()]:
+        return ()
+
+    def range(self, state, rate) -> tuple[PerThruster, PerThruster]:
+        top = jnp.asarray(self.thruster.supply)
+        limited = jnp.isfinite(top)
+        volts = jnp.where(limited, top, 0.0)  # the curve of a motor is inf / inf at infinite voltage
+        low, high = self.thruster.thrust((), -volts), self.thruster.thrust((), volts)
+        return jnp.where(limited, low, -jnp.inf), jnp.where(limited, high, jnp.inf)
+
+    def force(self, state, u) -> PerThruster:
+        return self.thruster.thrust((), u)
+
+    def command(self, state, force, rate) -> PerThruster:
+        return self.thruster.voltage_for(force)
+
+    def aim(self, state, u, rate) -> PerThruster:
+        return self.thruster.thrust((), u)
+
+    def advance(self, state, u, dt) -> tuple[()]:
+        return ()

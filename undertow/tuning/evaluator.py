@@ -1,0 +1,174 @@
+"""The runs themselves: many gains on many trials at once, and the slope of their cost by forward differentiation."""
+
+import concurrent.futures
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.analysis.linearization.jacobians import without
+from undertow.core import runtime
+from undertow.core.contracts import AbstractController, AbstractPlant
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.scenario.schema import Loop, Weights
+from undertow.tuning.cost import CostSums, Shares, shares
+from undertow.tuning.scaled import scaled
+from undertow.tuning.training_runs import Trials
+
+# Compiling is most of the time of a short tuning, and a lower level of optimisation halves it at the same speed.
+_COMPILER = {"xla_backend_optimization_level": "1"}
+
+AT_ONCE = 6  # gains per batch
+_STEPS = ("resolution", "dead_zone")  # parameters that make steps of what is smooth
+_WORKERS = 2
+
+
+class Bench(NamedTuple):
+    """All that does not change while gains do.
+
+    Attributes:
+        loop: reference, disturbance and sensor; plant and controller are put in.
+        settings: of the loop.
+        duration: of every run, s.
+        start: outputs at t = 0, and their rates.
+        sums: what is gathered.
+        weights: of the cost.
+    """
+
+    loop: ClosedLoop
+    settings: Loop
+    duration: float
+    start: tuple[Any, Any]
+    sums: CostSums
+    weights: Weights
+
+    def with_parts(self, plant: AbstractPlant, law: AbstractController, size: Any = 1.0) -> ClosedLoop:
+        """The loop of a plant and a law, with a disturbance of some size."""
+        loop = self.loop
+        return ClosedLoop(plant, law, loop.reference, scaled(loop.disturbance, size), loop.sensor)
+
+    def run(
+        self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""], smooth: bool = False
+    ) -> Shares:
+        """One closed loop; smooth for a slope that means something."""
+        loop = self.with_parts(plant, law, size)
+        # Differentiated as they are, rounding instruments would look as if they were cut off.
+        loop = without(loop, _STEPS) if smooth else loop
+        outcome = sampled.simulate(
+            loop,
+            duration=self.duration,
+            dt=self.settings.dt,
+            key=key,
+            position=self.start[0],
+            velocity=self.start[1],
+            record_every=0,
+            accumulators=(self.sums,),
+            method=self.settings.method,
+            substeps=self.settings.substeps,
+        )
+        return shares(outcome.accumulated[0], outcome.ended, self.duration)
+
+
+class Evaluation:
+    """Compiled programs for one bench and one number of trials per batch.
+
+    Args:
+        bench: what stays.
+        make: point -> law; may be traced.
+        like: a law of that kind, at any point.
+        trials: of the training; held-out ones run in batches of as many, so that nothing is compiled twice.
+    """
+
+    def __init__(
+        self, bench: Bench, make: Callable[[Any], AbstractController], like: AbstractController, trials: Trials
+    ):
+        self._bench, self._training = bench, trials
+        self._pool, self._lock = runtime.workers(_WORKERS), threading.Lock()
+        self._compilers = runtime.workers(_WORKERS)
+        self._programs: dict[str, concurrent.futures.Future[Any]] = {}
+        self._plant_rest = eqx.filter(trials.plants, eqx.is_array, inverse=True)
+        self._law_numbers, self._law_rest = eqx.partition(like, eqx.is_array)
+        self._numbers_at = lambda point: eqx.filter(make(point), eqx.is_array)
+        self._make = jax.jit(self._numbers_at)
+
+    def law(self, point: np.ndarray) -> AbstractController:
+        """The law of a point, unchecked."""
+        return eqx.combine(self._make(jnp.asarray(point)), self._law_rest)
+
+    def costs(self, points: Float[np.ndarray, "p k"]) -> Float[np.ndarray, " p"]:
+        """Mean cost of each point over the training."""
+        return self.total(self.shares([self.law(point) for point in points], self._training)).mean(axis=1)
+
+    def shares(self, laws: Sequence[AbstractController], trials: Trials) -> Shares:
+        """Parts of the cost, arrays (laws, trials): in batches of one shape, on both cores."""
+        numbers = [self._numbers(law) for law in laws]
+        height, width = len(numbers), self._training.number
+        rows = [(numbers + numbers[:1] * AT_ONCE)[i : i + AT_ONCE] for i in range(0, height, AT_ONCE)]
+        columns = [[min(i + j, trials.number - 1) for j in range(width)] for i in range(0, trials.number, width)]
+        batches = [(_stacked(row), trials.part(np.array(column))) for row in rows for column in columns]
+        done = list(self._pool.map(lambda batch: self._batch(*batch), batches))
+        lines = [done[i : i + len(columns)] for i in range(0, len(done), len(columns))]
+        blocks = [jax.tree.map(lambda *pieces: np.concatenate(pieces, axis=1), *line) for line in lines]
+        whole = jax.tree.map(lambda *pieces: np.concatenate(pieces, axis=0), *blocks)
+        return jax.tree.map(lambda part: part[:height, : trials.number], whole)
+
+    def total(self, parts: Shares) -> np.ndarray:
+        """Cost of every run."""
+        return np.asarray(parts.cost(self._bench.weights))
+
+    def slope(self, point: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Gradient of the mean cost over the training, forward through every run; runs without one count as flat."""
+        arguments = self._of_slope(point)
+        each = np.asarray(self._compiled("slope", self._slopes, *arguments)(*arguments))
+        return np.where(np.isfinite(each), each, 0.0).mean(axis=1)
+
+    def foresee_slope(self, point: Float[np.ndarray, " k"]) -> None:
+        """Begin to compile what `slope` needs, beside whatever else is done."""
+        self._compiling("slope", self._slopes, *self._of_slope(point))
+
+    def _of_slope(self, point: Float[np.ndarray, " k"]) -> tuple[Any, ...]:
+        trials = self._training
+        return jnp.asarray(point), eqx.filter(trials.plants, eqx.is_array), trials.keys, trials.sizes
+
+    def _slopes(self, point, plants, keys, sizes):
+        """Shape (k, trials)."""
+        costs = lambda at: self._over_trials(self._numbers_at(at), plants, keys, sizes, True).cost(self._bench.weights)
+        along = lambda direction: jax.jvp(costs, (point,), (direction,))[1]
+        return jax.vmap(along)(jnp.eye(point.shape[0]))
+
+    def _over_trials(self, law, plants, keys, sizes, smooth: bool = False) -> Shares:
+        whole = eqx.combine(law, self._law_rest)
+        one = lambda plant, key, size: self._bench.run(whole, eqx.combine(plant, self._plant_rest), key, size, smooth)
+        return jax.vmap(one)(plants, keys, sizes)
+
+    def _many(self, laws, plants, keys, sizes) -> Shares:
+        return jax.vmap(lambda law: self._over_trials(law, plants, keys, sizes))(laws)
+
+    def _batch(self, laws, trials: Trials) -> Shares:
+        arguments = (laws, eqx.filter(trials.plants, eqx.is_array), trials.keys, trials.sizes)
+        return jax.tree.map(np.asarray, self._compiled("costs", self._many, *arguments)(*arguments))
+
+    def _numbers(self, law: AbstractController) -> Any:
+        """Numbers of a law in the shapes of those that are tuned: one gain for all axes stands for one per axis."""
+        spread = lambda number, like: jnp.broadcast_to(number, like.shape)
+        return jax.tree.map(spread, eqx.filter(law, eqx.is_array), self._law_numbers)
+
+    def _compiled(self, name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+        return self._compiling(name, function, *arguments).result()
+
+    def _compiling(self, name: str, function: Callable[..., Any], *arguments: Any) -> concurrent.futures.Future[Any]:
+        compiled = lambda: jax.jit(function).lower(*arguments).compile(compiler_options=_COMPILER)
+        with self._lock:
+            if name not in self._programs:
+                self._programs[name] = self._compilers.submit(compiled)
+            return self._programs[name]
+
+
+def _stacked(trees: Sequence[Any]) -> Any:
+    return jax.tree.map(lambda *each: jnp.stack(each), *trees)

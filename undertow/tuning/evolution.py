@@ -1,0 +1,43 @@
+"""Without slopes, for what is not smooth: differential evolution (scipy), a whole generation in one batch."""
+
+import numpy as np
+from scipy.optimize import differential_evolution
+from scipy.stats import qmc
+
+from undertow.tuning.evaluator import AT_ONCE
+from undertow.tuning.objective import Objective
+
+_HOPELESS = 1e6  # cost of what is not certified
+_SPREAD = 1e-3  # of the population's costs, relative: it has come together
+
+
+def spread_points(count: int, dials: int, seed: int) -> np.ndarray:
+    """Points that fill the box evenly, by Sobol's sequence."""
+    with np.errstate(all="ignore"):
+        sequence = qmc.Sobol(dials, rng=np.random.default_rng(seed))
+        return sequence.random_base2(int(np.ceil(np.log2(count))))[:count]
+
+
+def search(objective: Objective, start: np.ndarray, iterations: int, seed: int) -> None:
+    """Best of a population that mixes its differences, Storn and Price (1997); the objective keeps the best.
+
+    Args:
+        objective: what is asked.
+        start: a certified point; the others fill the box.
+        iterations: generations, at most.
+        seed: of everything random.
+    """
+    dials = len(start)
+    population = AT_ONCE * max(2, int(np.ceil(2 * dials / AT_ONCE)))
+    first = np.vstack([start, spread_points(population - 1, dials, seed)])
+    differential_evolution(
+        lambda points: np.minimum(objective.costs(points.T), _HOPELESS),
+        [(0.0, 1.0)] * dials,
+        init=first,
+        maxiter=iterations,
+        tol=_SPREAD,
+        rng=np.random.default_rng(seed),
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+    )

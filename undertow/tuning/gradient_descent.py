@@ -1,0 +1,78 @@
+"""Downhill in a box: quasi-Newton steps (BFGS) on the free variables, several step lengths tried in one batch."""
+
+import numpy as np
+
+from undertow.tuning.objective import Objective
+
+_LENGTHS = np.array([2.0, 1.0, 0.4, 0.15, 0.04, 0.005])  # of the quasi-Newton step
+_FIRST = 0.2  # largest change of a variable in a step that knows no curvature; the box is 1 wide
+_LARGEST = 0.5  # and in any other
+_FLAT = 1e-9  # slope
+_LITTLE = 1e-4  # relative gain of a step that is not worth another one
+_PATIENCE = 3
+_NARROWER, _NEAREST = 0.5, 0.01  # how far it looks around: half as far after every failure, down to the nearest
+
+
+def descend(objective: Objective, start: np.ndarray, cost: float, iterations: int) -> None:
+    """From a certified point to a local minimum of the cost in [0, 1]^k; the objective keeps the best.
+
+    Nocedal and Wright (2006), ch. 6, with variables at a bound held there while the slope pushes outward. Instead of
+    a line search one by one, all lengths are run at once and the best certified one is taken. Where none is better,
+    points all around are tried, nearer and nearer.
+
+    Args:
+        objective: what is asked.
+        start: shape (k,).
+        cost: there.
+        iterations: at most.
+    """
+    x, inverse, slope, idle, stuck, reach = start, None, objective.slope(start), 0, False, _FIRST
+    chance = np.random.default_rng(0)
+    for _ in range(iterations):
+        free = ~(((x <= 0) & (slope > 0)) | ((x >= 1) & (slope < 0)))
+        if np.abs(slope[free]).max(initial=0.0) < _FLAT:
+            return
+        if stuck:
+            ways = reach * chance.uniform(-1.0, 1.0, (len(_LENGTHS), len(x)))
+        else:
+            ways = _LENGTHS[:, None] * _direction(slope, free, inverse)
+        points = np.clip(x + ways, 0.0, 1.0)
+        costs = objective.costs(points)
+        best = int(np.argmin(costs))
+        if not costs[best] < cost:
+            reach *= _NARROWER if stuck else 1.0
+            if reach < _NEAREST:
+                return
+            # First what was learnt of the curvature is forgotten; where the slope itself misleads, as limits and the
+            # certificate make it, points all around are tried.
+            inverse, stuck = None, inverse is None
+            continue
+        stuck = False
+        idle = idle + 1 if cost - costs[best] < _LITTLE * abs(cost) else 0
+        moved, x, cost, before = points[best] - x, points[best], float(costs[best]), slope
+        if idle >= _PATIENCE:
+            return
+        slope = objective.slope(x)
+        inverse = _updated(inverse, moved, slope - before)
+
+
+def _direction(slope: np.ndarray, free: np.ndarray, inverse: np.ndarray | None) -> np.ndarray:
+    """Quasi-Newton step of the free variables; along the slope where there is no curvature or it leads uphill."""
+    down = np.where(free, -slope, 0.0)
+    if inverse is not None:
+        newton = np.where(free, inverse @ down, 0.0)
+        if newton @ slope < 0:
+            return newton * min(1.0, _LARGEST / np.abs(newton).max())
+    return down * _FIRST / np.abs(down).max()
+
+
+def _updated(inverse: np.ndarray | None, moved: np.ndarray, change: np.ndarray) -> np.ndarray | None:
+    """BFGS estimate of the inverse Hessian; unchanged where the curvature along the step is not positive."""
+    along = float(moved @ change)
+    if not along > 1e-12 * np.linalg.norm(moved) * np.linalg.norm(change):
+        return inverse
+    identity = np.eye(len(moved))
+    if inverse is None:
+        inverse = identity * along / float(change @ change)
+    left = identity - np.outer(moved, change) / along
+    return left @ inverse @ left.T + np.outer(moved, moved) / along

@@ -1,0 +1,100 @@
+"""What a method may ask: costs of points, their slope, whether a point is certified; and the best that was found."""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from jaxtyping import Float
+
+from undertow.tuning.stability import Certificate
+from undertow.tuning.checkpoint import Journal
+
+Points = Float[np.ndarray, "p k"]
+
+
+class Computes(Protocol):
+    """Costs and slopes, as `Evaluation` computes them."""
+
+    def costs(self, points: Points) -> np.ndarray:
+        """Cost of each point."""
+        ...
+
+    def slope(self, point: np.ndarray) -> np.ndarray:
+        """Gradient of the cost at a point."""
+        ...
+
+
+class Step(NamedTuple):
+    """Something better than before."""
+
+    evaluations: int
+    elapsed: float  # s
+    cost: float
+    point: list[float]
+    radius: float  # spectral
+
+
+Watch = Callable[[Step, int], None]  # the best so far, evaluations so far
+
+
+class Objective:
+    """Costs by way of a journal. Nothing is accepted without a certificate.
+
+    Args:
+        computes: costs and slopes.
+        certify: point -> certificate.
+        journal: what is known already.
+        watch: told after every batch.
+    """
+
+    def __init__(
+        self, computes: Computes, certify: Callable[[np.ndarray], Certificate], journal: Journal, watch: Watch
+    ):
+        self._computes, self._certify, self._journal, self._watch = computes, certify, journal, watch
+        self.evaluations = 0
+        self.steps: list[Step] = []
+        self.refused = 0
+
+    @property
+    def best(self) -> Step | None:
+        """The best certified point so far."""
+        return self.steps[-1] if self.steps else None
+
+    def costs(self, points: Points, must: bool = False) -> np.ndarray:
+        """Cost of each point; one that would be the best, but is not certified, costs infinitely much.
+
+        Args:
+            points: shape (points, dials).
+            must: whether they are computed even if time is up.
+
+        Raises:
+            OutOfTime: it is.
+        """
+        found = np.asarray(self._journal.ask("costs", points, lambda: _finite(self._computes.costs(points)), must))
+        self.evaluations += len(points)
+        for i in np.argsort(found, kind="stable"):
+            if self.best is not None and not found[i] < self.best.cost:
+                break
+            radius = self.radius(points[i])
+            if radius < 1:
+                step = Step(self.evaluations, self._journal.elapsed, float(found[i]), points[i].tolist(), radius)
+                self.steps.append(step)
+                break
+            self.refused += 1
+            found[i] = np.inf
+        if self.best is not None:
+            self._watch(self.best, self.evaluations)
+        return found
+
+    def slope(self, point: np.ndarray) -> np.ndarray:
+        """Gradient of the cost."""
+        return np.asarray(self._journal.ask("slope", point, lambda: self._computes.slope(point).tolist()))
+
+    def radius(self, point: np.ndarray) -> float:
+        """Largest spectral radius of the loop there."""
+        return float(self._journal.ask("radius", point, lambda: min(self._certify(point).worst, 1e300), must=True))
+
+
+def _finite(costs: np.ndarray) -> list[float]:
+    """As JSON holds them."""
+    return np.nan_to_num(np.asarray(costs, dtype=float), nan=1e300, posinf=1e300).tolist()

@@ -1,0 +1,160 @@
+"""From a scenario to a tuning problem: dials, laws, trials and what is counted."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core import catalogue
+from undertow.core.contracts import AbstractController, AbstractPlant
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.scenario import factory
+from undertow.scenario.build import Built, build
+from undertow.scenario.consistency import placed
+from undertow.scenario.reading import Text, key_path
+from undertow.tuning import tunable_parameters as dials_
+from undertow.tuning.cost import CostSums
+from undertow.tuning.defaults import SHARED, Law, law_of, now
+from undertow.tuning.tunable_parameters import Dial
+from undertow.tuning.evaluator import Bench
+from undertow.tuning.training_runs import Trials, training_and_held_out
+
+_LONGEST = 20.0  # s, of a run, where nothing is said
+_DIGITS = 5  # of a tuned gain
+_FAR = 1e9  # an input beyond every limit
+
+
+class Problem(NamedTuple):
+    """What is tuned, and on what."""
+
+    built: Built
+    dials: list[Dial]
+    law: Callable[[Mapping[str, Any]], AbstractController]  # of tuned options
+    start: np.ndarray  # the given gains as a point; those beyond the bounds at the nearer one
+    bench: Bench
+    train: Trials
+    held_out: Trials
+
+    def options(self, point: Any) -> dict[str, Any]:
+        """Options at a point."""
+        return dials_.options(self.dials, point, len(self.built.closed_loop.controller.model.angles))
+
+    def rounded(self, point: np.ndarray) -> dict[str, Any]:
+        """Options at a point as a scenario has them."""
+        listed = {name: np.asarray(value) for name, value in self.options(point).items()}
+        return {name: _rounded(value).tolist() for name, value in listed.items()}
+
+    def scenario(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """The resolved scenario with these options of the controller."""
+        controller = self.built.resolved["controller"] | self._left_out(options) | dict(options)
+        return self.built.resolved | {"controller": controller}
+
+    def _left_out(self, options: Mapping[str, Any]) -> dict[str, None]:
+        return _left_out(_law_of(self.built), options)
+
+
+def problem(text: Text) -> Problem:
+    """A scenario as a tuning problem.
+
+    Raises:
+        BadInput: the scenario, or its section `tune`, cannot be used.
+    """
+    built = build(text)
+    loop, scenario, tune = built.closed_loop, built.scenario, built.scenario.tune
+    if scenario.loop.kind != "sampled":
+        where = text.where(("loop", "kind"))
+        raise BadInput("loop.kind", "be sampled, for gains to be used on a vehicle", scenario.loop.kind, where=where)
+    known, dt, angles = _law_of(built), scenario.loop.dt, loop.controller.model.angles
+    function, given = _controller(text, built)
+    try:
+        chosen = _dials(known, function, tune, dt, angles)
+        train, held_out = training_and_held_out(text, built)
+    except BadInput as error:
+        raise error.at(where=text.where(key_path(error.name))) from error.__cause__
+    duration = min(scenario.loop.duration, _LONGEST) if tune.duration is None else tune.duration
+    start = duration / 2 if tune.start is None else tune.start
+    if not start < duration or round(duration / dt) < 2:
+        must = f"be earlier than the end of a run ({duration:g} s)"
+        raise BadInput("tune.start", must, f"{start:g} s", where=text.where(("tune", "start")))
+    scales = np.where(angles, tune.angle_scale, tune.position_scale)
+    sums = CostSums(start, scales, _input_scale(loop.plant, loop.controller))
+    places = tuple(None if place is None else np.asarray(place, dtype=float) for _, place in scenario.initial)
+    bench = Bench(loop, scenario.loop, duration, places, sums, tune.weights)
+    model = loop.controller.model
+    law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))
+    begin = [dial.share(_mean(known, loop.controller, given, dial)) for dial in chosen]
+    found = Problem(built, chosen, law, np.array(begin), bench, train, held_out)
+    placed(text, "controller", lambda: found.law(found.options(found.start)))
+    return found
+
+
+def _law_of(built: Built) -> Law:
+    description = built.resolved["controller"]
+    return law_of(description["kind"], description.get("preset"))
+
+
+def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractController], dict[str, Any]]:
+    """The function that makes the controller, and the options that it was made with."""
+    options = dict(built.resolved["controller"])
+    function = catalogue.find("controllers", options.pop("kind"), text.folder)
+    preset = options.pop("preset", None)
+    return (function if preset is None else factory.presets_of(function)[preset]), options
+
+
+def _dials(known: Law, function: Callable[..., Any], tune: Any, dt: float, angles: tuple[bool, ...]) -> list[Dial]:
+    ranges = tune.parameters or known.ranges(dt)
+    if not ranges:
+        raise BadInput("tune.parameters", "be given for this controller", hint="As `gain: [low, high]`")
+    options = list(inspect.signature(function).parameters)[1:]
+    for name in ranges:
+        if name.partition("[")[0] not in options:
+            hint = did_you_mean(name, options)
+            raise BadInput(f"tune.parameters.{name}", "be an option of the controller", "unknown", hint=hint)
+    chosen = dials_.dials(ranges, _groups(tune.per, angles), SHARED)
+    dials_.whole(chosen)
+    return chosen
+
+
+def _groups(per: str, angles: tuple[bool, ...]) -> list[tuple[int, ...]]:
+    """Translation and rotation of a plant that has both; otherwise, or on demand, each axis or all together."""
+    axes = range(len(angles))
+    if per == "all":
+        return [tuple(axes)]
+    if per == "group" and len(set(angles)) == 2:
+        return [tuple(i for i in axes if angles[i] == turns) for turns in (False, True)]
+    return [(i,) for i in axes]
+
+
+def _left_out(known: Law, options: Mapping[str, Any]) -> dict[str, None]:
+    """Options that would say the same as tuned ones."""
+    return {other: None for option in options for other in known.instead.get(option, ())}
+
+
+def _mean(known: Law, law: AbstractController, given: Mapping[str, Any], dial: Dial) -> float:
+    """What a dial stands at in a law: the geometric mean over its axes; half-way where nothing is known."""
+    name = dial.option if dial.entry is None else f"{dial.option}[{dial.entry}]"
+    value = now(known, law, name, given.get(dial.option))
+    if value is None:
+        return float(np.sqrt(dial.low * dial.high))
+    numbers = np.asarray(value, dtype=float)
+    if name not in known.now and dial.entry is not None:
+        numbers = numbers[..., dial.entry]
+    of_axes = numbers[list(dial.axes)] if numbers.ndim and dial.axes else numbers
+    return float(np.exp(np.log(np.maximum(of_axes, dial.low)).mean()))
+
+
+def _input_scale(plant: AbstractPlant, law: AbstractController) -> float:
+    """Largest input; where there is none, the one that accelerates every axis by 1 m/s^2 or rad/s^2."""
+    x = plant.initial_state()
+    most = np.abs(np.asarray(plant.admissible(x, jnp.full(plant.inputs(), _FAR)))).max()
+    if most < _FAR:
+        return float(most)
+    y = plant.output(jnp.zeros(()), x)
+    size = np.abs(np.asarray(law.model.invert(y, jnp.ones(len(plant.outputs))))).max()
+    return float(size) if size > 0 else 1.0
+
+
+def _rounded(value: np.ndarray) -> np.ndarray:
+    return np.vectorize(lambda number: float(f"{number:.{_DIGITS}g}"), otypes=[float])(value)

@@ -1,0 +1,119 @@
+"""What gains are tried on: seeds, sizes of the disturbance, and vehicles that are not what the controller was told."""
+
+import inspect
+import sys
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import catalogue, checks
+from undertow.core.contracts import AbstractPlant
+from undertow.core.errors import BadInput
+from undertow.scenario import factory
+from undertow.scenario.build import Built
+from undertow.scenario.reading import Text
+from undertow.scenario.schema import Tries
+
+_HELD_OUT_SEEDS = 1_000_000  # far from those of the training
+
+
+class Trials(NamedTuple):
+    """Runs that differ in what the controller does not know; the leaves of `plants` have one entry per trial."""
+
+    plants: AbstractPlant
+    keys: Array
+    sizes: Float[Array, " trials"]
+    truths: tuple[str, ...]  # name of the true parameter set of each; "" where there is but one
+
+    @property
+    def number(self) -> int:
+        """How many."""
+        return len(self.truths)
+
+    def part(self, chosen: Any) -> "Trials":
+        """Some of them, by their numbers; numbers may repeat."""
+        pick = lambda tree: jax.tree.map(lambda leaf: leaf[chosen], eqx.filter(tree, eqx.is_array))
+        plants = eqx.combine(pick(self.plants), eqx.filter(self.plants, eqx.is_array, inverse=True))
+        return Trials(plants, self.keys[chosen], self.sizes[chosen], tuple(self.truths[i] for i in chosen))
+
+
+def training_and_held_out(text: Text, built: Built) -> tuple[Trials, Trials]:
+    """Both sets of trials of a scenario: other seeds in each, and other parameter sets where there are several.
+
+    The controller keeps what it was told. Published sets, the told one first, go in turn to the training and to the
+    held-out set, which has the told one, too.
+
+    Raises:
+        BadInput: a parameter set that the vehicle does not have.
+    """
+    tune, names = built.scenario.tune, parameter_sets(built)
+    own = tuple(dict.fromkeys((*names[:1], *names[1::2])))
+    train = trials(text, built, tune.train, names[::2], "train", built.scenario.seed)
+    return train, trials(text, built, tune.held_out, own, "held_out", built.scenario.seed + _HELD_OUT_SEEDS)
+
+
+def trials(text: Text, built: Built, wanted: Tries, default: Sequence[str], key: str, first_seed: int) -> Trials:
+    """Every set with every seed; sizes of the disturbance take turns with the seeds.
+
+    Args:
+        text: the scenario as read.
+        built: the same, built.
+        wanted: how many seeds, which sizes and sets.
+        default: sets where none are named.
+        key: under `tune`, for messages.
+        first_seed: the others follow.
+    """
+    names, known = tuple(wanted.sets if wanted.sets is not None else default), parameter_sets(built)
+    for i, name in enumerate(names):
+        if not known:
+            raise BadInput(f"tune.{key}.sets", "be left out: there is but one parameter set", list(names))
+        checks.choice(f"tune.{key}.sets[{i}]", name, known)
+    for i, size in enumerate(wanted.sizes):
+        checks.not_negative(f"tune.{key}.sizes[{i}]", size)
+    if not wanted.sizes:
+        raise BadInput(f"tune.{key}.sizes", "have an entry")
+    if names == ():
+        names = known[:1] if known else ("",)
+    plants = {name: _plant(text, built, name) for name in names}
+    each = [(name, seed) for seed in range(wanted.seeds) for name in names]
+    return Trials(
+        plants=stacked([plants[name] for name, _ in each]),
+        keys=jnp.stack([jax.random.PRNGKey((first_seed + seed) % 2**32) for _, seed in each]),
+        sizes=jnp.asarray([wanted.sizes[seed % len(wanted.sizes)] for _, seed in each], dtype=float),
+        truths=tuple(name for name, _ in each),
+    )
+
+
+def parameter_sets(built: Built) -> tuple[str, ...]:
+    """Published parameter sets of the scenario's vehicle, the one it has first; none where it has but one."""
+    vehicle = built.resolved["plant"].get("vehicle")
+    if not isinstance(vehicle, dict) or "parameters" not in vehicle:
+        return ()
+    function = catalogue.names("vehicles").get(vehicle["kind"])
+    if function is None or "parameters" not in inspect.signature(function).parameters:
+        return ()
+    names = tuple(getattr(sys.modules[function.__module__], "PARAMETERS", ()))
+    own = vehicle["parameters"]
+    return (own, *(name for name in names if name != own)) if own in names else ()
+
+
+def stacked(plants: Sequence[AbstractPlant]) -> AbstractPlant:
+    """Plants of one kind as one whose arrays have an entry for each; names and sources are those of the first."""
+    numbers = [jax.tree.leaves(eqx.filter(plant, eqx.is_array)) for plant in plants]
+    tree = jax.tree.structure(eqx.filter(plants[0], eqx.is_array))
+    together = jax.tree.unflatten(tree, [jnp.stack(leaves) for leaves in zip(*numbers, strict=True)])
+    return eqx.combine(together, eqx.filter(plants[0], eqx.is_array, inverse=True))
+
+
+def _plant(text: Text, built: Built, name: str) -> AbstractPlant:
+    """The scenario's plant with another parameter set."""
+    if not name or name == built.resolved["plant"]["vehicle"]["parameters"]:
+        return built.closed_loop.plant
+    given = dict(built.scenario.plant.model_dump())
+    vehicle = given.get("vehicle", built.resolved["plant"]["vehicle"])
+    given["vehicle"] = {**({"kind": vehicle} if isinstance(vehicle, str) else vehicle), "parameters": name}
+    return factory.make("plants", given, text.folder)[0]

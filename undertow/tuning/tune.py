@@ -1,0 +1,173 @@
+"""`undertow tune` without its command line: from a scenario to gains that are certified, and how good they are."""
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from undertow.core.contracts import AbstractController
+from undertow.core.errors import BadInput
+from undertow.scenario.build import in_its_precision
+from undertow.scenario.provenance import text_hash
+from undertow.scenario.reading import Text, dump
+from undertow.tuning.stability import Certificate, Certifier, refusal
+from undertow.tuning.cost import Shares
+from undertow.tuning.gradient_descent import descend
+from undertow.tuning.evaluator import AT_ONCE, Evaluation
+from undertow.tuning.checkpoint import Journal, OutOfTime
+from undertow.tuning.objective import Objective, Step, Watch
+from undertow.tuning.problem import Problem, problem
+from undertow.tuning.evolution import search, spread_points
+
+METHODS = ("gradient", "search")
+
+# A share of the budget is kept for judging what was found.
+_FOR_THE_SEARCH = 0.85
+
+_BEGINNINGS = 2 * AT_ONCE  # points that are tried before the first step, the given gains among them
+
+
+class Judged(NamedTuple):
+    """One choice of gains on both sets of trials."""
+
+    name: str
+    options: Mapping[str, Any] | None  # None for the gains as given
+    train: Shares  # arrays, one entry per trial
+    held_out: Shares
+    train_cost: float
+    held_out_cost: float
+    certificate: Certificate
+
+
+class Tuned(NamedTuple):
+    """What a tuning found."""
+
+    problem: Problem
+    method: str
+    judged: tuple[Judged, ...]  # given, ..., start, tuned
+    steps: list[Step]
+    evaluations: int
+    refused: int  # points that would have been better, but were not certified
+    elapsed: float  # s
+    finished: bool  # by itself, not by the budget
+    searched: int  # points that were tried after the first ones
+
+    @property
+    def scenario(self) -> dict[str, Any]:
+        """The scenario with the tuned gains."""
+        return self.problem.scenario(self.judged[-1].options or {})
+
+
+@in_its_precision
+def tune(
+    text: Text,
+    journal: Path,
+    *,
+    method: str = "gradient",
+    budget: float = 240.0,
+    resume: bool = False,
+    beside: Mapping[str, Mapping[str, Any]] | None = None,
+    say: Callable[[str], None] = lambda stage: None,
+    watch: Watch = lambda best, evaluations: None,
+) -> Tuned:
+    """Tune the controller of a scenario.
+
+    Args:
+        text: the scenario.
+        journal: file that an interrupted tuning goes on from.
+        method: gradient, downhill by forward differentiation, or search, differential evolution.
+        budget: s, all told; what is begun is finished, and the first points are tried whatever it takes.
+        resume: whether to go on from the journal.
+        beside: other choices of options, by name, to be judged like the given and the tuned ones.
+        say: told the stage.
+        watch: told the best so far after every batch.
+
+    Raises:
+        BadInput: anything wrong with the scenario, or with what is to be resumed.
+    """
+    begun = time.perf_counter()
+    say("building")
+    wanted = problem(text)
+    about = text_hash(
+        dump({"method": method, "tune": wanted.built.scenario.tune.model_dump(), **wanted.built.resolved})
+    )
+    notes = Journal(journal, about, _FOR_THE_SEARCH * budget, resume, begun)
+    make = lambda point: wanted.law(wanted.options(point))
+    first = make(wanted.start)
+    evaluation = Evaluation(wanted.bench, make, first, wanted.train)
+    if method == "gradient" and not notes.is_over:
+        evaluation.foresee_slope(wanted.start)
+    certifier = Certifier(wanted.bench, wanted.train, first)
+    objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
+    say("compiling, and looking for a beginning")
+    seed = wanted.built.scenario.seed
+    others = spread_points(_BEGINNINGS - 1, len(wanted.dials), seed)
+    objective.costs(np.vstack([wanted.start, others]), must=True)  # however long compiling takes: or nothing is found
+    start = objective.best
+    if start is None:
+        raise refusal(certifier(first), _BEGINNINGS)
+    say("tuning")
+    finished = True
+    try:
+        iterations = wanted.built.scenario.tune.iterations
+        if method == "gradient":
+            descend(objective, np.array(start.point), start.cost, iterations)
+        else:
+            search(objective, np.array(start.point), iterations, seed)
+    except OutOfTime:
+        finished = False
+    say("judging")
+    best = objective.best or start
+    chosen: list[tuple[str, Mapping[str, Any] | None]] = [("given", None), *(beside or {}).items()]
+    chosen += [(name, wanted.rounded(np.array(step.point))) for name, step in (("start", start), ("tuned", best))]
+    judged = _judged(wanted, evaluation, certifier, chosen)
+    if not judged[-1].certificate.holds:
+        raise BadInput("tune", "find gains whose certificate holds after rounding", judged[-1].certificate.worst)
+    return Tuned(
+        problem=wanted,
+        method=method,
+        judged=judged,
+        steps=objective.steps,
+        evaluations=objective.evaluations,
+        refused=objective.refused,
+        elapsed=notes.elapsed,
+        finished=finished,
+        searched=objective.evaluations - _BEGINNINGS,
+    )
+
+
+@in_its_precision
+def judge(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Judged, ...]:
+    """How the gains of a scenario, and other choices of its options by name, do in the runs that `tune` would take.
+
+    Scenarios that differ in their controller only meet the same runs.
+
+    Raises:
+        BadInput: anything wrong with the scenario.
+    """
+    wanted = problem(text)
+    make = lambda point: wanted.law(wanted.options(point))
+    first = make(wanted.start)
+    evaluation = Evaluation(wanted.bench, make, first, wanted.train)
+    return _judged(
+        wanted, evaluation, Certifier(wanted.bench, wanted.train, first), [("given", None), *choices.items()]
+    )
+
+
+def _judged(
+    wanted: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, Mapping[str, Any] | None]]
+) -> tuple[Judged, ...]:
+    """All choices on both sets of trials; the given gains exactly as they were given."""
+    own = wanted.built.closed_loop.controller
+    laws: list[AbstractController] = [own if options is None else wanted.law(options) for _, options in chosen]
+    train, held_out = (evaluation.shares(laws, trials) for trials in (wanted.train, wanted.held_out))
+    costs = [evaluation.total(parts).mean(axis=1) for parts in (train, held_out)]
+    row = lambda parts, i: Shares(*(np.asarray(part)[i] for part in parts))
+    return tuple(
+        Judged(
+            name, options, row(train, i), row(held_out, i), float(costs[0][i]), float(costs[1][i]), certifier(laws[i])
+        )
+        for i, (name, options) in enumerate(chosen)
+    )
