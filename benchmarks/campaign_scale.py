@@ -26,17 +26,17 @@ from undertow import process
 
 process.prepare()
 
-from undertow.scenario.reading import dump
 from undertow.campaign import task
 from undertow.campaign.clusters import cluster
 from undertow.campaign.columns import labels
-from undertow.campaign.run_campaign import STORE, conduct
 from undertow.campaign.executors import by_dask, in_threads
 from undertow.campaign.fingerprint import Identity
 from undertow.campaign.layout import Layout
 from undertow.campaign.prepare import prepare
+from undertow.campaign.run_campaign import STORE, conduct
 from undertow.campaign.store import Store
 from undertow.reproduction.setup import scenario
+from undertow.scenario.reading import dump
 
 VARY = {
     "initial.position[0]": {"normal": [0.0, 0.1]},
@@ -49,7 +49,7 @@ _LARGE = 8192  # trials of a task whose memory is looked at
 
 def prepared(folder: Path, trials: int, duration: float, chunk: int, vary: dict = VARY):
     loop = {"kind": "sampled", "duration": duration}
-    whole = scenario("W1", rung="electromechanical", composite=20.0, loop=loop) | {
+    whole = scenario("W1", fidelity="electromechanical", composite=20.0, loop=loop) | {
         "initial": {"position": [0.0] * 6},
         "steady": {"start": duration / 2},
     }
@@ -87,12 +87,12 @@ def pieces(trials: int) -> dict:
             campaign = prepared(Path(name), _LARGE, 1.0, 256, vary)
             here = task.site(campaign.text, str(campaign.folder))
             build = lambda i, here=here: [
-                task.build_trial(here.trials, here.workshop, row) for row in range(i * trials, (i + 1) * trials)
+                task.build_trial(here.trials, here.part_cache, row) for row in range(i * trials, (i + 1) * trials)
             ]
             found[what] = 1e3 * _shortest(build) / trials
-        columns = task.fly(campaign.text, str(campaign.folder), range(256))
+        columns = task.run(campaign.text, str(campaign.folder), range(256))
         before = _peak()
-        task.fly(campaign.text, str(campaign.folder), range(_LARGE))
+        task.run(campaign.text, str(campaign.folder), range(_LARGE))
         found["task_KiB_per_trial"] = 1024 * (_peak() - before) / _LARGE
         for rows in (256, 65_536):
             named = labels(campaign.trials, campaign.first)

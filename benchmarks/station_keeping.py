@@ -1,6 +1,6 @@
 """Station keeping of BlueROV2 Heavy at sea: preset `robust` against a PID tuned with the same budget.
 
-T200s at 16 V, 100 Hz, JONSWAP Hs 0.5 m at 3 m depth, current 0.5 m/s, the vehicle's own instruments. The controllers
+T200s at 16 V, 100 Hz, JONSWAP Hs 0.5 m at 3 m depth, current 0.5 m/s, the vehicle's own sensors. The controllers
 are told of one published parameter set; every one of them is the truth in turn.
 
     python benchmarks/station_keeping.py [--seeds 100] [--budget 240] [--laws pid,robust] [--fix-noise 0.05]
@@ -28,7 +28,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.sampled import AbstractAccumulator
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.scenario.schema import Tries
+from undertow.scenario.schema import TrainingRuns
 from undertow.tuning.training_runs import trials
 from undertow.tuning.tune import tune
 
@@ -80,7 +80,7 @@ class Station(AbstractAccumulator):
     def update(self, state, t, sample):
         inside = jnp.where(t >= START, 1.0, 0.0)
         return Sums(
-            state.samples + inside,
+            state.signals + inside,
             state.error + inside * sample.error**2,
             state.navigation + inside * (sample.measured_position - sample.position) ** 2,
             state.control + inside * (sample.target - sample.measured_position) ** 2,
@@ -93,14 +93,14 @@ def fly(scenario, seeds):
     """Per run, rms of each axis: error, error of navigation, error against it; variation, whether it lasted; truths."""
     text = from_data(scenario)
     built = build(text)
-    wanted = Tries.model_validate({"seeds": seeds, "sizes": [1.0], "sets": SETS})
+    wanted = TrainingRuns.model_validate({"seeds": seeds, "sizes": [1.0], "sets": SETS})
     loop, several = built.closed_loop, trials(text, built, wanted, (), "train", FIRST_SEED)
 
     def run(plant, key):
         whole = ClosedLoop(plant, loop.controller, loop.reference, loop.disturbance, loop.sensor)
         found = sampled.simulate(whole, duration=DURATION, dt=0.01, key=key, record_every=0, accumulators=(Station(),))
         sums = found.accumulated[0]
-        rms = lambda squares: jnp.sqrt(squares / sums.samples)
+        rms = lambda squares: jnp.sqrt(squares / sums.signals)
         signals = (rms(signal) for signal in (sums.error, sums.navigation, sums.control))
         return *signals, sums.variation / (DURATION - START), found.status == 0
 
@@ -123,18 +123,18 @@ def at_sea(name, fix_noise):
     fix = {"kind": "position_fix", "noise": fix_noise}
     if fix_noise != 0.05:
         fix |= {"period": 0.1, "delay": 0.01}
-    instruments = ["imu", "dvl", "depth", "compass", fix]
+    sensors = ["imu", "dvl", "depth", "compass", fix]
     return {
         **copy.deepcopy(SEA),
         "controller": LAWS[name],
-        "sensor": {"kind": "navigation", "instruments": instruments},
+        "sensor": {"kind": "navigation", "sensors": sensors},
     }
 
 
 def tuned(name, scenario, budget):
     """The scenario with tuned gains."""
     with tempfile.TemporaryDirectory() as folder:
-        found = tune(from_data(scenario), Path(folder) / "journal", budget=budget)
+        found = tune(from_data(scenario), Path(folder) / "checkpoint", budget=budget)
     best = found.judged[-1]
     print(
         f"{name}: tuned in {found.elapsed:.0f} s, {found.evaluations} gains, training cost {best.train_cost:.4g}, "

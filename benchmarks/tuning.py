@@ -40,7 +40,7 @@ TABLE_1 = {
 THRUSTERS = {
     "bluerov2_heavy": {"kind": "t200", "supply": 16.0},
     "bluerov2": {"kind": "t200", "supply": 16.0},
-    "odin": {"kind": "paper_table3", "rung": "shaft", "supply": 24.0},
+    "odin": {"kind": "paper_table3", "fidelity": "shaft", "supply": 24.0},
     "rexrov": {"kind": "first_order", "thrust_per_volt": 60.0, "time_constant": 0.05, "supply": 24.0},
 }
 
@@ -67,7 +67,7 @@ def scenario(vehicle, controller):
         "controller": {"kind": "rcaf", **controller},
         "reference": {"kind": "setpoint", "position": [2.0, 1.0, 1.0, 0.0, 0.0, 0.5], "settling": 15.0},
         "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0.0]}, {"kind": "waves", "height": 0.5}],
-        "sensor": {"kind": "navigation", "instruments": INSTRUMENTS},
+        "sensor": {"kind": "navigation", "sensors": INSTRUMENTS},
         "loop": {"dt": 0.02, "duration": 60.0, "record": 0.1},
         "tune": {"duration": 16.0, "train": {"sets": sets and sets[:2]}, "held_out": {"sets": sets}},
     }
@@ -82,7 +82,7 @@ def main():
         begun, busy = time.perf_counter(), time.process_time()
         with tempfile.TemporaryDirectory() as folder:
             text = from_data(scenario(vehicle, {"preset": "robust"}))
-            found = tune(text, Path(folder) / "journal", budget=options.budget)
+            found = tune(text, Path(folder) / "checkpoint", budget=options.budget)
         wall, processor = time.perf_counter() - begun, time.process_time() - busy
         print(f"\n{vehicle}: {found.evaluations} gains in {wall:.0f} s, {processor:.0f} s of processor time")
         by_hand = {"preset": "paper", **BY_HAND, **BY_HAND_TOO.get(vehicle, {})}

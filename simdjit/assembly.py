@@ -1,4 +1,4 @@
-"""The frame of a program of lanes: start, then tick after tick, and now and then a look."""
+"""The frame of a program of lanes: start, then step after step, and now and then a look."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from simdjit.graph import Graph, Node
 from simdjit.scalar import Scalar
 from simdjit.section import Section
 
-TICK = "tick"
+TICK = "step"
 
 
 class Sections(NamedTuple):
@@ -17,17 +17,17 @@ class Sections(NamedTuple):
 
     Attributes:
         start: first carry, of numbers.
-        tick: next carry, of numbers, the carry and the number of the tick.
+        step: next carry, of numbers, the carry and the number of the step.
         look: what is looked at, of the same.
     """
 
     start: Sequence[Node]
-    tick: Sequence[Node]
+    step: Sequence[Node]
     look: Sequence[Node]
 
 
 class Head(NamedTuple):
-    """How a program begins: from its arguments to %numbers, %carry and %series in their slots, %ticks, %every.
+    """How a program begins: from its arguments to %numbers, %carry and %series in their slots, %steps, %every.
 
     Attributes:
         text: up to block `begin`; may leave by block `end`.
@@ -42,9 +42,9 @@ class Head(NamedTuple):
     functions: tuple[str, ...] = ()
 
 
-# Arguments: numbers, carry and series; ticks in all; ticks between looks, 0 for none.
+# Arguments: numbers, carry and series; steps in all; steps between looks, 0 for none.
 VECTORS = Head("""\
-define void @run(ptr noalias %numbers, ptr noalias %carry, ptr noalias %series, i64 %ticks, i64 %every) {
+define void @run(ptr noalias %numbers, ptr noalias %carry, ptr noalias %series, i64 %steps, i64 %every) {
 entry:
   br label %begin""")
 
@@ -59,7 +59,7 @@ started:
   %looking = icmp ne i64 %every, 0
   br i1 %looking, label %look, label %straight
 straight:
-  br label %tick
+  br label %step
 look:
   %first = phi i64 [ 0, %started ], [ %next, %paused ]
   %row = phi ptr [ %series, %started ], [ %later, %paused ]
@@ -67,22 +67,22 @@ look:
 {look}
   %nextrow = getelementptr i8, ptr %row, i64 {row}
   %then = add i64 %first, %every
-  %early = icmp slt i64 %then, %ticks
-  %stop = select i1 %early, i64 %then, i64 %ticks
-  %more = icmp slt i64 %first, %ticks
+  %early = icmp slt i64 %then, %steps
+  %stop = select i1 %early, i64 %then, i64 %steps
+  %more = icmp slt i64 %first, %steps
   br i1 %more, label %go, label %end
 go:
-  br label %tick
-tick:
+  br label %step
+step:
   %k = phi i64 [ 0, %straight ], [ %first, %go ], [ %next, %ticked ]
-  %until = phi i64 [ %ticks, %straight ], [ %stop, %go ], [ %until, %ticked ]
+  %until = phi i64 [ %steps, %straight ], [ %stop, %go ], [ %until, %ticked ]
   %later = phi ptr [ %series, %straight ], [ %nextrow, %go ], [ %later, %ticked ]
-{tick}
+{step}
   br label %ticked
 ticked:
   %next = add i64 %k, 1
   %again = icmp slt i64 %next, %until
-  br i1 %again, label %tick, label %after
+  br i1 %again, label %step, label %after
 after:
   br i1 %looking, label %paused, label %end
 paused:
@@ -107,15 +107,15 @@ def assembly(graph: Graph, sections: Sections, lanes: int, head: Head = VECTORS)
     """
     emitter = Emitter(graph, lanes, 1 if head.threads else lanes)
     emitter.functions.update(head.functions)
-    fixed, needed = _fixed(graph), graph.needed([*sections.start, *sections.tick, *sections.look])
-    start = Section(emitter, "s", tick="0")
+    fixed, needed = _fixed(graph), graph.needed([*sections.start, *sections.step, *sections.look])
+    start = Section(emitter, "s", step="0")
     start.do([node for node, same in enumerate(fixed) if same and needed[node]])
     start.store(sections.start, "%carry")
     texts = {"start": emitter.taken()}
-    parts = {"look": (sections.look, "l", "%first", "%row"), "tick": (sections.tick, "t", "%k", "%carry")}
-    for name, (wanted, letter, tick, base) in parts.items():
+    parts = {"look": (sections.look, "l", "%first", "%row"), "step": (sections.step, "t", "%k", "%carry")}
+    for name, (wanted, letter, step, base) in parts.items():
         emitter.block = name
-        section, needed = start.after(letter, tick), graph.needed(wanted)
+        section, needed = start.after(letter, step), graph.needed(wanted)
         section.do([node for node, same in enumerate(fixed) if needed[node] and not same])
         section.store(wanted, base)
         texts[name] = emitter.taken()
@@ -136,7 +136,7 @@ def _function(name: str, dtype: str, emitter: Emitter) -> str:
     result = FORMULAS[name](Scalar(graph, graph.input(ARGUMENT, dtype))).node
     within = Emitter(graph, emitter.width, emitter.width)
     within.constants = emitter.constants
-    section = Section(within, "f", tick="0")
+    section = Section(within, "f", step="0")
     needed = graph.needed([result])
     section.do([node for node, wanted in enumerate(needed) if wanted])
     kind, body = within.vector(dtype), within.taken()
@@ -151,14 +151,14 @@ def _function(name: str, dtype: str, emitter: Emitter) -> str:
 
 
 def operations(graph: Graph, sections: Sections) -> int:
-    """Operations of one tick of one run, those inside a loop counted once; an elementary function counts as one."""
-    fixed, needed = _fixed(graph), graph.needed(sections.tick)
+    """Operations of one step of one run, those inside a loop counted once; an elementary function counts as one."""
+    fixed, needed = _fixed(graph), graph.needed(sections.step)
     worked = lambda node: graph.operations[node].name not in ("constant", "input", "region", "result")
     return sum(needed[node] and not same and worked(node) for node, same in enumerate(fixed))
 
 
 def _fixed(graph: Graph) -> list[bool]:
-    """Which nodes are the same in every tick."""
+    """Which nodes are the same in every step."""
     fixed: list[bool] = []
     for node, (name, _, detail) in enumerate(graph.operations):
         if name == "input":

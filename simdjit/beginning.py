@@ -18,7 +18,7 @@ _MOST = 15_000
 
 
 class Beginning:
-    """What does not depend on the tick: drawn in lanes where that can be, and by XLA before where not.
+    """What does not depend on the step: drawn in lanes where that can be, and by XLA before where not.
 
     Args:
         draw: the function, of `numbers`.

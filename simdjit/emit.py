@@ -1,7 +1,7 @@
 """A program of lanes as LLVM's assembly: every number a vector, one entry per lane.
 
-The program starts every lane, then goes from tick to tick; now and then it looks. What does not change from tick to
-tick is done once.
+The program starts every lane, then goes from step to step; now and then it looks. What does not change from step to
+step is done once.
 """
 
 from collections.abc import Mapping, Sequence

@@ -10,7 +10,7 @@ from llvmlite import binding
 from simdjit.cache import kept
 from simdjit.errors import Unsupported
 
-# Arguments of a program: numbers, carry, series; ticks, ticks between looks.
+# Arguments of a program: numbers, carry, series; steps, steps between looks.
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
 
 
@@ -27,10 +27,10 @@ class Code:
         self._engine.finalize_object()
         self._run: Callable[..., None] = _SIGNATURE(self._engine.get_function_address("run"))
 
-    def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, ticks: int, every: int) -> None:
+    def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, steps: int, every: int) -> None:
         """Run it for every group of lanes; memories as `memory.Layout` makes them."""
         for group in range(len(numbers)):
-            self._run(*(memory[group].ctypes.data for memory in (numbers, carry, series)), ticks, every)
+            self._run(*(memory[group].ctypes.data for memory in (numbers, carry, series)), steps, every)
 
 
 def lanes_of(bits: int) -> int:

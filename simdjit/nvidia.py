@@ -45,11 +45,11 @@ def _within(base: str) -> str:
 
 _OWN = "\n".join(map(_own, _MEMORIES))
 
-# Arguments: three memories and the bytes of a group in each; ticks, ticks between looks, threads.
+# Arguments: three memories and the bytes of a group in each; steps, steps between looks, threads.
 THREADS = Head(
     f"""\
 define ptx_kernel void @run(ptr noalias %numbersall, ptr noalias %carryall, ptr noalias %seriesall,
-    i64 %numberssize, i64 %carrysize, i64 %seriessize, i64 %ticks, i64 %every, i64 %threads) {{
+    i64 %numberssize, i64 %carrysize, i64 %seriessize, i64 %steps, i64 %every, i64 %threads) {{
 entry:
   %block = call i32 @llvm.nvvm.read.ptx.sreg.ctaid.x()
   %blocksize = call i32 @llvm.nvvm.read.ptx.sreg.ntid.x()
@@ -101,7 +101,7 @@ class Kernel:
         self._driver = driver
         self._function = driver.load(ptx(assembly, min(driver.generation, _NEWEST)), "run")
 
-    def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, ticks: int, every: int) -> None:
+    def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, steps: int, every: int) -> None:
         """Run it for all groups of lanes at once; memories as `memory.Layout` makes them.
 
         Raises:
@@ -111,7 +111,7 @@ class Kernel:
         sizes = [memory.nbytes // len(memory) for memory in memories]
         with self._driver.room([memory.nbytes for memory in memories]) as places:
             self._driver.put(numbers, places[0])
-            self._driver.launch(self._function, -(-threads // _BLOCK), _BLOCK, [*places, *sizes, ticks, every, threads])
+            self._driver.launch(self._function, -(-threads // _BLOCK), _BLOCK, [*places, *sizes, steps, every, threads])
             self._driver.get(places[1], carry)
             self._driver.get(places[2], series)
 

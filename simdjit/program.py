@@ -25,13 +25,13 @@ _MOST = 200_000
 
 
 class Program:
-    """Start, ticks and looks, compiled for vector registers or for a GPU.
+    """Start, steps and looks, compiled for vector registers or for a GPU.
 
     Args:
         draw: numbers -> all that is known from then on.
         start: known -> carry.
-        tick: known, carry, number of the tick -> carry.
-        look: known, carry, number of the tick -> what is to be kept of an instant.
+        step: known, carry, number of the step -> carry.
+        look: known, carry, number of the step -> what is to be kept of an instant.
         numbers: of one run; a tree of arrays.
         constant: which leaves of `numbers` are the same in every run; they make the program short.
         lanes: runs at once; as many as fit a register unless given. No result depends on it.
@@ -46,7 +46,7 @@ class Program:
         self,
         draw: Callable,
         start: Callable,
-        tick: Callable,
+        step: Callable,
         look: Callable,
         numbers: Any,
         constant: list[bool],
@@ -66,7 +66,7 @@ class Program:
         given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
         carried = lambda function: lambda known, carry, k: function(known, eqx.combine(carry, begun.still), k)
         self._tick, self._look = (
-            Traced(of_arrays(carried(function)), drawn.shapes, begun.shapes, number) for function in (tick, look)
+            Traced(of_arrays(carried(function)), drawn.shapes, begun.shapes, number) for function in (step, look)
         )
         if self._tick.types != begun.types:
             raise Unsupported("a carry that changes its type")
@@ -83,22 +83,22 @@ class Program:
         several = (self._beginning.inputs, begun.leaves, self._look.leaves)
         self._numbers_layout, self._carry_layout, self._look_layout = (Layout(leaves, lanes) for leaves in several)
 
-    def run(self, numbers: Any, ticks: int, every: int = 0) -> tuple[Any, Any]:
+    def run(self, numbers: Any, steps: int, every: int = 0) -> tuple[Any, Any]:
         """Run it.
 
         Args:
             numbers: as in the example, with a leading axis over runs.
-            ticks: how many.
-            every: ticks between looks, the first before the first tick; 0 for none.
+            steps: how many.
+            every: steps between looks, the first before the first step; 0 for none.
 
         Returns:
-            The carry after the last tick, and what was looked at with an axis over looks; both with a leading axis
+            The carry after the last step, and what was looked at with an axis over looks; both with a leading axis
             over runs.
         """
         runs = len(jax.tree.leaves(numbers)[0])
         given = self._numbers_layout.packed(self._beginning.packed(numbers), runs)
         carry = self._carry_layout.memory(len(given))
-        series = self._look_layout.memory(len(given), ticks // every + 1 if every else 0)
-        self._code.run(given, carry, series, ticks, every)
+        series = self._look_layout.memory(len(given), steps // every + 1 if every else 0)
+        self._code.run(given, carry, series, steps, every)
         final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
         return self._tick.whole(final), self._look.whole(self._look_layout.unpacked(series, runs))

@@ -13,22 +13,22 @@ class Section:
     Args:
         emitter: gets the lines.
         letter: begins the names of values.
-        tick: name of the number of the tick.
+        step: name of the number of the step.
         values: names of nodes that are known already.
     """
 
-    def __init__(self, emitter: Emitter, letter: str, tick: str, values: dict[Node, str] | None = None):
-        self._emitter, self._letter, self._tick = emitter, letter, tick
+    def __init__(self, emitter: Emitter, letter: str, step: str, values: dict[Node, str] | None = None):
+        self._emitter, self._letter, self._tick = emitter, letter, step
         self._values = values or {}
         self._results: dict[Node, list[str]] = {}
         self._tables: dict[Node, Table] = {}
 
-    def after(self, letter: str, tick: str) -> "Section":
+    def after(self, letter: str, step: str) -> "Section":
         """Another part, where everything of this one is known."""
-        return self._further(letter, tick)
+        return self._further(letter, step)
 
-    def _further(self, letter: str, tick: str) -> "Section":
-        section = Section(self._emitter, letter, tick, dict(self._values))
+    def _further(self, letter: str, step: str) -> "Section":
+        section = Section(self._emitter, letter, step, dict(self._values))
         section._tables = dict(self._tables)
         return section
 

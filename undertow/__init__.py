@@ -11,15 +11,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from undertow import controllers
-    from undertow import disturbances
-    from undertow import sensors as instruments
-    from undertow import plants
-    from undertow import power
-    from undertow import references
+    from undertow import controllers, disturbances, plants, power, references, thrusters, vehicles
     from undertow import navigation as sensors
-    from undertow import thrusters
-    from undertow import vehicles
+    from undertow import sensors as sensors
     from undertow.controllers.rcaf import rcaf as rcaf
     from undertow.core.errors import BadInput as BadInput
     from undertow.plants.hybrid_vehicle import HybridVehicle as HybridVehicle
@@ -43,7 +37,7 @@ _HOMES = {
 _PACKAGES = (
     "controllers",
     "disturbances",
-    "instruments",
+    "sensors",
     "plants",
     "power",
     "references",

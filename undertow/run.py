@@ -11,20 +11,26 @@ import xarray as xr
 from pydantic import ValidationError
 
 from undertow.analysis.metric_meanings import MEANINGS, unit_of
-from undertow.core.contracts import (AbstractController, AbstractDisturbance, AbstractPlant, AbstractReference, AbstractSensor)
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractDisturbance,
+    AbstractNavigation,
+    AbstractPlant,
+    AbstractReference,
+)
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
+from undertow.navigation.perfect import perfect
 from undertow.scenario import execute
 from undertow.scenario.consistency import check_fit, check_times, rounded_times
-from undertow.scenario.results import certificate_of, label
 from undertow.scenario.reading import from_data, read
+from undertow.scenario.results import certificate_of, label
 from undertow.scenario.schema import Initial, Loop, Window, complaint
 from undertow.scenario.step_size import step_failure
-from undertow.navigation.perfect import perfect
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,7 +90,7 @@ def simulate(
     reference: AbstractReference,
     *,
     disturbance: AbstractDisturbance | Sequence[AbstractDisturbance] | None = None,
-    sensor: AbstractSensor | None = None,
+    sensor: AbstractNavigation | None = None,
     duration: float = 20.0,
     loop: Literal["sampled", "continuous"] = "sampled",
     dt: float = 1e-3,
@@ -119,7 +125,7 @@ def simulate(
         "controller": (controller, AbstractController),
         "reference": (reference, AbstractReference),
         "disturbance": (none() if disturbance is None else disturbance, AbstractDisturbance),
-        "sensor": (perfect() if sensor is None else sensor, AbstractSensor),
+        "sensor": (perfect() if sensor is None else sensor, AbstractNavigation),
     }
     for name, (part, contract) in roles.items():
         if not isinstance(part, contract):

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from command import VEHICLE, contents
 
+from undertow.campaign.prepare import prepare
+from undertow.campaign.run_campaign import STORE, conduct
 from undertow.cli.main import run
 from undertow.core.disk import alone
 from undertow.scenario.reading import dump
-from undertow.campaign.run_campaign import STORE, conduct
-from undertow.campaign.prepare import prepare
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,17 @@ import numpy as np
 import pytest
 from lanes.emulated_gpu import EmulatedGpu
 
-from undertow.analysis.metrics import Metrics, results
 from simdjit import nvidia
 from simdjit.cuda import Driver
+from undertow.analysis.metrics import Metrics, results
+from undertow.campaign.batch_runner import ProgramCache
+from undertow.campaign.campaign_schema import validate
+from undertow.campaign.reading import whole
+from undertow.campaign.task import REFUSED, fly, site
+from undertow.campaign.trials import Trials, trials
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.campaign.batch_runner import Hangar
-from undertow.campaign.reading import whole
-from undertow.campaign.campaign_schema import validate
-from undertow.campaign.task import REFUSED, fly, site
-from undertow.campaign.trials import Trials, trials
 
 
 def made(data) -> Trials:
@@ -73,7 +73,7 @@ def test_a_gpu_changes_no_bit(campaign, monkeypatch):
 def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
     """The same trials with everything that probes share built in, and with nothing built in."""
     found = columns(campaign(), range(9))
-    monkeypatch.setattr(Hangar, "_commons", lambda self: {})
+    monkeypatch.setattr(ProgramCache, "_commons", lambda self: {})
     site.cache_clear()
     general = columns(campaign(), range(9))
     site.cache_clear()
@@ -123,7 +123,7 @@ def test_series_are_those_of_the_runs(campaign):
     built = build(made(campaign()).data(1))
     key = jax.random.PRNGKey(built.scenario.seed)
     run = simulate(built.closed_loop, duration=2.0, dt=0.02, key=key, record_every=25)
-    np.testing.assert_allclose(found["series:position"][1], run.samples.position, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found["series:position"][1], run.signals.position, rtol=1e-9, atol=1e-12)
 
 
 def test_single_precision(campaign):

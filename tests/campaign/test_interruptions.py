@@ -16,11 +16,11 @@ import pytest
 from command import contents, typed
 from distributed import Client, LocalCluster
 
-from undertow.cli.main import run
 from undertow.campaign.clusters import cluster
-from undertow.campaign.run_campaign import STORE, conduct
 from undertow.campaign.executors import by_dask
 from undertow.campaign.prepare import prepare
+from undertow.campaign.run_campaign import STORE, conduct
+from undertow.cli.main import run
 
 
 def killed(path, out, kills, longest):

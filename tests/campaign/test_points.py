@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from undertow.campaign.campaign_schema import Spread, validate
+from undertow.campaign.sampling import Draws, value
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
-from undertow.campaign.sampling import Draws, value
-from undertow.campaign.campaign_schema import Spread, validate
 
 TWO = {"loop.duration": {"uniform": [1, 2]}, "plant.limit": {"uniform": [0, 1]}}
 

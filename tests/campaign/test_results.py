@@ -9,10 +9,10 @@ import xarray as xr
 from command import contents
 
 from undertow.analysis.metrics import OVERALL
-from undertow.cli.main import run
-from undertow.campaign.run_campaign import STORE
 from undertow.campaign.prepare import prepare
+from undertow.campaign.run_campaign import STORE
 from undertow.campaign.task import site
+from undertow.cli.main import run
 
 CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant.limit": [1e30]}
 

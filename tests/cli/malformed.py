@@ -23,7 +23,7 @@ _KEYS = (
     "seed",
     "file",
     "samples",
-    "rung",
+    "fidelity",
     "mass",
     "preset",
     "loop",
@@ -36,7 +36,7 @@ _KEYS = (
 # Sections that most scenarios leave out, so that changes meet them as well.
 _EXTRA = {
     "initial": {"position": [0.1], "velocity": [0.0]},
-    "steady": {"start": 0.01, "stop": 0.02, "every_tick": True},
+    "steady": {"start": 0.01, "stop": 0.02, "every_step": True},
     "sensor": {"kind": "white_noise", "position": 0.01, "velocity": [0.01]},
     "seed": 3,
     "model": {"speed_sensor": False},

@@ -49,7 +49,7 @@ def test_what_is_doubtful_is_advised(undertow, tmp_path):
     assert said.code == 0
     assert "Advice: the loop is unstable at 3 of 3 operating points: rightmost pole +" in said.err
     assert "Advice: nothing bounds the weights" in said.err
-    assert "No metrics foretold: the loop linearised at fixed weights is unstable" in said.out
+    assert "No metrics predicted: the loop linearised at fixed weights is unstable" in said.out
     margins = json.loads((tmp_path / "out" / "prediction.json").read_text())["margins"]
     assert margins == {"sampling_time": 0.0, "delay": 0.0, "lag": 0.0, "gain_low": 1.0, "gain_high": 1.0}
 

@@ -134,14 +134,14 @@ MISTAKES = {
         "`controller.weight` must be symmetric, but is off by 1 (s.yaml, line 6)",
     ),
     "negative resistance": (
-        "rung: ideal",
-        "rung: ideal, motor: {resistance: -1.2}",
+        "fidelity: ideal",
+        "fidelity: ideal, motor: {resistance: -1.2}",
         "`plant.thruster.motor.resistance` must be positive, but is -1.2 (s.yaml, line 3)",
     ),
-    "unknown rung": (
-        "rung: ideal",
-        "rung: perfect",
-        "`plant.thruster.rung` must be one of ideal, static, shaft, electromechanical, but is perfect (s.yaml, line 3)",
+    "unknown fidelity": (
+        "fidelity: ideal",
+        "fidelity: perfect",
+        "`plant.thruster.fidelity` must be one of ideal, static, shaft, electromechanical, but is perfect (s.yaml, line 3)",
     ),
     "too many sets": (
         "feedback: [1, 2]",

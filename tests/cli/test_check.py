@@ -152,7 +152,7 @@ def test_vehicle_from_a_python_file(undertow, tmp_path):
 
 
 def test_result_file_is_the_scenario_in_it(undertow, tmp_path):
-    (tmp_path / "s.yaml").write_text(SCENARIO.replace("rung: ideal", "rung: static"))
+    (tmp_path / "s.yaml").write_text(SCENARIO.replace("fidelity: ideal", "fidelity: static"))
     assert undertow("simulate", "s.yaml", "--out", "out").code == 0
     said = undertow("check", "out/run.nc")
     assert said.code == 0 and "odin (vehicle)" in said.out

@@ -14,7 +14,7 @@ VALID = {
     "plant": {
         "kind": "hybrid_vehicle",
         "vehicle": {"kind": "odin", "mass": 125.0, "r_g": [0.0, 0.0, 0.05]},
-        "thruster": {"kind": "paper_table3", "rung": "ideal", "supply": 24.0, "motor": {"resistance": 1.2}},
+        "thruster": {"kind": "paper_table3", "fidelity": "ideal", "supply": 24.0, "motor": {"resistance": 1.2}},
     },
     "model": {"speed_sensor": False, "rate_term": True, "regularisation": 0.1},
     "controller": {

@@ -8,7 +8,7 @@ from undertow.scenario.execute import execute
 from undertow.scenario.results import certificate_of
 
 BASE = {
-    "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "rung": "ideal"}},
+    "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "ideal"}},
     "controller": {"kind": "rcaf", "preset": "paper"},
     "reference": {"kind": "setpoint", "position": [0.0] * 6},
     "loop": {"duration": 0.05, "dt": 0.01, "record": 0.01},

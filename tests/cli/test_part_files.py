@@ -68,7 +68,7 @@ from undertow.core.contracts import AbstractDisturbance
 
 
 class Bytes(AbstractDisturbance):
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def at(self, path, t, place, calm):

@@ -9,7 +9,7 @@ import undertow as ut
 
 @pytest.fixture(scope="module")
 def parts():
-    plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3(rung="ideal"))
+    plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3(fidelity="ideal"))
     return plant, ut.rcaf(plant.model(), preset="paper"), ut.references.setpoint([2, 3, 4, 0, 0, 1])
 
 
@@ -48,7 +48,7 @@ def test_scenario_as_data():
             {"disturbance": ut.disturbances.wrench([1.0])},
             "`disturbance.value` must have 6 entries, but is of shape (1,)",
         ),
-        ({"sensor": 3}, "`sensor` must be an AbstractSensor, but is a int"),
+        ({"sensor": 3}, "`sensor` must be an AbstractNavigation, but is a int"),
     ],
 )
 def test_bad_argument_is_one_line(parts, options, said):

@@ -7,14 +7,14 @@ import pytest
 import undertow as ut
 from undertow.core.status import Status
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.scenario.consistency import rounded_times
+from undertow.scenario.execute import execute
 from undertow.scenario.schema import Loop
 from undertow.scenario.step_size import fastest_decay, step_advice
 from undertow.thrusters import first_order, linear_voltage, t200
 
 SCENARIO = """
-plant: {{vehicle: odin, thruster: {{kind: t200, rung: electromechanical}}, ledger: false}}
+plant: {{vehicle: odin, thruster: {{kind: t200, fidelity: electromechanical}}, ledger: false}}
 reference: {{kind: setpoint, position: [0, 0, 0, 0, 0, 0]}}
 disturbance: {{kind: wrench, value: [5, 0, 0, 0, 0, 0]}}
 loop: {{dt: 0.01, duration: 0.5, substeps: {substeps}}}
@@ -22,8 +22,8 @@ loop: {{dt: 0.01, duration: 0.5, substeps: {substeps}}}
 
 
 def test_decay_of_the_winding_is_that_of_its_time_constant():
-    motor = t200(rung="electromechanical").motor
-    assert fastest_decay(t200(rung="electromechanical")) == pytest.approx(
+    motor = t200(fidelity="electromechanical").motor
+    assert fastest_decay(t200(fidelity="electromechanical")) == pytest.approx(
         float(motor.resistance / motor.inductance), rel=0.01
     )
     assert fastest_decay(first_order(time_constant=0.2)) == pytest.approx(5.0)
@@ -31,12 +31,14 @@ def test_decay_of_the_winding_is_that_of_its_time_constant():
 
 
 def test_advice_says_how_many_substeps_are_enough():
-    said = step_advice(t200(rung="electromechanical"), Loop(dt=0.01))
+    said = step_advice(t200(fidelity="electromechanical"), Loop(dt=0.01))
     assert len(said) == 1 and "Take loop.substeps: 9 or more" in said[0]
-    assert not step_advice(t200(rung="electromechanical"), Loop(dt=0.01, substeps=9))
+    assert not step_advice(t200(fidelity="electromechanical"), Loop(dt=0.01, substeps=9))
     assert not step_advice(t200(), Loop(dt=0.01))
-    assert not step_advice(t200(rung="electromechanical"), Loop(kind="continuous", dt=0.01, method="adaptive"))
-    assert "a loop.dt of at most" in step_advice(t200(rung="electromechanical"), Loop(kind="continuous", dt=0.01))[0]
+    assert not step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01, method="adaptive"))
+    assert (
+        "a loop.dt of at most" in step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01))[0]
+    )
 
 
 @pytest.mark.parametrize(("substeps", "code"), [(8, 1), (9, 0)])

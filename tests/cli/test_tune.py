@@ -119,5 +119,5 @@ def test_a_journal_that_cannot_be_read(refused, tmp_path, content):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "tuning.jsonl").write_bytes(content.encode("utf-8", "surrogateescape"))
     assert refused("tune", "s.yaml", "--out", "out", "--resume").startswith(
-        "`--resume` must find a journal that can be"
+        "`--resume` must find a checkpoint that can be"
     )

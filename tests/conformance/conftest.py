@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from undertow.core import catalogue
-from undertow.sensors import compass, depth, dvl, imu, position_fix
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.scenario.factory import presets_of
+from undertow.sensors import compass, depth, dvl, imu, position_fix
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -25,7 +25,7 @@ def required(argument):
         "model": lambda: hybrid_vehicle(odin(), thruster).model(),
         "position": lambda: np.linspace(-0.5, 0.5, 6),
         "samples": lambda: rows,
-        "instruments": lambda: [imu(), dvl(), depth(), position_fix(), compass()],
+        "sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()],
         "points": lambda: rows[:, 1:4],
     }[argument]()
 

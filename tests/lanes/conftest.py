@@ -25,7 +25,7 @@ def in_lanes():
                 fixed,
                 lanes,
             )
-            _, looked = program.run(tuple(map(np.asarray, rows)), ticks=1, every=1)
+            _, looked = program.run(tuple(map(np.asarray, rows)), steps=1, every=1)
             return jax.tree.map(lambda leaf: leaf[:, 0], looked)
 
         return run

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from undertow import process
 from simdjit import cache, machine
+from undertow import process
 
 CODE = b"compiled " * 1000
 
@@ -176,7 +176,7 @@ def test_two_processes_at_once(folder):
 def test_machine_code_that_was_truncated_is_compiled_again(folder):
     """Without the checksum, LLVM ends the process on such a file."""
     assembly = """
-define void @run(ptr noalias %numbers, ptr noalias %carry, ptr noalias %series, i64 %ticks, i64 %every) {
+define void @run(ptr noalias %numbers, ptr noalias %carry, ptr noalias %series, i64 %steps, i64 %every) {
   store double 7.0, ptr %carry
   ret void
 }"""

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from undertow.analysis.metrics import Metrics, overall
-from undertow.loop import simd_batch, sampled
+from undertow.bench.workload import constant
+from undertow.loop import sampled, simd_batch
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
-from undertow.bench.workload import constant
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 QUICK = ("inverted_pendulum", "recorded_disturbance")
@@ -45,12 +45,12 @@ def example(name, duration=1.0):
 
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_examples_fly_as_they_do_by_xla(name):
-    """Every signal, within 1e-10 of its largest; from noisy instruments 1e-8, as JAX rounds normal numbers earlier."""
+    """Every signal, within 1e-10 of its largest; from noisy sensors 1e-8, as JAX rounds normal numbers earlier."""
     loop, how = example(name)
     found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
     close = 1e-8 if name == "bluerov2_heavy" else 1e-10
-    for signal, here, there in zip(found.samples._fields, found.samples, wanted.samples, strict=True):
-        if signal != "books" and there.size:
+    for signal, here, there in zip(found.signals._fields, found.signals, wanted.signals, strict=True):
+        if signal != "diagnostics" and there.size:
             scale = np.abs(there).max()
             np.testing.assert_allclose(here, there, rtol=0, atol=close * max(scale, 1e-9), err_msg=signal)
     for key, here in overall(found.accumulated[0]).items():
@@ -60,7 +60,7 @@ def test_examples_fly_as_they_do_by_xla(name):
 
 @pytest.mark.parametrize("every", [0, 10, 35, 70])
 def test_a_run_lasts_as_long_however_seldom_it_is_recorded(every):
-    """70 ticks, recorded every 32, and at divisors of 70 or never: the same end and statistics by lanes and by XLA."""
+    """70 steps, recorded every 32, and at divisors of 70 or never: the same end and statistics by lanes and by XLA."""
     loop, how = example("inverted_pendulum", 0.07)
     how |= {"dt": 0.001, "record_every": every}
     odd = how | {"record_every": 32}
@@ -73,7 +73,7 @@ def test_a_run_lasts_as_long_however_seldom_it_is_recorded(every):
 
 
 def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
-    """Eleven runs from different places: in one fleet, backwards, one by one, and with nothing built in."""
+    """Eleven runs from different places: in one batch, backwards, one by one, and with nothing built in."""
     loop, how = example("inverted_pendulum")
     start = loop.outputs_at_start(None, None)
     run = simd_batch.Run(loop, how["accumulators"], start, how["key"])
@@ -84,13 +84,13 @@ def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     places = np.random.default_rng(0).normal(scale=0.05, size=(11, *start[0].shape))
     many = many._replace(start=(places, many.start[1]))
     same = constant(run)
-    fleet = simd_batch.Fleet(run, plan, same)
-    found = fleet.fly(many)
-    backwards = fleet.fly(jax.tree.map(lambda leaf: leaf[::-1], many))
-    general = simd_batch.Fleet(run, plan, [False] * len(leaves)).fly(many)
-    alone = simd_batch.Fleet(run, plan, same, lanes=1)
+    batch = simd_batch.BatchRunner(run, plan, same)
+    found = batch.run(many)
+    backwards = batch.run(jax.tree.map(lambda leaf: leaf[::-1], many))
+    general = simd_batch.BatchRunner(run, plan, [False] * len(leaves)).run(many)
+    alone = simd_batch.BatchRunner(run, plan, same, lanes=1)
     for i in range(11):
-        single = alone.fly(jax.tree.map(lambda leaf, i=i: leaf[i : i + 1], many))
+        single = alone.run(jax.tree.map(lambda leaf, i=i: leaf[i : i + 1], many))
         same = lambda a, b, i=i: np.testing.assert_array_equal(a[0], b[i])
         jax.tree.map(same, (single.accumulated, single.series), (found.accumulated, found.series))
     pair = lambda one: (one.accumulated, one.series)
@@ -105,4 +105,4 @@ def test_a_run_that_diverges_ends_where_it_does_by_xla():
     how |= {"position": np.full(len(loop.plant.outputs), 3.0)}
     found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
     assert found.status == int(wanted.status) != 0 and found.ended == float(wanted.ended)
-    np.testing.assert_allclose(found.samples.position[-1], wanted.samples.position[-1], rtol=1e-6)
+    np.testing.assert_allclose(found.signals.position[-1], wanted.signals.position[-1], rtol=1e-6)

@@ -14,8 +14,8 @@ from simdjit import nvidia
 from simdjit.cuda import Driver
 from simdjit.errors import Unsupported
 from simdjit.program import Program
-from undertow.loop.simd_batch import Fleet, Plan, Run
 from undertow.bench.workload import constant
+from undertow.loop.simd_batch import BatchRunner, Plan, Run
 
 
 @pytest.fixture
@@ -24,11 +24,11 @@ def gpu(monkeypatch):
     return EmulatedGpu()
 
 
-def several(name, ticks, runs, every=0):
+def several(name, steps, runs, every=0):
     """A run of an example, how it is run, which numbers are the same, and numbers of runs from different places."""
     loop, how = example(name)
     run = Run(loop, how["accumulators"], loop.outputs_at_start(None, None), how["key"])
-    plan = Plan(ticks, how["dt"], every, ("position", "voltage"), how["method"], how["substeps"])
+    plan = Plan(steps, how["dt"], every, ("position", "voltage"), how["method"], how["substeps"])
     numbers = eqx.filter(run, eqx.is_array)
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (runs, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(runs, *run.start[0].shape))
@@ -37,7 +37,7 @@ def several(name, ticks, runs, every=0):
 
 
 @pytest.mark.parametrize(
-    "name, ticks, runs, every",
+    "name, steps, runs, every",
     [
         ("inverted_pendulum", 40, 133, 10),  # two blocks, the second with threads that have no run
         ("inverted_pendulum", 40, 5, 0),
@@ -45,10 +45,10 @@ def several(name, ticks, runs, every=0):
         pytest.param("bluerov2_heavy", 20, 3, 5, marks=pytest.mark.slow),  # loops, branches and random numbers
     ],
 )
-def test_threads_give_the_bits_of_vectors(gpu, name, ticks, runs, every):
-    run, plan, same, many = several(name, ticks, runs, every)
-    found = Fleet(run, plan, same, driver=Driver(gpu)).fly(many)
-    wanted = Fleet(run, plan, same).fly(many)
+def test_threads_give_the_bits_of_vectors(gpu, name, steps, runs, every):
+    run, plan, same, many = several(name, steps, runs, every)
+    found = BatchRunner(run, plan, same, driver=Driver(gpu)).run(many)
+    wanted = BatchRunner(run, plan, same).run(many)
     jax.tree.map(np.testing.assert_array_equal, found, wanted)
     assert gpu.launches == [(-(-(-(-runs // 32) * 32) // 128), 128)]
     assert not gpu.buffers
@@ -61,7 +61,7 @@ def test_nothing_is_contracted_or_approximate(monkeypatch, generation):
     run, plan, same, _ = several("w1", 5, 1, 5)
     driver = Driver(EmulatedGpu())
     driver.generation = generation
-    Fleet(run, plan, same, driver=driver)
+    BatchRunner(run, plan, same, driver=driver)
     (text,) = written
     assert f".target sm_{generation}" in text and ".entry run" in text
     assert not re.findall(r"\b(fma|approx|ftz|mad\.f\d+)\b", text)
@@ -89,7 +89,7 @@ def test_memory_that_is_not_there_is_told_and_the_rest_given_back(gpu):
     run, plan, same, many = several("inverted_pendulum", 10, 64)
     gpu.left = 4000
     with pytest.raises(OSError, match=r"driver refuses cuMemAlloc_v2 \(CUDA error 2\)"):
-        Fleet(run, plan, same, driver=Driver(gpu)).fly(many)
+        BatchRunner(run, plan, same, driver=Driver(gpu)).run(many)
     assert not gpu.buffers and gpu.left == 4000
 
 

@@ -7,15 +7,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.core.contracts import AbstractController, AbstractDisturbance, AbstractSensor, Measurement, Telemetry
+from undertow.core.contracts import AbstractController, AbstractDisturbance, AbstractNavigation, Measurement, Telemetry
 
 
-class KalmanFilter(AbstractSensor):
+class KalmanFilter(AbstractNavigation):
     """Position and velocity of a double integrator, observed with an error; the gain is solved for at every step."""
 
     smooth: bool = False
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def init(self, path, truth):
@@ -32,12 +32,12 @@ class KalmanFilter(AbstractSensor):
         return Measurement(estimate[:1], estimate[1:]), (estimate, covariance)
 
 
-class Learned(AbstractSensor):
+class Learned(AbstractNavigation):
     """An error that a network makes of what it sees: 3 inputs, two layers of 64, one output."""
 
     smooth: bool = True
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def init(self, path, truth):
@@ -79,7 +79,7 @@ class Push(AbstractDisturbance):
 
     function: Callable = eqx.field(static=True)
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def at(self, path, t, place, calm):
@@ -89,10 +89,10 @@ class Push(AbstractDisturbance):
         return ()
 
 
-class Drawn(AbstractDisturbance):
+class Realization(AbstractDisturbance):
     """Something random that needs eigenvalues, and has a part of no entries."""
 
-    def draw(self, key):
+    def realize(self, key):
         matrix = jax.random.normal(key, (4, 4))
         return jnp.linalg.eigvalsh(matrix + matrix.T), jnp.zeros((0, 3))
 
@@ -151,4 +151,4 @@ def predictive(model):
 
 def pushed(by: str):
     """A disturbance by the name of its function."""
-    return Drawn() if by == "drawn" else Push(globals()[f"_{by}"])
+    return Realization() if by == "drawn" else Push(globals()[f"_{by}"])

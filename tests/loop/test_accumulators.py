@@ -9,9 +9,9 @@ from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.navigation.white_noise import white_noise
 
 TICKS, DT = 600, 2e-3
 
@@ -49,7 +49,7 @@ def test_same_end_however_much_is_recorded(runs):
 
 
 def test_accumulated_is_the_sum_of_the_series(runs):
-    series = jax.tree.map(lambda leaf: np.asarray(leaf)[:-1], runs[1].samples)  # the end is after the last tick
+    series = jax.tree.map(lambda leaf: np.asarray(leaf)[:-1], runs[1].samples)  # the end is after the last step
     time = np.asarray(runs[1].time)[:-1]
     for run in runs.values():
         count, times, squares, largest, last = map(np.asarray, run.accumulated[0])
@@ -64,9 +64,9 @@ def test_records_are_every_tenth_tick_and_the_end(runs):
     fine, coarse, none = runs[1], runs[10], runs[0]
     np.testing.assert_allclose(np.asarray(fine.time), DT * np.arange(TICKS + 1), rtol=1e-14)
     np.testing.assert_allclose(np.asarray(coarse.time), np.asarray(fine.time)[::10], rtol=1e-14)
-    assert none.time.shape == (0,) and none.samples.error.shape == (0, 2)
+    assert none.time.shape == (0,) and none.signals.error.shape == (0, 2)
     for name in ("position", "estimate", "voltage"):
-        pair = np.asarray(getattr(coarse.samples, name)), np.asarray(getattr(fine.samples, name))[::10]
+        pair = np.asarray(getattr(coarse.signals, name)), np.asarray(getattr(fine.signals, name))[::10]
         np.testing.assert_allclose(*pair, rtol=1e-10, atol=1e-12, err_msg=name)
 
 

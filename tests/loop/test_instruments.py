@@ -1,4 +1,4 @@
-"""When instruments speak and how wrong they are; what the observer makes of it. Closed forms throughout."""
+"""When sensors speak and how wrong they are; what the observer makes of it. Closed forms throughout."""
 
 import equinox as eqx
 import jax
@@ -8,23 +8,22 @@ import pytest
 
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
+from undertow.numerics.rotations import wrap_angle
 from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
 from undertow.sensors.sampling import Sampling
-from undertow.numerics.rotations import wrap_angle
-from undertow.navigation import observer
 from undertow.thrusters.thruster import PropellerReport
 
 QUIET_IMU = {"angle_noise": 0.0, "rate_noise": 0.0, "force_noise": 0.0}
 
 
-def listen(sampling, tick, duration, truth=lambda t: jnp.stack([t]), key=0):
-    """Instants, readings and freshness of an instrument that is asked every `tick` seconds."""
-    ticks = round(duration / tick)
-    times = jnp.arange(ticks, dtype=float) * tick
+def initial_measuring(sampling, step, duration, truth=lambda t: jnp.stack([t]), key=0):
+    """Instants, readings and freshness of an sensor that is asked every `step` seconds."""
+    steps = round(duration / step)
+    times = jnp.arange(steps, dtype=float) * step
 
     def step(state, t):
         chance = jax.random.normal(jax.random.fold_in(jax.random.PRNGKey(key), sampling.number(t)), (2,))
-        arrival, state = sampling.hear(state, t, truth(t), chance)
+        arrival, state = sampling.deliver(state, t, truth(t), chance)
         return state, arrival
 
     _, arrivals = jax.lax.scan(step, sampling.init(jnp.zeros(1), jnp.ones(1)), times)
@@ -33,43 +32,43 @@ def listen(sampling, tick, duration, truth=lambda t: jnp.stack([t]), key=0):
 
 def test_readings_come_at_the_period_and_are_as_old_as_the_delay():
     """The truth is the time itself, so a reading tells when it was taken."""
-    times, readings, fresh = listen(Sampling(0.05, delay=0.12), 0.01, 2.0)
+    times, readings, fresh = initial_measuring(Sampling(0.05, delay=0.12), 0.01, 2.0)
     np.testing.assert_allclose(times[fresh], np.arange(38) * 0.05 + 0.12, atol=1e-12)
     np.testing.assert_allclose(readings[fresh], np.arange(38) * 0.05, atol=1e-12)
 
 
 def test_a_period_between_ticks_waits_for_the_next_tick():
-    times, readings, fresh = listen(Sampling(0.015), 0.01, 0.1)
+    times, readings, fresh = initial_measuring(Sampling(0.015), 0.01, 0.1)
     np.testing.assert_allclose(times[fresh], [0.0, 0.02, 0.03, 0.05, 0.06, 0.08, 0.09], atol=1e-12)
     np.testing.assert_array_equal(readings[fresh], times[fresh])
 
 
 def test_faster_than_the_loop_the_newest_is_heard():
-    times, readings, fresh = listen(Sampling(0.01, delay=0.03), 0.05, 1.0)
+    times, readings, fresh = initial_measuring(Sampling(0.01, delay=0.03), 0.05, 1.0)
     assert fresh[1:].all() and not fresh[0]
-    # Sample (t - delay) falls between two ticks and is answered with the truth at the tick after it.
+    # Signals (t - delay) falls between two steps and is answered with the truth at the step after it.
     np.testing.assert_allclose(readings[fresh], times[fresh], atol=1e-12)
 
 
 def test_resolution_rounds_to_the_nearest_step():
-    _, readings, _ = listen(Sampling(0.01, resolution=0.25), 0.01, 1.0)
+    _, readings, _ = initial_measuring(Sampling(0.01, resolution=0.25), 0.01, 1.0)
     np.testing.assert_array_equal(readings, np.round(np.arange(100) * 0.01 / 0.25) * 0.25)
 
 
 def test_bias_is_one_number_per_run():
-    _, readings, _ = listen(Sampling(0.01, bias=0.3), 0.01, 0.5, lambda t: jnp.zeros(1))
+    _, readings, _ = initial_measuring(Sampling(0.01, bias=0.3), 0.01, 0.5, lambda t: jnp.zeros(1))
     np.testing.assert_allclose(readings, 0.3, rtol=1e-15)
 
 
 def test_noise_belongs_to_the_sample_not_to_the_loop():
     sampling, still = Sampling(0.02, noise=0.5), lambda t: jnp.zeros(1)
-    _, slow, when_slow = listen(sampling, 0.02, 4.0, still)
-    _, fast, when_fast = listen(sampling, 0.005, 4.0, still)
+    _, slow, when_slow = initial_measuring(sampling, 0.02, 4.0, still)
+    _, fast, when_fast = initial_measuring(sampling, 0.005, 4.0, still)
     np.testing.assert_array_equal(slow[when_slow], fast[when_fast])
 
 
 def test_noise_and_dropout_have_the_stated_statistics():
-    _, readings, fresh = listen(Sampling(0.01, noise=0.5, dropout=0.3), 0.01, 200.0, lambda t: jnp.zeros(1))
+    _, readings, fresh = initial_measuring(Sampling(0.01, noise=0.5, dropout=0.3), 0.01, 200.0, lambda t: jnp.zeros(1))
     kept, n = readings[fresh], len(fresh)
     assert abs(fresh.mean() - 0.7) < 4 * np.sqrt(0.21 / n)
     assert abs(kept.mean()) < 4 * 0.5 / np.sqrt(len(kept))
@@ -108,21 +107,21 @@ def still(t):
 
 
 @eqx.filter_jit
-def observe(sensor, motion, ticks, tick, key):
-    """Estimated and true measurements at every tick."""
-    path = sensor.draw(key)
+def observe(sensor, motion, steps, step, key):
+    """Estimated and true measurements at every step."""
+    path = sensor.realize(key)
 
     def step(state, k):
-        truth = motion(k * tick)
-        told, state = sensor.measure(path, state, k * tick, truth)
+        truth = motion(k * step)
+        told, state = sensor.measure(path, state, k * step, truth)
         return state, (told, truth)
 
-    return jax.lax.scan(step, sensor.init(path, motion(0.0)), jnp.arange(ticks, dtype=float))[1]
+    return jax.lax.scan(step, sensor.init(path, motion(0.0)), jnp.arange(steps, dtype=float))[1]
 
 
-def errors(instruments, motion, tick, duration, key=0):
-    """Errors of position and velocity at every tick, [t, 12]."""
-    told, truth = observe(navigation(instruments), motion, round(duration / tick), tick, jax.random.PRNGKey(key))
+def errors(sensors, motion, step, duration, key=0):
+    """Errors of position and velocity at every step, [t, 12]."""
+    told, truth = observe(navigation(sensors), motion, round(duration / step), step, jax.random.PRNGKey(key))
     apart = told.position - truth.position
     apart = apart.at[:, 3:].set(wrap_angle(apart[:, 3:]))
     return np.concatenate([apart, told.velocity - truth.velocity], axis=1)
@@ -134,13 +133,13 @@ def test_a_still_vehicle_with_perfect_instruments_is_known_exactly():
 
 
 def test_the_observer_converges_at_second_order_when_corrected_at_every_tick():
-    """One prediction is off by the square of the tick, and each correction takes away the same share of what is left."""
+    """One prediction is off by the square of the step, and each correction takes away the same share of what is left."""
     found = []
-    for tick in (0.02, 0.01, 0.005):
-        period = {"period": tick}
+    for step in (0.02, 0.01, 0.005):
+        period = {"period": step}
         exact = {"noise": 0.0, "delay": 0.0} | period
         parts = [imu(**QUIET_IMU, **period), dvl(resolution=0, **exact), depth(resolution=0, **exact), compass(**exact)]
-        found.append(np.abs(errors([*parts, position_fix(**exact)], swinging, tick, 20.0)).max())
+        found.append(np.abs(errors([*parts, position_fix(**exact)], swinging, step, 20.0)).max())
     ratios = np.array(found[:-1]) / np.array(found[1:])
     assert ((ratios > 3.9) & (ratios < 4.1)).all(), (found, ratios)
     assert found[-1] < 1e-4
@@ -148,7 +147,7 @@ def test_the_observer_converges_at_second_order_when_corrected_at_every_tick():
 
 def test_dead_reckoning_converges_at_first_order():
     """Inertial navigation alone, without noise: 20 s of it are off by millimetres at 1 kHz, and half of it at 2 kHz."""
-    far = [np.abs(errors([imu(period=tick, **QUIET_IMU)], swinging, tick, 20.0)[:, :3]).max() for tick in (1e-3, 5e-4)]
+    far = [np.abs(errors([imu(period=step, **QUIET_IMU)], swinging, step, 20.0)[:, :3]).max() for step in (1e-3, 5e-4)]
     assert far[0] < 0.02
     assert 1.9 < far[0] / far[1] < 2.1
 
@@ -185,7 +184,7 @@ def test_delays_do_not_matter_at_constant_velocity():
     parts = [imu(**QUIET_IMU), depth(resolution=0, **late), compass(**late), position_fix(**late)]
     found = np.abs(errors(parts, steady, 0.01, 30.0))
     assert found[:, [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]].max() < 1e-9
-    # The quaternion turns by 2 atan(w T / 2) a tick instead of w T; 0.05 of it is corrected every fifth tick.
+    # The quaternion turns by 2 atan(w T / 2) a step instead of w T; 0.05 of it is corrected every fifth step.
     left = 5 * (0.2 * 0.01) ** 3 / 12 / 0.05
     np.testing.assert_allclose(found[-1000:, 5].max(), left, rtol=0.05)
 
@@ -201,12 +200,12 @@ def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
     ]
     sensor = navigation(parts)
     level = lambda t: Measurement(jnp.zeros(6), jnp.zeros(6))
-    drawn = sensor.init(sensor.draw(jax.random.PRNGKey(key)), level(0.0)).spoken[0].offset[5:]
+    realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).spoken[0].offset[5:]
     velocity = errors(parts, level, 0.01, 40.0, key)[2000:, 6:9]
     before_correction = np.abs(velocity).max(0)
-    expected = np.abs(np.asarray(drawn)) * period / alpha * (1 - alpha)
-    # The largest value that is reported is the one a tick before the correction.
-    expected += np.abs(np.asarray(drawn)) * (period - 0.01)
+    expected = np.abs(np.asarray(realization)) * period / alpha * (1 - alpha)
+    # The largest value that is reported is the one a step before the correction.
+    expected += np.abs(np.asarray(realization)) * (period - 0.01)
     np.testing.assert_allclose(before_correction, expected, rtol=1e-6)
 
 
@@ -241,4 +240,4 @@ def test_an_imu_is_needed():
 def test_only_vehicles_navigate():
     with pytest.raises(BadInput, match="a plant of 1 output"):
         sensor = navigation([imu()])
-        sensor.init(sensor.draw(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)))
+        sensor.init(sensor.realize(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)))

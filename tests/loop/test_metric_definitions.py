@@ -15,12 +15,12 @@ from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants import double_integrator, inverted_pendulum, magnetic_levitation, two_link_arm
 from undertow.references.setpoint import setpoint
 from undertow.references.sine import sine
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
-from undertow.navigation.perfect import perfect
 
 DT = 0.01
 
@@ -40,7 +40,7 @@ def settling(reference, duration=20.0, position=None, load=None, stop=np.inf):
 def test_a_step_settles_when_the_error_stays_within_2_percent_of_it():
     """By the recorded error itself."""
     whole, axes, outcome = settling(setpoint([1.0, -3.0]), position=np.array([0.5, 0.0]))
-    error, time = np.abs(np.asarray(outcome.samples.error)), np.asarray(outcome.time)
+    error, time = np.abs(np.asarray(outcome.signals.error)), np.asarray(outcome.time)
     wanted = [time[np.flatnonzero(error[:, i] > 0.02 * step)[-1]] for i, step in enumerate((0.5, 3.0))]
     np.testing.assert_allclose(axes, wanted, atol=1e-12)
     assert whole == max(axes) and 1.0 < whole < 15.0
@@ -49,7 +49,7 @@ def test_a_step_settles_when_the_error_stays_within_2_percent_of_it():
 def test_a_transition_settles_after_its_end():
     """Not before the target rests, however well it is followed; 2 % of the way, not of an error that was none at first."""
     whole, _, outcome = settling(setpoint([1.0, 2.0], settling=5.0))
-    error, time = np.abs(np.asarray(outcome.samples.error)), np.asarray(outcome.time)
+    error, time = np.abs(np.asarray(outcome.signals.error)), np.asarray(outcome.time)
     late = max(time[np.flatnonzero(error[:, i] > 0.02 * way)[-1:]].max(initial=0.0) for i, way in enumerate((1.0, 2.0)))
     assert whole == pytest.approx(max(5.0, late), abs=2 * DT)
 

@@ -10,10 +10,10 @@ from undertow.core.contracts import Measurement
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
 from undertow.navigation.perfect import perfect
 from undertow.navigation.white_noise import white_noise
+from undertow.plants.double_integrator import double_integrator
+from undertow.references.setpoint import setpoint
 
 LIMIT, DT = 3.0, 1e-3
 
@@ -21,7 +21,7 @@ LIMIT, DT = 3.0, 1e-3
 def measured(key, samples, truth=0.0, dt=1e-3):
     """Measurements of a plant that stands still, one after the other."""
     sensor = white_noise(0.1, 0.2)
-    path, still = sensor.draw(key), Measurement(jnp.full(3, truth), jnp.full(3, truth))
+    path, still = sensor.realize(key), Measurement(jnp.full(3, truth), jnp.full(3, truth))
 
     def step(state, t):
         told, state = sensor.measure(path, state, t, still)
@@ -49,7 +49,7 @@ def test_noise_is_white_with_the_given_deviations(key):
 
 
 def test_two_laws_meet_the_same_noise(key):
-    """From eps = x_hat_dot - (x_dot + noise), both runs give back the same noise at every tick."""
+    """From eps = x_hat_dot - (x_dot + noise), both runs give back the same noise at every step."""
     plant = double_integrator(2)
 
     def noise(**gains):

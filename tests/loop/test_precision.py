@@ -9,15 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.campaign.layout import layout
+from undertow.campaign.reading import read_text
+from undertow.campaign.task import fly, site
 from undertow.core import runtime
-from undertow.core.contracts import Load, Place
+from undertow.core.contracts import Load, Pose
 from undertow.disturbances.u1 import u1
 from undertow.numerics.rotations import cross
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
-from undertow.campaign.layout import layout
-from undertow.campaign.reading import read_text
-from undertow.campaign.task import fly, site
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "limit": 20.0},
@@ -42,7 +42,7 @@ def scenario(precision, engine="lanes"):
 
 def content(precision, engine="lanes"):
     found = execute(scenario(precision, engine))
-    assert found.outcome.samples.position.dtype == precision == str(found.dataset["position"].dtype)
+    assert found.outcome.signals.position.dtype == precision == str(found.dataset["position"].dtype)
     return found.dataset.attrs["content_hash"]
 
 
@@ -104,7 +104,7 @@ def test_a_campaign_across_precisions():
 
 def test_constants_of_parts_follow():
     """JAX remembers what NumPy arrays were made into: constants of u1 and of rotations are made anew in each precision."""
-    place = Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3))
+    place = Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3))
     load = jax.jit(lambda t, calm: u1().at((), t, place, calm).acceleration)
     for precision in ("float64", "float32", "float64"):
         with runtime.in_precision(precision):

@@ -9,10 +9,10 @@ from undertow.core.contracts import AbstractModel
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.white_noise import white_noise
 from undertow.numerics.linear import matvec
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.navigation.white_noise import white_noise
 
 
 class PlainRAFC(AbstractContinuousController):
@@ -52,7 +52,7 @@ def trajectory(make, key):
     load = sinusoid(np.array([1.0, 5.0, 0.1]), np.array([1.0, 20.0, 3.0]), offset=0.3)
     loop = ClosedLoop(plant, make(plant.model()), setpoint(np.array([2.0, 0.0, -1.0])), load, white_noise())
     outcome = sampled.simulate(loop, duration=2.0, key=key)
-    return jax.tree.leaves((outcome.samples, outcome.final))
+    return jax.tree.leaves((outcome.signals, outcome.final))
 
 
 def rafc(model):

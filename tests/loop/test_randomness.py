@@ -7,18 +7,18 @@ import pytest
 
 from undertow.controllers.pid import pid
 from undertow.core import runtime
-from undertow.core.contracts import AbstractDisturbance, AbstractSensor, Measurement
+from undertow.core.contracts import AbstractDisturbance, AbstractNavigation, Measurement
 from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
-from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
-from undertow.sensors.sensor import AbstractInstrument
-from undertow.loop import simd_batch, sampled
+from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.observer import navigation
+from undertow.navigation.white_noise import white_noise
 from undertow.numerics.randomness import numbered
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.navigation.observer import navigation
-from undertow.navigation.white_noise import white_noise
+from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.sensors.sensor import AbstractSensor
 
 DEVIATION = 0.1
 
@@ -26,7 +26,7 @@ DEVIATION = 0.1
 class Keyed(AbstractDisturbance):
     """No load; its path is its key."""
 
-    def draw(self, key):
+    def realize(self, key):
         return key
 
     def at(self, path, t, place, calm):
@@ -38,15 +38,15 @@ class Keyed(AbstractDisturbance):
 
 @pytest.mark.parametrize("seed", [0, 1, 2**32 - 1])
 def test_no_two_parts_share_a_key(seed):
-    """Disturbances by nine, three of them in a group of their own, all instruments, and each of their samples."""
+    """Disturbances by nine, three of them in a group of their own, all sensors, and each of their samples."""
     disturbance = Together((*(Keyed() for _ in range(6)), Together((Keyed(), Keyed(), Keyed()))))
-    instruments = [imu(), dvl(), depth(), position_fix(), compass(), propeller_speed()]
+    sensors = [imu(), dvl(), depth(), position_fix(), compass(), propeller_speed()]
     plant = double_integrator()
-    loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, navigation(instruments))
-    drawn = loop.draw(jax.random.PRNGKey(seed))
-    keys = [*jax.tree.leaves(drawn.disturbance_path), *drawn.sensor_path]
-    samples = [numbered(key, jnp.asarray(k)) for key in drawn.sensor_path for k in (-1, 0, 1, 2, 3, 4, 5)]
-    assert len(keys) == 9 + len(instruments) and all(isinstance(one, AbstractInstrument) for one in instruments)
+    loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, navigation(sensors))
+    realization = loop.realize(jax.random.PRNGKey(seed))
+    keys = [*jax.tree.leaves(realization.disturbance_realization), *realization.sensor_realization]
+    samples = [numbered(key, jnp.asarray(k)) for key in realization.sensor_realization for k in (-1, 0, 1, 2, 3, 4, 5)]
+    assert len(keys) == 9 + len(sensors) and all(isinstance(one, AbstractSensor) for one in sensors)
     assert len({tuple(np.asarray(key).tolist()) for key in (*keys, *samples)}) == len(keys) + len(samples)
 
 
@@ -90,7 +90,7 @@ def test_instruments_are_heard_and_noisy_at_any_time(precision):
         for start, period in times:
             sensor = navigation([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
             truth = Measurement(jnp.zeros(6), jnp.zeros(6))
-            path = sensor.draw(jax.random.PRNGKey(1))
+            path = sensor.realize(jax.random.PRNGKey(1))
 
             def step(state, k, sensor=sensor, path=path, truth=truth, start=start, period=period):
                 told, state = sensor.measure(path, state, start + period * k, truth)
@@ -105,7 +105,7 @@ def test_instruments_are_heard_and_noisy_at_any_time(precision):
 def test_single_precision_noise_outlives_its_clock():
     """Beyond 2^24 steps two instants are one in float32, but their noise is not: samples are counted."""
     with runtime.in_precision("float32"):
-        sensor: AbstractSensor = white_noise(DEVIATION, 0.0)
-        path, truth, state = sensor.draw(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)), 2**24
+        sensor: AbstractNavigation = white_noise(DEVIATION, 0.0)
+        path, truth, state = sensor.realize(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)), 2**24
         told = [sensor.measure(path, jnp.asarray(state + k), jnp.asarray(1e5), truth)[0].position[0] for k in range(9)]
         assert len(set(map(float, told))) == 9

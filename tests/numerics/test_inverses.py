@@ -7,7 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.numerics.inverses import (partial_inverse, printed_inverse, pseudo_inverse, regularised_inverse, regularised_sharp)
+from undertow.numerics.inverses import (
+    partial_inverse,
+    printed_inverse,
+    pseudo_inverse,
+    regularised_inverse,
+    regularised_sharp,
+)
 from undertow.numerics.rotations import jacobian
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import t200
@@ -154,7 +160,7 @@ def test_a_partial_inverse_serves_as_many_rows_as_the_rank_allows(name, rank):
 
 def test_bluerov2_is_not_asked_to_pitch():
     """Its horizontal thrusters lie below its centre: G+ would have it surge for the sake of pitch."""
-    model = hybrid_vehicle(bluerov2(), t200()).model().own_axes()
+    model = hybrid_vehicle(bluerov2(), t200()).model().in_body_axes()
     given = np.asarray(model.acceleration_per_thrust @ model.allocation)
     kept = [0, 1, 2, 3, 5]
     np.testing.assert_allclose(given[kept][:, kept], np.eye(5), atol=1e-12)

@@ -10,13 +10,13 @@ from undertow.analysis.drift import gain_of, time_to_divergence
 from undertow.controllers.presets.paper import paper
 from undertow.core.status import Status
 from undertow.plants.double_integrator import double_integrator
-from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.reproduction import claims, drifting, horizons, lag_map
 from undertow.reproduction.batches import fly
 from undertow.reproduction.claims import c05_fuzzy_input, conditions
 from undertow.reproduction.claims.c04_chattering import perfect_variation
-from undertow.reproduction.setup import RUNGS, SIX_AXES, law_of, scenario
+from undertow.reproduction.setup import FIDELITIES, SIX_AXES, law_of, scenario
+from undertow.scenario.build import build
+from undertow.scenario.execute import execute
 
 WINDOWS = ((10.0, 20.0), (100.0, 200.0))
 
@@ -43,7 +43,7 @@ def test_a_batch_is_its_runs_one_by_one():
     runs["d"] = scenario("d", loop=horizons.sampled(2.0), **SIX_AXES, disturbance="none")
     found = flown(runs, ((0.0, 2.0), (1.0, 4.0)))
     for name, (start, stop) in (("a", (0.0, 2.0)), ("b", (1.0, 4.0))):
-        alone = execute(runs[name] | {"steady": {"start": start, "stop": stop, "every_tick": True}})
+        alone = execute(runs[name] | {"steady": {"start": start, "stop": stop, "every_step": True}})
         window = found[name].windows[0 if name == "a" else 1]
         for metric in ("tracking_rms", "input_variation", "weights_peak"):
             assert window[metric] == pytest.approx(alone.steady[metric], rel=1e-12), (name, metric)
@@ -127,11 +127,11 @@ def test_drift_by_noise_with_the_sets_of_the_benchmark():
 
 def test_fuzzy_input_is_judged_on_every_level():
     wanted = c05_fuzzy_input.batched(False)
-    assert {name.split("_")[1] for name in wanted} == set(RUNGS)
+    assert {name.split("_")[1] for name in wanted} == set(FIDELITIES)
     one_rule = build(wanted["c05_shaft_error_1"]).closed_loop.controller
     five = paper(double_integrator(1).model())
-    assert float(one_rule.fuzzy.gathering()) == 1.0
-    assert float(one_rule.adaptation) == pytest.approx(100 * float(five.fuzzy.gathering()), rel=1e-4)
+    assert float(one_rule.fuzzy.basis_norm_squared()) == 1.0
+    assert float(one_rule.adaptation) == pytest.approx(100 * float(five.fuzzy.basis_norm_squared()), rel=1e-4)
 
 
 def test_rows_of_the_long_ladder_keep_their_scenarios(tmp_path):
@@ -145,4 +145,4 @@ def test_rows_of_the_long_ladder_keep_their_scenarios(tmp_path):
         assert row["weights_peak"][0] >= row["growth"]["weights_peak"][-1] > 0
     json.dumps(rows)
     quick, full = (set(horizons.scenarios(quick)) for quick in (True, False))
-    assert quick < full and {name.split("_")[1] for name in full} == set(RUNGS)
+    assert quick < full and {name.split("_")[1] for name in full} == set(FIDELITIES)

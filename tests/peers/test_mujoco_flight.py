@@ -90,7 +90,7 @@ def test_what_does_not_fit_is_refused(parts):
     plant, thruster, law, reference = parts
     with pytest.raises(BadInput, match=r"`dt` must be a whole number of the engine's steps \(0.004 s\)"):
         fly(Submerged(plant.vehicle, timestep=4e-3), thruster, law, reference)
-    with pytest.raises(BadInput, match="`thruster` must be on rung `shaft` or `static`, but is Memoryless"):
+    with pytest.raises(BadInput, match="`thruster` must be on fidelity `shaft` or `static`, but is Memoryless"):
         fly(Submerged(plant.vehicle), ut.thrusters.linear_voltage(), law, reference)
     with pytest.raises(BadInput, match="`added_mass` must be one of force, body, but is ghost"):
         Submerged(plant.vehicle, added_mass="ghost")

@@ -12,13 +12,13 @@ from undertow.controllers import pid, rcaf
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
 from undertow.core.errors import BadInput
 from undertow.disturbances import none
-from undertow.loop import simd_batch, sampled
+from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect
 from undertow.numerics.integrators import rk4
 from undertow.plants import hybrid_vehicle
 from undertow.power import battery
 from undertow.references import setpoint
-from undertow.navigation import perfect
 from undertow.thrusters import commanded_thrust, first_order
 from undertow.vehicles import bluerov2_heavy, odin
 
@@ -121,7 +121,7 @@ THRUSTERS = {
 @pytest.mark.parametrize("name", THRUSTERS)
 def test_a_drive_knows_both_limits_and_the_steady_curve(name):
     thruster, limits = THRUSTERS[name]
-    drive = thruster.drive(3, False)
+    drive = thruster.actuator_model(3, False)
     still, natural = drive.init(), 10.0  # 1/s: no faster than by itself
     np.testing.assert_allclose(drive.range(still, natural), np.repeat(np.array(limits)[:, None], 3, 1))
     np.testing.assert_allclose(drive.range(still, 2 * natural), np.repeat(np.array(limits)[:, None], 3, 1) / 2)
@@ -129,15 +129,15 @@ def test_a_drive_knows_both_limits_and_the_steady_curve(name):
     newtons = np.array([-5.0, 0.5, 11.0])
     commands = drive.command(still, newtons, natural)
     np.testing.assert_allclose(settle(thruster, commands, 3.0).thrust, newtons, rtol=1e-9)
-    np.testing.assert_allclose(drive.steady().force((), commands), newtons, rtol=1e-12)
-    np.testing.assert_allclose(drive.aim(still, commands, natural), newtons, rtol=1e-12)
+    np.testing.assert_allclose(drive.quasi_static().force((), commands), newtons, rtol=1e-12)
+    np.testing.assert_allclose(drive.target_of(still, commands, natural), newtons, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", THRUSTERS)
 def test_a_drive_predicts_the_thrust_behind_its_lag(name):
     """Step by step with the thruster itself; made to follow faster than by itself, it does: exp(-rate t)."""
     thruster, _ = THRUSTERS[name]
-    drive, rate, dt = thruster.drive(3, False), 30.0, 0.01
+    drive, rate, dt = thruster.actuator_model(3, False), 30.0, 0.01
     wanted, believed, true = jnp.array([-1.0, 0.5, 3.0]), drive.init(), thruster.initial_state(3)
     for k in range(1, 20):
         volts = drive.command(believed, wanted, rate)
@@ -166,12 +166,17 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
         unfiltered = eqx.tree_at(lambda c: c.filter, controller, None)
         z = unfiltered.init(y, r)
         u, telemetry = unfiltered.command(z, y, r)
-        return u, telemetry.books["attained_share"], unfiltered._plan(z, y, r).forces, own.effect(y)
+        return (
+            u,
+            telemetry.diagnostics["attained_share"],
+            unfiltered._plan(z, y, r).forces,
+            own.acceleration_per_force(y),
+        )
 
     for _ in range(6):
         position = jnp.asarray(rng.normal(size=6) * [3.0, 3.0, 3.0, 0.3, 0.3, 0.6])
         u, share, forces, effect = decide(position)
-        given = thruster.drive(8, False).steady().force((), u)
+        given = thruster.actuator_model(8, False).quasi_static().force((), u)
         assert float(jnp.min(given)) >= low - 1e-9 and float(jnp.max(given)) <= high + 1e-9
         wanted = np.asarray(effect @ forces)
         # max s with effect f = s a, low <= f <= high, 0 <= s <= 1
@@ -194,9 +199,9 @@ def test_a_vehicle_comes_to_its_place_within_both_limits(law):
     loop = ClosedLoop(plant, controller, setpoint([3.0, 0.0, 1.0, 0.0, 0.0, 0.0]), none(), perfect())
     how = dict(duration=30.0, dt=0.05, record_every=5)
     run = sampled.simulate(loop, **how)
-    error, u = np.asarray(run.samples.error), np.asarray(run.samples.voltage)
+    error, u = np.asarray(run.signals.error), np.asarray(run.signals.voltage)
     assert int(run.status) == 0
-    assert u.min() >= -4.0 and u.max() <= 40.0 and np.asarray(run.samples.saturated).any()
+    assert u.min() >= -4.0 and u.max() <= 40.0 and np.asarray(run.signals.saturated).any()
     np.testing.assert_allclose(error[-1], 0.0, atol=0.02)
     assert error[:, :3].min() > -0.05
 
@@ -211,7 +216,7 @@ def test_batches_and_xla_agree(law):
     found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
     wrench = lambda samples: np.asarray(samples.voltage) @ np.asarray(plant.thruster_matrix).T
     for pick in (wrench, lambda samples: np.asarray(samples.position)):
-        here, there = pick(found.samples), pick(wanted.samples)
+        here, there = pick(found.signals), pick(wanted.signals)
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max())
-    np.testing.assert_array_equal(found.samples.saturated, wanted.samples.saturated)
-    assert np.asarray(wanted.samples.saturated).any()
+    np.testing.assert_array_equal(found.signals.saturated, wanted.signals.saturated)
+    assert np.asarray(wanted.signals.saturated).any()

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.core.contracts import Place, Water
+from undertow.core.contracts import Pose, Water
 from undertow.core.errors import BadInput
 from undertow.disturbances.adding import Together
 from undertow.disturbances.current import current
@@ -29,20 +29,20 @@ STEP, TICKS = 2e-3, 2500
 
 
 def at(position):
-    return Place(jnp.asarray(position), rotation_from_euler(POSE[3:]), jnp.zeros(3))
+    return Pose(jnp.asarray(position), rotation_from_euler(POSE[3:]), jnp.zeros(3))
 
 
 def fly(disturbance, velocity):
     """Outputs after five seconds."""
-    path = disturbance.draw(jax.random.PRNGKey(0))
+    path = disturbance.realize(jax.random.PRNGKey(0))
 
     def rate(t, x):
-        return PLANT.dynamics(t, x, VOLTS, disturbance.at(path, t, PLANT.place(x), CALM))
+        return PLANT.dynamics(t, x, VOLTS, disturbance.at(path, t, PLANT.pose(x), CALM))
 
-    def tick(k, x):
+    def step(k, x):
         return rk4(rate, k.astype(float) * STEP, x, jnp.asarray(STEP))
 
-    x = jax.jit(lambda x: jax.lax.fori_loop(0, TICKS, tick, x))(PLANT.initial_state(POSE, velocity))
+    x = jax.jit(lambda x: jax.lax.fori_loop(0, TICKS, step, x))(PLANT.initial_state(POSE, velocity))
     y = PLANT.output(0.0, x)
     return np.concatenate([y.position, y.velocity])
 
@@ -86,7 +86,7 @@ def test_morison():
 
 
 def water_of(disturbance, key, t, position):
-    return disturbance.at(disturbance.draw(key), t, at(position), CALM).water
+    return disturbance.at(disturbance.realize(key), t, at(position), CALM).water
 
 
 def test_wave_acceleration_is_the_rate_of_the_velocity():
@@ -132,7 +132,7 @@ def test_wandering_current_has_its_variance_and_correlation():
 def test_wandering_current_is_its_samples_and_linear_between():
     process = gauss_markov_current(span=10.0, step=0.5)
     key = jax.random.PRNGKey(4)
-    path = np.asarray(process.draw(key)) + [0.3, 0.0, 0.0]
+    path = np.asarray(process.realize(key)) + [0.3, 0.0, 0.0]
     for t, expected, slope in (
         (2.0, path[4], (path[5] - path[4]) / 0.5),
         (2.25, path[4:6].mean(0), (path[5] - path[4]) / 0.5),
@@ -152,7 +152,7 @@ def test_sheared_current(down, north):
 
 def test_currents_add_and_each_member_has_its_own_randomness():
     two = Together((gauss_markov_current(), gauss_markov_current(), current((0.0, 0.2, 0.0))))
-    path = two.draw(jax.random.PRNGKey(0))
+    path = two.realize(jax.random.PRNGKey(0))
     assert np.abs(path[0] - path[1]).max() > 0.01
     water = two.at(path, jnp.asarray(3.0), at(jnp.zeros(3)), CALM).water
     np.testing.assert_allclose(water.velocity, np.array([0.6, 0.2, 0.0]) + path[0][6] + path[1][6], rtol=0, atol=1e-12)

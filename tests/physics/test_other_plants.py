@@ -12,17 +12,17 @@ from undertow.core.status import Status
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.numerics.integrators import rk4
 from undertow.plants import inverted_pendulum, linear_plant, magnetic_levitation, two_link_arm
 from undertow.plants.levitation_rig import RIGS
 from undertow.plants.reachability import lost_directions, open_loop_advice
 from undertow.references.setpoint import setpoint
-from undertow.navigation.perfect import perfect
 
 UNDER = ((1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # pushes x1 and x2 alike
 PLANTS = {
     "pendulum": inverted_pendulum(),
-    "levitation": magnetic_levitation(rung="ideal"),
+    "levitation": magnetic_levitation(fidelity="ideal"),
     "arm": two_link_arm(),
     "redundant": linear_plant(position_term=-np.eye(2), velocity_term=-0.3 * np.ones((2, 2))),
     "under-actuated": linear_plant(UNDER, -4 * np.eye(3)),
@@ -42,9 +42,9 @@ def integrate(plant, x, u, duration, dt):
     """State after a time under a constant input, by RK4."""
 
     @eqx.filter_jit
-    def run(plant, x, dt, ticks):
+    def run(plant, x, dt, steps):
         field = lambda t, x: plant.dynamics(t, x, jnp.asarray(u), plant.no_load())
-        return jax.lax.fori_loop(0, ticks, lambda k, x: rk4(field, jnp.zeros(()), x, dt), x)
+        return jax.lax.fori_loop(0, steps, lambda k, x: rk4(field, jnp.zeros(()), x, dt), x)
 
     return run(plant, x, np.asarray(dt), np.asarray(round(duration / dt)))
 
@@ -133,8 +133,8 @@ def test_work_of_the_force_is_the_gain_of_energy():
 
 def test_pendulum_ends_where_its_pole_lies_flat():
     plant = inverted_pendulum()
-    assert plant.health(plant.initial_state(jnp.array([1.5]))) == int(Status.OK)
-    assert plant.health(plant.initial_state(jnp.array([1.57]))) == int(Status.OUT_OF_RANGE)
+    assert plant.status(plant.initial_state(jnp.array([1.5]))) == int(Status.OK)
+    assert plant.status(plant.initial_state(jnp.array([1.57]))) == int(Status.OUT_OF_RANGE)
 
 
 # -------------------------------------------------------------------------------------------------- levitation
@@ -225,7 +225,7 @@ def test_levitation_plant_moves_by_the_same_equations():
 
 
 def test_levitation_allocates_to_the_coil_that_pulls_the_wanted_way():
-    plant = magnetic_levitation(rung="ideal")
+    plant = magnetic_levitation(fidelity="ideal")
     model = plant.model()
     for wanted in (-3.0, 5.0):
         y = Measurement(jnp.array([0.012]), jnp.zeros(1))
@@ -314,7 +314,7 @@ def test_under_actuated_controlled_rows_follow_and_the_rest_is_the_open_loop():
     load = sinusoid(1.0, jnp.array([1.0, 2.0, 3.0]))
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), load, perfect())
     outcome = sampled.simulate(loop, duration=12.0, dt=1e-3, record_every=10)
-    samples = outcome.samples
+    samples = outcome.signals
     error, apart = np.asarray(samples.error), np.array([1.0, -1.0, 0.0])
     late = np.asarray(outcome.time) > 8
     together = (error[:, 0] + error[:, 1])[late]
@@ -330,7 +330,7 @@ def test_under_actuated_error_equation_holds_along_the_controlled_rows():
     """Q^T (e_ddot + K^T E - d_hat + d + u_r) = 0 to 1e-9, with Q an orthonormal basis of the range of G."""
     plant = linear_plant(UNDER, -np.eye(3), -0.5 * np.eye(3))
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), sinusoid(1.0, 2.0), perfect())
-    drawn, rng = loop.draw(jax.random.PRNGKey(0)), np.random.default_rng(6)
+    drawn, rng = loop.realize(jax.random.PRNGKey(0)), np.random.default_rng(6)
     basis = np.linalg.svd(np.asarray(UNDER))[0][:, :2]
     for t in rng.uniform(0, 5, 10):
         x, z = drawn.start(jnp.asarray(rng.normal(size=3)), jnp.asarray(rng.normal(size=3)))
@@ -347,7 +347,7 @@ def test_under_actuated_error_equation_holds_along_the_controlled_rows():
 
 def test_loads_act_as_they_say():
     """A wrench opposes: through the mass for the ball, through M^-1 for the arm."""
-    ball, arm = magnetic_levitation(rung="ideal"), two_link_arm()
+    ball, arm = magnetic_levitation(fidelity="ideal"), two_link_arm()
     for plant, mobility in ((ball, np.eye(1) / 0.039), (arm, None)):
         x = start(plant)
         n = len(plant.outputs)

@@ -11,11 +11,11 @@ from undertow.core.errors import BadInput
 from undertow.disturbances.none import none
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, waypoints
 from undertow.scenario import factory
 from undertow.scenario.execute import execute
-from undertow.navigation.perfect import perfect
 
 RNG = np.random.default_rng(4)
 SQUARE = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [0, 4, 1], [0, 0, 0.5]], dtype=float)
@@ -123,12 +123,12 @@ def test_settling_starts_where_the_plant_does_unless_told():
     """A cart and a vehicle that start away from zero are not sent to zero and back; a step and a given start stay."""
     goal, begun = np.array([3.0, -1.0]), np.array([5.0, 2.0])
     for told, start in ((None, begun), ([1.0, 0.0], [1.0, 0.0])):
-        position, _, _ = at(setpoint(goal, 4.0, told).beginning_at(begun), np.linspace(0, 4, 401))
+        position, _, _ = at(setpoint(goal, 4.0, told).starting_at(begun), np.linspace(0, 4, 401))
         np.testing.assert_array_equal(position[[0, -1]], [start, goal])
         assert (position <= np.maximum(start, goal) + 1e-12).all() and (
             position >= np.minimum(start, goal) - 1e-12
         ).all()
-    np.testing.assert_array_equal(at(setpoint(goal).beginning_at(begun), [0.0])[0], [goal])
+    np.testing.assert_array_equal(at(setpoint(goal).starting_at(begun), [0.0])[0], [goal])
     cart = {
         "plant": "inverted_pendulum",
         "controller": {"kind": "pid", "frequency": 4.0},
@@ -142,7 +142,7 @@ def test_settling_starts_where_the_plant_does_unless_told():
         law = rcaf(plant.model(), sets=3)
         loop = ClosedLoop(plant, law, setpoint(goal, 4.0), none(), perfect())
         found = simulate(loop, duration=0.1, dt=0.01, position=begun)
-        np.testing.assert_array_equal(found.samples.target[0], begun)
+        np.testing.assert_array_equal(found.signals.target[0], begun)
 
 
 def test_settling_may_be_traced_and_zero():

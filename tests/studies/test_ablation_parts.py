@@ -26,15 +26,15 @@ LOAD = random_suite(0.5, step=0.3)
 def samples(law, **options):
     run = sampled.simulate(on_axes.loop(law, LOAD, **options), duration=0.4, record_every=10)
     assert int(run.status) == 0
-    return run.samples
+    return run.signals
 
 
-def heard(sensor, ticks=12):
+def update_from_report(sensor, steps=12):
     """What a sensor makes of velocity 0.1, 0.2, ... and position 1, 2, ... on two axes."""
-    path, told, measure = sensor.draw(jax.random.PRNGKey(3)), [], eqx.filter_jit(sensor.measure)
+    path, told, measure = sensor.realize(jax.random.PRNGKey(3)), [], eqx.filter_jit(sensor.measure)
     truth = lambda k: Measurement(jnp.full(2, 1.0 + k), jnp.full(2, 0.1 * (1 + k)))
     state = sensor.init(path, truth(0))
-    for k in range(ticks):
+    for k in range(steps):
         y, state = measure(path, state, 0.0, truth(k))
         told.append((float(y.position[0]), float(y.velocity[0])))
     return np.array(told)
@@ -60,7 +60,7 @@ def test_resolution_and_bias():
 
 
 def test_noise_has_its_size():
-    told = heard(RoughSensor(axes=2, noise=0.01), ticks=400)
+    told = heard(RoughSensor(axes=2, noise=0.01), steps=400)
     assert np.std(told[:, 1] - 0.1 * np.arange(1, 401)) == pytest.approx(0.01, rel=0.1)
 
 
@@ -96,7 +96,7 @@ def test_leakage_and_dead_zone():
 
 @pytest.mark.parametrize("number", [0, 1, 3])
 def test_as_many_thrusters_fail_as_are_asked_for(number):
-    left = np.asarray(ThrusterLoss(0.25, float(number)).draw(jax.random.PRNGKey(5)))
+    left = np.asarray(ThrusterLoss(0.25, float(number)).realize(jax.random.PRNGKey(5)))
     assert sorted(left) == [0.25] * number + [1.0] * (8 - number)
 
 

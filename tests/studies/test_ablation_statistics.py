@@ -67,7 +67,7 @@ def test_training_seeds_are_not_reported():
 def test_an_ablation_with_a_known_answer():
     """One set or five, the same gamma |xi|^2: the same errors, as long as the modelling error is small (I18)."""
     load = random_suite(0.2, step=0.1)
-    gamma = 100 * on_axes.gathering() / on_axes.gathering(sets=1)
+    gamma = 100 * on_axes.basis_norm_squared() / on_axes.basis_norm_squared(sets=1)
     five = runner.run(on_axes.loop(paper, load), SHORT, 2)
     one = runner.run(on_axes.loop(lambda model: paper(model, sets=1, adaptation=gamma), load), SHORT, 2)
     for metric in ("tracking_rms", "estimation_rms"):
@@ -106,7 +106,7 @@ def test_loads_have_the_size_that_is_asked_for():
 
     @jax.jit
     def signal(key):
-        path = load.draw(key)
+        path = load.realize(key)
         return jax.vmap(lambda t: load.at(path, t, None, plant.no_load()).acceleration)(times)
 
     values = np.asarray([signal(key) for key in jax.random.split(jax.random.PRNGKey(0), 8)])

@@ -8,10 +8,10 @@ import pytest
 from undertow.report.figures.ablations import ablations_figure
 from undertow.report.figures.robust_fidelity import sound_ladder_figure
 from undertow.report.reproduction.report import write_report
-from undertow.scenario.reading import from_data
-from undertow.scenario.schema import validate
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
+from undertow.scenario.reading import from_data
+from undertow.scenario.schema import validate
 
 
 def spread(median):

@@ -10,29 +10,29 @@ import numpy as np
 import pytest
 from lanes.emulated_gpu import EmulatedGpu
 
-from undertow.cli.main import run
 from simdjit import nvidia
 from simdjit.cuda import Driver
 from simdjit.program import Program
+from undertow.bench import measure, plain_numpy, workload
+from undertow.cli.main import run
 from undertow.loop import sampled
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
-from undertow.bench import measure, plain_numpy, workload
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 W1 = workload.workload(workload.W1)
 
 
-def short(one, ticks):
-    return one._replace(plan=one.plan._replace(ticks=ticks))
+def short(one, steps):
+    return one._replace(plan=one.plan._replace(steps=steps))
 
 
 def test_the_workload_is_that_of_plain_numpy():
     """Mean square of the error over the second half of the first two seconds: two programs that share no code."""
     late = eqx.tree_at(lambda run: (run.accumulators[0].start, run.accumulators[0].stop), W1.run, (0.9995, 1.9995))
-    fleet = workload.fleet(short(workload.Workload(late, W1.plan), 2000))
-    found = workload.tracking(fleet.fly(workload.alone(late)).accumulated)[0]
+    batch = workload.batch(short(workload.Workload(late, W1.plan), 2000))
+    found = workload.tracking(batch.run(workload.alone(late)).accumulated)[0]
     bounded = np.sqrt(plain_numpy.workload_w1(2000))
     assert found == pytest.approx(bounded, rel=1e-9)
     assert abs(np.sqrt(plain_numpy.workload_w1(2000, bound=np.inf)) / bounded - 1) > 1e-3, "the bound is met"
@@ -40,7 +40,7 @@ def test_the_workload_is_that_of_plain_numpy():
 
 def test_runs_of_a_batch_start_from_different_places():
     run = W1.run
-    rms = workload.tracking(workload.fleet(short(W1, 11_000)).fly(workload.several(run, 9)).accumulated)
+    rms = workload.tracking(workload.batch(short(W1, 11_000)).run(workload.several(run, 9)).accumulated)
     assert len(set(rms)) == 9
     places = workload.several(run, 9).start
     at = {"position": places[0][4], "velocity": places[1][4]}
@@ -57,7 +57,7 @@ def test_workloads_are_the_examples(data, example, steps):
     for one, other in zip(*(jax.tree.leaves(each.closed_loop) for each in (ours, theirs)), strict=True):
         np.testing.assert_array_equal(one, other)
     mine = workload.workload(data)
-    assert mine.ticks == steps == round(theirs.scenario.loop.duration / theirs.scenario.loop.dt)
+    assert mine.steps == steps == round(theirs.scenario.loop.duration / theirs.scenario.loop.dt)
     assert mine.plan.dt == theirs.scenario.loop.dt and mine.plan.every == 0
 
 
@@ -68,7 +68,7 @@ def test_operations_are_counted():
     )
     assert program(lambda known, carry, k: carry * 2.5 + known).operations == 6
     assert program(lambda known, carry, k: carry + jnp.sin(known)).operations == 3, "sin(known) is done before"
-    assert workload.fleet(short(W1, 1), lanes=1).operations > 2_000
+    assert workload.batch(short(W1, 1), lanes=1).operations > 2_000
 
 
 def test_what_a_gpu_would_do(monkeypatch):

@@ -60,7 +60,7 @@ class MotorRail(AbstractPlant):
     def acceleration(self, t, x, u, d: Load):
         return self.thruster.thrust(x.thrusters, u).sum()[None] / MASS + d.acceleration
 
-    def place(self, x):
+    def pose(self, x):
         return None
 
     def admissible(self, x, u):
@@ -72,7 +72,7 @@ class MotorRail(AbstractPlant):
     def inputs(self):
         return COUNT
 
-    def health(self, x):
+    def status(self, x):
         far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 

@@ -41,7 +41,7 @@ class DeafToLimits(AbstractController):
 def estimator(loop):
     outcome = sampled.simulate(loop, duration=4.0, record_every=1)
     assert int(outcome.status) == 0
-    samples = outcome.samples
+    samples = outcome.signals
     return np.asarray(samples.modelling_error), np.asarray(samples.estimate - samples.uncertainty), samples
 
 
@@ -68,5 +68,5 @@ def test_commanded_instead_of_applied_spoils_it(rails, free):
     loop = rails(2, disturbance=sinusoid(**PROBES), **(COMPOSITE_ONLY | CASES["hard against the stop"]))
     deaf = eqx.tree_at(lambda loop: loop.controller, loop, DeafToLimits(loop.controller, loop.controller.model))
     outcome = sampled.simulate(deaf, duration=4.0, record_every=1)
-    eps = jnp.abs(outcome.samples.modelling_error - free[0])
+    eps = jnp.abs(outcome.signals.modelling_error - free[0])
     assert float(eps.max()) > 1e-3

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from motor_rail import COUNT, MASS, InnerLoop, MotorRail, ThrustModel
 
-from undertow.analysis import small_signal, motor_loop
+from undertow.analysis import motor_loop, small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import Load, Target
 from undertow.core.status import Status
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.numerics.integrators import rk4
 from undertow.references.setpoint import setpoint
-from undertow.navigation.perfect import perfect
 from undertow.thrusters.electromechanical import ElectromechanicalState
 from undertow.thrusters.paper_table3 import paper_table3
 
@@ -29,7 +29,7 @@ SPEEDS = np.array([2.0, 10.0, 20.0, 40.0])  # rad/s
 def observer(bandwidth):
     """A pure linear observer in Table 1's letters: no robust term, no share of s, critically damped."""
     nothing = {"robust_gain": 0.0, "compensation_gain": 0.0, "weight": np.eye(2) * 1e-9}
-    rho = float(rcaf(ThrustModel(), sets=3).fuzzy.gathering())
+    rho = float(rcaf(ThrustModel(), sets=3).fuzzy.basis_norm_squared())
     return nothing | {"sets": 3, "pole": 2 * bandwidth, "composite": bandwidth**2 / (100 * rho)}
 
 
@@ -63,14 +63,14 @@ def departure(law, speed):
         return plant.dynamics(t, x, u, load), law.flow(z, y, target, u)
 
     def second(state, _):
-        def tick(state, _):
+        def step(state, _):
             state = rk4(flow, 0.0, state, 1e-3)
             x, z = state
             away = [x.position, x.velocity, x.thrusters.speed - speeds, z.weights.mean(1) - held]
             away = jnp.abs(jnp.concatenate(away)).max()
             return state, jnp.where(jnp.isfinite(away), away, jnp.inf)
 
-        state, away = jax.lax.scan(tick, state, None, length=1000)
+        state, away = jax.lax.scan(step, state, None, length=1000)
         return state, away.max()
 
     return jax.lax.scan(second, (start._replace(velocity=jnp.full(1, 1e-7)), z), None, length=12)[1]
@@ -105,7 +105,7 @@ def test_a_linear_observer_is_stable_between_two_bandwidths():
 
 PERIOD = 2 * np.pi
 ROWS = {
-    "ideal": {"rung": "ideal"},
+    "ideal": {"fidelity": "ideal"},
     "motor": {},
     "motor, 24 V": {"supply": 24.0},
     "speed sensor": {"speed_sensor": True},
@@ -129,8 +129,8 @@ def rows():
     return table
 
 
-def row(rung="electromechanical", supply=np.inf, speed_sensor=False, inner=None, dt=1e-3, **choices):
-    thruster = paper_table3(rung, supply=supply)
+def row(fidelity="electromechanical", supply=np.inf, speed_sensor=False, inner=None, dt=1e-3, **choices):
+    thruster = paper_table3(fidelity, supply=supply)
     plant = MotorRail(thruster)
     law = rcaf(plant.model(speed_sensor=speed_sensor) if inner is None else ThrustModel(), **({"sets": 3} | choices))
     flown = law if inner is None else InnerLoop(law.model, law, thruster, inner)
@@ -138,7 +138,7 @@ def row(rung="electromechanical", supply=np.inf, speed_sensor=False, inner=None,
     duration = 15.0 + 2 * PERIOD
     run = sampled.simulate(loop, duration=duration, dt=dt, record_every=1, substeps=round(dt / 1e-3))
     late = np.asarray(run.time) > 15.0
-    error, volts = np.asarray(run.samples.error)[late, 0], np.asarray(run.samples.voltage)[late, 0]
+    error, volts = np.asarray(run.signals.error)[late, 0], np.asarray(run.signals.voltage)[late, 0]
     rms = lambda series: float(np.sqrt((series**2).mean()))
     found = {"e": rms(error), "V": rms(volts), "variation": float(np.abs(np.diff(volts)).sum() / (2 * PERIOD))}
     return int(run.status), float(run.ended), found, law

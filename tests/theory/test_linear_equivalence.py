@@ -15,9 +15,9 @@ from undertow.disturbances.sinusoid import sinusoid
 from undertow.estimation.memberships import memberships
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.navigation.perfect import perfect
 
 FREQUENCIES = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 150.0, 200.0])
 FAST = np.flatnonzero(FREQUENCIES >= 100)
@@ -31,7 +31,7 @@ def record():
     loop = ClosedLoop(plant, law, goal, sinusoid(1.0, FREQUENCIES), perfect())
     outcome = continuous.simulate(loop, duration=16.0, tolerances=(1e-7, 1e-9))
     assert int(outcome.status) == 0
-    return law, np.asarray(outcome.time), jax.tree.map(np.asarray, outcome.samples)
+    return law, np.asarray(outcome.time), jax.tree.map(np.asarray, outcome.signals)
 
 
 def amplitudes(time, series, starts, ends):

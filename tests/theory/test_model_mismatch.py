@@ -11,14 +11,14 @@ import pytest
 
 from undertow.controllers import pid
 from undertow.controllers.presets.robust import robust
-from undertow.core.contracts import AbstractSensor
+from undertow.core.contracts import AbstractNavigation
 from undertow.disturbances import current, waves
 from undertow.disturbances.adding import Together
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect, white_noise
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
-from undertow.navigation import perfect, white_noise
 from undertow.thrusters import first_order, t200
 from undertow.vehicles import bluerov2_heavy
 
@@ -26,17 +26,17 @@ DT, GOAL = 0.01, [2.0, 1.0, 1.0, 0.0, 0.0, 0.5]  # s; m, rad
 SEA = Together((current([0.3, 0.2, 0.0]), waves(height=0.5, period=5.0)))
 
 
-class Late(AbstractSensor):
+class Late(AbstractNavigation):
     """A perfect sensor whose measurements come some sampling times late."""
 
-    ticks: int = eqx.field(static=True)
+    steps: int = eqx.field(static=True)
     smooth: bool = eqx.field(static=True, default=False)
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def init(self, path, truth):
-        return jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (self.ticks, *leaf.shape)), truth)
+        return jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (self.steps, *leaf.shape)), truth)
 
     def measure(self, path, state, t, truth):
         held = jax.tree.map(lambda old, new: jnp.concatenate([old[1:], new[None]]), state, truth)
@@ -57,7 +57,7 @@ def motor(lag):
 @eqx.filter_jit
 def flown(loop):
     run = sampled.simulate(loop, duration=30.0, dt=DT, record_every=5, position=[0.0] * 6)
-    late = run.samples
+    late = run.signals
     half = late.error.shape[0] // 2
     swings = jnp.abs(jnp.diff(late.voltage[half:], axis=0)).mean() / (5 * DT)
     return run.status, jnp.sqrt((late.error[half:] ** 2).mean()), swings

@@ -13,10 +13,10 @@ from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.navigation.white_noise import white_noise
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -25,15 +25,15 @@ DT, NOISE = 1e-3, 1e-2  # s, m/s
 
 
 def minute(**choices):
-    """Law, c at every tenth tick, largest weight, and rms of d_hat and e over the 2nd and the 6th ten seconds."""
+    """Law, c at every tenth step, largest weight, and rms of d_hat and e over the 2nd and the 6th ten seconds."""
     plant = double_integrator(SEEDS)
     law = rcaf(plant.model(), **choices)
     loop = ClosedLoop(plant, law, setpoint(np.zeros(SEEDS)), none(), white_noise(0.0, NOISE))
     outcome = sampled.simulate(loop, duration=60.0, dt=DT, record_every=10)
     assert int(outcome.status) == 0
-    rms = lambda name, k: float(jnp.sqrt((getattr(outcome.samples, name)[1000 * k : 1000 * (k + 1)] ** 2).mean()))
+    rms = lambda name, k: float(jnp.sqrt((getattr(outcome.signals, name)[1000 * k : 1000 * (k + 1)] ** 2).mean()))
     windows = {name: (rms(name, 1), rms(name, 5)) for name in ("estimate", "error")}
-    return law, drift.gain_of(law, outcome.samples.weights), float(outcome.samples.weights_peak.max()), windows
+    return law, drift.gain_of(law, outcome.signals.weights), float(outcome.signals.weights_peak.max()), windows
 
 
 def test_a_minute_with_a_box_and_without():

@@ -36,31 +36,31 @@ def test_nonlinear_loop_agrees(rails, rule):
     for factor, stable in ((0.95, True), (1.05, False)):
         dt = factor * LIMITS[rule]
         outcome = sampled.simulate(loop, duration=1000 * dt, dt=dt, record_every=1)
-        eps = np.abs(np.asarray(outcome.samples.modelling_error))[:, 0]
+        eps = np.abs(np.asarray(outcome.signals.modelling_error))[:, 0]
         first, later = eps[:100].max(), eps[100:].max()
         assert later < first if stable else later > 10 * first, (rule, factor, first, later)
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_jacobian_is_that_of_the_code(rails, rule):
-    """Eigenvalues of one tick by central differences: the predicted four, and ones for what is marginal."""
+    """Eigenvalues of one step by central differences: the predicted four, and ones for what is marginal."""
     loop = rails(1, **DISCRETISED[rule])
-    drawn = loop.draw(jax.random.PRNGKey(0))
+    drawn = loop.realize(jax.random.PRNGKey(0))
     zero = jnp.zeros(())
     flat, restore = ravel_pytree(drawn.start())
 
-    def tick(flat, step):
+    def step(flat, step):
         x, z = restore(flat)
         seen = drawn.decide(zero, x, z)
         moved = rk4(lambda t, x: loop.plant.dynamics(t, x, seen.applied, drawn.load(t, x)), zero, x, step)
         after = moved, loop.controller.advance(z, seen.y, seen.r, seen.applied, step)
         return ravel_pytree(after)[0]
 
-    tick = jax.jit(tick)
+    step = jax.jit(step)
     nudges = 1e-6 * np.eye(flat.size)
     for dt in (1e-3, 3e-3):
         step = jnp.asarray(dt)
-        columns = [(tick(flat + nudge, step) - tick(flat - nudge, step)) / 2e-6 for nudge in nudges]
+        columns = [(step(flat + nudge, step) - step(flat - nudge, step)) / 2e-6 for nudge in nudges]
         found = np.linalg.eigvals(np.stack(columns, 1))
         predicted = np.linalg.eigvals(small_signal.sampled_matrix(loop.controller, dt, rule))
         marginal = np.ones(len(found) - 4)  # x_hat, and weights that cancel in d_hat

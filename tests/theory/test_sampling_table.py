@@ -1,7 +1,7 @@
 """Section 3.6, the whole table: largest sampling times by closed form, and the nonlinear loop on both sides of each.
 
 The law's own state may be stepped explicitly, semi-implicitly (weights first, then the identification model with the
-new estimate) or exactly; the input may reach the plant one tick late, and the law is told when it does.
+new estimate) or exactly; the input may reach the plant one step late, and the law is told when it does.
 """
 
 import jax.numpy as jnp
@@ -16,11 +16,11 @@ from undertow.disturbances.none import none
 from undertow.estimation.tsk import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.navigation.perfect import perfect
 
-RHO = float(gaussian_sets(3).gathering())
+RHO = float(gaussian_sets(3).basis_norm_squared())
 LAYOUTS = {"three sets": {"sets": 3}, "one set": {"sets": 1}, "rho = 1/3": {"sets": 3, "adaptation": 100 / (3 * RHO)}}
 # Rule, delay, RAFC -> limits in ms as printed, one per layout.
 TABLE = {
@@ -51,7 +51,7 @@ def law_of(rule, rafc, layout):
 
 
 def tick_matrix(g, dt, rule, delayed):
-    """One tick of (e, e_dot, eps, d_hat, input on its way)."""
+    """One step of (e, e_dot, eps, d_hat, input on its way)."""
     unit = np.eye(5)
     asked = np.array([g.stiffness, g.damping, 0.0, -1.0, 0.0])
     applied = unit[4] if delayed else asked
@@ -90,7 +90,7 @@ def test_without_delay_it_is_the_matrix_of_the_package(table1):
 
 
 class Stepped(AbstractController):
-    """The law with its input one tick late, its weights stepped before its identification model, or as it is."""
+    """The law with its input one step late, its weights stepped before its identification model, or as it is."""
 
     model: AbstractModel
     law: AbstractController

@@ -1,7 +1,7 @@
 """I28, section 3.11: thrusters that lose part of their effect, unannounced, weaken the loop and never turn it round.
 
 eig(G W G+) for every vehicle of rank six; closed loops on ODIN that lose one thruster in mid-flight; and on one axis
-how large a gain error the sampled law bears.
+how large a gain error the sampled law tolerated_status.
 """
 
 import itertools
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis import small_signal, noise
+from undertow.analysis import noise, small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractPlant
@@ -20,10 +20,10 @@ from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.hybrid_vehicle import HybridVehicle, hybrid_vehicle
 from undertow.plants.linear_plant import linear_plant
 from undertow.references.setpoint import setpoint
-from undertow.navigation.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -104,8 +104,8 @@ class LosesEffect(AbstractPlant):
     def output(self, t, x):
         return self.vehicle.output(t, x)
 
-    def place(self, x):
-        return self.vehicle.place(x)
+    def pose(self, x):
+        return self.vehicle.pose(x)
 
     def admissible(self, x, u):
         return self.vehicle.admissible(x, u)
@@ -116,8 +116,8 @@ class LosesEffect(AbstractPlant):
     def inputs(self):
         return self.vehicle.inputs()
 
-    def health(self, x):
-        return self.vehicle.health(x)
+    def status(self, x):
+        return self.vehicle.status(x)
 
     def advice(self):
         return self.vehicle.advice()
@@ -131,7 +131,7 @@ LOAD = np.array([0.3, 0.3, 0.3, 0.1, 0.1, 0.1])  # m/s^2, rad/s^2
 
 
 def amplitudes(law, effect):
-    """Amplitudes of e in the end, from the linearised tick of all six axes coupled by what is left of G G+."""
+    """Amplitudes of e in the end, from the linearised step of all six axes coupled by what is left of G G+."""
     one, unit = noise.steps(law, DT), np.eye(6)
     q = np.exp(1j * FREQUENCY * DT)
     across = lambda row: np.kron(row, unit)  # over (e, e_dot, eps, z) of six axes each
@@ -165,7 +165,7 @@ def test_after_any_single_loss_the_error_is_what_the_linear_loop_predicts(preset
         plant = LosesEffect(vehicle, left, LOSS, vehicle.outputs, vehicle.output_units)
         loop = ClosedLoop(plant, law, setpoint(np.zeros(6)), load, perfect())
         run = sampled.simulate(loop, duration=END, dt=DT, record_every=10)
-        return run.time, jnp.abs(run.samples.error), run.status
+        return run.time, jnp.abs(run.signals.error), run.status
 
     lefts = np.concatenate([np.ones((1, 8)), 1 - np.eye(8), 1 - 0.5 * np.eye(8)])
     time, error, status = (np.asarray(found) for found in jax.jit(jax.vmap(flight))(jnp.asarray(lefts)))

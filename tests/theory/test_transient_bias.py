@@ -14,7 +14,7 @@ def transient(rails, **choices):
     """Times, s, d_hat and eps of the step, finely sampled."""
     loop = rails(1, goal=STEP, **choices)
     outcome = sampled.simulate(loop, duration=1.0, dt=2e-4, record_every=1)
-    samples = jax.tree.map(np.asarray, outcome.samples)
+    samples = jax.tree.map(np.asarray, outcome.signals)
     s = 5 * (samples.error - samples.velocity)[:, 0]
     return np.asarray(outcome.time), s, samples.estimate[:, 0], samples.modelling_error[:, 0], loop.controller
 
@@ -46,6 +46,6 @@ def test_nothing_balances_s_without_the_composite_term(rails):
 def test_first_demand_of_the_papers_scenario(rails):
     """K e + w_bar: 12 m/s^2 for 2 m, asked for at once."""
     loop = rails(1, goal=STEP)
-    drawn = loop.draw(jax.random.PRNGKey(0))
+    drawn = loop.realize(jax.random.PRNGKey(0))
     decision = drawn.decide(jax.numpy.zeros(()), *drawn.start())
     assert float(decision.command[0]) == pytest.approx(12.0, rel=1e-6)

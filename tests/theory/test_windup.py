@@ -13,9 +13,9 @@ from undertow.core.contracts import AbstractController, AbstractModel
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.navigation.perfect import perfect
 
 LIMITS = (np.inf, 5.0, 3.0, 1.5)  # m/s^2
 SURVIVES = {
@@ -44,7 +44,7 @@ class FedCommanded(AbstractController):
 
 
 def step(name, limit, load=1.0):
-    """Error, estimate and s of the step at every tick, on one axis, and the law."""
+    """Error, estimate and s of the step at every step, on one axis, and the law."""
     plant = double_integrator(1, limit)
     choices = {"rafc": {"sets": 3, "composite": 0.0}, "robust": {"preset": "robust"}}.get(name, {"sets": 3})
     law = rcaf(plant.model(), **choices)

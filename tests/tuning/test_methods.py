@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.tuning.stability import Certificate, refusal
-from undertow.tuning.gradient_descent import descend
-from undertow.tuning.checkpoint import Journal, OutOfTime
-from undertow.tuning.objective import Objective
+from undertow.tuning.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.evolution import search
+from undertow.tuning.gradient_descent import descend
+from undertow.tuning.objective import Objective
+from undertow.tuning.stability import Certificate, refusal
 
 RNG = np.random.default_rng(4)
 ROOT = RNG.normal(size=(3, 3))
@@ -40,7 +40,7 @@ def stable(point):
 
 
 def objective(tmp_path, bowl, certify=stable, resume=False, budget=1e9):
-    return Objective(bowl, certify, Journal(tmp_path / "j", "bowl", budget, resume), lambda best, evaluations: None)
+    return Objective(bowl, certify, Checkpoint(tmp_path / "j", "bowl", budget, resume), lambda best, evaluations: None)
 
 
 def tune(asked, method, iterations=60):
@@ -92,7 +92,7 @@ def test_nothing_is_accepted_without_certificate(tmp_path, method):
 @pytest.mark.parametrize("method", ["gradient", "search"])
 @pytest.mark.parametrize("lines", [1, 5, 8])
 def test_resumed_is_the_same_as_uninterrupted(tmp_path, method, lines):
-    """The journal as a kill leaves it: cut off after some lines, and in the middle of the next."""
+    """The checkpoint as a kill leaves it: cut off after some lines, and in the middle of the next."""
     bowl = Bowl()
     whole = objective(tmp_path, bowl)
     tune(whole, method, iterations=6)
@@ -119,12 +119,12 @@ def test_budget_ends_it(tmp_path):
 
 def test_journal_of_something_else(tmp_path):
     with pytest.raises(BadInput, match="unfinished tuning"):
-        Journal(tmp_path / "j", "one", 1.0, resume=True)
-    Journal(tmp_path / "j", "one", 1.0, resume=False)
+        Checkpoint(tmp_path / "j", "one", 1.0, resume=True)
+    Checkpoint(tmp_path / "j", "one", 1.0, resume=False)
     with pytest.raises(BadInput, match="resume"):
-        Journal(tmp_path / "j", "one", 1.0, resume=False)
+        Checkpoint(tmp_path / "j", "one", 1.0, resume=False)
     with pytest.raises(BadInput, match="another one"):
-        Journal(tmp_path / "j", "two", 1.0, resume=True)
+        Checkpoint(tmp_path / "j", "two", 1.0, resume=True)
 
 
 def test_where_nothing_is_certified_the_worst_truth_is_named():

@@ -7,26 +7,25 @@ import pytest
 
 from undertow.analysis.linearization.jacobians import without
 from undertow.controllers import pid
-from undertow.core.contracts import Load, Place
+from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
 from undertow.disturbances import current, sinusoid, wrench
 from undertow.disturbances.adding import Together
-from undertow.sensors import depth, dvl, imu
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
 from undertow.scenario.reading import from_data
-from undertow.navigation import observer
-from undertow.tuning.stability import Certifier
-from undertow.tuning.gradient_descent import descend
-from undertow.tuning.tunable_parameters import dials, options
+from undertow.sensors import depth, dvl, imu
+from undertow.thrusters import t200
+from undertow.tuning.checkpoint import Checkpoint
 from undertow.tuning.evaluator import Evaluation
-from undertow.tuning.checkpoint import Journal
+from undertow.tuning.evolution import search
+from undertow.tuning.gradient_descent import descend
 from undertow.tuning.objective import Objective
 from undertow.tuning.problem import problem
 from undertow.tuning.scaled import scaled
-from undertow.tuning.evolution import search
-from undertow.thrusters import t200
+from undertow.tuning.stability import Certifier
+from undertow.tuning.tunable_parameters import options, parameters
 from undertow.vehicles import bluerov2_heavy
 
 AXIS = {
@@ -61,8 +60,8 @@ def test_both_methods_come_to_the_same_gains(axis, tmp_path):
     certifier = Certifier(found.bench, found.train, evaluation.law(found.start))
     best = []
     for method in ("gradient", "search"):
-        journal = Journal(tmp_path / method, method, 1e9, False)
-        asked = Objective(evaluation, lambda point: certifier(evaluation.law(point)), journal, lambda *_: None)
+        checkpoint = Checkpoint(tmp_path / method, method, 1e9, False)
+        asked = Objective(evaluation, lambda point: certifier(evaluation.law(point)), checkpoint, lambda *_: None)
         start = found.start
         asked.costs(start[None])
         if method == "gradient":
@@ -103,11 +102,11 @@ def test_parameter_sets_take_turns():
         "loop": {"dt": 0.05, "duration": 2.0, "record": 0.1},
     }
     found = problem(from_data(sea | still))
-    assert found.train.truths == ("vonbenzon2022", "ng2024", "px4") * 2
-    assert found.held_out.truths == ("vonbenzon2022", "wu2018", "gazebo_box_drag") * 4
+    assert found.train.variants == ("vonbenzon2022", "ng2024", "px4") * 2
+    assert found.held_out.variants == ("vonbenzon2022", "wu2018", "gazebo_box_drag") * 4
     masses = np.asarray(found.train.plants.body.mass_matrix)[:3, 0, 0]
     np.testing.assert_allclose(masses, [13.5 + 6.36, 11.5 + 10.77, 13.4 + 1.272])
-    assert [dial.axes for dial in found.dials[:2]] == [(0, 1, 2), (3, 4, 5)]
+    assert [parameter.axes for parameter in found.parameters[:2]] == [(0, 1, 2), (3, 4, 5)]
     np.testing.assert_allclose(found.bench.sums.input_scale, 16.0)
 
 
@@ -118,7 +117,7 @@ def test_slopes_are_taken_without_steps():
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0] * 6), sinusoid(), sensor)
     smooth = without(loop, ("resolution", "dead_zone"))
     assert float(smooth.plant.thruster.dead_zone) == 0.0 and float(loop.plant.thruster.dead_zone) == 1.2
-    pairs = zip(loop.sensor.instruments, smooth.sensor.instruments, strict=True)
+    pairs = zip(loop.sensor.sensors, smooth.sensor.sensors, strict=True)
     assert [(float(a.sampling.resolution), float(b.sampling.resolution)) for a, b in pairs] == [(0.0, 0.0)] + [
         (1e-3, 0.0)
     ] * 2
@@ -127,7 +126,7 @@ def test_slopes_are_taken_without_steps():
 
 
 def test_dials_and_options():
-    chosen = dials(
+    chosen = parameters(
         {"tracking": (1.0, 100.0), "feedback[0]": (1, 2), "feedback[1]": (3, 4), "rate": (5, 6)},
         [(0, 2), (1,)],
         ["rate"],
@@ -136,9 +135,9 @@ def test_dials_and_options():
     np.testing.assert_allclose(at["tracking"], [10.0, 1.0, 10.0])
     np.testing.assert_allclose(at["feedback"], [[1, 4], [2, 3], [1, 4]])
     np.testing.assert_allclose(at["rate"], 6.0)
-    for dial in chosen:
-        np.testing.assert_allclose(dial.share(dial.value(0.3)), 0.3)
-        assert dial.share(1e9) == 1.0 and dial.share(1e-9) == 0.0
+    for parameter in chosen:
+        np.testing.assert_allclose(parameter.share(parameter.value(0.3)), 0.3)
+        assert parameter.share(1e9) == 1.0 and parameter.share(1e-9) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -156,7 +155,7 @@ def test_dials_and_options():
 )
 def test_ranges_that_cannot_be(ranges, said):
     with pytest.raises(BadInput) as error:
-        dials(ranges, [(0,)])
+        parameters(ranges, [(0,)])
     assert str(error.value) == said
 
 
@@ -168,9 +167,9 @@ def test_one_ode_is_not_what_a_vehicle_runs():
 
 def test_disturbance_of_another_size():
     inner = Together((sinusoid(2.0, 1.0), wrench([1.0] * 6), current([0.3, 0.1, 0.0])))
-    place, calm = Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)), Load(jnp.ones(6), jnp.zeros(6))
+    place, calm = Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)), Load(jnp.ones(6), jnp.zeros(6))
     half = scaled(inner, 0.5)
-    one, two = (each.at(each.draw(jax.random.PRNGKey(0)), 0.7, place, calm) for each in (inner, half))
+    one, two = (each.at(each.realize(jax.random.PRNGKey(0)), 0.7, place, calm) for each in (inner, half))
     np.testing.assert_allclose(two.acceleration - 1, 0.5 * (one.acceleration - 1))
     np.testing.assert_allclose(two.wrench, 0.5 * one.wrench)
     np.testing.assert_allclose(two.water.velocity, [0.15, 0.05, 0.0])

@@ -65,7 +65,7 @@ def drift_rate(law: RCAF | RobustRCAF, dt: float, mean_square: float, axis: int 
 def noise_square(law: RCAF | RobustRCAF, dt: float, velocity: float, gain: float = 0.0, axis: int = 0) -> float:
     """Mean square of eps, (m/s)^2, under white noise of a standard deviation `velocity`, with a gain c in 1/s.
 
-    Of the estimator alone: eps = -(q - 1)^2 / ((q - 1)^2 + p (q - 1) + r) n, q the shift by one tick.
+    Of the estimator alone: eps = -(q - 1)^2 / ((q - 1)^2 + p (q - 1) + r) n, q the shift by one step.
     """
     one = steps(law, dt, axis)
     p, r = one.of_rates + dt * gain, one.of_estimate * dt
@@ -84,7 +84,7 @@ def time_to_divergence(law: RCAF | RobustRCAF, dt: float, velocity: float, axis:
 
 
 def _per_square(law: RCAF | RobustRCAF, one: Steps) -> float:
-    return one.of_estimate / one.dt / one.gathering * float((basis_slope(_fuzzy(law)) ** 2).sum())
+    return one.of_estimate / one.dt / one.basis_norm_squared * float((basis_slope(_fuzzy(law)) ** 2).sum())
 
 
 def _fuzzy(law: RCAF | RobustRCAF) -> FuzzySystem:

@@ -32,8 +32,8 @@ MEANINGS = {
     "settling_time": Meaning("time from which the target rests and the error stays within 2 % of the way to it", "s"),
     "saturated_fraction": Meaning("share of input-seconds at a limit", ""),
     "bad_readings": Meaning("readings so far that were no numbers, left out or replaced by what the law expected", ""),
-    "energy_books_share": Meaning("what the energy ledger leaves over, share of the energy drawn: rounding", ""),
-    "energy_defect_share": Meaning("the same against the state itself: error of the integrator", ""),
+    "energy_balance_residual": Meaning("what the energy ledger leaves over, share of the energy drawn: rounding", ""),
+    "energy_integration_residual": Meaning("the same against the state itself: error of the integrator", ""),
     "rules": Meaning("fuzzy rules per axis", ""),
 }
 

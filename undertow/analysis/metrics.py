@@ -1,4 +1,4 @@
-"""The benchmark's metrics, defined once: gathered tick by tick inside the loop, or from a recorded series."""
+"""The benchmark's metrics, defined once: gathered step by step inside the loop, or from a recorded series."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -10,14 +10,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core.param import param
-from undertow.loop.closed_loop import Sample
+from undertow.loop.closed_loop import Signals
 from undertow.loop.outcome import Outcome
 from undertow.loop.sampled import AbstractAccumulator
 
 PerAxis = Float[Array, " n"]
 Scalar = Float[Array, ""]
 
-# Sample times are k * dt in floating point: a window takes its borders in.
+# Signals times are k * dt in floating point: a window takes its borders in.
 _HAIR = 1e-9  # s
 
 # Share of the way to the last target that the error must leave no more to be settled.
@@ -53,7 +53,7 @@ class Settling(NamedTuple):
     last: Scalar  # time of the last sample, s
     resting: Scalar  # 1 while the target stays
 
-    def updated(self, t: Scalar, sample: Sample, counts: Any) -> "Settling":
+    def updated(self, t: Scalar, sample: Signals, counts: Any) -> "Settling":
         """With a sample more, where it counts."""
         first = self.begun == 0
         start = jnp.where(first, sample.error - sample.target, self.start)
@@ -90,7 +90,7 @@ class Metrics(AbstractAccumulator):
     start: Scalar = param("s", "first time that counts", default=0.0)
     stop: Scalar = param("s", "last time that counts", default=jnp.inf)
 
-    def init(self, sample: Sample) -> MetricsState:
+    def init(self, sample: Signals) -> MetricsState:
         axes, zero = jnp.zeros_like(sample.error), jnp.zeros(())
         return MetricsState(
             samples=zero,
@@ -108,13 +108,13 @@ class Metrics(AbstractAccumulator):
             previous=(zero, jnp.zeros_like(sample.voltage), zero, zero),
         )
 
-    def update(self, state: MetricsState, t: Scalar, sample: Sample) -> MetricsState:
+    def update(self, state: MetricsState, t: Scalar, sample: Signals) -> MetricsState:
         inside = jnp.where((t >= self.start - _HAIR) & (t <= self.stop + _HAIR), 1.0, 0.0)
         last_t, last_input, last_power, last_inside = state.previous
         power, between = sample.power.sum(), inside * last_inside
         size, applied = jnp.abs(sample.error), sample.voltage
         return MetricsState(
-            samples=state.samples + inside,
+            samples=state.signals + inside,
             squares={name: state.squares[name] + inside * pick(sample) ** 2 for name, pick in _SIGNALS.items()},
             largest_error=jnp.maximum(state.largest_error, inside * size),
             input_squares=state.input_squares + inside * (applied**2).mean(),
@@ -133,7 +133,7 @@ class Metrics(AbstractAccumulator):
 def results(state: MetricsState) -> dict[str, Any]:
     """Metrics by their names in result files: overall values as numbers, per-axis values as `<name>_axes` lists."""
     host = jax.tree.map(np.asarray, state)
-    count = max(float(host.samples), 1.0)
+    count = max(float(host.signals), 1.0)
     found: dict[str, Any] = {name: float(value) for name, value in overall(host).items()}
     for name, squares in host.squares.items():
         found[f"{name}_rms_axes"] = np.sqrt(squares / count).tolist()
@@ -163,13 +163,13 @@ OVERALL = tuple(_OVERALL)
 def overall(state: MetricsState) -> dict[str, np.ndarray]:
     """Metrics over all axes by their names; of many runs at once where the leaves have leading axes."""
     host = jax.tree.map(np.asarray, state)
-    count = np.maximum(host.samples, 1.0)
+    count = np.maximum(host.signals, 1.0)
     return {name: value(host, count) for name, value in _OVERALL.items()}
 
 
 def measure(outcome: Outcome, start: float = 0.0, stop: float = float("inf")) -> dict[str, Any]:
     """Metrics of a recorded run over start <= t <= stop, s, at the rate of the record."""
-    samples, kept = outcome.samples, int((np.asarray(outcome.time) <= stop + _HAIR).sum())
+    samples, kept = outcome.signals, int((np.asarray(outcome.time) <= stop + _HAIR).sum())
     if 0 < kept < len(outcome.time):  # what comes later may be no numbers, and none of them times zero is none
         index = np.minimum(np.arange(len(outcome.time)), kept - 1)
         samples = jax.tree.map(lambda series: np.asarray(series)[index], samples)
@@ -177,7 +177,7 @@ def measure(outcome: Outcome, start: float = 0.0, stop: float = float("inf")) ->
 
 
 @eqx.filter_jit
-def _over_series(metrics: Metrics, time: Array, samples: Sample) -> MetricsState:
+def _over_series(metrics: Metrics, time: Array, signals: Signals) -> MetricsState:
     first = jax.tree.map(lambda series: series[0], samples)
     step = lambda state, at: (metrics.update(state, *at), None)
     return jax.lax.scan(step, metrics.init(first), (time, samples))[0]

@@ -54,7 +54,7 @@ def gains(law: RCAF, axis: int = 0) -> Gains:
         p12=float(p12),
         p22=float(p22),
         pole=_number(model.pole, axis) + _number(model.compensation_gain, axis) / _number(model.layer, axis),
-        adaptation=_number(law.adaptation, axis) * float(law.fuzzy.gathering()),
+        adaptation=_number(law.adaptation, axis) * float(law.fuzzy.basis_norm_squared()),
         composite=_number(law.composite, axis),
     )
 
@@ -146,12 +146,12 @@ def transient_bias(law: RCAF, axis: int = 0) -> float:
 
 
 def sampled_matrix(law: RCAF, dt: float, rule: str = "euler", axis: int = 0) -> np.ndarray:
-    """Jacobian (4 x 4) of one tick on (e, e_dot, eps, d_til): y, r and u held over dt seconds. Section 3.6.
+    """Jacobian (4 x 4) of one step on (e, e_dot, eps, d_til): y, r and u held over dt seconds. Section 3.6.
 
     Args:
         law: the law.
         dt: sampling time, s.
-        rule: `euler`, one explicit step of the law's state per tick, or `exact`, its flow followed exactly, which
+        rule: `euler`, one explicit step of the law's state per step, or `exact`, its flow followed exactly, which
             is the limit of many substeps.
         axis: which axis.
     """
@@ -194,13 +194,13 @@ def _tick(g: Gains, dt: float, rule: str) -> np.ndarray:
     unit = np.eye(4)
     push = np.array([g.stiffness, g.damping, 0.0, -1.0])  # u = push . state
     sliding = np.array([g.p12, g.p22, 0.0, 0.0])  # s = sliding . state
-    # The law's own flow between two ticks: (x_hat_dot - measured x_dot, d_hat), driven by s and u.
+    # The law's own flow between two steps: (x_hat_dot - measured x_dot, d_hat), driven by s and u.
     flow = np.zeros((4, 4))
     flow[0] = -g.pole, 1.0, 0.0, 1.0
     flow[1] = -g.b2, 0.0, -g.adaptation, 0.0
     across = unit + dt * flow if rule == "euler" else expm(dt * flow)
     learned = across[:2] @ np.stack([unit[2], unit[3], sliding, push])
-    rate = unit[1] - dt * push  # e_dot one tick later; x_dot moves by dt u
+    rate = unit[1] - dt * push  # e_dot one step later; x_dot moves by dt u
     return np.stack([unit[0] + dt * unit[1] - dt**2 / 2 * push, rate, learned[0] - dt * push, learned[1]])
 
 

@@ -4,8 +4,8 @@ from undertow.process import prepare
 
 prepare()
 
-from undertow.scenario.execute import execute
 from undertow.bench.workload import W1
+from undertow.scenario.execute import execute
 
 
 def main() -> None:

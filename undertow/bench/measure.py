@@ -12,14 +12,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.core import runtime
 from simdjit import nvidia
 from simdjit.cuda import Driver
 from simdjit.machine import lanes_of
-from undertow.loop import sampled
-from undertow.loop.vmap_batch import Fleet as Vmapped
 from undertow.bench import plain_numpy, workload
 from undertow.bench.workload import W1, W2, Workload
+from undertow.core import runtime
+from undertow.loop import sampled
+from undertow.loop.vmap_batch import BatchRunner as Vmapped
 
 # Runs of a batch, and how often everything is done; the shortest time counts.
 _BATCH, _BATCH_W2 = 64, 16
@@ -47,12 +47,12 @@ def measure(watch: Watch) -> dict[str, Any]:
     with runtime.on_processor():
         watch("W1, one run", 0.1)
         one = workload.workload(W1)
-        found |= {"ticks": one.ticks} | _in_a_lane(one)
+        found |= {"steps": one.steps} | _in_a_lane(one)
         watch("W1, one run, by XLA", 0.2)
         found |= _by_xla(one)
         watch("W2, one run", 0.3)
         other = workload.workload(W2)
-        second = {"ticks": other.ticks} | _in_a_lane(other, _REPETITIONS_W2)
+        second = {"steps": other.steps} | _in_a_lane(other, _REPETITIONS_W2)
         second |= _prefixed("batch_float64_", _batch(other, threads, _BATCH_W2, _REPETITIONS_W2))
         found |= _prefixed("w2_", second)
     for i, kind in enumerate(("float64", "float32")):
@@ -78,10 +78,10 @@ def _first_results() -> tuple[float, float]:
 
 
 def _in_a_lane(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:
-    single, compiling = _timed(lambda: workload.fleet(one, lanes=1))
+    single, compiling = _timed(lambda: workload.batch(one, lanes=1))
     numbers = workload.alone(one.run)
-    tracking = float(workload.tracking(single.fly(numbers).accumulated)[0])
-    each = _shortest(lambda: single.fly(numbers), repetitions) / one.ticks
+    tracking = float(workload.tracking(single.run(numbers).accumulated)[0])
+    each = _shortest(lambda: single.run(numbers), repetitions) / one.steps
     figures = {"single_compile_s": compiling, "single_ns": each, "tracking_rms": tracking}
     return figures | {"operations": single.operations}
 
@@ -89,12 +89,12 @@ def _in_a_lane(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, floa
 def _by_xla(one: Workload) -> dict[str, float]:
     run, plan = one
 
-    def fly():
+    def run():
         at = dict(zip(("position", "velocity"), run.start, strict=True))
         return jax.block_until_ready(
             sampled.simulate(
                 run.loop,
-                duration=plan.ticks * plan.dt,
+                duration=plan.steps * plan.dt,
                 dt=plan.dt,
                 record_every=0,
                 accumulators=run.accumulators,
@@ -104,7 +104,7 @@ def _by_xla(one: Workload) -> dict[str, float]:
 
     _, first = _timed(fly)
     shortest = _shortest(fly)
-    return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / plan.ticks}
+    return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / plan.steps}
 
 
 def _many(kind: str, threads: int) -> dict[str, Any]:
@@ -122,23 +122,23 @@ def _many(kind: str, threads: int) -> dict[str, Any]:
 
 def _batch(one: Workload, threads: int, runs: int, repetitions: int = _REPETITIONS) -> dict[str, float]:
     """Several runs per thread, all threads at once and one alone."""
-    program, compiling = _timed(lambda: workload.fleet(one))
+    program, compiling = _timed(lambda: workload.batch(one))
     numbers = workload.several(one.run, runs)
 
     def together(count: int) -> float:
         with runtime.workers(count) as pool:
-            work = lambda: list(pool.map(lambda _: program.fly(numbers), range(count)))
+            work = lambda: list(pool.map(lambda _: program.run(numbers), range(count)))
             return _shortest(work, repetitions) / count
 
-    each = one.ticks * runs
+    each = one.steps * runs
     return {"compile_s": compiling, "one_thread_ns": together(1) / each, "ns": together(threads) / each}
 
 
 def on_gpu(one: Workload, driver: Driver, runs: int) -> dict[str, float]:
     """Many runs on a GPU, a thread each; copying to and fro is counted."""
-    program, compiling = _timed(lambda: workload.fleet(one, driver=driver))
+    program, compiling = _timed(lambda: workload.batch(one, driver=driver))
     numbers = workload.several(one.run, runs)
-    each = _shortest(lambda: program.fly(numbers), 3) / (one.ticks * runs)
+    each = _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)
     return {"compile_s": compiling, "ns": each, "ticks_per_second": 1e9 / each}
 
 
@@ -146,11 +146,11 @@ def vmapped_ns(one: Workload, runs: int) -> float:
     """Nanoseconds per step and run by `jax.vmap` on the device that JAX uses."""
     program = Vmapped(one.run, one.plan, width=runs)
     numbers = jax.tree.map(jnp.asarray, workload.several(one.run, runs))
-    return _shortest(lambda: program.fly(numbers), 3) / (one.ticks * runs)
+    return _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)
 
 
-def _short(one: Workload, ticks: int) -> Workload:
-    return one._replace(plan=one.plan._replace(ticks=ticks))
+def _short(one: Workload, steps: int) -> Workload:
+    return one._replace(plan=one.plan._replace(steps=steps))
 
 
 def _prefixed(prefix: str, figures: dict[str, Any]) -> dict[str, Any]:

@@ -96,11 +96,11 @@ def rk4(rate, t, y, h):
     return tuple(p + h / 6 * (a + 2 * b + 2 * c + d) for p, a, b, c, d in zip(y, k1, k2, k3, k4, strict=True))
 
 
-def paper_example(rung, composite, duration=20.0, h=1e-3, every=10):
+def paper_example(fidelity, composite, duration=20.0, h=1e-3, every=10):
     """Examples 1 (`ideal`) and 2 (`static`) as one ODE: e, d_hat - d and u_r at 10 ms from 10 s on."""
 
     def thrust(voltage):
-        if rung == "ideal":
+        if fidelity == "ideal":
             return ALPHA * voltage
         speed = 2 * voltage / (K2 + np.sqrt(K2**2 + 4 * K3 * CQ * np.abs(voltage)))
         return CT * speed * np.abs(speed)
@@ -121,7 +121,7 @@ def paper_example(rung, composite, duration=20.0, h=1e-3, every=10):
     return tuple(np.array(series) for series in zip(*kept, strict=True))
 
 
-def workload_w1(ticks=20_000, h=1e-3, composite=20.0, bound=20.0):
+def workload_w1(steps=20_000, h=1e-3, composite=20.0, bound=20.0):
     """Benchmark workload W1: whole motor, 1 kHz hold; mean square of e over the steady half."""
 
     def rate(t, y, voltage):
@@ -133,9 +133,9 @@ def workload_w1(ticks=20_000, h=1e-3, composite=20.0, bound=20.0):
         return j @ nu, nu_dot, speed_dot, (voltage - R * current - KE * speed) / L
 
     y, v_hat, theta, total = (np.zeros(6), np.zeros(6), np.zeros(8), np.zeros(8)), np.zeros(6), np.zeros((6, 5)), 0.0
-    for k in range(ticks):
+    for k in range(steps):
         voltage, v_hat_dot, theta_dot, (e, *_) = law(y[0], jacobian(y[0]) @ y[1], v_hat, theta, composite)
-        total += (e**2).mean() if k >= ticks // 2 else 0.0
+        total += (e**2).mean() if k >= steps // 2 else 0.0
         y = rk4(lambda t, y, voltage=voltage: rate(t, y, voltage), k * h, y, h)
         v_hat, theta = v_hat + h * v_hat_dot, np.clip(theta + h * theta_dot, -bound, bound)
-    return total / (ticks - ticks // 2)
+    return total / (steps - steps // 2)

@@ -8,18 +8,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.analysis.metrics import overall
 from simdjit.cuda import Driver
-from undertow.loop.simd_batch import Fleet, Plan, Run
-from undertow.scenario.build import build
+from undertow.analysis.metrics import overall
 from undertow.campaign.runs import planned, run_of
-from undertow.reproduction.setup import scenario
+from undertow.loop.simd_batch import BatchRunner, Plan, Run
 from undertow.reproduction.robust_variant.fidelity import at_sea
+from undertow.reproduction.setup import scenario
+from undertow.scenario.build import build
 
 # Table 1 but for gamma_eps and the bound: without it the weights drift until the loop is lost after 139 s.
 W1 = scenario(
     "W1",
-    rung="electromechanical",
+    fidelity="electromechanical",
     composite=20.0,
     controller={"weights_bound": 20.0},
     loop={"kind": "sampled", "duration": 20.0},
@@ -36,9 +36,9 @@ class Workload(NamedTuple):
     plan: Plan
 
     @property
-    def ticks(self) -> int:
+    def steps(self) -> int:
         """Steps of one run."""
-        return self.plan.ticks
+        return self.plan.steps
 
 
 def workload(data: Mapping[str, Any]) -> Workload:
@@ -61,9 +61,9 @@ def several(run: Run, count: int) -> Any:
     return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
 
 
-def fleet(one: Workload, lanes: int = 0, driver: Driver | None = None) -> Fleet:
-    """Its program; arguments as of `Fleet`."""
-    return Fleet(one.run, one.plan, constant(one.run), lanes, driver)
+def batch(one: Workload, lanes: int = 0, driver: Driver | None = None) -> BatchRunner:
+    """Its program; arguments as of `BatchRunner`."""
+    return BatchRunner(one.run, one.plan, constant(one.run), lanes, driver)
 
 
 def tracking(accumulated: Any) -> np.ndarray:

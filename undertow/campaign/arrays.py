@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from undertow.core.errors import BadInput
 from undertow.campaign.columns import Label
+from undertow.core.errors import BadInput
 
 try:
     import zarr

@@ -9,24 +9,24 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from undertow.analysis.metrics import overall
-from undertow.core import runtime
-from undertow.core.status import Status
 from simdjit import nvidia
 from simdjit.errors import Unsupported
+from undertow.analysis.metrics import overall
+from undertow.campaign.campaign_schema import Series
+from undertow.campaign.runs import leaves, planned, run_of, shared_numbers
+from undertow.core import runtime
+from undertow.core.status import Status
 from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.simd_batch import Plan, Run
 from undertow.scenario.build import Built
-from undertow.scenario.schema import Scenario
 from undertow.scenario.part_cache import structure
-from undertow.campaign.runs import leaves, planned, run_of, shared_numbers
-from undertow.campaign.campaign_schema import Series
+from undertow.scenario.schema import Scenario
 
 # What flies a trial. By XLA it takes longer, and alone it is repeated to rounding only.
 LANES, XLA = 0, 1
 
 
-class Flown(NamedTuple):
+class BatchResult(NamedTuple):
     """What is kept of trials, one entry each."""
 
     metrics: dict[str, np.ndarray]  # over the steady window; NaN where a run did not last
@@ -46,7 +46,7 @@ class _Kind(NamedTuple):
     precision: str
 
 
-class _Crew(NamedTuple):
+class _Group(NamedTuple):
     """Trials of one kind in a task."""
 
     first: Run
@@ -54,7 +54,7 @@ class _Crew(NamedTuple):
     numbers: list[list[np.ndarray]]  # of each what is not the same in all
 
 
-class Hangar:
+class ProgramCache:
     """Programs that were compiled, for any number of threads.
 
     Args:
@@ -68,46 +68,48 @@ class Hangar:
         self._programs: dict[_Kind, Any] = {}
         self._lock = threading.Lock()
 
-    def fly(self, built: Iterable[Built], asked: Series | None = None) -> Flown:
+    def fly(self, built: Iterable[Built], asked: Series | None = None) -> BatchResult:
         """Run trials; those of one kind together.
 
         Args:
             built: the trials, sampled loops; only numbers that differ are kept of each.
             asked: series that are kept.
         """
-        crews: dict[_Kind, _Crew] = {}
+        groups: dict[_Kind, _Group] = {}
         for i, one in enumerate(built):
             run = run_of(one)
             numbers = leaves(run)
             kind = self._kind(run, numbers, planned(one, asked), one.scenario)
-            crew = crews.setdefault(kind, _Crew(run, [], []))
-            crew.members.append(i)
+            group = groups.setdefault(kind, _Group(run, [], []))
+            group.members.append(i)
             pairs = zip(numbers, self._common(kind, len(numbers)), strict=True)
             # Copies: views would keep JAX's arrays, and those ten times the memory.
-            crew.numbers.append([np.array(leaf) for leaf, shared in pairs if shared is None])
-        if not crews:  # none of them, as one would be
-            return jax.tree.map(lambda kept: kept[:0], self.fly(self._probes()[:1], asked))
+            group.numbers.append([np.array(leaf) for leaf, shared in pairs if shared is None])
+        if not groups:  # none of them, as one would be
+            return jax.tree.map(lambda kept: kept[:0], self.run(self._probes()[:1], asked))
         pieces = []
-        for kind, crew in crews.items():
+        for kind, group in groups.items():
             with runtime.in_precision(kind.precision):
-                pieces.append(self._together(kind, crew))
-        back = np.argsort([i for crew in crews.values() for i in crew.members])
+                pieces.append(self._together(kind, group))
+        back = np.argsort([i for group in groups.values() for i in group.members])
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
-    def _together(self, kind: _Kind, crew: _Crew) -> Flown:
-        common = self._common(kind, len(leaves(crew.first)))
+    def _together(self, kind: _Kind, group: _Group) -> BatchResult:
+        common = self._common(kind, len(leaves(group.first)))
         with self._lock:
             if kind not in self._programs:
-                self._programs[kind] = _program(crew.first, kind, [shared is not None for shared in common])
-        count, own = len(crew.members), map(np.stack, zip(*crew.numbers, strict=True))
+                self._programs[kind] = _program(group.first, kind, [shared is not None for shared in common])
+        count, own = len(group.members), map(np.stack, zip(*group.numbers, strict=True))
         repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
         numbers = [next(own) if shared is None else repeated(shared) for shared in common]
-        tree = jax.tree.structure(eqx.filter(crew.first, eqx.is_array))
-        flown = self._programs[kind].fly(jax.tree.unflatten(tree, numbers))
+        tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
+        flown = self._programs[kind].run(jax.tree.unflatten(tree, numbers))
         lasted = flown.status == int(Status.OK)
         metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(flown.accumulated[0]).items()}
-        engine = np.full(count, LANES if isinstance(self._programs[kind], simd_batch.Fleet) else XLA, dtype=np.int8)
-        return Flown(metrics, flown.status.astype(np.int8), flown.ended, engine, flown.series)
+        engine = np.full(
+            count, LANES if isinstance(self._programs[kind], simd_batch.BatchRunner) else XLA, dtype=np.int8
+        )
+        return BatchResult(metrics, flown.status.astype(np.int8), flown.ended, engine, flown.series)
 
     def _common(self, kind: _Kind, count: int) -> list[np.ndarray | None]:
         """Numbers that are built into the program of a kind, in the order of the leaves of its runs; None elsewhere."""
@@ -131,9 +133,9 @@ class Hangar:
             return self._shared
 
 
-def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.Fleet | vmap_batch.Fleet:
+def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
     if kind.engine == "lanes":
         for driver in dict.fromkeys((nvidia.gpu(), None)):
             with contextlib.suppress(Unsupported):
-                return simd_batch.Fleet(run, kind.plan, constant, driver=driver)
-    return vmap_batch.Fleet(run, kind.plan)
+                return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver)
+    return vmap_batch.BatchRunner(run, kind.plan)

@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from undertow.campaign.labels import by_name, words
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import Text
 from undertow.scenario.schema import Scenario, Strict, complaint
-from undertow.campaign.labels import by_name, words
 
 # Entries of lists in brackets only: each key has one spelling, so that two that name it are noticed.
 _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
@@ -58,7 +58,9 @@ class Series(Strict):
     """Signals that are kept of every trial."""
 
     signals: list[str] = Field(
-        ["position", "error"], min_length=1, description="names of variables of run.nc, as `undertow simulate` writes them"
+        ["position", "error"],
+        min_length=1,
+        description="names of variables of run.nc, as `undertow simulate` writes them",
     )
     every: float = Field(1.0, gt=0, description="time between records, s")
 

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from undertow.campaign.columns import ENDINGS
-from undertow.campaign.sensitivity import by_choice, correlations, quantiles
 from undertow.campaign.batch_runner import XLA
+from undertow.campaign.columns import ENDINGS
 from undertow.campaign.invalid_trials import refusals
 from undertow.campaign.requirements import verdict
+from undertow.campaign.sensitivity import by_choice, correlations, quantiles
 from undertow.campaign.store_results import Results
 from undertow.campaign.trials import Trials
 

@@ -7,16 +7,16 @@ import xarray as xr
 
 from undertow.analysis.metric_meanings import MEANINGS, unit_of
 from undertow.analysis.metrics import OVERALL
+from undertow.campaign.batch_runner import LANES, XLA
+from undertow.campaign.campaign_schema import Campaign
+from undertow.campaign.labels import is_number, words
+from undertow.campaign.layout import DRAWS
+from undertow.campaign.runs import planned
+from undertow.campaign.task import REFUSED
+from undertow.campaign.trials import Trials, drawn
 from undertow.core.status import Status
 from undertow.loop import record
 from undertow.scenario.build import Built
-from undertow.campaign.batch_runner import LANES, XLA
-from undertow.campaign.layout import DRAWS
-from undertow.campaign.labels import is_number, words
-from undertow.campaign.runs import planned
-from undertow.campaign.campaign_schema import Campaign
-from undertow.campaign.task import REFUSED
-from undertow.campaign.trials import Trials, drawn
 
 # Codes of the columns `status` and `engine`, and their words.
 ENDINGS = {int(status): status.word for status in Status} | {REFUSED: "refused"}

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from undertow.campaign.labels import is_number
 from undertow.core.errors import BadInput
 from undertow.scenario.provenance import text_hash, versions
 from undertow.scenario.reading import parse
-from undertow.campaign.labels import is_number
 
 
 class Identity(NamedTuple):

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from undertow.core.errors import BadInput
-from undertow.scenario.part_cache import Workshop
 from undertow.campaign.task import build_trial
 from undertow.campaign.trials import Trials
+from undertow.core.errors import BadInput
+from undertow.scenario.part_cache import PartCache
 
 # Trials that are looked at: building one takes milliseconds.
 _MOST = 200
@@ -26,10 +26,10 @@ def refusals(several: Trials, rows: Sequence[int]) -> tuple[Refusal, ...]:
         several: the trials.
         rows: numbers of those that were refused; only the first 200 are looked at.
     """
-    workshop, found = Workshop(), dict[tuple[str, str], list[str]]()
+    part_cache, found = PartCache(), dict[tuple[str, str], list[str]]()
     for row in rows[:_MOST]:
         try:
-            build_trial(several, workshop, int(row))
+            build_trial(several, part_cache, int(row))
         except BadInput as error:
             found.setdefault((error.name, error.must), []).append(str(error))
     return tuple(Refusal(each[0], len(each)) for each in sorted(found.values(), key=len, reverse=True))

@@ -6,20 +6,20 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.analysis.metrics import OVERALL
+from undertow.campaign import task as tasks
+from undertow.campaign.campaign_schema import Campaign
+from undertow.campaign.invalid_trials import refusals
+from undertow.campaign.reading import read_campaign, whole
+from undertow.campaign.requirements import too_few
+from undertow.campaign.trials import Trials, trials
+from undertow.checks.vehicle_findings import vehicle_warnings
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.loop.closed_loop import Sample
+from undertow.loop.closed_loop import Signals
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.results import rules
 from undertow.scenario.schema import Loop
-from undertow.checks.vehicle_findings import vehicle_doubts
-from undertow.campaign import task as tasks
-from undertow.campaign.reading import read_campaign, whole
-from undertow.campaign.invalid_trials import refusals
-from undertow.campaign.requirements import too_few
-from undertow.campaign.campaign_schema import Campaign
-from undertow.campaign.trials import Trials, trials
 
 
 class Prepared(NamedTuple):
@@ -52,7 +52,7 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
     advice: dict[str, str] = {}
     for row, built in firsts:
         _check(campaign, built.scenario.loop)
-        for sentence in (*built.advice(), *vehicle_doubts(built)):
+        for sentence in (*built.advice(), *vehicle_warnings(built)):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
     told = (*too_few(campaign), *_refused(several, here), *advice.values())
     named = (*(built.resolved for _, built in firsts), *_chosen(several, here))
@@ -63,7 +63,7 @@ def _chosen(several: Trials, here: tasks.Site) -> Iterator[dict[str, Any]]:
     """The first trial with each entry of what is chosen, where it can be built: it may name another file."""
     for data in several.alternatives():
         with contextlib.suppress(BadInput):
-            yield tasks.build_data(several, here.workshop, data).resolved
+            yield tasks.build_data(several, here.part_cache, data).resolved
 
 
 def _refused(several: Trials, here: tasks.Site) -> tuple[str, ...]:
@@ -83,7 +83,7 @@ def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Bu
     for row in rows:
         if row in here.probes():
             return row, here.probes()[row]
-    return rows[0], tasks.build_trial(several, here.workshop, rows[0])
+    return rows[0], tasks.build_trial(several, here.part_cache, rows[0])
 
 
 def _check(campaign: Campaign, loop: Loop) -> None:
@@ -99,7 +99,7 @@ def _check(campaign: Campaign, loop: Loop) -> None:
         if key in ("loop", "loop.dt", "loop.duration"):
             raise BadInput("series", "be of runs of one length and sampling time", f"beside {key}, which differs")
     for i, name in enumerate(campaign.series.signals):
-        checks.choice(f"series.signals[{i}]", name, [field for field in Sample._fields if field != "books"])
+        checks.choice(f"series.signals[{i}]", name, [field for field in Signals._fields if field != "books"])
     if not whole_steps(campaign.series.every, loop.dt):
         must = f"be a whole number of sampling times ({loop.dt:g} s)"
         raise BadInput("series.every", must, f"{campaign.series.every:g} s")

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from undertow.scenario.reading import Text, dump, parse, read
 from undertow.campaign.campaign_schema import Campaign, validate
+from undertow.scenario.reading import Text, dump, parse, read
 
 
 def read_campaign(path: Path) -> tuple[Campaign, Text]:

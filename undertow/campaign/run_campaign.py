@@ -63,7 +63,7 @@ def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None
         tally = Tally(several.number, several.number - sum(map(store.layout.count, missing)), 0, 0)
         watch(tally)
         work = [(text, str(folder), store.layout, number) for number in missing]
-        for i, columns in engine(tasks.fly_block, work):
+        for i, columns in engine(tasks.run_block, work):
             store.write(missing[i], columns)
             tally = tally.after(columns["status"])
             watch(tally)

@@ -8,10 +8,10 @@ import jax
 import numpy as np
 
 from undertow.analysis.metrics import Metrics
+from undertow.campaign.campaign_schema import Series
 from undertow.loop.simd_batch import Plan, Run
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.part_cache import structure
-from undertow.campaign.campaign_schema import Series
 
 _STARTS = ("position", "velocity")
 

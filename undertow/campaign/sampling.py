@@ -8,8 +8,8 @@ from jaxtyping import Float
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from undertow.core.errors import BadInput
 from undertow.campaign.campaign_schema import Campaign, Spread
+from undertow.core.errors import BadInput
 
 # Of the seed: what else is drawn from it.
 _POINTS, _SEEDS = 0, 1

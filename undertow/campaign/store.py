@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from undertow.core.disk import alone, sync
 from undertow.campaign.arrays import check_array, chunk_file, flags, found_array, new_array, opened
 from undertow.campaign.columns import DONE, FLAGS, INPUT_UNIT, Label
 from undertow.campaign.fingerprint import Identity, draws
 from undertow.campaign.layout import Layout
+from undertow.core.disk import alone, sync
 
 
 class Store:

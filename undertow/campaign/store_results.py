@@ -8,15 +8,15 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.metric_meanings import MEANINGS
-from undertow.core.errors import BadInput
-from undertow.core.status import Status
 from undertow.campaign.arrays import check_array, chunk_file, flags, to_be_read
+from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.columns import DONE, FLAGS, INPUT_UNIT, trial_labels
-from undertow.campaign.run_campaign import STORE
 from undertow.campaign.layout import DRAWS, Layout, layout
 from undertow.campaign.reading import read_text
-from undertow.campaign.campaign_schema import Campaign
+from undertow.campaign.run_campaign import STORE
 from undertow.campaign.task import REFUSED
+from undertow.core.errors import BadInput
+from undertow.core.status import Status
 
 
 class Results(NamedTuple):

@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from undertow.core import runtime
-from undertow.core.errors import BadInput
-from undertow.scenario.build import Built, build
-from undertow.scenario.reading import Text
-from undertow.scenario.part_cache import Workshop
-from undertow.campaign.batch_runner import Hangar
+from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.layout import Layout
 from undertow.campaign.reading import read_text
 from undertow.campaign.trials import Trials, trials
+from undertow.core import runtime
+from undertow.core.errors import BadInput
+from undertow.scenario.build import Built, build
+from undertow.scenario.part_cache import PartCache
+from undertow.scenario.reading import Text
 
 # Status of a trial whose scenario cannot be built, beside those of `undertow.core.status`.
 REFUSED = -1
@@ -26,8 +26,8 @@ class Site(NamedTuple):
     """What a process keeps between tasks of one campaign."""
 
     trials: Trials
-    workshop: Workshop
-    hangar: Hangar
+    part_cache: PartCache
+    programs: ProgramCache
     probes: Callable[[], dict[int, Built]]  # of the first trials of every combination those that can be built
 
 
@@ -39,13 +39,13 @@ def site(text: str, folder: str) -> Site:
         text: of the campaign file.
         folder: where relative paths in it start.
     """
-    several, workshop = trials(*read_text(text, Path(folder))), Workshop()
+    several, part_cache = trials(*read_text(text, Path(folder))), PartCache()
     rows = several.probes()
-    probes = functools.cache(lambda: {rows[place]: built for place, built in _built(several, workshop, rows)})
-    return Site(several, workshop, Hangar(lambda: list(probes().values())), probes)
+    probes = functools.cache(lambda: {rows[place]: built for place, built in _built(several, part_cache, rows)})
+    return Site(several, part_cache, ProgramCache(lambda: list(probes().values())), probes)
 
 
-def fly_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
+def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
     """Columns of the trials of a task."""
     return fly(text, folder, layout.trials(task).tolist())
 
@@ -59,21 +59,21 @@ def fly(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndarray]:
         rows: numbers of the trials.
     """
     with runtime.on_processor():
-        return _flown(site(text, folder), rows)
+        return _ran(site(text, folder), rows)
 
 
-def _flown(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
+def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns = {f"vary:{key}": column for key, column in _columns(here.trials, rows)}
     columns["trial"] = np.array(rows, dtype=np.uint32)
     columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
     where: list[int] = []
 
     def flying() -> Iterator[Built]:
-        for place, built in _built(here.trials, here.workshop, rows):
+        for place, built in _built(here.trials, here.part_cache, rows):
             where.append(place)
             yield built
 
-    flown = here.hangar.fly(flying(), here.trials.campaign.series)
+    flown = here.programs.run(flying(), here.trials.campaign.series)
     spread = functools.partial(_spread, len(rows), where)
     columns["status"] = spread(flown.status, REFUSED)
     columns["ended"] = spread(flown.ended, np.nan)
@@ -84,34 +84,34 @@ def _flown(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     return columns | {name: spread(values, np.nan) for name, values in found.items()}
 
 
-def build_trial(several: Trials, workshop: Workshop, row: int) -> Built:
+def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
     """One trial, ready to run.
 
     Raises:
         BadInput: its scenario cannot be built.
     """
     try:
-        return build_data(several, workshop, several.data(row))
+        return build_data(several, part_cache, several.data(row))
     except BadInput as error:
         place = several.place(error.name) or error.where
         raise error.at(where=f"{place}, trial {row}" if place else f"trial {row}") from error.__cause__
 
 
-def build_data(several: Trials, workshop: Workshop, data: dict[str, Any]) -> Built:
+def build_data(several: Trials, part_cache: PartCache, data: dict[str, Any]) -> Built:
     """A scenario that stands where that of the trials does.
 
     Raises:
         BadInput: it cannot be built.
     """
     scenario = several.scenario
-    return build(Text(data, scenario.name, scenario.folder, scenario.lines), workshop)
+    return build(Text(data, scenario.name, scenario.folder, scenario.lines), part_cache)
 
 
-def _built(several: Trials, workshop: Workshop, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
+def _built(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
     """Place among the rows, and trial, of those that can be built; a task of many does not hold them all."""
     for place, row in enumerate(rows):
         with contextlib.suppress(BadInput):
-            yield place, build_trial(several, workshop, row)
+            yield place, build_trial(several, part_cache, row)
 
 
 def _columns(several: Trials, rows: Sequence[int]) -> Iterable[tuple[str, np.ndarray]]:

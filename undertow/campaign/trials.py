@@ -5,11 +5,11 @@ import itertools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from undertow.core.errors import BadInput, nearest
-from undertow.scenario.reading import Text, key_path, read
+from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.labels import is_number, words
 from undertow.campaign.sampling import Draws, value
-from undertow.campaign.campaign_schema import Campaign
+from undertow.core.errors import BadInput, nearest
+from undertow.scenario.reading import Text, key_path, read
 
 # Of each combination so many trials tell whether it can be flown, and which numbers differ.
 _PROBES = 4

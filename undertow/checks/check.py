@@ -9,6 +9,7 @@ from undertow.checks.finding import Finding
 from undertow.checks.part_check import check_contract, of_plant
 from undertow.checks.plant_check import derived_of_plant
 from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
+from undertow.checks.vehicle_findings import vehicle_facts
 from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractPlant
@@ -18,7 +19,6 @@ from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.reading import Text, key_path, read
 from undertow.scenario.schema import Scenario
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
-from undertow.checks.vehicle_findings import vehicle_facts
 from undertow.scenario.vehicle_keys import KEYS
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle

@@ -11,35 +11,45 @@ from undertow.checks.answers import agree, alike, is_a, shaped
 from undertow.checks.finding import Finding, error
 from undertow.checks.plant_check import check_plant
 from undertow.checks.thruster_check import check_thruster
-from undertow.core.contracts import (AbstractController, AbstractDisturbance, AbstractPlant, AbstractReference, AbstractSensor, Load, Measurement, Place, Target)
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractDisturbance,
+    AbstractNavigation,
+    AbstractPlant,
+    AbstractReference,
+    Load,
+    Measurement,
+    Pose,
+    Target,
+)
 from undertow.core.user_code import python_says
 from undertow.sensors.estimate import estimate_of, motion_of
-from undertow.sensors.sensor import AbstractInstrument
+from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 
 _TIMES = (0.37, 1.93, 7.1)  # s; away from round numbers, where references may turn
 
 
-class Surroundings(NamedTuple):
+class DisturbanceProfile(NamedTuple):
     """Where a part is used."""
 
     truth: Measurement
-    place: Place | None
+    pose: Pose | None
 
 
-_BODY = Surroundings(
+_BODY = DisturbanceProfile(
     truth=Measurement(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
-    place=Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
+    pose=Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
 )
 
 
-def of_plant(plant: AbstractPlant) -> Surroundings:
+def of_plant(plant: AbstractPlant) -> DisturbanceProfile:
     """With this plant, as it starts."""
     x = plant.initial_state()
-    return Surroundings(plant.output(jnp.zeros(()), x), plant.place(x))
+    return DisturbanceProfile(plant.output(jnp.zeros(()), x), plant.pose(x))
 
 
-def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ...]:
+def check_contract(part: Any, around: DisturbanceProfile = _BODY) -> tuple[Finding, ...]:
     """What a part does that its contract does not allow; nothing for kinds whose contract is their data.
 
     Args:
@@ -56,7 +66,7 @@ def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ..
     return ()
 
 
-def _controller(controller: AbstractController, around: Surroundings) -> Iterator[Finding]:
+def _controller(controller: AbstractController, around: DisturbanceProfile) -> Iterator[Finding]:
     n = len(controller.model.angles)
     y = Measurement(0.1 * jnp.ones(n), jnp.zeros(n))
     r = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n))
@@ -73,15 +83,15 @@ def _controller(controller: AbstractController, around: Surroundings) -> Iterato
     yield from alike("advance", after, z, "have the form of the state")
 
 
-def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iterator[Finding]:
-    n, place = len(around.truth.position), around.place
+def _disturbance(disturbance: AbstractDisturbance, around: DisturbanceProfile) -> Iterator[Finding]:
+    n, pose = len(around.truth.position), around.pose
     calm = Load(jnp.zeros(n), jnp.zeros(n))
     busy = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
-    path, again = (disturbance.draw(jax.random.PRNGKey(0)) for _ in range(2))
+    path, again = (disturbance.realize(jax.random.PRNGKey(0)) for _ in range(2))
     yield from alike("draw", again, path, "give the same path for the same key")
     if not all(map(np.array_equal, jax.tree.leaves(path), jax.tree.leaves(again))):
         yield error("contract", "draw", "give the same path for the same key", "another one")
-    at = jax.jit(lambda t, calm: disturbance.at(path, t, place, calm))
+    at = jax.jit(lambda t, calm: disturbance.at(path, t, pose, calm))
     form = jax.eval_shape(at, jnp.zeros(()), calm)
     wrong = list(is_a("at", form, Load))
     wrong = wrong or [*shaped("at", form.acceleration, (n,)), *shaped("at", form.wrench, (n,))]
@@ -99,7 +109,7 @@ def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iter
         yield error("contract", "jumps", "be a tuple of times between 0 and the duration", f"{jumps} for 10 s")
 
 
-def _sensor(sensor: AbstractSensor, around: Surroundings) -> Iterator[Finding]:
+def _sensor(sensor: AbstractNavigation, around: DisturbanceProfile) -> Iterator[Finding]:
     path = jax.eval_shape(sensor.draw, jax.random.PRNGKey(0))
     state = jax.eval_shape(sensor.init, path, around.truth)
     y, after = jax.eval_shape(sensor.measure, path, state, jnp.zeros(()), around.truth)
@@ -108,16 +118,16 @@ def _sensor(sensor: AbstractSensor, around: Surroundings) -> Iterator[Finding]:
     yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
 
 
-def _instrument(instrument: AbstractInstrument, around: Surroundings) -> Iterator[Finding]:
+def _instrument(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
     """Tried on a body at rest, so that a delay makes no difference."""
     report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
     truth = Measurement(around.truth.position, jnp.zeros(6), report)
     motion, right = motion_of(truth, jnp.zeros(3), jnp.asarray(0.01)), estimate_of(truth)
-    reading = instrument.reading(motion)
+    reading = sensor.reading(motion)
     if jnp.ndim(reading) != 1:
         yield error("contract", "reading", "give an array of one axis", f"of shape {jnp.shape(reading)}")
         return
-    corrected = instrument.correct(right, reading)
+    corrected = sensor.correct(right, reading)
     wrong = list(alike("correct", corrected, right, "give an estimate in the form it was"))
     if wrong:
         yield from wrong
@@ -126,7 +136,7 @@ def _instrument(instrument: AbstractInstrument, around: Surroundings) -> Iterato
     for name in ("position", "velocity"):
         true = getattr(right, name)
         yield from agree("correct", getattr(corrected, name), true, f"the {name}, where the reading tells nothing new")
-        after = instrument.correct(right._replace(**{name: true + off}), reading)
+        after = sensor.correct(right._replace(**{name: true + off}), reading)
         errors = [float(jnp.linalg.norm(vector)) for vector in (off, getattr(after, name) - true)]
         late = name == "velocity" and (after.position != right.position).any()  # a position of some time ago
         if not late and errors[1] > (1 + 1e-9) * errors[0]:
@@ -134,7 +144,7 @@ def _instrument(instrument: AbstractInstrument, around: Surroundings) -> Iterato
             yield error("contract", "correct", f"move the {name} towards the reading", got)
 
 
-def _reference(reference: AbstractReference, around: Surroundings) -> Iterator[Finding]:
+def _reference(reference: AbstractReference, around: DisturbanceProfile) -> Iterator[Finding]:
     for t in map(jnp.asarray, _TIMES):
         target, rate = jax.jvp(lambda t: tuple(reference.at(t)), (t,), (jnp.ones(()),))
         for value in target:
@@ -143,12 +153,12 @@ def _reference(reference: AbstractReference, around: Surroundings) -> Iterator[F
         yield from agree("at", target[2], rate[1], f"the rate of the velocity at {t:g} s")
 
 
-_USES: dict[type, Callable[[Any, Surroundings], Iterator[Finding]]] = {
+_USES: dict[type, Callable[[Any, DisturbanceProfile], Iterator[Finding]]] = {
     AbstractPlant: lambda plant, around: check_plant(plant),
     AbstractController: _controller,
     AbstractDisturbance: _disturbance,
     AbstractReference: _reference,
-    AbstractSensor: _sensor,
-    AbstractInstrument: _instrument,
+    AbstractNavigation: _sensor,
+    AbstractSensor: _instrument,
     AbstractThruster: lambda thruster, around: check_thruster(thruster),
 }

@@ -87,7 +87,7 @@ def _forms(plant: AbstractPlant) -> Iterator[Finding]:
         yield from (finding for value in effort for finding in shaped("effort", value, (m,)))
     yield from alike("dynamics", jax.eval_shape(plant.dynamics, t, x, u, calm), x, "have the form of the state")
     yield from shaped("acceleration", jax.eval_shape(plant.acceleration, t, x, u, calm), (n,))
-    yield from shaped("health", jax.eval_shape(plant.health, x), ())
+    yield from shaped("status", jax.eval_shape(plant.status, x), ())
 
 
 def _forms_of_model(plant: AbstractPlant) -> Iterator[Finding]:

@@ -15,7 +15,7 @@ def vehicle_facts(built: Built) -> Facts | None:
     return parse(description["contents"]).facts() if "contents" in description else facts_of(vehicle)
 
 
-def vehicle_doubts(built: Built) -> tuple[str, ...]:
+def vehicle_warnings(built: Built) -> tuple[str, ...]:
     """A sentence for each thing that no vehicle can be, and for a weight that is not that of its mass.
 
     The latter is what comes of changing the mass alone, in a scenario or from trial to trial.

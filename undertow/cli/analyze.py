@@ -11,14 +11,14 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
+from undertow.prediction.predict import predict
+from undertow.prediction.prediction_summary import summary
+from undertow.prediction.warnings import advice
 from undertow.report.prediction_page import write_prediction
 from undertow.report.prediction_tables import Rows, tables
 from undertow.scenario.build import build
-from undertow.scenario.results import to_json
 from undertow.scenario.reading import read
-from undertow.prediction.warnings import advice
-from undertow.prediction.predict import predict
-from undertow.prediction.prediction_summary import summary
+from undertow.scenario.results import to_json
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 
@@ -33,16 +33,16 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool)
         built = build(read(scenario, allow_code=allow_code))
         with shares(console) as progress:
             prediction = interruptible(lambda: predict(built, progress))
-        doubts = (*built.advice(), *advice(prediction))
+        warnings = (*built.advice(), *advice(prediction))
         text = to_json(summary(prediction), indent=1) + "\n"
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
         draft.publish()  # whatever becomes of the figures
-        warn_of(write_prediction(prediction, doubts, draft.path))
+        warn_of(write_prediction(prediction, warnings, draft.path))
     for rows in tables(prediction):
         console.print(_table(rows))
     if prediction.why_not:
-        console.print(f"No metrics foretold: {prediction.why_not}.", highlight=False, soft_wrap=True)
-    for sentence in dict.fromkeys(doubts):
+        console.print(f"No metrics predicted: {prediction.why_not}.", highlight=False, soft_wrap=True)
+    for sentence in dict.fromkeys(warnings):
         typer.echo(f"Advice: {sentence}", err=True)
     console.print(f"Page: {folder / 'prediction.html'}", highlight=False, soft_wrap=True)
     return DONE

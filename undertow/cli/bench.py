@@ -6,11 +6,11 @@ from typing import Any
 import typer
 from rich.table import Table
 
+from undertow.bench.measure import measure
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
-from undertow.bench.measure import measure
 
 _ROWS = {
     "single_ns": "one run, in a lane of its own",
@@ -56,7 +56,7 @@ def bench(as_json: bool) -> int:
 
 def _table(words: str, found: dict[str, Any], prefix: str) -> Table:
     """One workload; ratios to plain NumPy where that was measured, too."""
-    steps = f"{found[f'{prefix}ticks']} steps, {found['lanes']} lanes, {found['threads']} threads"
+    steps = f"{found[f'{prefix}steps']} steps, {found['lanes']} lanes, {found['threads']} threads"
     table = Table(title=f"{words}: nanoseconds per step and run ({steps})", title_justify="left", title_style="bold")
     table.add_column("what")
     table.add_column("ns", justify="right")

@@ -12,6 +12,13 @@ from typing import NoReturn
 import typer
 from rich.console import Console
 
+from undertow.campaign.campaign_summary import endings, summary
+from undertow.campaign.clusters import check_cluster, cluster
+from undertow.campaign.executors import by_dask, in_threads
+from undertow.campaign.prepare import Prepared, prepare
+from undertow.campaign.run_campaign import STORE, Engine, Tally, Watch, conduct
+from undertow.campaign.store_results import load
+from undertow.campaign.task import build_trial
 from undertow.cli.campaign_folder import check_folder, clear_folder
 from undertow.cli.campaign_text import sentences, table
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
@@ -22,16 +29,9 @@ from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import write_campaign
-from undertow.scenario.results import to_json
+from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
-from undertow.scenario.part_cache import Workshop
-from undertow.campaign.clusters import check_cluster, cluster
-from undertow.campaign.run_campaign import STORE, Engine, Tally, Watch, conduct
-from undertow.campaign.executors import by_dask, in_threads
-from undertow.campaign.prepare import Prepared, prepare
-from undertow.campaign.store_results import load
-from undertow.campaign.campaign_summary import endings, summary
-from undertow.campaign.task import build_trial
+from undertow.scenario.results import to_json
 
 
 def campaign(
@@ -144,9 +144,9 @@ def _live(console: Console) -> Iterator[Watch]:
 def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    workshop = Workshop()
+    part_cache = PartCache()
     for trial in trials:
-        data = build_trial(prepared.trials, workshop, trial).resolved  # with the contents of files that it names
-        data = data | {"steady": data["steady"] | {"every_tick": True}}
+        data = build_trial(prepared.trials, part_cache, trial).resolved  # with the contents of files that it names
+        data = data | {"steady": data["steady"] | {"every_step": True}}
         text = f"# Trial {trial} of the campaign.\n{dump(data)}"
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")

@@ -3,10 +3,10 @@
 import shutil
 from pathlib import Path
 
+from undertow.campaign.run_campaign import STORE
 from undertow.cli import results_folder
 from undertow.core.disk import alone
 from undertow.core.errors import BadInput
-from undertow.campaign.run_campaign import STORE
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 

@@ -2,8 +2,8 @@
 
 from rich.table import Table
 
-from undertow.report.campaign_tables import by_xla
 from undertow.campaign.store_results import Results
+from undertow.report.campaign_tables import by_xla
 
 
 def table(results: Results, found: dict) -> Table:

@@ -6,10 +6,10 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from undertow.checks import check
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.tables import wide_console
 from undertow.core.errors import BadInput
-from undertow.checks import check
 from undertow.scenario.yaml_text import load
 
 

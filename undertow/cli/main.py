@@ -69,7 +69,7 @@ def simulate(
     ] = False,
     prediction: Annotated[
         bool,
-        typer.Option("--prediction/--no-prediction", help="Whether to foretell the steady metrics beside the run."),
+        typer.Option("--prediction/--no-prediction", help="Whether to predict the steady metrics beside the run."),
     ] = True,
     allow_code: AllowCode = False,
 ) -> int:
@@ -186,7 +186,7 @@ def list_parts(
 ) -> None:
     """List what there is.
 
-    Kinds: vehicles, thrusters, power, plants, controllers, disturbances, references, instruments, sensors.
+    Kinds: vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, sensors.
     """
     from undertow.cli.list_parts import list_parts
 

@@ -1,4 +1,4 @@
-"""What was foretold of a run, beside what came of it."""
+"""What was predicted of a run, beside what came of it."""
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -6,9 +6,9 @@ from typing import Any, NamedTuple, TypeVar
 
 from undertow.analysis.linearization.response import Comparison, compare
 from undertow.core.user_code import python_says
+from undertow.prediction.operating_point import operating_point, predicted
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.execute import Executed
-from undertow.prediction.operating_point import foretold, ground
 
 Result = TypeVar("Result")
 
@@ -30,7 +30,7 @@ class Foresight(NamedTuple):
 
 
 def beside(work: Callable[[], Result], built: Built, wanted: bool) -> tuple[Result, Foresight | None]:
-    """Result of `work`, and what is foretold of the scenario meanwhile: compiling takes most of the time of both."""
+    """Result of `work`, and what is predicted of the scenario meanwhile: compiling takes most of the time of both."""
     if not wanted:
         return work(), None
     with ThreadPoolExecutor(1) as other:
@@ -38,44 +38,44 @@ def beside(work: Callable[[], Result], built: Built, wanted: bool) -> tuple[Resu
         return work(), foreseen.result()
 
 
-def departures(foresight: Foresight, executed: Executed) -> list[Comparison]:
-    """Metrics that depart by more than a tenth from what was foretold."""
-    return [one for one in _compared(foresight, executed) if one.name not in _PEAKS and one.departure > _DEPARTS]
+def departures(predicted: Foresight, executed: Executed) -> list[Comparison]:
+    """Metrics that depart by more than a tenth from what was predicted."""
+    return [one for one in _compared(predicted, executed) if one.name not in _PEAKS and one.departure > _DEPARTS]
 
 
-def judgement(foresight: Foresight, executed: Executed) -> str:
+def judgement(predicted: Foresight, executed: Executed) -> str:
     """One sentence on how the run compares with its prediction."""
-    if foresight.metrics is None:
-        return f"No prediction: {foresight.why_not}"
+    if predicted.metrics is None:
+        return f"No prediction: {predicted.why_not}"
     if executed.steady is None:
         return "The prediction is for the steady window, which the run did not reach"
-    departing = departures(foresight, executed)
+    departing = departures(predicted, executed)
     if not departing:
         return "As predicted: no metric departs by more than 10 %"
     named = ", ".join(f"{one.name} by {one.departure:.0%}" for one in departing)
     return f"Departs from the linear prediction by more than 10 %: {named}{_because(executed.steady)}"
 
 
-def in_results(foresight: Foresight | None) -> dict[str, Any]:
+def in_results(predicted: Foresight | None) -> dict[str, Any]:
     """What metrics.json says of it."""
-    if foresight is None:
+    if predicted is None:
         return {}
-    return {"predicted": foresight.metrics} | ({"not_predicted": foresight.why_not} if foresight.why_not else {})
+    return {"predicted": predicted.metrics} | ({"not_predicted": predicted.why_not} if predicted.why_not else {})
 
 
 @in_its_precision
 def _foresee(built: Built) -> Foresight:
     try:
-        return Foresight(*foretold(ground(built)))
+        return Foresight(*predicted(operating_point(built)))
     except Exception as error:  # a part of the user's own may be run, and yet not be differentiated
         return Foresight(None, f"this loop cannot be linearised: {python_says(error)}")
 
 
-def _compared(foresight: Foresight, executed: Executed) -> list[Comparison]:
-    if foresight.metrics is None or executed.steady is None:
+def _compared(predicted: Foresight, executed: Executed) -> list[Comparison]:
+    if predicted.metrics is None or executed.steady is None:
         return []
-    largest = max(foresight.metrics.values())
-    return [one for one in compare(foresight.metrics, executed.steady) if one.measured > _NOTHING * largest]
+    largest = max(predicted.metrics.values())
+    return [one for one in compare(predicted.metrics, executed.steady) if one.measured > _NOTHING * largest]
 
 
 def _because(steady: dict[str, Any]) -> str:

@@ -5,9 +5,10 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
+from undertow.checks.vehicle_findings import vehicle_warnings
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
-from undertow.cli.prediction_check import Foresight, beside, in_results, judgement
 from undertow.cli.interruptible import interruptible
+from undertow.cli.prediction_check import Foresight, beside, in_results, judgement
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import Stages
 from undertow.cli.tables import certificate_table, metrics_table, wide_console
@@ -15,10 +16,9 @@ from undertow.core.status import Status
 from undertow.report.figures import run_drawings, save_all
 from undertow.scenario.build import build
 from undertow.scenario.execute import Executed, execute, save
-from undertow.scenario.results import certificate_of, metrics_text
 from undertow.scenario.reading import dump, read
 from undertow.scenario.reproducibility import Repetition, compare
-from undertow.checks.vehicle_findings import vehicle_doubts
+from undertow.scenario.results import certificate_of, metrics_text
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
@@ -31,20 +31,20 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
         output_folder(out, Path("runs") / scenario.stem) as folder,
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
     ):
-        executed, foresight = _run(scenario, stages, prediction, allow_code)
+        executed, predicted = _run(scenario, stages, prediction, allow_code)
         with stages("files and figures"):
-            _write(executed, foresight, draft.path)
+            _write(executed, predicted, draft.path)
             repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # whatever becomes of the figures
             warn_of(save_all(lambda: run_drawings(executed.dataset), draft.path / "figures").failures)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
         typer.echo(f"Advice: left to XLA, which is slower, as lanes (docs/lanes.md) lack something: {why}.", err=True)
-    foretold = foresight.metrics if foresight else None
+    predicted = predicted.metrics if predicted else None
     unit = executed.built.closed_loop.plant.input_unit
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, foretold))
-    if foresight:
-        console.print(f"{judgement(foresight, executed)}.", highlight=False, soft_wrap=True)
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, predicted))
+    if predicted:
+        console.print(f"{judgement(predicted, executed)}.", highlight=False, soft_wrap=True)
     certificate = certificate_of(executed.dataset)
     if certificate is not None:
         console.print(certificate_table(certificate, executed.built.window()))
@@ -58,15 +58,15 @@ def _run(path: Path, stages: Stages, prediction: bool, allow_code: bool) -> tupl
         text = read(path, allow_code=allow_code)
     with stages("building"):
         built = build(text)
-    for sentence in (*built.advice(), *vehicle_doubts(built)):
+    for sentence in (*built.advice(), *vehicle_warnings(built)):
         typer.echo(f"Advice: {sentence}", err=True)
     with stages("compiling, running and predicting" if prediction else "compiling and running"):
         return interruptible(lambda: beside(lambda: execute(built), built, prediction))
 
 
-def _write(executed: Executed, foresight: Foresight | None, folder: Path) -> None:
+def _write(executed: Executed, predicted: Foresight | None, folder: Path) -> None:
     save(executed.dataset, folder / "run.nc")
-    (folder / "metrics.json").write_text(metrics_text(executed.dataset, in_results(foresight)), encoding="utf-8")
+    (folder / "metrics.json").write_text(metrics_text(executed.dataset, in_results(predicted)), encoding="utf-8")
     (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
 
 

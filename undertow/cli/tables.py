@@ -15,7 +15,7 @@ def metrics_table(
     input_unit: str,
     predicted: dict[str, float] | None = None,
 ) -> Table:
-    """Metrics of the steady window beside those foretold for it and those of the whole run."""
+    """Metrics of the steady window beside those predicted for it and those of the whole run."""
     table = Table(title="Metrics", title_justify="left", title_style="bold")
     table.add_column("metric")
     if predicted:
@@ -25,9 +25,9 @@ def metrics_table(
     table.add_column("unit")
     for name in MEANINGS:
         if name in whole:
-            foretold = [_number(predicted[name]) if name in predicted else ""] if predicted else []
+            predicted = [_number(predicted[name]) if name in predicted else ""] if predicted else []
             late = _number(steady[name]) if steady and name in steady else "-"
-            table.add_row(name, *foretold, late, _number(whole[name]), unit_of(name, input_unit))
+            table.add_row(name, *predicted, late, _number(whole[name]), unit_of(name, input_unit))
     return table
 
 

@@ -17,12 +17,12 @@ from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
-from undertow.scenario.results import to_json
 from undertow.scenario.reading import read
-from undertow.tuning.tuned_scenario import as_data, as_scenario
+from undertow.scenario.results import to_json
 from undertow.tuning.checkpoint import has_answers
 from undertow.tuning.objective import Step
 from undertow.tuning.tune import METHODS, Tuned, tune
+from undertow.tuning.tuned_scenario import as_data, as_scenario
 
 _WRITTEN = ("tuned.yaml", "tuning.json", "figures")
 _JOURNAL = "tuning.jsonl"
@@ -45,16 +45,16 @@ def tune_scenario(
     with (
         output_folder(_unfinished(first) if resume and out is None else out, first) as folder,
         results_folder(folder, _WRITTEN, "tuning.json", overwrite) as draft,
-        _kept(folder) as journal,
+        _kept(folder) as checkpoint,
     ):
         with _live(console, budget) as (say, watch):
-            run = lambda: tune(text, journal, method=method, budget=budget, resume=resume, say=say, watch=watch)
+            run = lambda: tune(text, checkpoint, method=method, budget=budget, resume=resume, say=say, watch=watch)
             found = interruptible(run)
         data = as_data(found)
         (draft.path / "tuned.yaml").write_text(as_scenario(found), encoding="utf-8")
         (draft.path / "tuning.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
         draft.publish()  # whatever becomes of the figure
-        journal.unlink()
+        checkpoint.unlink()
         warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures").failures)
     console.print(_table(found))
     for line in _sentences(found):
@@ -71,18 +71,18 @@ def _unfinished(first: Path) -> Path:
 
 @contextlib.contextmanager
 def _kept(folder: Path) -> Iterator[Path]:
-    """The journal, which stays when a tuning is interrupted after its first answer, and only then."""
+    """The checkpoint, which stays when a tuning is interrupted after its first answer, and only then."""
     existed = folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
-    journal = folder / _JOURNAL
-    before = journal.exists()
+    checkpoint = folder / _JOURNAL
+    before = checkpoint.exists()
     try:
-        yield journal
+        yield checkpoint
     except BaseException as error:
-        if isinstance(error, KeyboardInterrupt) and has_answers(journal):
+        if isinstance(error, KeyboardInterrupt) and has_answers(checkpoint):
             typer.echo(f"Interrupted. `undertow tune ... --out {folder} --resume` goes on.", err=True)
         elif not before:
-            journal.unlink(missing_ok=True)
+            checkpoint.unlink(missing_ok=True)
             if not existed:
                 with contextlib.suppress(OSError):
                     folder.rmdir()

@@ -17,8 +17,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core import checks
+from undertow.core.actuator_model import AbstractActuatorModel, Forces
 from undertow.core.contracts import AbstractModel, Measurement
-from undertow.core.actuator_model import AbstractDrive, Forces
 from undertow.numerics.linear import matvec
 
 # Largest sensitivity |1 / (1 + L)| that is allowed with a lag that is so many times the nominal one, an actuator that
@@ -53,7 +53,7 @@ class Axis(NamedTuple):
     Attributes:
         sampling_time: s.
         lag: nominal time constant of the actuators, s; None where nothing is known of them.
-        quickest: rate, 1/s, at which they can be made to follow.
+        max_bandwidth: rate, 1/s, at which they can be made to follow.
         delay: that the law knows of and nothing makes up for, s.
         velocity_noise: standard deviation at each sampling time, m/s or rad/s.
         load_rate: how fast loads wander, m/s^2 per sqrt(s) or rad/s^2 per sqrt(s).
@@ -62,7 +62,7 @@ class Axis(NamedTuple):
 
     sampling_time: float
     lag: float | None
-    quickest: float
+    max_bandwidth: float
     delay: float
     velocity_noise: float
     load_rate: float
@@ -114,15 +114,17 @@ def axes_of(
     checks.positive("load_rate", load_rate)
     axes = len(model.angles)
     with jax.ensure_compile_time_eval():  # a law may be made inside a compiled function; its bandwidths are numbers
-        drive, still = model.drive(), jnp.zeros(axes)
-        known = drive.time_constant()
+        actuators, still = model.actuators(), jnp.zeros(axes)
+        known = actuators.time_constant()
         lag = None if known is None else float(jnp.max(known))
-        quickest = float(drive.quickest(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
-        reached = np.asarray(matvec(jnp.abs(model.effect(Measurement(still, still))), largest_forces(drive)))
+        max_bandwidth = float(actuators.max_bandwidth(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
+        reached = np.asarray(
+            matvec(jnp.abs(model.acceleration_per_force(Measurement(still, still))), largest_forces(actuators))
+        )
     authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
     rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
-    common = (float(sampling_time), lag, quickest, float(delay))
+    common = (float(sampling_time), lag, max_bandwidth, float(delay))
     return [Axis(*common, *row) for row in rows]
 
 
@@ -131,9 +133,9 @@ def alike(values: Sequence[float]):
     return values[0] if len(set(values)) == 1 else jnp.asarray(values, dtype=float)
 
 
-def largest_forces(drive: AbstractDrive) -> Forces:
+def largest_forces(actuators: AbstractActuatorModel) -> Forces:
     """Force that each actuator can hold in its better direction; a very large number where there is no limit."""
-    held = drive.steady()
+    held = actuators.quasi_static()
     low, high = held.range(held.init(), jnp.ones(()))
     return jnp.minimum(jnp.maximum(-low, high), _UNLIMITED)
 
@@ -147,7 +149,7 @@ def robust_bandwidths(axis: Axis) -> Bandwidths:
     tracking = np.minimum(share * bandwidth, 1 / axis.response_time if np.isfinite(axis.authority) else np.inf)
     bandwidth = np.minimum(bandwidth, tracking / _TRACKING_SHARES[0])
     natural = 1 / axis.lag if axis.lag else 0.0
-    actuators = np.minimum(np.maximum(faster * np.maximum(bandwidth, tracking), natural), axis.quickest)
+    actuators = np.minimum(np.maximum(faster * np.maximum(bandwidth, tracking), natural), axis.max_bandwidth)
     best = _best(axis, lambda s: _robust(axis, s, actuators, bandwidth, tracking), bandwidth)
     return Bandwidths(*(float(rate[best, 0]) for rate in (actuators, bandwidth, tracking)))
 
@@ -169,7 +171,7 @@ def _robust_grid(axis: Axis) -> tuple[np.ndarray, ...]:
 
 
 def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking) -> Law:
-    """The law of `controllers/robust` from y to u: sampled estimator, actuators as in `LaggedDrive`."""
+    """The law of `controllers/robust` from y to u: sampled estimator, actuators as in `LaggedActuator`."""
     dt, z = axis.sampling_time, np.exp(s * axis.sampling_time)
     decay = np.exp(-bandwidth * dt)
     of_rates, of_estimate = 2 - 2 * decay, (1 - decay) ** 2 / dt

@@ -9,15 +9,15 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.diagnostics import COLUMNS, share_given, tracking_books, weight_books
+from undertow.controllers.diagnostics import COLUMNS, share_given, tracking_diagnostics, weight_diagnostics
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.contracts import AbstractModel, Measurement, Target, Telemetry
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.estimation.tsk import FuzzySystem
 from undertow.estimation.series_parallel import SeriesParallel
+from undertow.estimation.tsk import FuzzySystem
 from undertow.numerics.linear import matvec
 from undertow.numerics.lyapunov import companion_lyapunov
 from undertow.numerics.projection import projected_rate
@@ -107,8 +107,8 @@ class RCAF(AbstractContinuousController):
             predicted_position=z.predicted_position,
             predicted_velocity=z.predicted_velocity,
             weights=z.weights,
-            books=tracking_books(off, self.lyapunov(), self.weight)
-            | weight_books(z.weights, self.weights_bound)
+            diagnostics=tracking_diagnostics(off, self.lyapunov(), self.weight)
+            | weight_diagnostics(z.weights, self.weights_bound)
             | {"attained_share": share_given(wanted, matvec(self.model.gain(y), u))},
         )
         return u, telemetry

@@ -8,7 +8,7 @@ from undertow.controllers.tracking_error import Tracking
 PerAxis = Float[Array, " n"]
 Scalar = Float[Array, ""]
 
-# Entry of a telemetry's `books` -> meaning and unit. Sums run over the axes.
+# Entry of a telemetry's `diagnostics` -> meaning and unit. Sums run over the axes.
 COLUMNS = {
     "lyapunov_tracking": ("tracking part of the Lyapunov function, 1/2 E^T P E", "m^2/s^2, rad^2/s^2"),
     "lyapunov_decay": ("rate at which feedback takes from it, 1/2 E^T Q E", "m^2/s^3, rad^2/s^3"),
@@ -18,14 +18,14 @@ COLUMNS = {
 }
 
 
-def tracking_books(
+def tracking_diagnostics(
     off: Tracking, lyapunov: Float[Array, "*n 2 2"], weight: Float[Array, "*n 2 2"]
 ) -> dict[str, Scalar]:
     """1/2 E^T P E of Eq. (46) and 1/2 E^T Q E of Eq. (58), E as the law sees it, summed over axes."""
     return {"lyapunov_tracking": _half(off, lyapunov), "lyapunov_decay": _half(off, weight)}
 
 
-def weight_books(weights: Float[Array, "n rules"], bound: Float[Array, "..."]) -> dict[str, Scalar]:
+def weight_diagnostics(weights: Float[Array, "n rules"], bound: Float[Array, "..."]) -> dict[str, Scalar]:
     """Share of the weights that stand at +-bound (one number or one per axis), and how far they have come apart."""
     at_bound = jnp.abs(weights) >= jnp.broadcast_to(bound, weights.shape[:1])[:, None]
     return {

@@ -12,8 +12,8 @@ from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
 from undertow.core import checks
+from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
-from undertow.core.actuator_model import AbstractDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
@@ -27,14 +27,14 @@ class PIDState(NamedTuple):
     """State z of the law."""
 
     integral: PerAxis  # what the integral asks for, m/s^2, rad/s^2
-    drive: Any  # what is believed of the actuators
+    actuators: Any  # what is believed of the actuators
     filter: FilterState | None
 
 
 class Plan(NamedTuple):
     """All that is decided at one instant."""
 
-    drive: Any
+    actuators: Any
     error: PerAxis  # m, rad
     forces: Float[Array, " m"]  # that would give what is wanted
 
@@ -70,11 +70,11 @@ class PID(AbstractController):
 
     def init(self, y: Measurement, r: Target) -> PIDState:
         smoothing = None if self.filter is None else self.filter.init(y.position)
-        return PIDState(jnp.zeros_like(y.position), self._drive().init(), smoothing)
+        return PIDState(jnp.zeros_like(y.position), self._actuators().init(), smoothing)
 
     def command(self, z: PIDState, y: Measurement, r: Target):
-        plan, drive, effect = self._plan(z, y, r), self._drive(), self.model.effect(y)
-        forces = allocate(effect, plan.forces, *drive.range(plan.drive, self.actuator_rate), self.direction)
+        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.acceleration_per_force(y)
+        forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, self.actuator_rate), self.direction)
         none = jnp.zeros_like(y.position)
         telemetry = Telemetry(
             estimate=-z.integral,
@@ -83,37 +83,37 @@ class PID(AbstractController):
             predicted_position=y.position,
             predicted_velocity=self.model.rates(y),
             weights=jnp.zeros((y.position.shape[0], 0)),
-            books={"attained_share": attained(effect, plan.forces, forces)},
+            diagnostics={"attained_share": attained(effect, plan.forces, forces)},
         )
-        return drive.command(plan.drive, forces, self.actuator_rate), telemetry
+        return actuators.command(plan.actuators, forces, self.actuator_rate), telemetry
 
     def advance(self, z: PIDState, y: Measurement, r: Target, u_applied, dt) -> PIDState:
         """What limits take away is taken from the integral, too: back-calculation, Astrom and Murray (2008), 10.4.
 
-        Its time constant is the geometric mean of those of integral and derivative, or one tick where that is longer.
+        Its time constant is the geometric mean of those of integral and derivative, or one step where that is longer.
         """
-        plan, drive, effect = self._plan(z, y, r), self._drive(), self.model.effect(y)
-        heading = lambda u: drive.aim(plan.drive, u, self.actuator_rate)
-        asked, going = heading(drive.command(plan.drive, plan.forces, self.actuator_rate)), heading(u_applied)
+        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.acceleration_per_force(y)
+        heading = lambda u: actuators.target_of(plan.actuators, u, self.actuator_rate)
+        asked, going = heading(actuators.command(plan.actuators, plan.forces, self.actuator_rate)), heading(u_applied)
         back = jnp.minimum(jnp.sqrt(self.integral / self.derivative), 1 / dt) * matvec(effect, going - asked)
         share = attained(effect, asked, going)
         return PIDState(
             integral=z.integral + dt * (self.integral * plan.error + back),
-            drive=drive.advance(plan.drive, u_applied, dt),
+            actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model, share, dt),
         )
 
-    def known(self, z: PIDState, y: Measurement, u_applied) -> PerAxis:
-        drive = self._drive()
-        given = drive.force(drive.heard(z.drive, y.actuator), u_applied)
-        return self._drift(y) + matvec(self.model.effect(y), given)
+    def known_acceleration(self, z: PIDState, y: Measurement, u_applied) -> PerAxis:
+        actuators = self._actuators()
+        given = actuators.force(actuators.update_from_report(z.actuators, y.actuator), u_applied)
+        return self._drift(y) + matvec(self.model.acceleration_per_force(y), given)
 
     def columns(self):
         return {"attained_share": ("share of the wanted acceleration that the actuators can give", "1")}
 
-    def _drive(self) -> AbstractDrive:
-        drive = self.model.drive()
-        return drive.steady() if self.motor == "steady" else drive
+    def _actuators(self) -> AbstractActuatorModel:
+        actuators = self.model.actuators()
+        return actuators.quasi_static() if self.motor == "steady" else actuators
 
     def _drift(self, y: Measurement) -> PerAxis:
         return self.model.drift(y) if self.feedforward else jnp.zeros_like(y.position)
@@ -121,10 +121,10 @@ class PID(AbstractController):
     def _plan(self, z: PIDState, y: Measurement, r: Target) -> Plan:
         model = self.model
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
-        velocity, acceleration = model.wanted(y, target)
+        velocity, acceleration = model.desired_motion(y, target)
         error, rate = model.error(y, target), velocity - model.rates(y)
         demand = acceleration + self.proportional * error + self.derivative * rate + z.integral - self._drift(y)
-        return Plan(self._drive().heard(z.drive, y.actuator), error, model.spread(y, demand))
+        return Plan(self._actuators().update_from_report(z.actuators, y.actuator), error, model.force_for(y, demand))
 
 
 def pid(
@@ -170,7 +170,7 @@ def pid(
         BadInput: a value is out of its range.
     """
     checks.positive("sampling_time", sampling_time, "s")
-    model = model.own_axes()
+    model = model.in_body_axes()
     if gains is None:
         if frequency is None:
             axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)

@@ -27,7 +27,7 @@ class Tracking(NamedTuple):
 
 def tracking(model: AbstractModel, lyapunov: Matrices, y: Measurement, r: Target) -> Tracking:
     """Errors of a measurement against a target, with P of Eq. (21)."""
-    velocity, acceleration = model.wanted(y, r)
+    velocity, acceleration = model.desired_motion(y, r)
     error, rate = model.error(y, r), velocity - model.rates(y)
     return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
 

@@ -10,11 +10,11 @@ Inputs = Float[Array, " m"]
 Forces = Float[Array, " m"]
 
 
-class AbstractDrive(eqx.Module):
+class AbstractActuatorModel(eqx.Module):
     """From input to force and back, with what the controller remembers of it (propeller speeds, for instance)."""
 
     @abc.abstractmethod
-    def quickest(self, sampled: Float[Array, ""]) -> Float[Array, ""]:
+    def max_bandwidth(self, sampled: Float[Array, ""]) -> Float[Array, ""]:
         """Rate, 1/s, at which it can be made to follow where sampling allows `sampled` (1/s)."""
 
     @abc.abstractmethod
@@ -26,7 +26,7 @@ class AbstractDrive(eqx.Module):
         """State at rest."""
 
     @abc.abstractmethod
-    def heard(self, state: PyTree, report: PyTree) -> PyTree:
+    def update_from_report(self, state: PyTree, report: PyTree) -> PyTree:
         """State with what the actuators report of themselves put into it."""
 
     @abc.abstractmethod
@@ -42,19 +42,19 @@ class AbstractDrive(eqx.Module):
         """Input that brings the force to a wanted one, as fast as `rate` (1/s) where it cannot be at once."""
 
     @abc.abstractmethod
-    def aim(self, state: PyTree, u: Inputs, rate: Float[Array, ""]) -> Forces:
+    def target_of(self, state: PyTree, u: Inputs, rate: Float[Array, ""]) -> Forces:
         """Force that an input is on its way to: `command` solved."""
 
     @abc.abstractmethod
     def advance(self, state: PyTree, u: Inputs, dt: Float[Array, ""]) -> PyTree:
         """State after a sampling time with an input held."""
 
-    def steady(self) -> "AbstractDrive":
+    def quasi_static(self) -> "AbstractActuatorModel":
         """The same actuators taken for ones that follow at once."""
         return self
 
 
-class DirectDrive(AbstractDrive):
+class DirectActuator(AbstractActuatorModel):
     """The force is proportional to the input, within limits of the input."""
 
     gain: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
@@ -62,7 +62,7 @@ class DirectDrive(AbstractDrive):
     high: Inputs = eqx.field(converter=jnp.asarray, default=jnp.inf)
     at_once: bool = eqx.field(static=True, default=True)  # whether the force is known to follow the input at once
 
-    def quickest(self, sampled):
+    def max_bandwidth(self, sampled):
         return sampled
 
     def time_constant(self):
@@ -71,7 +71,7 @@ class DirectDrive(AbstractDrive):
     def init(self) -> tuple[()]:
         return ()
 
-    def heard(self, state, report) -> tuple[()]:
+    def update_from_report(self, state, report) -> tuple[()]:
         return ()
 
     def range(self, state, rate):
@@ -83,24 +83,24 @@ class DirectDrive(AbstractDrive):
     def command(self, state, force, rate):
         return force / self.gain
 
-    def aim(self, state, u, rate):
+    def target_of(self, state, u, rate):
         return self.gain * u
 
     def advance(self, state, u, dt) -> tuple[()]:
         return ()
 
 
-class LaggedDrive(AbstractDrive):
+class LaggedActuator(AbstractActuatorModel):
     """Actuators whose force follows that of a steady curve with a first-order lag: tau f_dot + f = f_steady(u).
 
     The force is that of the same equation, driven by the input that was applied.
     """
 
-    curve: AbstractDrive  # without memory
+    curve: AbstractActuatorModel  # without memory
     tau: Float[Array, ""] = eqx.field(converter=jnp.asarray)  # s
     count: int = eqx.field(static=True)
 
-    def quickest(self, sampled):
+    def max_bandwidth(self, sampled):
         return jnp.maximum(sampled, 1 / self.tau)  # no faster than it is by itself costs nothing
 
     def time_constant(self):
@@ -109,7 +109,7 @@ class LaggedDrive(AbstractDrive):
     def init(self) -> Forces:
         return jnp.zeros(self.count)
 
-    def heard(self, state, report) -> Forces:
+    def update_from_report(self, state, report) -> Forces:
         return state
 
     def range(self, state, rate):
@@ -126,12 +126,12 @@ class LaggedDrive(AbstractDrive):
     def command(self, state, force, rate):
         return self.curve.command((), state + self.tau * rate * (force - state), rate)
 
-    def aim(self, state, u, rate):
+    def target_of(self, state, u, rate):
         return state + (self.curve.force((), u) - state) / (self.tau * rate)
 
     def advance(self, state, u, dt):
         """Exactly, for an input that is held."""
         return state + (self.curve.force((), u) - state) * -jnp.expm1(-dt / self.tau)
 
-    def steady(self) -> AbstractDrive:
+    def quasi_static(self) -> AbstractActuatorModel:
         return self.curve

@@ -27,7 +27,7 @@ KINDS = (
     "controllers",
     "disturbances",
     "references",
-    "instruments",
+    "sensors",
     "sensors",
 )
 

@@ -11,8 +11,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
+from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
 from undertow.core.arrays import as_array
-from undertow.core.actuator_model import AbstractDrive, DirectDrive
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 
@@ -38,7 +38,7 @@ class Target(NamedTuple):
     acceleration: Outputs
 
 
-class Place(NamedTuple):
+class Pose(NamedTuple):
     """Where a body is and how it moves, for loads that depend on it. World axes north, east, down."""
 
     position: Float[Array, "3"]  # m
@@ -53,7 +53,7 @@ class Water(NamedTuple):
     acceleration: Float[Array, "3"]  # m/s^2
 
 
-class Factors(NamedTuple):
+class ModelScaling(NamedTuple):
     """By how much the true body differs from the one the controller was told: factors, 1 for not at all."""
 
     mass: Float[Array, ""]  # on M, and with it on C
@@ -76,7 +76,7 @@ class Load(NamedTuple):
     acceleration: Outputs  # lumped, added to x_ddot; m/s^2, rad/s^2
     wrench: Outputs  # w_d of Eq. (2), on the left side: it opposes; N, N m (body axes for a vehicle)
     water: Water | None = None
-    factors: Factors | None = None
+    scaling: ModelScaling | None = None
     payloads: tuple[Payload, ...] = ()
 
 
@@ -96,7 +96,7 @@ class Telemetry(NamedTuple):
     predicted_position: Outputs  # x_hat
     predicted_velocity: Outputs
     weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2; no columns when nothing is learnt
-    books: dict[str, Array] | None = None  # scalars that this law alone has to tell, by name
+    diagnostics: dict[str, Array] | None = None  # scalars that this law alone has to tell, by name
 
 
 class AbstractModel(eqx.Module):
@@ -116,15 +116,15 @@ class AbstractModel(eqx.Module):
     def invert(self, y: Measurement, acceleration: Outputs) -> Inputs:
         """u with G u = acceleration as nearly as the plant allows: G# of Eqs. (22)-(27)."""
 
-    def drive(self) -> AbstractDrive:
+    def actuators(self) -> AbstractActuatorModel:
         """What stands between input and force; G is per unit of input unless a model says otherwise."""
-        return DirectDrive()
+        return DirectActuator()
 
-    def effect(self, y: Measurement) -> Gain:
+    def acceleration_per_force(self, y: Measurement) -> Gain:
         """Acceleration per force of the drive: x_ddot = F + effect force + d."""
         return self.gain(y)
 
-    def spread(self, y: Measurement, acceleration: Outputs) -> Inputs:
+    def force_for(self, y: Measurement, acceleration: Outputs) -> Inputs:
         """Smallest forces of the drive with effect force = acceleration, as nearly as possible."""
         return self.invert(y, acceleration)
 
@@ -138,23 +138,23 @@ class AbstractModel(eqx.Module):
         """Velocity, m/s and rad/s."""
         return y.velocity
 
-    def outward(self, y: Measurement, rates: Outputs) -> Outputs:
+    def output_rates(self, y: Measurement, rates: Outputs) -> Outputs:
         """Velocity of the outputs for given `rates`, or any small motion likewise."""
         return rates
 
-    def wanted(self, y: Measurement, r: Target) -> tuple[Outputs, Outputs]:
+    def desired_motion(self, y: Measurement, r: Target) -> tuple[Outputs, Outputs]:
         """Velocity of the target and its time derivative."""
         return r.velocity, r.acceleration
 
-    def seen(self, y: Measurement, acceleration: Outputs) -> Outputs:
+    def rates_derivative(self, y: Measurement, acceleration: Outputs) -> Outputs:
         """Time derivative of `rates` for a second derivative of the outputs."""
         return acceleration
 
-    def bears(self) -> tuple[Status, ...]:
+    def tolerated_status(self) -> tuple[Status, ...]:
         """Conditions of the plant under which a run goes on, because these coordinates are not touched by them."""
         return ()
 
-    def own_axes(self) -> "AbstractModel":
+    def in_body_axes(self) -> "AbstractModel":
         """This model in the coordinates that suit the plant best; itself where there are no better ones."""
         return self
 
@@ -189,7 +189,7 @@ class AbstractPlant(eqx.Module):
         """x_ddot of the outputs, m/s^2 and rad/s^2."""
 
     @abc.abstractmethod
-    def place(self, x: PyTree) -> Place | None:
+    def pose(self, x: PyTree) -> Pose | None:
         """Where the body is; None for plants that are not bodies in water."""
 
     @abc.abstractmethod
@@ -205,7 +205,7 @@ class AbstractPlant(eqx.Module):
         """Number m of inputs."""
 
     @abc.abstractmethod
-    def health(self, x: PyTree) -> Array:
+    def status(self, x: PyTree) -> Array:
         """Status code of a state; `Status.OK` as long as it means anything."""
 
     @abc.abstractmethod
@@ -216,16 +216,16 @@ class AbstractPlant(eqx.Module):
     def model(self) -> AbstractModel:
         """What a controller is told of this plant; keyword arguments with defaults are the scenario's `model`."""
 
-    def books(self, x: PyTree, u: Inputs) -> dict[str, Array]:
+    def diagnostics(self, x: PyTree, u: Inputs) -> dict[str, Array]:
         """Scalars that this plant alone has and that are worth recording, by name."""
         return {}
 
     def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of `books`."""
+        """Meaning and unit of each entry of `diagnostics`."""
         return {}
 
     def no_load(self) -> Load:
-        """Load of calm surroundings."""
+        """Load of load surroundings."""
         zero = jnp.zeros(len(self.outputs))
         return Load(zero, zero)
 
@@ -247,12 +247,12 @@ class AbstractController(eqx.Module):
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
         """State one sampling time later."""
 
-    def known(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+    def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
         """F + G u: what the law takes for granted of the acceleration; d is all the rest."""
         return self.model.drift(y) + matvec(self.model.gain(y), u_applied)
 
     def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of the telemetry's `books`."""
+        """Meaning and unit of each entry of the telemetry's `diagnostics`."""
         return {}
 
 
@@ -260,12 +260,12 @@ class AbstractDisturbance(eqx.Module):
     """A load drawn once from a key; afterwards a function of time."""
 
     @abc.abstractmethod
-    def draw(self, key: PRNGKeyArray) -> PyTree:
+    def realize(self, key: PRNGKeyArray) -> PyTree:
         """Path: everything random about one realisation."""
 
     @abc.abstractmethod
-    def at(self, path: PyTree, t: Time, place: Place | None, calm: Load) -> Load:
-        """`calm`, which is what the surroundings do without this disturbance, with it added, at time t."""
+    def at(self, realization: PyTree, t: Time, pose: Pose | None, load: Load) -> Load:
+        """`load`, which is what the surroundings do without this disturbance, with it added, at time t."""
 
     @abc.abstractmethod
     def jumps(self, duration: float) -> tuple[float, ...]:
@@ -279,26 +279,26 @@ class AbstractReference(eqx.Module):
     def at(self, t: Time) -> Target:
         """Wanted position, velocity and acceleration at time t."""
 
-    def beginning_at(self, position: Outputs) -> "AbstractReference":
+    def starting_at(self, position: Outputs) -> "AbstractReference":
         """This reference for a plant that starts at a position; itself unless it leaves open where it begins."""
         return self
 
 
-class AbstractSensor(eqx.Module):
+class AbstractNavigation(eqx.Module):
     """What stands between the truth and the measurement."""
 
     smooth: eqx.AbstractVar[bool]  # whether it has no memory and changes smoothly with the truth, as one ODE needs
 
     @abc.abstractmethod
-    def draw(self, key: PRNGKeyArray) -> PyTree:
+    def realize(self, key: PRNGKeyArray) -> PyTree:
         """Path: everything random about one realisation."""
 
     @abc.abstractmethod
-    def init(self, path: PyTree, truth: Measurement) -> PyTree:
+    def init(self, realization: PyTree, truth: Measurement) -> PyTree:
         """State at t = 0: what it remembers; () for nothing."""
 
     @abc.abstractmethod
-    def measure(self, path: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
+    def measure(self, realization: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
         """Measurement at time t, and the state after it."""
 
     def ignored(self, state: PyTree) -> Int[Array, ""]:
@@ -306,7 +306,7 @@ class AbstractSensor(eqx.Module):
         return jnp.zeros((), dtype=int)
 
     def velocity_noise(self, dt: float) -> Array:
-        """What a law is told of it: standard deviation of white noise, new at every tick of dt (s), on velocities.
+        """What a law is told of it: standard deviation of white noise, new at every step of dt (s), on velocities.
 
         One number or one per output, m/s and rad/s; zero where nothing is known.
         """

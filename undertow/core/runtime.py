@@ -12,7 +12,7 @@ import jax
 
 # XLA compiles the body of a small `while` loop into one plain function instead of a list of kernels to be
 # dispatched one by one. Its own limit (1 kB of loop state) is below a vehicle with its thrusters; with the limit
-# raised, one tick of the closed loop takes a quarter of the time.
+# raised, one step of the closed loop takes a quarter of the time.
 _ONE_FUNCTION_PER_LOOP = "xla_cpu_small_while_loop_byte_threshold=100000000"
 
 

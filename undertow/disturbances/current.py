@@ -18,11 +18,11 @@ class Current(AbstractDisturbance):
         checks.length("velocity", self.velocity, 3, "north, east, down")
         checks.finite("velocity", self.velocity, "m/s")
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        return with_water(calm, place, self.velocity, jnp.zeros(3))
+    def at(self, realization, t, pose, load: Load) -> Load:
+        return with_water(load, pose, self.velocity, jnp.zeros(3))
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

@@ -37,7 +37,7 @@ class GaussMarkovCurrent(AbstractDisturbance):
         checks.not_negative("deviation", self.deviation, "m/s")
         checks.positive("correlation_time", self.correlation_time, "s")
 
-    def draw(self, key) -> Float[Array, "samples 3"]:
+    def realize(self, key) -> Float[Array, "samples 3"]:
         """Deviations from the mean, m/s: x_k+1 = q x_k + sqrt(1 - q^2) sigma n_k with q = exp(-step/time)."""
         kept = jnp.exp(-self.step / self.correlation_time)
         fresh = jnp.sqrt(-jnp.expm1(-2 * self.step / self.correlation_time))
@@ -47,13 +47,13 @@ class GaussMarkovCurrent(AbstractDisturbance):
         after = lambda first, second: (first[0] * second[0], first[1] * second[0] + second[1])
         return self.deviation * jax.lax.associative_scan(after, (jnp.full((self.samples, 1), kept), news))[1]
 
-    def at(self, path, t, place, calm: Load) -> Load:
+    def at(self, realization, t, pose, load: Load) -> Load:
         index = jnp.clip(t / self.step, 0.0, self.samples - 1.0)
         before = jnp.minimum(index.astype(int), self.samples - 2)
         share = index - before.astype(index.dtype)
-        change = path[before + 1] - path[before]
+        change = realization[before + 1] - realization[before]
         slope = jnp.where(t < self.step * (self.samples - 1), change / self.step, 0.0)
-        return with_water(calm, place, self.mean + path[before] + share * change, slope)
+        return with_water(load, pose, self.mean + realization[before] + share * change, slope)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         times = float(self.step) * np.arange(1, self.samples)

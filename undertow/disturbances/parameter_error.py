@@ -7,16 +7,16 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractDisturbance, Factors, Load
+from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.disturbances.adding import with_factors
+from undertow.disturbances.adding import with_scaling
 
 _RANGES = ("mass", "damping", "restoring", "thrust")
 
 
 class ParameterError(AbstractDisturbance):
-    """Factors on M, D, g and thrust of the true vehicle, each drawn uniformly from a range; the model keeps 1.
+    """ModelScaling on M, D, g and thrust of the true vehicle, each drawn uniformly from a range; the model keeps 1.
 
     Raises:
         BadInput: a range that is not low <= high, or a mass not positive.
@@ -36,13 +36,13 @@ class ParameterError(AbstractDisturbance):
                 raise BadInput(name, "be (lowest, highest)", np.asarray(span).tolist())
         checks.positive("mass", self.mass)
 
-    def draw(self, key) -> Factors:
+    def realize(self, key) -> ModelScaling:
         shares = jax.random.uniform(key, (4,), dtype=self.mass.dtype)
         low, high = jnp.stack([getattr(self, name) for name in _RANGES]).T
-        return Factors(*(low + shares * (high - low)))
+        return ModelScaling(*(low + shares * (high - low)))
 
-    def at(self, path: Factors, t, place, calm: Load) -> Load:
-        return with_factors(calm, place, path)
+    def at(self, realization: ModelScaling, t, pose, load: Load) -> Load:
+        return with_scaling(load, pose, realization)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

@@ -36,7 +36,7 @@ class RandomSuite(AbstractDisturbance):
             checks.positive(name, getattr(self, name), "rad/s")
         checks.positive("hold", self.hold, "s")
 
-    def draw(self, key):
+    def realize(self, key):
         """Frequencies (rad/s, logarithmically uniform) and phases (rad) per axis, and levels (m/s^2, rad/s^2)."""
         of_rates, of_phases, of_levels = jax.random.split(key, 3)
         shape, dtype = (self.axes, _SINUSOIDS), self.slowest.dtype
@@ -45,13 +45,13 @@ class RandomSuite(AbstractDisturbance):
         phases = 2 * jnp.pi * jax.random.uniform(of_phases, shape, dtype=dtype)
         return rates, phases, self.step * jax.random.normal(of_levels, (self.levels, self.axes), dtype=dtype)
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        if calm.acceleration.shape != (self.axes,):
-            raise BadInput("axes", f"be {calm.acceleration.shape[0]}, as the plant has", self.axes)
-        rates, phases, levels = path
+    def at(self, realization, t, pose, load: Load) -> Load:
+        if load.acceleration.shape != (self.axes,):
+            raise BadInput("axes", f"be {load.acceleration.shape[0]}, as the plant has", self.axes)
+        rates, phases, levels = realization
         swing = np.sqrt(2 / _SINUSOIDS) * jnp.sin(rates * t + phases).sum(-1)
         index = jnp.clip(jnp.floor(t / self.hold), 0, self.levels - 1).astype(int)
-        return calm._replace(acceleration=calm.acceleration + self.amplitude * swing + levels[index])
+        return load._replace(acceleration=load.acceleration + self.amplitude * swing + levels[index])
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         times = float(self.hold) * np.arange(1, self.levels)

@@ -37,13 +37,13 @@ class ShearedCurrent(AbstractDisturbance):
         if not isinstance(self.depths, Tracer) and not (np.diff(np.asarray(self.depths)) > 0).all():
             raise BadInput("depths", "increase", np.asarray(self.depths).tolist())
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        down = body_of(place).position[2]
+    def at(self, realization, t, pose, load: Load) -> Load:
+        down = body_of(pose).position[2]
         north, east = jax.vmap(jnp.interp, in_axes=(None, None, 1))(down, self.depths, self.velocities)
-        return with_water(calm, place, jnp.stack([north, east, jnp.zeros_like(north)]), jnp.zeros(3))
+        return with_water(load, pose, jnp.stack([north, east, jnp.zeros_like(north)]), jnp.zeros(3))
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

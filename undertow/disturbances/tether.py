@@ -35,18 +35,18 @@ class Tether(AbstractDisturbance):
         checks.positive("stiffness", self.stiffness, "N/m")
         checks.not_negative("drag", self.drag, "N s^2/m^3")
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        body = body_of(place)
+    def at(self, realization, t, pose, load: Load) -> Load:
+        body = body_of(pose)
         span = self.anchor - body.position - matvec(body.rotation, self.point)
         distance = jnp.sqrt((span**2).sum() + _TINY**2)
         tension = self.stiffness * jnp.maximum(distance - self.length, 0.0)
         speed = jnp.sqrt((body.velocity**2).sum() + _TINY**2)
         hanging = jnp.minimum(distance, self.length)
         force = tension * span / distance - 0.5 * self.drag * hanging * speed * body.velocity
-        return with_force(calm, place, force, self.point)
+        return with_force(load, pose, force, self.point)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

@@ -23,11 +23,11 @@ class SuiteU1(AbstractDisturbance):
     scale: Float[Array, ""] = param("", "factor on all six", default=1.0)
     period: float = eqx.field(static=True, default=math.inf)  # s, after which it begins again
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        if calm.acceleration.shape != (6,):
+    def at(self, realization, t, pose, load: Load) -> Load:
+        if load.acceleration.shape != (6,):
             raise BadInput("disturbance", "fit the plant", "u1, which has 6 axes", hint="Use kind: table")
         if self.period < math.inf:
             t = t - self.period * jnp.floor(t / self.period)
@@ -42,7 +42,7 @@ class SuiteU1(AbstractDisturbance):
                 2 * chirp,
             ]
         )
-        return calm._replace(acceleration=calm.acceleration + self.scale * signals)
+        return load._replace(acceleration=load.acceleration + self.scale * signals)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         once = min(duration, self.period)

@@ -52,7 +52,7 @@ class Waves(AbstractDisturbance):
         checks.not_negative("spreading", self.spreading, "rad")
         checks.positive("peakedness", self.peakedness)
 
-    def draw(self, key) -> Sea:
+    def realize(self, key) -> Sea:
         """Frequencies anywhere in their share of the energy, phases anywhere, headings about the mean one."""
         shares, phases, headings = jax.random.split(key, 3)
         kind = self.height.dtype
@@ -64,18 +64,18 @@ class Waves(AbstractDisturbance):
             heading=self.heading + self.spreading * jax.random.normal(headings, (self.components,), dtype=kind),
         )
 
-    def at(self, path: Sea, t, place, calm: Load) -> Load:
-        north, east, down = body_of(place).position
+    def at(self, realization: Sea, t, pose, load: Load) -> Load:
+        north, east, down = body_of(pose).position
         amplitude = self.height / 4 * math.sqrt(2 / self.components)  # m; sum of a^2 / 2 = (H_s / 4)^2
-        number = path.frequency**2 / _GRAVITY  # 1/m, deep water
-        cosine, sine = jnp.cos(path.heading), jnp.sin(path.heading)
-        angle = number * (north * cosine + east * sine) - path.frequency * t + path.phase
-        speed = amplitude * path.frequency * jnp.exp(-number * jnp.maximum(self.depth + down, 0.0))
+        number = realization.frequency**2 / _GRAVITY  # 1/m, deep water
+        cosine, sine = jnp.cos(realization.heading), jnp.sin(realization.heading)
+        angle = number * (north * cosine + east * sine) - realization.frequency * t + realization.phase
+        speed = amplitude * realization.frequency * jnp.exp(-number * jnp.maximum(self.depth + down, 0.0))
         along, up = speed * jnp.cos(angle), speed * jnp.sin(angle)
         velocity = jnp.stack([(along * cosine).sum(), (along * sine).sum(), -up.sum()])
-        gain_along, gain_up = path.frequency * up, -path.frequency * along
+        gain_along, gain_up = realization.frequency * up, -path.frequency * along
         acceleration = jnp.stack([(gain_along * cosine).sum(), (gain_along * sine).sum(), -gain_up.sum()])
-        return with_water(calm, place, velocity, acceleration)
+        return with_water(load, pose, velocity, acceleration)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

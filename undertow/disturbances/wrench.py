@@ -17,13 +17,13 @@ class ConstantWrench(AbstractDisturbance):
     def __check_init__(self):
         checks.finite("value", self.value)
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        if np.shape(self.value) != calm.wrench.shape:
-            raise BadInput("value", f"have {calm.wrench.shape[0]} entries", f"of shape {np.shape(self.value)}")
-        return calm._replace(wrench=calm.wrench + self.value)
+    def at(self, realization, t, pose, load: Load) -> Load:
+        if np.shape(self.value) != load.wrench.shape:
+            raise BadInput("value", f"have {load.wrench.shape[0]} entries", f"of shape {np.shape(self.value)}")
+        return load._replace(wrench=load.wrench + self.value)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

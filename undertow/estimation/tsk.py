@@ -59,7 +59,7 @@ class FuzzySystem(eqx.Module):
         """theta^T xi of Eqs. (36) and (42); between the smallest and the largest weight."""
         return (weights * basis).sum(-1)
 
-    def gathering(self) -> Float[Array, ""]:
+    def basis_norm_squared(self) -> Float[Array, ""]:
         """|xi(0)|^2: all that is left of the fuzzy design in small signal; between 1/rules and 1."""
         return (self.basis(jnp.zeros((1, self.inputs))) ** 2).sum()
 

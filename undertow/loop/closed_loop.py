@@ -9,11 +9,24 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.arrays import as_array
-from undertow.core.contracts import (AbstractController, AbstractDisturbance, AbstractPlant, AbstractReference, AbstractSensor, Inputs, Load, Measurement, Outputs, Target, Telemetry, Time)
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractDisturbance,
+    AbstractNavigation,
+    AbstractPlant,
+    AbstractReference,
+    Inputs,
+    Load,
+    Measurement,
+    Outputs,
+    Target,
+    Telemetry,
+    Time,
+)
 from undertow.loop.readings import Expected, at_start
 
 
-class Sample(NamedTuple):
+class Signals(NamedTuple):
     """Everything worth keeping of one instant; names as they stand in result files."""
 
     position: Outputs
@@ -35,10 +48,10 @@ class Sample(NamedTuple):
     power: Inputs
     saturated: Inputs
     bad_readings: Int[Array, ""]  # so far
-    books: dict[str, Array]  # what this plant alone has to tell, by name
+    diagnostics: dict[str, Array]  # what this plant alone has to tell, by name
 
 
-class Heard(NamedTuple):
+class MeasurementState(NamedTuple):
     """What is remembered of measurements."""
 
     sensor: PyTree  # state of the sensor
@@ -53,7 +66,7 @@ class Decision(NamedTuple):
     command: Inputs
     applied: Inputs
     telemetry: Telemetry
-    heard: Any  # Heard afterwards; () where nothing is remembered
+    measuring: Any  # MeasurementState afterwards; () where nothing is remembered
 
 
 class ClosedLoop(eqx.Module):
@@ -63,7 +76,7 @@ class ClosedLoop(eqx.Module):
     controller: AbstractController
     reference: AbstractReference
     disturbance: AbstractDisturbance
-    sensor: AbstractSensor
+    sensor: AbstractNavigation
 
     def outputs_at_start(self, position: Any, velocity: Any) -> tuple[Outputs, Outputs]:
         """Outputs at t = 0 as arrays, zero where None: one compiled program serves every start."""
@@ -71,80 +84,81 @@ class ClosedLoop(eqx.Module):
         made = lambda given: as_array(zero if given is None else given)
         return made(position), made(velocity)
 
-    def beginning_at(self, position: Any) -> "ClosedLoop":
+    def starting_at(self, position: Any) -> "ClosedLoop":
         """This loop with its reference beginning where the plant does; at zero where None."""
         start, _ = self.outputs_at_start(position, None)
-        reference = self.reference.beginning_at(start)
+        reference = self.reference.starting_at(start)
         return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.sensor)
 
-    def draw(self, key: PRNGKeyArray) -> "Drawn":
+    def realize(self, key: PRNGKeyArray) -> "Realization":
         """Draw everything random once."""
         of_disturbance, of_sensor = jax.random.split(key)
-        return Drawn(self, self.disturbance.draw(of_disturbance), self.sensor.draw(of_sensor))
+        return Realization(self, self.disturbance.realize(of_disturbance), self.sensor.realize(of_sensor))
 
 
-class Drawn(NamedTuple):
-    """A closed loop whose random parts have been drawn: from here on everything is a function of time."""
+class Realization(NamedTuple):
+    """A closed loop whose random parts have been realization: from here on everything is a function of time."""
 
     loop: ClosedLoop
-    disturbance_path: PyTree
-    sensor_path: PyTree
+    disturbance_realization: PyTree
+    sensor_realization: PyTree
 
     def start(self, position: Outputs | None = None, velocity: Outputs | None = None) -> tuple[PyTree, PyTree]:
         """States of plant and controller at t = 0, from the outputs there."""
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
-        y, _ = self._read(zero, self.loop.plant.output(zero, x), self.listen(x))
+        y, _ = self._read(zero, self.loop.plant.output(zero, x), self.initial_measuring(x))
         return x, self.loop.controller.init(y, self.loop.reference.at(zero))
 
-    def listen(self, x: PyTree) -> Heard:
+    def initial_measuring(self, x: PyTree) -> MeasurementState:
         """What is remembered of measurements at t = 0."""
         zero, sensor = jnp.zeros(()), self.loop.sensor
         truth = self.loop.plant.output(zero, x)
-        state = sensor.init(self.sensor_path, truth)
+        state = sensor.init(self.sensor_realization, truth)
         if sensor.smooth is True:  # traced in a part whose field is not static; guarded then
-            return Heard(state, None)
-        y, _ = sensor.measure(self.sensor_path, state, zero, truth)
-        return Heard(state, at_start(self.loop.controller.model, truth, y))
+            return MeasurementState(state, None)
+        y, _ = sensor.measure(self.sensor_realization, state, zero, truth)
+        return MeasurementState(state, at_start(self.loop.controller.model, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
         """What the surroundings do to the plant at time t."""
         plant = self.loop.plant
-        return self.loop.disturbance.at(self.disturbance_path, t, plant.place(x), plant.no_load())
+        return self.loop.disturbance.at(self.disturbance_realization, t, plant.pose(x), plant.no_load())
 
-    def decide(self, t: Time, x: PyTree, z: PyTree, heard: Any = ()) -> Decision:
-        """Measure, compare, command, limit; `heard` of a sensor with a memory, and where readings may be no numbers."""
-        y, heard = self._read(t, self.loop.plant.output(t, x), heard)
+    def decide(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Decision:
+        """Measure, compare, command, limit; `measuring` of a sensor with a memory, and where readings may be no numbers."""
+        y, measuring = self._read(t, self.loop.plant.output(t, x), measuring)
         r = self.loop.reference.at(t)
         command, telemetry = self.loop.controller.command(z, y, r)
-        return Decision(y, r, command, self.loop.plant.admissible(x, command), telemetry, heard)
+        return Decision(y, r, command, self.loop.plant.admissible(x, command), telemetry, measuring)
 
-    def _read(self, t: Time, truth: Measurement, heard: Any) -> tuple[Measurement, Any]:
+    def _read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
         """What the law is given, and what is remembered afterwards."""
         measure = self.loop.sensor.measure
-        if not isinstance(heard, Heard):
-            return measure(self.sensor_path, heard, t, truth)
-        y, state = measure(self.sensor_path, heard.sensor, t, truth)
-        if heard.expected is None:
-            return y, Heard(state, None)
-        y, expected = heard.expected.repaired(self.loop.controller.model, y)
-        return y, Heard(state, expected)
+        if not isinstance(measuring, MeasurementState):
+            return measure(self.sensor_realization, measuring, t, truth)
+        y, state = measure(self.sensor_realization, measuring.sensor, t, truth)
+        if measuring.expected is None:
+            return y, MeasurementState(state, None)
+        y, expected = measuring.expected.repaired(self.loop.controller.model, y)
+        return y, MeasurementState(state, expected)
 
-    def sample(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Sample:
+    def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
         """What is written down about time t. Errors are those of the truth, not of the measurement."""
         plant, controller = self.loop.plant, self.loop.controller
         truth = plant.output(t, x)
-        y, r, command, applied, telemetry, heard = decision
+        y, r, command, applied, telemetry, measuring = decision
         acceleration = plant.acceleration(t, x, applied, self.load(t, x))
         effort = plant.effort(x, applied)
-        return Sample(
+        return Signals(
             position=truth.position,
             velocity=truth.velocity,
             measured_position=y.position,
             measured_velocity=y.velocity,
             target=r.position,
             error=controller.model.difference(r.position, truth.position),
-            uncertainty=controller.model.seen(truth, acceleration) - controller.known(z, truth, applied),
+            uncertainty=controller.model.rates_derivative(truth, acceleration)
+            - controller.known_acceleration(z, truth, applied),
             estimate=telemetry.estimate,
             robust=telemetry.robust,
             modelling_error=telemetry.modelling_error,
@@ -156,16 +170,16 @@ class Drawn(NamedTuple):
             command=command,
             power=effort.power,
             saturated=effort.saturated,
-            bad_readings=self._bad_readings(heard),
-            books=plant.books(x, applied) | (telemetry.books or {}),
+            bad_readings=self._bad_readings(measuring),
+            diagnostics=plant.diagnostics(x, applied) | (telemetry.diagnostics or {}),
         )
 
-    def _bad_readings(self, heard: Any) -> Int[Array, ""]:
+    def _bad_readings(self, measuring: Any) -> Int[Array, ""]:
         """Readings so far that were no numbers: left out by the sensor, or replaced for the law."""
-        if not isinstance(heard, Heard) or heard.expected is None:
+        if not isinstance(measuring, MeasurementState) or measuring.expected is None:
             return jnp.zeros((), dtype=int)
-        return heard.expected.replaced + self.loop.sensor.ignored(heard.sensor)
+        return measuring.expected.replaced + self.loop.sensor.ignored(measuring.sensor)
 
-    def look(self, t: Time, x: PyTree, z: PyTree, heard: Any = ()) -> Sample:
+    def record(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Signals:
         """`sample` of the decision taken at time t."""
-        return self.sample(t, x, z, self.decide(t, x, z, heard))
+        return self.signals(t, x, z, self.decide(t, x, z, measuring))

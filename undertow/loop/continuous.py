@@ -14,7 +14,7 @@ from undertow.core.errors import BadInput
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.one_ode import blamed, flow
 from undertow.loop.outcome import Outcome, going
-from undertow.loop.recording import instant, keep_sound, record
+from undertow.loop.recording import freeze_on_failure, instant, record
 from undertow.numerics.integrators import rk4_compact
 
 
@@ -47,7 +47,7 @@ def simulate(
         BadInput: duration, record_step or dt not positive, or as `check`.
     """
     check(loop)
-    loop = loop.beginning_at(position)
+    loop = loop.starting_at(position)
     # As many records as fit; what a division of whole multiples leaves over does not count.
     records = math.floor(duration / record_step * (1 + 1e-9)) if 0 < duration < math.inf and record_step > 0 else 0
     if records < 1:
@@ -84,15 +84,17 @@ def check(loop: ClosedLoop) -> None:
 
 @eqx.filter_jit
 def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, int]) -> Outcome:
-    ticks, every = plan
-    drawn, controller = loop.draw(key), cast(AbstractContinuousController, loop.controller)
+    steps, every = plan
+    realization, controller = loop.realize(key), cast(AbstractContinuousController, loop.controller)
 
-    def tick(carry, k):
+    def control_step(carry, k):
         state, ending = carry
         t = instant(k, dt)
-        x, z = rk4_compact(lambda s, state: flow(s, state, drawn), t, state, dt)
-        return keep_sound(loop, state, (x, controller.project(z)), ending, t, dt)
+        x, z = rk4_compact(lambda s, state: flow(s, state, realization), t, state, dt)
+        return freeze_on_failure(loop, state, (x, controller.project(z)), ending, t, dt)
 
-    (final, ending), (time, samples) = record(drawn, tick, (drawn.start(*start), going()), dt, ticks, every)
-    ending = blamed(ending, drawn, ending.time - dt, final, dt)  # where the step that failed began
-    return Outcome(time, samples, (), final, *ending.until(instant(ticks, dt)))
+    (final, ending), (time, samples) = record(
+        realization, control_step, (realization.start(*start), going()), dt, steps, every
+    )
+    ending = blamed(ending, realization, ending.time - dt, final, dt)  # where the step that failed began
+    return Outcome(time, samples, (), final, *ending.until(instant(steps, dt)))

@@ -7,8 +7,8 @@ from jaxtyping import Array, Float, Int, PyTree
 
 from undertow.core.contracts import Inputs
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop, Sample
-from undertow.loop.readings import all_sound
+from undertow.loop.closed_loop import ClosedLoop, Signals
+from undertow.loop.readings import all_finite
 
 
 class Ending(NamedTuple):
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
     """One run: what was recorded, what was accumulated, how it ended."""
 
     time: Float[Array, " records"]  # s
-    samples: Sample  # one entry per record, the end included
+    signals: Signals  # one entry per record, the end included
     accumulated: Any  # final states of the accumulators
     final: Any  # states (x, z) of plant and controller at the end
     status: Int[Array, ""]  # a Status code
@@ -54,12 +54,12 @@ class Outcome(NamedTuple):
         return status.sentence + said
 
 
-def health(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
+def status_of(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
     """Status code of an instant; what the controller's model can bear is no failure."""
-    code = loop.plant.health(x)
-    for borne in loop.controller.model.bears():
+    code = loop.plant.status(x)
+    for borne in loop.controller.model.tolerated_status():
         code = jnp.where(code == int(borne), int(Status.OK), code)
-    return jnp.where(all_sound((x, z)), code, int(Status.NOT_FINITE))
+    return jnp.where(all_finite((x, z)), code, int(Status.NOT_FINITE))
 
 
 def wrong_input(command: Inputs) -> Int[Array, ""]:

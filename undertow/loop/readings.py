@@ -6,19 +6,19 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Int
 
-from undertow.core.contracts import (AbstractController, AbstractModel, Inputs, Measurement, Outputs, Telemetry, Time)
+from undertow.core.contracts import AbstractController, AbstractModel, Inputs, Measurement, Outputs, Telemetry, Time
 
 
-def sound(numbers: Array) -> Bool[Array, "..."]:
+def is_finite(numbers: Array) -> Bool[Array, "..."]:
     """Which numbers have a square, as laws and metrics need it; a filter may grow for long before it overflows."""
     if not jnp.issubdtype(numbers.dtype, jnp.floating):
         return jnp.isfinite(numbers)
     return jnp.abs(numbers) < jnp.sqrt(jnp.finfo(numbers.dtype).max)
 
 
-def all_sound(tree: Any) -> Bool[Array, ""]:
+def all_finite(tree: Any) -> Bool[Array, ""]:
     """Whether all numbers of a tree are sound."""
-    return jnp.stack([sound(leaf).all() for leaf in jax.tree.leaves(tree)]).all()
+    return jnp.stack([is_finite(leaf).all() for leaf in jax.tree.leaves(tree)]).all()
 
 
 class Expected(NamedTuple):
@@ -36,20 +36,20 @@ class Expected(NamedTuple):
     def repaired(self, model: AbstractModel, y: Measurement) -> tuple[Measurement, "Expected"]:
         """The measurement, each entry that is no number replaced by what is expected of it; and the count."""
         known = Measurement(self.position, self.rates, self.actuator)
-        known = known._replace(velocity=model.outward(known, self.rates))
-        whole = jax.tree.map(lambda read, own: jnp.where(sound(read), read, own), y, known)
-        return whole, self._replace(replaced=self.replaced + jnp.where(all_sound(y), 0, 1))
+        known = known._replace(velocity=model.output_rates(known, self.rates))
+        whole = jax.tree.map(lambda read, own: jnp.where(is_finite(read), read, own), y, known)
+        return whole, self._replace(replaced=self.replaced + jnp.where(all_finite(y), 0, 1))
 
     def after(
         self, law: AbstractController, z: Any, y: Measurement, telemetry: Telemetry, applied: Inputs, dt: Time
     ) -> "Expected":
         """A sampling time later, with an input applied."""
-        acceleration = law.known(z, y, applied) + telemetry.estimate
+        acceleration = law.known_acceleration(z, y, applied) + telemetry.estimate
         rates = law.model.rates(y) + dt * acceleration
         return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)
 
 
 def at_start(model: AbstractModel, truth: Measurement, y: Measurement) -> Expected:
     """Before the first reading `y` the law knows where it was put: the truth, and actuators at rest unless reported."""
-    actuator = jax.tree.map(lambda read: jnp.where(sound(read), read, jnp.zeros_like(read)), y.actuator)
+    actuator = jax.tree.map(lambda read: jnp.where(is_finite(read), read, jnp.zeros_like(read)), y.actuator)
     return Expected(truth.position, model.rates(truth), actuator, jnp.zeros((), dtype=int))

@@ -23,7 +23,7 @@ _MEANINGS = {
     "predicted_velocity": ("axis", "velocity of the identification model", "/s"),
     "voltage": ("input", "input applied", None),
     "command": ("input", "input asked for", None),
-    "power": ("input", "electrical power drawn", "W"),
+    "power": ("input", "electrical power realization", "W"),
     "saturated": ("input", "1 where the input is at its limit", "1"),
     "bad_readings": (None, "readings so far that were no numbers: left out, or replaced by what the law expects", "1"),
     "weights_peak": (None, "largest |theta|", "m/s^2, rad/s^2"),
@@ -34,11 +34,11 @@ _MEANINGS = {
 def to_dataset(outcome: Outcome, plant: AbstractPlant, controller: AbstractController) -> xr.Dataset:
     """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `input` (numbers from 1)."""
     variables = {
-        name: series(dimensions(name), np.asarray(getattr(outcome.samples, name)), *meaning(name, plant))
+        name: series(dimensions(name), np.asarray(getattr(outcome.signals, name)), *meaning(name, plant))
         for name in _MEANINGS
     }
     columns = plant.columns() | controller.columns()
-    for name, values in outcome.samples.books.items():
+    for name, values in outcome.signals.diagnostics.items():
         variables[name] = series(("time",), np.asarray(values), *columns[name])
     status = Status(int(outcome.status))
     return xr.Dataset(

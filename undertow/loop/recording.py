@@ -9,34 +9,39 @@ from jaxtyping import Array, Float, Int
 
 from undertow.core.contracts import Inputs
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
-from undertow.loop.outcome import Ending, health, wrong_input
+from undertow.loop.closed_loop import ClosedLoop, Realization, Signals
+from undertow.loop.outcome import Ending, status_of, wrong_input
 
 
 def record(
-    drawn: Drawn, tick: Callable[[Any, Int[Array, ""]], Any], carry: Any, dt: Float[Array, ""], ticks: int, every: int
-) -> tuple[Any, tuple[Float[Array, " records"], Sample]]:
-    """Run `ticks` ticks and look at every `every`-th instant, the first included.
+    realization: Realization,
+    control_step: Callable[[Any, Int[Array, ""]], Any],
+    carry: Any,
+    dt: Float[Array, ""],
+    steps: int,
+    every: int,
+) -> tuple[Any, tuple[Float[Array, " records"], Signals]]:
+    """Run `steps` steps and look at every `every`-th instant, the first included.
 
     Args:
-        drawn: what is run.
-        tick: carry and number of the tick -> carry one tick later.
-        carry: what goes from tick to tick; the states (x, z, ...) first.
-        dt: time between ticks, s.
-        ticks: how many.
-        every: ticks per record.
+        realization: what is run.
+        control_step: carry and number of the control_step -> carry one control_step later.
+        carry: what goes from control_step to control_step; the states (x, z, ...) first.
+        dt: time between steps, s.
+        steps: how many.
+        every: steps per record.
     """
 
     def block(carry, first):
         """Record, then run to the next record, or to the end."""
-        t, until = instant(first, dt), jnp.minimum(first + every, ticks)
-        sample = drawn.look(t, *carry[0])
-        return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), (t, sample)
+        t, until = instant(first, dt), jnp.minimum(first + every, steps)
+        sample = realization.record(t, *carry[0])
+        return jax.lax.fori_loop(first, until, lambda k, c: control_step(c, k), carry), (t, sample)
 
-    return jax.lax.scan(block, carry, jnp.arange(0, ticks + 1, every))
+    return jax.lax.scan(block, carry, jnp.arange(0, steps + 1, every))
 
 
-def keep_sound(
+def freeze_on_failure(
     loop: ClosedLoop,
     old: Any,
     new: Any,
@@ -45,16 +50,16 @@ def keep_sound(
     dt: Float[Array, ""],
     command: Inputs | None = None,
 ) -> tuple[Any, Ending]:
-    """States (x, z, ...) after a tick from t to t + dt: the new ones, or for ever the old ones once something is wrong.
+    """States (x, z, ...) after a control_step from t to t + dt: the new ones, or for ever the old ones once something is wrong.
 
     Args:
         loop: the five roles.
         old, new: states before and after.
         ending: of the run so far.
         t, dt: s.
-        command: of the tick, where a command that is no number ends the run.
+        command: of the control_step, where a command that is no number ends the run.
     """
-    code, time, wrong = health(loop, *new[:2]), t + dt, jnp.zeros((), dtype=int)
+    code, time, wrong = status_of(loop, *new[:2]), t + dt, jnp.zeros((), dtype=int)
     if command is not None:
         wrong = wrong_input(command)
         code = jnp.where(wrong > 0, int(Status.COMMAND_NOT_FINITE), code)
@@ -65,6 +70,6 @@ def keep_sound(
     return jax.tree.map(lambda n, o: jnp.where(sound, n, o), new, old), ending
 
 
-def instant(tick: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:
-    """Time of a tick, s."""
-    return jnp.asarray(tick, dtype=float) * dt
+def instant(control_step: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:
+    """Time of a control_step, s."""
+    return jnp.asarray(control_step, dtype=float) * dt

@@ -11,12 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, PRNGKeyArray
 
-from undertow.core.contracts import Outputs
-from undertow.core.status import Status
 from simdjit.cuda import Driver
 from simdjit.program import Program
+from undertow.core.contracts import Outputs
+from undertow.core.status import Status
 from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop, Sample
+from undertow.loop.closed_loop import ClosedLoop, Signals
 from undertow.loop.outcome import Outcome
 from undertow.loop.recording import instant
 from undertow.numerics.integrators import METHODS
@@ -35,14 +35,14 @@ class Plan(NamedTuple):
     """How a run is run.
 
     Attributes:
-        ticks: how many.
+        steps: how many.
         dt: sampling time, s.
-        every: ticks per record; 0 for none.
-        signals: of a `Sample`, which are recorded.
-        method, substeps: integration of the plant within one tick.
+        every: steps per record; 0 for none.
+        signals: of a `Signals`, which are recorded.
+        method, substeps: integration of the plant within one control_step.
     """
 
-    ticks: int
+    steps: int
     dt: float
     every: int
     signals: tuple[str, ...]
@@ -51,7 +51,7 @@ class Plan(NamedTuple):
 
     def times(self) -> Float[np.ndarray, " records"]:
         """Of the records, s."""
-        return np.arange(0, self.ticks + 1, self.every) * self.dt
+        return np.arange(0, self.steps + 1, self.every) * self.dt
 
 
 class Ended(NamedTuple):
@@ -66,7 +66,7 @@ class Ended(NamedTuple):
     series: dict[str, Any]
 
 
-class Fleet:
+class BatchRunner:
     """Runs of one kind, compiled once.
 
     Args:
@@ -84,43 +84,43 @@ class Fleet:
     def __init__(self, run: Run, plan: Plan, constant: list[bool], lanes: int = 0, driver: Driver | None = None):
         numbers, rest = eqx.partition(run, eqx.is_array)
         self._plan = plan
-        step, dt = METHODS[plan.method], plan.dt
+        integrate, dt = METHODS[plan.method], plan.dt
 
         def draw(numbers):
             loop, accumulators, at, key = eqx.combine(numbers, rest)
-            return loop.draw(key), accumulators, at
+            return loop.realize(key), accumulators, at
 
         def start(known):
-            drawn, accumulators, at = known
-            return sampled.begin(drawn, at, accumulators)
+            realization, accumulators, at = known
+            return sampled.begin(realization, at, accumulators)
 
-        def tick(known, carry, k):
-            drawn, accumulators, _ = known
-            return sampled.tick(drawn, accumulators, jnp.asarray(dt), step, plan.substeps, carry, k)
+        def control_step(known, carry, k):
+            realization, accumulators, _ = known
+            return sampled.control_step(realization, accumulators, jnp.asarray(dt), integrate, plan.substeps, carry, k)
 
         def look(known, carry, k):
             t = instant(k, jnp.asarray(dt))
             sample = known[0].look(t, *carry[0])
             return t, {name: getattr(sample, name) for name in plan.signals}
 
-        self._program = Program(draw, start, tick, look, numbers, constant, lanes, driver)
+        self._program = Program(draw, start, control_step, look, numbers, constant, lanes, driver)
 
     @property
     def operations(self) -> int:
-        """Arithmetic operations of one step of one run: law, plant and its integration, what is accumulated."""
+        """Arithmetic operations of one integrate of one run: law, plant and its integration, what is accumulated."""
         return self._program.operations
 
-    def fly(self, numbers: Any, ticks: int | None = None) -> Ended:
+    def run(self, numbers: Any, steps: int | None = None) -> Ended:
         """Run them.
 
         Args:
             numbers: arrays of the runs, as in `run`, with a leading axis over runs.
-            ticks: how many; as planned unless given.
+            steps: how many; as planned unless given.
         """
-        ticks, every = self._plan.ticks if ticks is None else ticks, self._plan.every
-        carry, (time, series) = self._program.run(numbers, ticks, every)
+        steps, every = self._plan.steps if steps is None else steps, self._plan.every
+        carry, (time, series) = self._program.run(numbers, steps, every)
         states, accumulated, (status, ended, wrong) = carry
-        ended = np.where(status == int(Status.OK), ticks * self._plan.dt, ended)
+        ended = np.where(status == int(Status.OK), steps * self._plan.dt, ended)
         return Ended(accumulated, states[:2], status, ended, wrong, time, series)
 
 
@@ -142,13 +142,13 @@ def simulate(
     Raises:
         Unsupported: a part needs something that lanes cannot do.
     """
-    ticks, loop = sampled.ticks_of(duration, dt, record_every), loop.beginning_at(position)
+    steps, loop = sampled.steps_of(duration, dt, record_every), loop.starting_at(position)
     start = loop.outputs_at_start(position, velocity)
     run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
     arrays = eqx.filter(run, eqx.is_array)
     constant = [True] * len(jax.tree.leaves(arrays))
-    plan = Plan(ticks, dt, record_every, Sample._fields, method, substeps)
-    fleet = Fleet(run, plan, constant, lanes=1)
-    flown = fleet.fly(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
+    plan = Plan(steps, dt, record_every, Signals._fields, method, substeps)
+    batch = BatchRunner(run, plan, constant, lanes=1)
+    flown = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
     one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, flown)
-    return Outcome(one.time, Sample(**one.series), one.accumulated, one.final, one.status, one.ended, one.input)
+    return Outcome(one.time, Signals(**one.series), one.accumulated, one.final, one.status, one.ended, one.input)

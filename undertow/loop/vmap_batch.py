@@ -11,7 +11,7 @@ from undertow.loop import sampled
 from undertow.loop.simd_batch import Ended, Plan, Run
 
 
-class Fleet:
+class BatchRunner:
     """Runs of one kind, compiled once; `fly` runs them, given their arrays with a leading axis over runs.
 
     Args:
@@ -29,7 +29,7 @@ def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
     loop, accumulators, (position, velocity), key = eqx.combine(numbers, rest)
     outcome = sampled.simulate(
         loop,
-        duration=plan.ticks * plan.dt,
+        duration=plan.steps * plan.dt,
         dt=plan.dt,
         key=key,
         position=position,
@@ -39,6 +39,6 @@ def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
         method=plan.method,
         substeps=plan.substeps,
     )
-    series = {name: getattr(outcome.samples, name) for name in plan.signals}
+    series = {name: getattr(outcome.signals, name) for name in plan.signals}
     ending = outcome.status, outcome.ended, outcome.input
     return Ended(outcome.accumulated, outcome.final, *ending, outcome.time, series)

@@ -1,4 +1,4 @@
-"""Instruments and a plain observer, which gives the controller x and x_dot at the controller's own rate."""
+"""Sensors and a plain observer, which gives the controller x and x_dot at the controller's own rate."""
 
 from typing import NamedTuple
 
@@ -7,14 +7,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from undertow.core.contracts import AbstractSensor, Measurement
+from undertow.core.contracts import AbstractNavigation, Measurement
 from undertow.core.errors import BadInput
+from undertow.numerics.randomness import numbered
 from undertow.sensors.estimate import Estimate, estimate_of, motion_of
 from undertow.sensors.imu import IMU
-from undertow.sensors.sensor import AbstractInstrument
 from undertow.sensors.propeller_speed import PropellerSpeed
-from undertow.sensors.sampling import Spoken
-from undertow.numerics.randomness import numbered
+from undertow.sensors.sampling import SensorState
+from undertow.sensors.sensor import AbstractSensor
 
 # (m/s)^2 s; less counts as none.
 _NOISELESS = 1e-20
@@ -23,14 +23,14 @@ _NOISELESS = 1e-20
 class NavigationState(NamedTuple):
     """What it remembers."""
 
-    time: Float[Array, ""]  # of the last tick, s
+    time: Float[Array, ""]  # of the last step, s
     velocity: Float[Array, "3"]  # the true one then, m/s: accelerometers feel its change
-    spoken: tuple[Spoken, ...]  # one per instrument
+    states: tuple[SensorState, ...]  # one per sensor
     estimate: Estimate
     ignored: Int[Array, ""]  # readings so far that were no numbers
 
 
-class Navigation(AbstractSensor):
+class Navigation(AbstractNavigation):
     """Strapdown inertial navigation, corrected by whatever else arrives, each by its own constant share.
 
     Between readings the estimate moves on by rates and acceleration of the IMU. A late reading is compared with what
@@ -39,54 +39,54 @@ class Navigation(AbstractSensor):
     reading of the DVL over the share that is given to it. A reading that is no number counts as lost.
 
     Raises:
-        BadInput: no instrument, or no IMU.
+        BadInput: no sensor, or no IMU.
     """
 
-    instruments: tuple[AbstractInstrument, ...]
+    sensors: tuple[AbstractSensor, ...]
     smooth: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
-        for i, instrument in enumerate(self.instruments):
-            if not isinstance(instrument, AbstractInstrument):
-                raise BadInput(f"instruments[{i}]", "be an instrument", type(instrument).__name__)
-        if not any(isinstance(instrument, IMU) for instrument in self.instruments):
+        for i, sensor in enumerate(self.sensors):
+            if not isinstance(sensor, AbstractSensor):
+                raise BadInput(f"sensors[{i}]", "be an sensor", type(sensor).__name__)
+        if not any(isinstance(sensor, IMU) for sensor in self.sensors):
             hint = "Add `imu`: nothing else tells roll, pitch and angular rates"
-            raise BadInput("instruments", "have an IMU among them", f"{len(self.instruments)} without", hint=hint)
+            raise BadInput("sensors", "have an IMU among them", f"{len(self.sensors)} without", hint=hint)
 
-    def draw(self, key):
-        return jax.random.split(key, len(self.instruments))
+    def realize(self, key):
+        return jax.random.split(key, len(self.sensors))
 
     def velocity_noise(self, dt):
-        """That of all readings of a second, as if they came evenly at every tick; the filters' memory is left out."""
-        told = [one.velocity_noise() ** 2 * one.sampling.period for one in self.instruments]
+        """That of all readings of a second, as if they came evenly at every step; the filters' memory is left out."""
+        told = [one.velocity_noise() ** 2 * one.sampling.period for one in self.sensors]
         density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in told)
         return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
 
-    def init(self, path, truth: Measurement) -> NavigationState:
+    def init(self, realization, truth: Measurement) -> NavigationState:
         if truth.position.shape != (6,):
             hint = "Take `perfect` or `white_noise`"
             raise BadInput("", "be used on a vehicle", f"a plant of {truth.position.shape[0]} outputs", hint=hint)
         motion = motion_of(truth, truth.velocity[:3], jnp.zeros(()))
-        readings = [instrument.reading(motion) for instrument in self.instruments]
-        chances = _chances(path, jnp.full(len(readings), -1), readings)
-        spoken = tuple(
-            instrument.sampling.init(reading, chance[:-1])
-            for instrument, reading, chance in zip(self.instruments, readings, chances, strict=True)
+        readings = [sensor.reading(motion) for sensor in self.sensors]
+        chances = _chances(realization, jnp.full(len(readings), -1), readings)
+        states = tuple(
+            sensor.sampling.init(reading, chance[:-1])
+            for sensor, reading, chance in zip(self.sensors, readings, chances, strict=True)
         )
         estimate = estimate_of(truth)
-        if not any(isinstance(instrument, PropellerSpeed) for instrument in self.instruments):
+        if not any(isinstance(sensor, PropellerSpeed) for sensor in self.sensors):
             estimate = estimate._replace(actuator=None)
-        return NavigationState(jnp.zeros(()), motion.velocity, spoken, estimate, jnp.zeros((), dtype=int))
+        return NavigationState(jnp.zeros(()), motion.velocity, states, estimate, jnp.zeros((), dtype=int))
 
-    def measure(self, path, state: NavigationState, t, truth: Measurement):
+    def measure(self, realization, state: NavigationState, t, truth: Measurement):
         elapsed = t - state.time
         motion = motion_of(truth, state.velocity, elapsed)
-        readings = [instrument.reading(motion) for instrument in self.instruments]
-        numbers = jnp.stack([instrument.sampling.number(t) for instrument in self.instruments])
+        readings = [sensor.reading(motion) for sensor in self.sensors]
+        numbers = jnp.stack([sensor.sampling.number(t) for sensor in self.sensors])
         heard = [
-            instrument.sampling.hear(spoken, t, reading, chance)
-            for instrument, spoken, reading, chance in zip(
-                self.instruments, state.spoken, readings, _chances(path, numbers, readings), strict=True
+            sensor.sampling.deliver(states, t, reading, chance)
+            for sensor, states, reading, chance in zip(
+                self.sensors, state.states, readings, _chances(realization, numbers, readings), strict=True
             )
         ]
         arrivals = [arrival for arrival, _ in heard]
@@ -95,17 +95,17 @@ class Navigation(AbstractSensor):
             jnp.where(fresh & ~good, 1, 0) for (_, fresh), good in zip(arrivals, finite, strict=True)
         )
         news = [
-            (instrument, (reading, fresh & good))
-            for instrument, (reading, fresh), good in zip(self.instruments, arrivals, finite, strict=True)
+            (sensor, (reading, fresh & good))
+            for sensor, (reading, fresh), good in zip(self.sensors, arrivals, finite, strict=True)
         ]
         estimate = state.estimate
-        for instrument, (reading, fresh) in news:
-            estimate = _either(fresh, instrument.foretell(estimate, reading), estimate)
+        for sensor, (reading, fresh) in news:
+            estimate = _either(fresh, sensor.predict(estimate, reading), estimate)
         estimate = estimate.predicted(elapsed)
-        for instrument, (reading, fresh) in news:
-            estimate = _either(fresh, instrument.correct(estimate, reading), estimate)
-        spoken = tuple(spoken for _, spoken in heard)
-        return estimate.measurement(), NavigationState(t, motion.velocity, spoken, estimate, ignored)
+        for sensor, (reading, fresh) in news:
+            estimate = _either(fresh, sensor.correct(estimate, reading), estimate)
+        states = tuple(states for _, states in heard)
+        return estimate.measurement(), NavigationState(t, motion.velocity, states, estimate, ignored)
 
     def ignored(self, state: NavigationState):
         return state.ignored
@@ -123,10 +123,10 @@ def _either(fresh, new: Estimate, old: Estimate) -> Estimate:
     return jax.tree.map(lambda a, b: jnp.where(fresh, a, b), new, old)
 
 
-def navigation(instruments) -> Navigation:
-    """A vehicle that knows where it is from its instruments only. For the sampled loop.
+def navigation(sensors) -> Navigation:
+    """A vehicle that knows where it is from its sensors only. For the sampled loop.
 
     Args:
-        instruments: any of imu, dvl, depth, position_fix, compass, propeller_speed; an IMU must be among them.
+        sensors: any of imu, dvl, depth, position_fix, compass, propeller_speed; an IMU must be among them.
     """
-    return Navigation(instruments=tuple(instruments))
+    return Navigation(sensors=tuple(sensors))

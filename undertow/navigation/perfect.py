@@ -2,21 +2,21 @@
 
 import equinox as eqx
 
-from undertow.core.contracts import AbstractSensor, Measurement
+from undertow.core.contracts import AbstractNavigation, Measurement
 
 
-class Perfect(AbstractSensor):
+class Perfect(AbstractNavigation):
     """Measures exactly."""
 
     smooth: bool = eqx.field(static=True, default=True)
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def init(self, path, truth) -> tuple[()]:
+    def init(self, realization, truth) -> tuple[()]:
         return ()
 
-    def measure(self, path, state, t, truth: Measurement):
+    def measure(self, realization, state, t, truth: Measurement):
         return truth, ()
 
 

@@ -6,12 +6,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractSensor, Measurement
+from undertow.core.contracts import AbstractNavigation, Measurement
 from undertow.core.param import param
 from undertow.numerics.randomness import numbered
 
 
-class WhiteNoise(AbstractSensor):
+class WhiteNoise(AbstractNavigation):
     """Independent Gaussian errors, new at every sample of the control loop; the number of the sample picks them.
 
     Raises:
@@ -27,18 +27,18 @@ class WhiteNoise(AbstractSensor):
         checks.not_negative("position", self.position)
         checks.not_negative("velocity", self.velocity)
 
-    def draw(self, key):
+    def realize(self, key):
         return key
 
     def velocity_noise(self, dt):
         return self.velocity
 
-    def init(self, path, truth) -> Int[Array, ""]:
+    def init(self, realization, truth) -> Int[Array, ""]:
         """Samples so far."""
         return jnp.zeros((), dtype=int)
 
-    def measure(self, path, state, t, truth: Measurement):
-        errors = jax.random.normal(numbered(path, state), (2, *truth.position.shape), dtype=truth.position.dtype)
+    def measure(self, realization, state, t, truth: Measurement):
+        errors = jax.random.normal(numbered(realization, state), (2, *truth.position.shape), dtype=truth.position.dtype)
         noisy = truth._replace(
             position=truth.position + self.position * errors[0],
             velocity=truth.velocity + self.velocity * errors[1],

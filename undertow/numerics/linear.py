@@ -8,6 +8,6 @@ def matvec(matrix: Float[Array, "m n"], vector: Float[Array, " n"]) -> Float[Arr
 
     A multiply and a sum instead of a `dot`: XLA turns every `dot` into a call of its own, which for a
     6 x 8 matrix costs more than the arithmetic. Written this way the product melts into the elementwise
-    code around it, and one closed-loop tick becomes one compiled function.
+    code around it, and one closed-loop step becomes one compiled function.
     """
     return (matrix * vector).sum(-1)

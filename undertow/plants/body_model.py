@@ -4,11 +4,17 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.contracts import AbstractModel, Measurement, Target
-from undertow.core.actuator_model import AbstractDrive
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import (attitude_error, cross, kinematics_from_euler, quaternion_from_euler, rotation_from_quaternion)
+from undertow.numerics.rotations import (
+    attitude_error,
+    cross,
+    kinematics_from_euler,
+    quaternion_from_euler,
+    rotation_from_quaternion,
+)
 from undertow.vehicles.body import Body
 
 Vector6 = Float[Array, "6"]
@@ -22,16 +28,16 @@ class BodyModel(AbstractModel):
     """
 
     body: Body
-    thrusters: AbstractDrive
+    thrusters: AbstractActuatorModel
     acceleration_per_thrust: Float[Array, "6 N"]  # M^-1 B
     allocation: Float[Array, "N 6"]  # inverse of M^-1 B; what no thruster can give is not asked for
     thrust_per_volt: Float[Array, " N"]  # alpha
     angles: tuple[bool, ...] = eqx.field(static=True, default=(False, False, False, True, True, True))
 
-    def drive(self) -> AbstractDrive:
+    def actuators(self) -> AbstractActuatorModel:
         return self.thrusters
 
-    def bears(self) -> tuple[Status, ...]:
+    def tolerated_status(self) -> tuple[Status, ...]:
         return (Status.PITCH_SINGULAR,)
 
     def error(self, y: Measurement, r: Target) -> Vector6:
@@ -44,10 +50,10 @@ class BodyModel(AbstractModel):
         """nu."""
         return kinematics_from_euler(y.position[3:]).to_body(y.velocity)
 
-    def outward(self, y: Measurement, rates: Vector6) -> Vector6:
+    def output_rates(self, y: Measurement, rates: Vector6) -> Vector6:
         return kinematics_from_euler(y.position[3:]).to_world(rates)
 
-    def wanted(self, y: Measurement, r: Target) -> tuple[Vector6, Vector6]:
+    def desired_motion(self, y: Measurement, r: Target) -> tuple[Vector6, Vector6]:
         """nu of the target as the vehicle sees it in its own axes, and its time derivative."""
         own, other = kinematics_from_euler(y.position[3:]), kinematics_from_euler(r.position[3:])
         rates, nu = own.to_body(y.velocity)[3:], other.to_body(r.velocity)
@@ -58,7 +64,7 @@ class BodyModel(AbstractModel):
         acceleration = matvec(own.rotation.T, r.acceleration[:3]) - cross(rates, velocity)
         return jnp.concatenate([velocity, rate]), jnp.concatenate([acceleration, turning - cross(rates, rate)])
 
-    def seen(self, y: Measurement, acceleration: Vector6) -> Vector6:
+    def rates_derivative(self, y: Measurement, acceleration: Vector6) -> Vector6:
         """nu_dot of an acceleration of the outputs."""
         kinematics = kinematics_from_euler(y.position[3:])
         return kinematics.to_body(acceleration - kinematics.rate_term(kinematics.to_body(y.velocity)))
@@ -67,14 +73,14 @@ class BodyModel(AbstractModel):
         kinematics = kinematics_from_euler(y.position[3:])
         return self.body.free_acceleration(kinematics.to_body(y.velocity), kinematics.rotation[2])
 
-    def effect(self, y: Measurement) -> Float[Array, "6 N"]:
+    def acceleration_per_force(self, y: Measurement) -> Float[Array, "6 N"]:
         return self.acceleration_per_thrust
 
-    def spread(self, y: Measurement, acceleration: Vector6) -> Float[Array, " N"]:
+    def force_for(self, y: Measurement, acceleration: Vector6) -> Float[Array, " N"]:
         return matvec(self.allocation, acceleration)
 
     def gain(self, y: Measurement) -> Float[Array, "6 N"]:
         return self.acceleration_per_thrust * self.thrust_per_volt
 
     def invert(self, y: Measurement, acceleration: Vector6) -> Float[Array, " N"]:
-        return self.spread(y, acceleration) / self.thrust_per_volt
+        return self.force_for(y, acceleration) / self.thrust_per_volt

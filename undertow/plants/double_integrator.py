@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.actuator_model import DirectDrive
 from undertow.core.param import param
 from undertow.core.status import Status
 
@@ -25,10 +25,10 @@ class AxisState(NamedTuple):
 class DoubleIntegratorModel(AbstractModel):
     """F = 0, G = I."""
 
-    actuator: DirectDrive
+    actuator: DirectActuator
     angles: tuple[bool, ...] = eqx.field(static=True)
 
-    def drive(self) -> DirectDrive:
+    def actuators(self) -> DirectActuator:
         return self.actuator
 
     def drift(self, y: Measurement):
@@ -65,7 +65,7 @@ class DoubleIntegrator(AbstractPlant):
     def acceleration(self, t, x: AxisState, u, d: Load):
         return u + d.acceleration - d.wrench
 
-    def place(self, x: AxisState) -> None:
+    def pose(self, x: AxisState) -> None:
         return None
 
     def admissible(self, x: AxisState, u):
@@ -77,7 +77,7 @@ class DoubleIntegrator(AbstractPlant):
     def inputs(self) -> int:
         return len(self.outputs)
 
-    def health(self, x: AxisState) -> Array:
+    def status(self, x: AxisState) -> Array:
         far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
@@ -87,7 +87,7 @@ class DoubleIntegrator(AbstractPlant):
     def model(self) -> DoubleIntegratorModel:
         """The exact model."""
         return DoubleIntegratorModel(
-            actuator=DirectDrive(low=-self.limit, high=self.limit), angles=(False,) * self.inputs()
+            actuator=DirectActuator(low=-self.limit, high=self.limit), angles=(False,) * self.inputs()
         )
 
 

@@ -57,13 +57,13 @@ class HybridModel(AbstractModel):
         wrench = matvec(self.body.mass_matrix, kinematics_from_euler(y.position[3:]).to_body(acceleration))
         return matvec(self.allocation, wrench)
 
-    def own_axes(self) -> BodyModel:
+    def in_body_axes(self) -> BodyModel:
         """The same knowledge in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
         count, effect = self.thruster_matrix.shape[1], self.body.inverse_mass_matrix @ self.thruster_matrix
         alike = 1 / jnp.sqrt(jnp.diagonal(self.body.mass_matrix))  # accelerations of the same kinetic energy
         return BodyModel(
             body=self.body,
-            thrusters=self.thruster.drive(count, self.speed_sensor),
+            thrusters=self.thruster.actuator_model(count, self.speed_sensor),
             acceleration_per_thrust=effect,
             allocation=partial_inverse(effect, alike, self.rank),
             thrust_per_volt=jnp.broadcast_to(self.thruster.voltage_gain(), (count,)),

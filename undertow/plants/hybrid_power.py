@@ -10,7 +10,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core.errors import BadInput
-from undertow.power import ledger as books
+from undertow.power import ledger as diagnostics
 from undertow.power.battery import Battery
 from undertow.power.esc import ESC
 from undertow.thrusters.thruster import AbstractThruster
@@ -52,13 +52,13 @@ class HybridPower(eqx.Module):
             hint = "Give the thruster a supply, or the vehicle a battery"
             raise BadInput("esc", "have a bus voltage to share out", "on an infinite supply", hint=hint)
         if self.ledger and not has_motor(thruster):
-            hint = "There is no motor behind this thruster whose books could be kept"
+            hint = "There is no motor behind this thruster whose diagnostics could be kept"
             raise BadInput("ledger", "be false", "true", hint=hint)
 
     def initial_state(self, thrusters: int) -> PowerState:
         """Full battery, empty ledger."""
         drawn = None if self.battery is None else jnp.zeros(())
-        return PowerState(drawn, books.opened(thrusters) if self.ledger else None)
+        return PowerState(drawn, diagnostics.opened(thrusters) if self.ledger else None)
 
     def dynamics(self, thruster: AbstractThruster, state: Any, rates: Any, power: PowerState, u) -> PowerState:
         """Rates of the electrical state, with those of the thrusters given."""
@@ -71,7 +71,7 @@ class HybridPower(eqx.Module):
             return PowerState(current)
         _, into_store = jax.jvp(thruster.stored, (state,), (rates,))
         heat = jnp.zeros(()) if loss is None else loss
-        rows = books.Ledger(*flows, stored=jnp.broadcast_to(into_store, u.shape), battery=heat)
+        rows = diagnostics.Ledger(*flows, stored=jnp.broadcast_to(into_store, u.shape), battery=heat)
         return PowerState(current, rows)
 
     def admissible(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
@@ -103,7 +103,7 @@ class HybridPower(eqx.Module):
             return thruster.supply
         return self.battery.bus_voltage(power.drawn, thruster.electrical_power(state, u).sum())
 
-    def books(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> dict[str, Scalar]:
+    def diagnostics(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> dict[str, Scalar]:
         """What is worth recording, by name."""
         found, cells = {}, None
         if self.battery is not None:
@@ -112,22 +112,22 @@ class HybridPower(eqx.Module):
             found["charge_drawn"] = power.drawn
             found["state_of_charge"] = self.battery.state_of_charge(power.drawn)
         if self.ledger:
-            found |= books.columns(power.ledger, thruster.stored(state).sum(), cells)
+            found |= diagnostics.columns(power.ledger, thruster.stored(state).sum(), cells)
         return found
 
     def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of `books`."""
+        """Meaning and unit of each entry of `diagnostics`."""
         battery = {
             "bus_voltage": ("voltage of the bus under load", "V"),
             "charge_drawn": ("charge drawn from the battery", "C"),
             "state_of_charge": ("1 when the battery is full, 0 when empty", "1"),
         }
-        energies = {name: (meaning, "J") for name, meaning in books.COLUMNS.items()}
+        energies = {name: (meaning, "J") for name, meaning in diagnostics.COLUMNS.items()}
         return (battery if self.battery is not None else {}) | (energies if self.ledger else {})
 
 
 def has_motor(thruster: AbstractThruster) -> bool:
-    """Whether a motor stands behind the thrust, so that books can be kept; traced, not computed."""
+    """Whether a motor stands behind the thrust, so that diagnostics can be kept; traced, not computed."""
     return jax.eval_shape(thruster.powers, thruster.initial_state(1), jnp.zeros(1)) is not None
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import Place
+from undertow.core.contracts import Pose
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import Kinematics, quaternion_from_euler, rotation_from_quaternion
@@ -23,12 +23,12 @@ class VehicleState(NamedTuple):
     thrusters: Any
     power: PowerState = PowerState()  # battery and ledger
 
-    def place(self) -> Place:
+    def pose(self) -> Pose:
         """Where the body is and how it moves."""
         rotation = rotation_from_quaternion(self.attitude)
-        return Place(self.position, rotation, matvec(rotation, self.nu[:3]))
+        return Pose(self.position, rotation, matvec(rotation, self.nu[:3]))
 
-    def health(self) -> Array:
+    def status(self) -> Array:
         """Status code: Euler angles exist, and nothing is far beyond any vehicle."""
         third_row = rotation_from_quaternion(self.attitude)[2]
         near_vertical = third_row[1] ** 2 + third_row[2] ** 2 < 1e-6

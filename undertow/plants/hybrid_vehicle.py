@@ -8,7 +8,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Place
+from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Pose
 from undertow.core.errors import BadInput
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_rate, rotation_from_quaternion
@@ -29,7 +29,7 @@ _FREEDOMS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 class HybridVehicle(AbstractPlant):
     """x = (north, east, down, roll, pitch, yaw) driven by thruster voltages.
 
-    On the rungs `ideal` and `static` a prescribed acceleration load is the whole of d, J_dot nu included
+    On the fidelities `ideal` and `static` a prescribed acceleration load is the whole of d, J_dot nu included
     (Remark 2); on the others the body moves as it does and the load is added to x_ddot.
 
     Args:
@@ -96,10 +96,10 @@ class HybridVehicle(AbstractPlant):
 
     def _body_acceleration(self, kinematics: Kinematics, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
         """nu_dot of Eq. (2): thrust (6), the body's own motion, and the loads."""
-        body = altered(self.body, d.factors, d.payloads)
+        body = altered(self.body, d.scaling, d.payloads)
         thrust = self.thruster.thrust(x.thrusters, u)
-        if d.factors is not None:
-            thrust = d.factors.thrust * thrust
+        if d.scaling is not None:
+            thrust = d.scaling.thrust * thrust
         wrench = matvec(self.thruster_matrix, thrust) - d.wrench
         prescribed = d.acceleration
         if self.thruster.has_prescribed_acceleration:
@@ -108,8 +108,8 @@ class HybridVehicle(AbstractPlant):
         own = body.free_acceleration(seen.nu, seen.down) + seen.rate
         return own + body.accelerate(wrench) + kinematics.to_body(prescribed)
 
-    def place(self, x: VehicleState) -> Place:
-        return x.place()
+    def pose(self, x: VehicleState) -> Pose:
+        return x.pose()
 
     def admissible(self, x: VehicleState, u):
         return self.power.admissible(self.thruster, x.thrusters, x.power, u)
@@ -118,8 +118,8 @@ class HybridVehicle(AbstractPlant):
         limited = self.power.saturated(self.thruster, x.thrusters, x.power, u)
         return Effort(self.thruster.electrical_power(x.thrusters, u), limited.astype(u.dtype))
 
-    def books(self, x: VehicleState, u):
-        return self.power.books(self.thruster, x.thrusters, x.power, u)
+    def diagnostics(self, x: VehicleState, u):
+        return self.power.diagnostics(self.thruster, x.thrusters, x.power, u)
 
     def columns(self):
         return self.power.columns()
@@ -127,8 +127,8 @@ class HybridVehicle(AbstractPlant):
     def inputs(self) -> int:
         return self.vehicle.thrusters
 
-    def health(self, x: VehicleState) -> Array:
-        return x.health()
+    def status(self, x: VehicleState) -> Array:
+        return x.status()
 
     def advice(self) -> tuple[str, ...]:
         return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _FREEDOMS)

@@ -7,11 +7,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.actuator_model import DirectDrive
 from undertow.core.param import param
 from undertow.core.status import Status
-from undertow.plants.nominal import as_told
+from undertow.plants.nominal import nominal
 
 _FLAT = 0.01  # rad short of 90 deg, where the force has all but lost its grip: G is 1 % of what it is upright
 
@@ -71,10 +71,10 @@ class InvertedPendulumModel(AbstractModel):
     """F = f, G = b of the cart and pole that the controller was told of."""
 
     cart_pole: CartPole
-    actuator: DirectDrive
+    actuator: DirectActuator
     angles: tuple[bool, ...] = eqx.field(static=True, default=(True,))
 
-    def drive(self) -> DirectDrive:
+    def actuators(self) -> DirectActuator:
         return self.actuator
 
     def drift(self, y: Measurement):
@@ -111,7 +111,7 @@ class InvertedPendulum(AbstractPlant):
         own = self.cart_pole.drift(x.angle, x.rate) + self.cart_pole.gain(x.angle) * u
         return own + d.acceleration - d.wrench / self.cart_pole.inertia(x.angle)
 
-    def place(self, x: PendulumState) -> None:
+    def pose(self, x: PendulumState) -> None:
         return None
 
     def admissible(self, x: PendulumState, u):
@@ -123,7 +123,7 @@ class InvertedPendulum(AbstractPlant):
     def inputs(self) -> int:
         return 1
 
-    def health(self, x: PendulumState) -> Array:
+    def status(self, x: PendulumState) -> Array:
         flat = (jnp.abs(x.angle) > jnp.pi / 2 - _FLAT).any()
         return jnp.where(flat, int(Status.OUT_OF_RANGE), int(Status.OK))
 
@@ -140,8 +140,8 @@ class InvertedPendulum(AbstractPlant):
             pole_mass: kg.
             half_length: half the length of the pole, m.
         """
-        told = as_told(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
-        return InvertedPendulumModel(cart_pole=told, actuator=DirectDrive(low=-self.limit, high=self.limit))
+        told = nominal(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
+        return InvertedPendulumModel(cart_pole=told, actuator=DirectActuator(low=-self.limit, high=self.limit))
 
 
 def inverted_pendulum(

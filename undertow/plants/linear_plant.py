@@ -8,14 +8,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.actuator_model import DirectDrive
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.inverses import pseudo_inverse
 from undertow.numerics.linear import matvec
-from undertow.plants.nominal import as_told
+from undertow.plants.nominal import nominal
 from undertow.plants.reachability import open_loop_advice
 
 _ENVELOPE = 1e6
@@ -59,10 +59,10 @@ class LinearModel(AbstractModel):
 
     system: LinearSystem
     allocation: Float[Array, "m n"]  # G+; constant, so nothing is factorised in the loop
-    actuator: DirectDrive
+    actuator: DirectActuator
     angles: tuple[bool, ...] = eqx.field(static=True)
 
-    def drive(self) -> DirectDrive:
+    def actuators(self) -> DirectActuator:
         return self.actuator
 
     def drift(self, y: Measurement):
@@ -101,7 +101,7 @@ class LinearPlant(AbstractPlant):
         own = self.system.drift(x.position, x.velocity) + matvec(self.system.gain, u)
         return own + d.acceleration - d.wrench
 
-    def place(self, x: LinearState) -> None:
+    def pose(self, x: LinearState) -> None:
         return None
 
     def admissible(self, x: LinearState, u):
@@ -115,7 +115,7 @@ class LinearPlant(AbstractPlant):
     def inputs(self) -> int:
         return self.system.gain.shape[1]
 
-    def health(self, x: LinearState) -> Array:
+    def status(self, x: LinearState) -> Array:
         far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
@@ -133,13 +133,13 @@ class LinearPlant(AbstractPlant):
         Raises:
             BadInput: another shape than the truth.
         """
-        told = as_told(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
+        told = nominal(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
         if told.gain.shape != self.system.gain.shape:
             raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{told.gain.shape}")
         return LinearModel(
             system=told,
             allocation=pseudo_inverse(told.gain),
-            actuator=DirectDrive(low=-self.limit, high=self.limit),
+            actuator=DirectActuator(low=-self.limit, high=self.limit),
             angles=(False,) * len(self.outputs),
         )
 

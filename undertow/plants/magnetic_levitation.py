@@ -7,17 +7,17 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.actuator_model import DirectDrive
 from undertow.core.status import Status
 from undertow.plants.levitation_rig import RIGS, LevitationRig, PerCoil
-from undertow.plants.nominal import as_told
+from undertow.plants.nominal import nominal
 
-RUNGS = ("ideal", "coil")
+FIDELITIES = ("ideal", "coil")
 
 
 class LevitationState(NamedTuple):
-    """Place of the ball (m, down from the upper magnet), its speed (m/s), and currents (A; none on rung `ideal`)."""
+    """Pose of the ball (m, down from the upper magnet), its speed (m/s), and currents (A; none on fidelity `ideal`)."""
 
     z: Float[Array, "1"]
     speed: Float[Array, "1"]
@@ -28,10 +28,10 @@ class MagneticLevitationModel(AbstractModel):
     """F = g, G = the pull of each coil per squared current: the rig once its currents are where they should be."""
 
     rig: LevitationRig
-    actuator: DirectDrive
+    actuator: DirectActuator
     angles: tuple[bool, ...] = eqx.field(static=True, default=(False,))
 
-    def drive(self) -> DirectDrive:
+    def actuators(self) -> DirectActuator:
         return self.actuator
 
     def drift(self, y: Measurement):
@@ -54,26 +54,26 @@ class MagneticLevitation(AbstractPlant):
 
     Args:
         rig: ball and coils.
-        rung: `ideal`, currents follow at once, or `coil`, with the time constants of the coils.
+        fidelity: `ideal`, currents follow at once, or `coil`, with the time constants of the coils.
     """
 
     rig: LevitationRig
-    rung: str = eqx.field(static=True, default="coil")
+    fidelity: str = eqx.field(static=True, default="coil")
     outputs: tuple[str, ...] = eqx.field(static=True, default=("z",))
     output_units: tuple[str, ...] = eqx.field(static=True, default=("m",))
     input_unit: str = eqx.field(static=True, default="A^2")
 
     def __check_init__(self):
-        checks.choice("rung", self.rung, RUNGS)
+        checks.choice("fidelity", self.fidelity, FIDELITIES)
 
     def initial_state(self, position=None, velocity=None) -> LevitationState:
         zero = jnp.zeros(1)
-        rest = jnp.broadcast_to(self.rig.smallest_current, (2,)) if self.rung == "coil" else jnp.zeros(0)
+        rest = jnp.broadcast_to(self.rig.smallest_current, (2,)) if self.fidelity == "coil" else jnp.zeros(0)
         return LevitationState(zero if position is None else position, zero if velocity is None else velocity, rest)
 
     def dynamics(self, t, x: LevitationState, u, d: Load) -> LevitationState:
         steady = self.rig.current_gain * self.rig.duty(u) + self.rig.current_offset
-        flowing = (steady - x.current) / self.rig.lag(x.z) if self.rung == "coil" else x.current
+        flowing = (steady - x.current) / self.rig.lag(x.z) if self.fidelity == "coil" else x.current
         return LevitationState(x.speed, self.acceleration(t, x, u, d), flowing)
 
     def output(self, t, x: LevitationState) -> Measurement:
@@ -84,9 +84,9 @@ class MagneticLevitation(AbstractPlant):
         return self.rig.gravity + magnets + d.acceleration - d.wrench / self.rig.mass
 
     def _squared_current(self, x: LevitationState, u) -> PerCoil:
-        return x.current**2 if self.rung == "coil" else u
+        return x.current**2 if self.fidelity == "coil" else u
 
-    def place(self, x: LevitationState) -> None:
+    def pose(self, x: LevitationState) -> None:
         return None
 
     def admissible(self, x: LevitationState, u):
@@ -100,7 +100,7 @@ class MagneticLevitation(AbstractPlant):
     def inputs(self) -> int:
         return 2
 
-    def health(self, x: LevitationState) -> Array:
+    def status(self, x: LevitationState) -> Array:
         touching = ((x.z < 0) | (x.z > self.rig.travel)).any()
         return jnp.where(touching, int(Status.OUT_OF_RANGE), int(Status.OK))
 
@@ -124,21 +124,21 @@ class MagneticLevitation(AbstractPlant):
             inductance_reach: gap over which it falls e times, m.
         """
         changed = {"inductance": inductance, "inductance_reach": inductance_reach}
-        told = as_told(self.rig, mass=mass, force_factor=force_factor, **changed)
-        limits = DirectDrive(low=self.rig.smallest_current**2, high=self.rig.largest_current**2, at_once=False)
+        told = nominal(self.rig, mass=mass, force_factor=force_factor, **changed)
+        limits = DirectActuator(low=self.rig.smallest_current**2, high=self.rig.largest_current**2, at_once=False)
         return MagneticLevitationModel(rig=told, actuator=limits)
 
 
-def magnetic_levitation(rig: str = "balko_rosinova", rung: str = "coil") -> MagneticLevitation:
+def magnetic_levitation(rig: str = "balko_rosinova", fidelity: str = "coil") -> MagneticLevitation:
     """Ball between two electromagnets (INTECO MLS2EM), squared currents in; a run ends where it touches one.
 
     Args:
         rig: a published set of constants: balko_rosinova (ball of 39 g), balko_rosinova_23g, balko_rosinova_16g, or
             inteco_polimi (60.5 g).
-        rung: ideal (currents follow at once) or coil (they lag by 31 ms at the magnet, 3.5 ms at 10 mm).
+        fidelity: ideal (currents follow at once) or coil (they lag by 31 ms at the magnet, 3.5 ms at 10 mm).
 
     Raises:
-        BadInput: no such rig or rung.
+        BadInput: no such rig or fidelity.
     """
     checks.choice("rig", rig, tuple(RIGS))
-    return MagneticLevitation(rig=RIGS[rig](), rung=rung)
+    return MagneticLevitation(rig=RIGS[rig](), fidelity=fidelity)

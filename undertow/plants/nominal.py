@@ -8,6 +8,6 @@ import equinox as eqx
 Part = TypeVar("Part", bound=eqx.Module)
 
 
-def as_told(truth: Part, **told: Any) -> Part:
+def nominal(truth: Part, **told: Any) -> Part:
     """The same part with other values of the named parameters; None leaves the true one."""
     return replace(truth, **{name: value for name, value in told.items() if value is not None})

@@ -7,13 +7,13 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.actuator_model import DirectDrive
 from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 from undertow.plants.arm_links import Links
-from undertow.plants.nominal import as_told
+from undertow.plants.nominal import nominal
 
 _ENVELOPE = 1e3  # rad, rad/s
 
@@ -29,10 +29,10 @@ class TwoLinkArmModel(AbstractModel):
     """F = -M^-1 (C q_dot + g), G = M^-1 of the links that the controller was told of."""
 
     links: Links
-    actuator: DirectDrive
+    actuator: DirectActuator
     angles: tuple[bool, ...] = eqx.field(static=True, default=(True, True))
 
-    def drive(self) -> DirectDrive:
+    def actuators(self) -> DirectActuator:
         return self.actuator
 
     def drift(self, y: Measurement):
@@ -68,7 +68,7 @@ class TwoLinkArm(AbstractPlant):
         turned = matvec(self.links.inverse_mass_matrix(x.angle), u - d.wrench)
         return self.links.drift(x.angle, x.rate) + turned + d.acceleration
 
-    def place(self, x: ArmState) -> None:
+    def pose(self, x: ArmState) -> None:
         return None
 
     def admissible(self, x: ArmState, u):
@@ -80,7 +80,7 @@ class TwoLinkArm(AbstractPlant):
     def inputs(self) -> int:
         return 2
 
-    def health(self, x: ArmState) -> Array:
+    def status(self, x: ArmState) -> Array:
         far = (jnp.abs(x.angle) > _ENVELOPE).any() | (jnp.abs(x.rate) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
@@ -97,8 +97,8 @@ class TwoLinkArm(AbstractPlant):
             outer_centre: from the elbow to their centre of mass, m.
             outer_offset: by how far that centre lags behind the link, rad.
         """
-        told = as_told(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
-        return TwoLinkArmModel(links=told, actuator=DirectDrive(low=-self.limit, high=self.limit))
+        told = nominal(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
+        return TwoLinkArmModel(links=told, actuator=DirectActuator(low=-self.limit, high=self.limit))
 
 
 def two_link_arm(

@@ -59,7 +59,7 @@ COLUMNS = {
     "energy_copper": "heat in the windings",
     "energy_friction": "heat in bearings and seals",
     "energy_water": "work of the propellers on the water",
-    "energy_conversion": "energy out of nothing: (k_t - k_e) I Om, and what rung `ideal` leaves out",
+    "energy_conversion": "energy out of nothing: (k_t - k_e) I Om, and what fidelity `ideal` leaves out",
     "energy_stored": "energy gone into windings and rotors",
     "energy_battery": "heat in the battery",
     "energy_books": "what these leave over: rounding, where the equations conserve energy",

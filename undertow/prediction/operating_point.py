@@ -1,4 +1,4 @@
-"""Where a scenario's loop rests under its mean load, and the metrics of its run foretold from there."""
+"""Where a scenario's loop rests under its mean load, and the metrics of its run predicted from there."""
 
 from typing import Any, NamedTuple
 
@@ -8,29 +8,29 @@ from jax.flatten_util import ravel_pytree
 
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.closed_loop import LinearLoop
+from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile, disturbance_profile
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.response import from_start, metrics_of, signals_within
-from undertow.analysis.linearization.equilibrium import Rest, rest
-from undertow.analysis.linearization.disturbance_profile import Surroundings, surroundings
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.contracts import AbstractController
 from undertow.scenario.build import Built
 
 _HELD = "at fixed weights"
-_MOST_TICKS = 200_000  # that are foretold one by one
+_MAX_STEPS = 200_000  # that are predicted one by one
 
 
-class Ground(NamedTuple):
+class OperatingPoint(NamedTuple):
     """A scenario's loop where it rests under its mean load, and what acts on it."""
 
     built: Built
-    around: Surroundings
-    mean: Rest
+    around: DisturbanceProfile
+    mean: Equilibrium
     linear: LinearLoop
     radius: float  # spectral radius of `linear`
 
 
-def ground(built: Built) -> Ground:
+def operating_point(built: Built) -> OperatingPoint:
     """Where the loop of a scenario rests under the mean load of its steady window, and its linearisation there.
 
     Raises:
@@ -39,17 +39,17 @@ def ground(built: Built) -> Ground:
     loop, settings = built.closed_loop, built.scenario.loop
     start, stop = built.window()
     position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)
-    calm = rest(loop, settings.dt, position, np.zeros(len(position)))
-    ticks = min(round(settings.duration / settings.dt) + 1, _MOST_TICKS)
-    around = surroundings(loop, calm, jax.random.PRNGKey(built.scenario.seed), ticks, settings.dt)
+    calm = equilibrium(loop, settings.dt, position, np.zeros(len(position)))
+    steps = min(round(settings.duration / settings.dt) + 1, _MAX_STEPS)
+    around = disturbance_profile(loop, calm, jax.random.PRNGKey(built.scenario.seed), steps, settings.dt)
     inside = (around.time >= start) & (around.time <= stop)
     load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
-    mean = rest(loop, settings.dt, position, load)
+    mean = equilibrium(loop, settings.dt, position, load)
     linear = margins.closed(mean, settings.dt, settings.kind)
-    return Ground(built, around, mean, linear, margins.spectral_radius(linear))
+    return OperatingPoint(built, around, mean, linear, margins.spectral_radius(linear))
 
 
-def foretold(known: Ground) -> tuple[dict[str, float] | None, str]:
+def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     """Metrics of the steady window by the linearised loop; or None, and why."""
     if not known.mean.found:
         return None, f"no input holds the mean load: something still moves at {known.mean.moving:.2g} per second"
@@ -91,12 +91,12 @@ def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
     return ""
 
 
-def _start(known: Ground) -> list[np.ndarray]:
+def _start(known: OperatingPoint) -> list[np.ndarray]:
     """States of plant and law at t = 0 as vectors."""
     loop, initial = known.built.closed_loop, known.built.scenario.initial
     outputs = loop.outputs_at_start(initial.position, initial.velocity)
-    drawn = loop.draw(jax.random.PRNGKey(known.built.scenario.seed))
-    return [np.asarray(ravel_pytree(state)[0]) for state in drawn.start(*outputs)]
+    realization = loop.realize(jax.random.PRNGKey(known.built.scenario.seed))
+    return [np.asarray(ravel_pytree(state)[0]) for state in realization.start(*outputs)]
 
 
 def _turning(pole: complex) -> str:

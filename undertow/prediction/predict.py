@@ -6,13 +6,19 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.analysis.linearization import margins
-from undertow.analysis.linearization.closed_forms import (ClosedForm, closed_form_poles, drift_bound, estimator, ramp_error)
+from undertow.analysis.linearization.actuator_authority import ActuatorAuthority
+from undertow.analysis.linearization.closed_forms import (
+    ClosedForm,
+    closed_form_poles,
+    drift_bound,
+    estimator,
+    ramp_error,
+)
 from undertow.analysis.linearization.closed_loop import LinearLoop
-from undertow.analysis.linearization.actuator_authority import Reach, reach
-from undertow.analysis.linearization.equilibrium import Rest, rest
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.plants.reachability import open_loop_advice
+from undertow.prediction.operating_point import OperatingPoint, operating_point, predicted
 from undertow.scenario.build import Built, in_its_precision
-from undertow.prediction.operating_point import Ground, foretold, ground
 
 # Loads at which the loop is looked at: larger than these shares of all that act along the reference.
 SHARES = (0.1, 0.5, 0.9)
@@ -29,10 +35,10 @@ class Point(NamedTuple):
     """One operating point."""
 
     share: float  # of all loads that are smaller
-    at: Rest
+    at: Equilibrium
     used: float  # largest |u| as a share of its limit; 0 without a limit
     poles: np.ndarray  # 1/s
-    radius: float  # spectral radius from tick to tick; below 1 it is stable
+    radius: float  # spectral radius from step to step; below 1 it is stable
 
     @property
     def load(self) -> np.ndarray:
@@ -51,7 +57,7 @@ class Point(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """White noise on the measured velocities, new at every tick."""
+    """White noise on the measured velocities, new at every step."""
 
     of_input: np.ndarray  # standard deviation per m/s or rad/s of noise
     of_estimate: np.ndarray  # 1/s
@@ -61,7 +67,7 @@ class Noise(NamedTuple):
 class Prediction(NamedTuple):
     """All that `undertow analyze` says."""
 
-    ground: Ground
+    operating_point: OperatingPoint
     points: tuple[Point, ...]
     margins: dict[str, float]  # of the point that is nearest to instability
     noise: Noise
@@ -71,7 +77,7 @@ class Prediction(NamedTuple):
     forms: list[ClosedForm]
     estimators: list[tuple[str, float, float, float | None]]  # axis, w_o rad/s, zeta, |d_til| per |d_dot| s
     drift: tuple[float, float] | None  # largest gain that weights in their box add, and the one that breaks, 1/s
-    reach: Reach
+    reach: ActuatorAuthority
     lost: tuple[str, ...]
     metrics: dict[str, float] | None  # of the steady window
     why_not: str  # a sentence where there are none
@@ -86,7 +92,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
         progress: told a message and the share done.
     """
     progress("where the loop rests", 0.0)
-    known = ground(built)
+    known = operating_point(built)
     loop, settings = built.closed_loop, built.scenario.loop
     progress("poles at its operating points", 0.5)
     points = tuple(_point(known, *each) for each in zip(SHARES, known.around.operating_loads(SHARES), strict=True))
@@ -97,11 +103,11 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     frequency = np.geomspace(_SLOWEST, _HIGHEST / settings.dt, 300)
     error, estimation = _responses(known.linear, frequency)
     law, names = loop.controller, loop.plant.outputs
-    metrics, why_not = foretold(known)
+    metrics, why_not = predicted(known)
     axes = range(len(names))
     gains = np.asarray(law.model.gain(loop.plant.output(0.0, worst.parts.states(worst.at)[0])))
     return Prediction(
-        ground=known,
+        operating_point=known,
         points=points,
         margins=bears,
         noise=_noise(known),
@@ -118,16 +124,16 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     )
 
 
-def _point(known: Ground, share: float, load: np.ndarray) -> Point:
+def _point(known: OperatingPoint, share: float, load: np.ndarray) -> Point:
     loop, settings = known.built.closed_loop, known.built.scenario.loop
-    at = rest(loop, settings.dt, known.mean.parts.target.position, load)
+    at = equilibrium(loop, settings.dt, known.mean.parts.target.position, load)
     linear = margins.closed(at, settings.dt, settings.kind)
     low, high = _limits(known.built, at)
     used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
     return Point(share, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear))
 
 
-def _margins(at: Rest, dt: float) -> dict[str, float]:
+def _margins(at: Equilibrium, dt: float) -> dict[str, float]:
     low, high = margins.gain_range(at, dt)
     return {
         "sampling_time": margins.largest_sampling_time(at, dt, _LONGEST),
@@ -138,7 +144,7 @@ def _margins(at: Rest, dt: float) -> dict[str, float]:
     }
 
 
-def _noise(known: Ground) -> Noise:
+def _noise(known: OperatingPoint) -> Noise:
     dt, axes = known.linear.dt, known.around.load.shape[1]
     sampled = margins.closed(known.mean, dt)
     one = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
@@ -150,7 +156,7 @@ def _noise(known: Ground) -> Noise:
     return Noise(of_input, of_estimate, largest)
 
 
-def _limits(built: Built, at: Rest) -> tuple[np.ndarray, np.ndarray]:
+def _limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest input that reaches the actuators."""
     plant, (x, _) = built.closed_loop.plant, at.parts.states(at.at)
     ask = np.full(plant.inputs(), 1e9)

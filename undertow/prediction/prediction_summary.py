@@ -7,7 +7,7 @@ from undertow.prediction.predict import Prediction
 
 def summary(prediction: Prediction) -> dict[str, Any]:
     """What stands in prediction.json."""
-    known = prediction.ground
+    known = prediction.operating_point
     return {
         "position": known.mean.parts.target.position.tolist(),
         "mean_load": known.mean.at["load"].tolist(),

@@ -31,7 +31,7 @@ def _stability(prediction: Prediction) -> tuple[str, ...]:
     turning = f" at {abs(pole.imag):.3g} rad/s" if pole.imag else ""
     moving = (
         " This is at fixed weights: weights that move apart add damping, so that a run may last or not. Run it"
-        if has_weights(prediction.ground.built)
+        if has_weights(prediction.operating_point.built)
         else ""
     )
     return (
@@ -54,7 +54,7 @@ def _actuators(prediction: Prediction) -> tuple[str, ...]:
 
 
 def _sampling(prediction: Prediction) -> tuple[str, ...]:
-    said, law, dt = [], prediction.ground.built.closed_loop.controller, prediction.ground.linear.dt
+    said, law, dt = [], prediction.operating_point.built.closed_loop.controller, prediction.operating_point.linear.dt
     fastest = max((row[1] for row in prediction.estimators), default=0.0)
     if fastest * dt > _SAMPLED:
         said.append(
@@ -73,8 +73,8 @@ def _sampling(prediction: Prediction) -> tuple[str, ...]:
 
 
 def _noise(prediction: Prediction) -> tuple[str, ...]:
-    axes = prediction.ground.around.load.shape[1]
-    present = float(prediction.ground.around.noise[:, axes:].std(axis=0).max())
+    axes = prediction.operating_point.around.load.shape[1]
+    present = float(prediction.operating_point.around.noise[:, axes:].std(axis=0).max())
     largest = prediction.noise.largest
     if not present > largest or any(point.radius >= 1 for point in prediction.points):
         return ()  # an unstable loop has no stationary noise

@@ -64,7 +64,7 @@ class Setpoint(AbstractReference):
         zero = jnp.zeros_like(self.position)
         return Target(self.position, zero, zero)
 
-    def beginning_at(self, position):
+    def starting_at(self, position):
         if self.transition is None or self.transition.start is not None:
             return self
         return Setpoint(self.position, Transition(self.transition.settling, position))

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from undertow.report.campaign_tables import (asked, by_choice, by_xla, distributions, endings, named, requirements, worst)
+from undertow.campaign.store_results import Results
+from undertow.report.campaign_tables import asked, by_choice, by_xla, distributions, endings, named, requirements, worst
 from undertow.report.figures.campaign import distributions_figure, sensitivity_figure
 from undertow.report.figures.writing import Drawings, Saved, save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, tag
-from undertow.campaign.store_results import Results
 
 _CAPTIONS = {
     "distributions": "Every trial that was flown, one step each; a curve that ends below 1 lacks those that failed. "
@@ -88,7 +88,7 @@ def _drawings(results: Results, found: Mapping[str, Any]) -> Drawings:
     """What makes each figure; nothing where there is nothing to draw."""
     values, units = _values(results, found), {metric: results.unit(metric) for metric in results.metrics}
     figures = {
-        "distributions": (lambda: distributions_figure(values, _flown(found), units)) if values else None,
+        "distributions": (lambda: distributions_figure(values, _ran(found), units)) if values else None,
         "sensitivity": (lambda: sensitivity_figure(found["sensitivity"])) if found["sensitivity"] else None,
     }
     return {name: make for name, make in figures.items() if make is not None}
@@ -102,7 +102,7 @@ def _drawn(saved: Saved) -> dict[str, Html]:
     }
 
 
-def _flown(found: Mapping[str, Any]) -> dict[str, int]:
+def _ran(found: Mapping[str, Any]) -> dict[str, int]:
     return {named(one): one["trials"] - one["refused"] for one in found["combinations"]}
 
 

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
-from undertow.core.status import Status
-from undertow.report.formats import chip, ending, number, prose, unit
-from undertow.report.page import Html, join, table, tag
+from undertow.campaign.campaign_schema import Spread
 from undertow.campaign.columns import ENDINGS
 from undertow.campaign.labels import words
 from undertow.campaign.store_results import Results
-from undertow.campaign.campaign_schema import Spread
+from undertow.core.status import Status
+from undertow.report.formats import chip, ending, number, prose, unit
+from undertow.report.page import Html, join, table, tag
 
 _DIGITS = 4
 _BY_CHOICE = ("tracking_rms", "input_rms")

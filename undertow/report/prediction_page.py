@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from undertow.prediction.predict import Prediction
 from undertow.report.figures.prediction import prediction_drawings
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import bullets, document, figure, section, table, tag
 from undertow.report.prediction_tables import Rows, tables
-from undertow.prediction.predict import Prediction
 
 _CAPTIONS = {
     "poles": "Poles that control can move, of the sampled loop as rates, motors and coupling included; both axes are "
@@ -30,12 +30,12 @@ def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path
         said = _CAPTIONS[name]
         drawn.append(figure(vector.read_text(encoding="utf-8"), name, said, said))
     title = prediction.ground.built.scenario.description or "a closed loop"
-    doubts = [tag("h2", "Advice"), bullets([prose(sentence) for sentence in advice])] if advice else []
+    warnings = [tag("h2", "Advice"), bullets([prose(sentence) for sentence in advice])] if advice else []
     page = document(
         f"Prediction: {title}",
         tag("h1", "Before anything is run"),
         tag("p", prose(title), class_="lead"),
-        *doubts,
+        *warnings,
         *(_section(number, rows) for number, rows in enumerate(tables(prediction))),
         section("drawn", "Figures", *drawn),
         tag("p", prose(LEFT_OUT), class_="small"),

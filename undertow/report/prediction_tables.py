@@ -107,7 +107,7 @@ def _noise(prediction: Prediction) -> Rows:
         "White noise on measured velocities",
         ("", "standard deviation"),
         rows,
-        "From the discrete Lyapunov equation of the sampled loop; new at every tick.",
+        "From the discrete Lyapunov equation of the sampled loop; new at every step.",
     )
 
 
@@ -144,7 +144,7 @@ def _metrics(prediction: Prediction) -> Rows:
     of_input = prediction.ground.built.closed_loop.plant.input_unit
     rows = [(name, _number(value), unit_of(name, of_input)) for name, value in (prediction.metrics or {}).items()]
     return Rows(
-        "Metrics foretold for the steady window",
+        "Metrics predicted for the steady window",
         ("metric", "predicted", "unit"),
         rows,
         "The linearised loop driven by the disturbance and the sensor's errors along the reference; "

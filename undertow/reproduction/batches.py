@@ -8,19 +8,19 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from undertow.analysis.metrics import Metrics, results
-from undertow.core.status import Status
 from simdjit.machine import lanes_of
-from undertow.loop.simd_batch import Ended, Fleet, Plan, Run
-from undertow.scenario.build import Built, build
-from undertow.scenario.part_cache import Workshop, structure
-from undertow.campaign.runs import leaves, planned, run_of
+from undertow.analysis.metrics import Metrics, results
 from undertow.campaign.campaign_schema import Series
+from undertow.campaign.runs import leaves, planned, run_of
+from undertow.core.status import Status
+from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run
+from undertow.scenario.build import Built, build
+from undertow.scenario.part_cache import PartCache, structure
 
 Window = tuple[float, float]  # s
 
 
-class Flown(NamedTuple):
+class BatchResult(NamedTuple):
     """One run."""
 
     built: Built
@@ -38,7 +38,7 @@ class Flown(NamedTuple):
 
 def fly(
     scenarios: Mapping[str, dict[str, Any]], windows: Sequence[Window], every: float, signals: Sequence[str]
-) -> dict[str, Flown]:
+) -> dict[str, BatchResult]:
     """Run sampled scenarios, those whose programs are equal side by side; arguments and errors of `start`."""
     with ThreadPoolExecutor(1) as pool:
         return start(scenarios, windows, every, signals, pool)()
@@ -50,7 +50,7 @@ def start(
     every: float,
     signals: Sequence[str],
     pool: Executor,
-) -> Callable[[], dict[str, Flown]]:
+) -> Callable[[], dict[str, BatchResult]]:
     """Start to run sampled scenarios, one piece of work for each program.
 
     Args:
@@ -63,44 +63,44 @@ def start(
     Returns:
         What waits for all of it; it raises Unsupported where a part needs something that the batch compiler cannot do.
     """
-    workshop = Workshop()
-    built = {name: build(scenario, workshop=workshop) for name, scenario in scenarios.items()}
+    part_cache = PartCache()
+    built = {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
     accumulators = tuple(Metrics(*window) for window in windows)
     groups: dict[Any, dict[str, tuple[Run, int]]] = {}
     for name, one in built.items():
         run = run_of(one)._replace(accumulators=accumulators)
         plan = planned(one, Series(signals=list(signals), every=every))
-        groups.setdefault((structure(run), plan._replace(ticks=0)), {})[name] = (run, plan.ticks)
+        groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
     pieces = [pool.submit(_together, plan, runs) for (_, plan), runs in groups.items()]
 
-    def flown() -> dict[str, Flown]:
+    def flown() -> dict[str, BatchResult]:
         ended = {name: one for piece in pieces for name, one in piece.result().items()}
-        return {name: _flown(one, ended[name], windows) for name, one in built.items()}
+        return {name: _ran(one, ended[name], windows) for name, one in built.items()}
 
     return flown
 
 
 def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ended]:
-    """Runs of one program, by name with their numbers of ticks; those of one length side by side."""
+    """Runs of one program, by name with their numbers of steps; those of one length side by side."""
     first = next(iter(runs.values()))[0]
     numbers = {name: leaves(run) for name, (run, _) in runs.items()}
     constant = [
         all(np.array_equal(column[0], other) for other in column[1:]) for column in zip(*numbers.values(), strict=True)
     ]
-    lengths = {ticks: [name for name in runs if runs[name][1] == ticks] for _, ticks in runs.values()}
+    lengths = {steps: [name for name in runs if runs[name][1] == steps] for _, steps in runs.values()}
     # A program for one run is faster than one for eight that flies one.
     width = min(lanes_of(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
-    fleet = Fleet(first, plan, constant, width)
+    batch = BatchRunner(first, plan, constant, width)
     tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}
-    for ticks, names in lengths.items():
+    for steps, names in lengths.items():
         stacked = [np.stack(column) for column in zip(*(numbers[name] for name in names), strict=True)]
-        flown = fleet.fly(jax.tree.unflatten(tree, stacked), ticks)
+        flown = batch.run(jax.tree.unflatten(tree, stacked), steps)
         for i, name in enumerate(names):
             found[name] = jax.tree.map(lambda leaf, i=i: leaf[i] if isinstance(leaf, np.ndarray) else leaf, flown)
     return found
 
 
-def _flown(built: Built, ended: Ended, windows: Sequence[Window]) -> Flown:
+def _ran(built: Built, ended: Ended, windows: Sequence[Window]) -> BatchResult:
     status, end = Status(int(ended.status)), float(ended.ended)
     metrics = [
         results(state) if end >= stop else None for state, (_, stop) in zip(ended.accumulated, windows, strict=True)
@@ -108,4 +108,4 @@ def _flown(built: Built, ended: Ended, windows: Sequence[Window]) -> Flown:
     time = np.asarray(ended.time)
     kept = time <= end
     series = {name: np.asarray(values)[kept] for name, values in ended.series.items()}
-    return Flown(built, status, end, metrics, series, time[kept])
+    return BatchResult(built, status, end, metrics, series, time[kept])

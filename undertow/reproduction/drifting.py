@@ -11,7 +11,7 @@ import numpy as np
 
 from undertow.analysis.drift import gain_bound, gain_of
 from undertow.analysis.motor_loop import lag_matrix, stable_gains
-from undertow.reproduction.batches import Flown, fly
+from undertow.reproduction.batches import BatchResult, fly
 from undertow.reproduction.experiments import write_all
 from undertow.reproduction.horizons import BOUND
 from undertow.reproduction.lag_map import lag_thruster
@@ -54,7 +54,7 @@ def shown(folder: Path) -> dict[str, Any]:
     return {"lag": LAG, "needed": between and between[0], "bounded_gain": bounded, "runs": runs}
 
 
-def _curves(run: Flown) -> dict[str, Any]:
+def _curves(run: BatchResult) -> dict[str, Any]:
     """Every series at the ends of the bins."""
     gain = gain_of(law_of(run), run.series["weights"])
     ends = np.arange(_BIN, len(run.time), _BIN)
@@ -75,7 +75,7 @@ def _curves(run: Flown) -> dict[str, Any]:
 def _scenario(words: str, bound: float) -> dict[str, Any]:
     one = scenario(
         f"Table 1 behind a lag of {1e3 * LAG:g} ms, {words}: one sinusoid per axis",
-        rung="electromechanical",
+        fidelity="electromechanical",
         controller={"weights_bound": bound},
         disturbance=STATIONARY,
         loop={"kind": "sampled", "duration": _SECONDS, "record": 1e-3},

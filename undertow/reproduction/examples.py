@@ -6,8 +6,8 @@ from typing import Any
 from undertow.analysis.drift import gain_of
 from undertow.analysis.motor_loop import motor_matrix, rightmost
 from undertow.core.status import Status
+from undertow.reproduction.setup import CONTROLLERS, FIDELITIES, law_of, motor_of, scenario
 from undertow.scenario.execute import Executed
-from undertow.reproduction.setup import CONTROLLERS, RUNGS, law_of, motor_of, scenario
 
 # Propeller speeds at which the linearised loop is looked at, rad/s: Section 3.9 of the theory, 6 to 90 N of thrust.
 _SPEEDS = (2.0, 10.0, 20.0, 40.0, 60.0)
@@ -16,9 +16,11 @@ _SPEEDS = (2.0, 10.0, 20.0, 40.0, 60.0)
 def scenarios() -> dict[str, dict[str, Any]]:
     """Every run of this part, by name."""
     runs = {}
-    for rung in RUNGS:
+    for fidelity in FIDELITIES:
         for name, composite in CONTROLLERS.items():
-            runs[_on_rung(rung, name)] = scenario(f"{name.upper()} on rung {rung}", rung=rung, composite=composite)
+            runs[_with_fidelity(fidelity, name)] = scenario(
+                f"{name.upper()} on fidelity {fidelity}", fidelity=fidelity, composite=composite
+            )
     for name, composite in CONTROLLERS.items():
         runs[f"table2_{name}_state"] = scenario(
             f"{name.upper()} with the state as fuzzy input", composite=composite, controller={"fuzzy_input": "state"}
@@ -27,30 +29,33 @@ def scenarios() -> dict[str, dict[str, Any]]:
 
 
 def example(runs: Mapping[str, Executed], number: int) -> dict[str, Any]:
-    """Metrics of Example 1 (rung `ideal`) or 2 (rung `static`) for both controllers."""
-    rung = RUNGS[number - 1]
-    return {name: _metrics(runs[_on_rung(rung, name)]) for name in CONTROLLERS}
+    """Metrics of Example 1 (fidelity `ideal`) or 2 (fidelity `static`) for both controllers."""
+    fidelity = FIDELITIES[number - 1]
+    return {name: _metrics(runs[_with_fidelity(fidelity, name)]) for name in CONTROLLERS}
 
 
 def table2(runs: Mapping[str, Executed]) -> dict[str, Any]:
     """Table 2 in numbers: both controllers with the modelling error or the state as fuzzy input."""
     table = {}
     for name in CONTROLLERS:
-        table[f"{name}_error"] = _metrics(runs[_on_rung("ideal", name)])
+        table[f"{name}_error"] = _metrics(runs[_with_fidelity("ideal", name)])
         table[f"{name}_state"] = _metrics(runs[f"table2_{name}_state"])
     return table
 
 
 def ladder(runs: Mapping[str, Executed]) -> dict[str, Any]:
-    """Both controllers at Table 1 gains on every rung: how it ended, when, and why."""
+    """Both controllers at Table 1 gains on every fidelity: how it ended, when, and why."""
     return {
-        rung: {name: _metrics(runs[_on_rung(rung, name)]) | {"why": _why(runs, rung, name)} for name in CONTROLLERS}
-        for rung in RUNGS
+        fidelity: {
+            name: _metrics(runs[_with_fidelity(fidelity, name)]) | {"why": _why(runs, fidelity, name)}
+            for name in CONTROLLERS
+        }
+        for fidelity in FIDELITIES
     }
 
 
-def _on_rung(rung: str, controller: str) -> str:
-    return f"{rung}_{controller}"
+def _with_fidelity(fidelity: str, controller: str) -> str:
+    return f"{fidelity}_{controller}"
 
 
 def _metrics(run: Executed) -> dict[str, Any]:
@@ -64,14 +69,14 @@ def _metrics(run: Executed) -> dict[str, Any]:
     }
 
 
-def _why(runs: Mapping[str, Executed], rung: str, controller: str) -> str:
-    run = runs[_on_rung(rung, controller)]
-    if rung == "ideal":
+def _why(runs: Mapping[str, Executed], fidelity: str, controller: str) -> str:
+    run = runs[_with_fidelity(fidelity, controller)]
+    if fidelity == "ideal":
         return "Thrust follows voltage at once: what the theory assumes."
-    if rung == "static":
+    if fidelity == "static":
         return "The motor's curve is part of d, but without lag: the estimator sees it as one more disturbance."
     law, motor = law_of(run), motor_of(run)
-    winding = rung == "electromechanical"
+    winding = fidelity == "electromechanical"
     modes = [rightmost(motor_matrix(law, motor, speed, winding)) for speed in _SPEEDS]
     growth = [mode.real for mode in modes]
     # Both are statements about small motion at the weights of the start; weights that drift add damping.

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from undertow.reproduction.batches import Flown
+from undertow.reproduction.batches import BatchResult
 from undertow.reproduction.matching import equal_gain
-from undertow.reproduction.setup import RAFC, RCAFC, RUNGS, scenario
+from undertow.reproduction.setup import FIDELITIES, RAFC, RCAFC, scenario
 
 LONG, QUICK = 2000.0, 200.0  # s
 
 # Over which metrics are taken, s; the first is the `steady` one of the runs of 20 s, whose load U2 repeats.
 WINDOWS = ((10.0, 20.0), (100.0, 200.0), (1000.0, 2000.0))
 
-WHOLE = RUNGS[-1]
+WHOLE = FIDELITIES[-1]
 BOUND = 20.0  # m/s^2, rad/s^2; of workload W1
 
 # gamma_eps of workload W1, and others that were tried on the whole motor.
@@ -27,7 +27,7 @@ _SWEEP = (30.0, 10.0, 5.0)
 
 _KEPT = 60  # points of a curve in results.json
 
-Long = Mapping[str, Flown]
+Long = Mapping[str, BatchResult]
 
 
 def duration(quick: bool) -> float:
@@ -55,7 +55,7 @@ def table(long: Long, quick: bool) -> list[dict[str, Any]]:
     return [described(name, told, long[name]) for name, (told, _) in _runs(quick).items()]
 
 
-def described(name: str, told: dict[str, Any], run: Flown) -> dict[str, Any]:
+def described(name: str, told: dict[str, Any], run: BatchResult) -> dict[str, Any]:
     """A row of results.json: what was told about a run, how it ended, metrics by window, growth of its weights."""
     over = lambda metric: [None if found is None else found[metric] for found in run.windows]
     peaks = run.series["weights_peak"]
@@ -89,7 +89,7 @@ def _runs(quick: bool) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
     swept = {f"composite_{value:g}": (f"gamma_eps {value:g}", value, {}) for value in _SWEEP}
     one_rule = {"one_rule": ("one rule, gamma_eps 5", 5.0, {"sets": 1})}
     found = {}
-    for level in RUNGS[2:] if quick else RUNGS:
+    for level in FIDELITIES[2:] if quick else FIDELITIES:
         more = swept | one_rule if level == WHOLE and not quick else {}
         for law, (words, composite, gains) in (laws | more).items():
             for bounded in (False, True):
@@ -108,7 +108,7 @@ def _runs(quick: bool) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
 def _scenario(words: str, level: str, quick: bool, composite: float, gains: dict, bounded: bool) -> dict[str, Any]:
     return scenario(
         f"{words} on {level}, suite U2 for {duration(quick):g} s, 1 kHz",
-        rung=level,
+        fidelity=level,
         composite=composite,
         controller=gains | {"weights_bound": BOUND if bounded else math.inf},
         disturbance={"kind": "u2"},

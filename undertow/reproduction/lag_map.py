@@ -3,7 +3,7 @@
 from typing import Any
 
 from undertow.analysis.motor_loop import lag_matrix, motor_matrix, stable_gains
-from undertow.reproduction.batches import Flown
+from undertow.reproduction.batches import BatchResult
 from undertow.reproduction.horizons import Long, described, duration, sampled
 from undertow.reproduction.matching import same_loop_gain
 from undertow.reproduction.setup import law_of, motor_of, scenario
@@ -50,7 +50,7 @@ def table(long: Long, quick: bool) -> list[dict[str, Any]]:
     return rows
 
 
-def windings(long: Long) -> dict[float, Flown]:
+def windings(long: Long) -> dict[float, BatchResult]:
     """Runs of the law of Table 1 with five sets, by inductance of the winding, H, where they were run."""
     named = {value: _name("winding", value, "five") for value in _WINDINGS}
     return {value: long[name] for value, name in named.items() if name in long}
@@ -88,7 +88,7 @@ def _scenario(kind: str, value: float, law: str, quick: bool) -> dict[str, Any]:
     behind = f"a lag of {1e3 * value:g} ms" if kind == "lag" else f"a winding of {1e3 * value:g} mH"
     one = scenario(
         f"Table 1 with {words} behind {behind}, suite U2 for {seconds:g} s",
-        rung="electromechanical",
+        fidelity="electromechanical",
         controller=options,
         disturbance={"kind": "u2"},
         loop=sampled(seconds, substeps=1 if kind == "lag" else 2),

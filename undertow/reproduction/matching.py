@@ -27,10 +27,10 @@ def equal_gain_ratio() -> float:
 
 def same_loop_gain(fuzzy_input: str, sets: int) -> dict[str, Any]:
     """A fuzzy system with the gamma |xi|^2 of Table 1 with five sets on the modelling error. Section 3.1."""
-    matched = _GAMMA * _gathering("error", 5) / _gathering(fuzzy_input, sets)
+    matched = _GAMMA * _basis_norm_squared("error", 5) / _basis_norm_squared(fuzzy_input, sets)
     return {"fuzzy_input": fuzzy_input, "sets": sets, "adaptation": round(matched, 3)}
 
 
-def _gathering(fuzzy_input: str, sets: int) -> float:
+def _basis_norm_squared(fuzzy_input: str, sets: int) -> float:
     """|xi|^2 at zero."""
-    return float(paper(double_integrator(1).model(), fuzzy_input=fuzzy_input, sets=sets).fuzzy.gathering())
+    return float(paper(double_integrator(1).model(), fuzzy_input=fuzzy_input, sets=sets).fuzzy.basis_norm_squared())

@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from undertow.scenario.execute import Executed
-from undertow.scenario.results import to_json
-from undertow.scenario.provenance import versions
 from undertow.reproduction import claims, drifting, examples, horizons, lag_map
 from undertow.reproduction.batches import start
 from undertow.reproduction.experiments import run_all, write_all
+from undertow.reproduction.robust_variant.chapter import chapter
 from undertow.reproduction.setup import CONTROLLERS
 from undertow.reproduction.thruster_response import ThrusterResponse, thruster_response
-from undertow.reproduction.robust_variant.chapter import chapter
+from undertow.scenario.execute import Executed
+from undertow.scenario.provenance import versions
+from undertow.scenario.results import to_json
 
 Progress = Callable[[str, float], None]
 
@@ -33,9 +33,9 @@ class Reproduction(NamedTuple):
     runs: dict[str, Executed]
     response: ThrusterResponse
 
-    def datasets(self, rung: str) -> dict[str, xr.Dataset]:
-        """Recorded series on a rung of the ladder, by controller. Examples 1 and 2 are `ideal` and `static`."""
-        return {name: self.runs[f"{rung}_{name}"].dataset for name in CONTROLLERS}
+    def datasets(self, fidelity: str) -> dict[str, xr.Dataset]:
+        """Recorded series on a fidelity of the ladder, by controller. Examples 1 and 2 are `ideal` and `static`."""
+        return {name: self.runs[f"{fidelity}_{name}"].dataset for name in CONTROLLERS}
 
 
 def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True) -> Reproduction:

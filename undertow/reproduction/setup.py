@@ -5,8 +5,8 @@ from typing import Any, cast
 
 from undertow.controllers.composite_law import RCAF
 from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.reproduction.batches import BatchResult
 from undertow.scenario.execute import Executed
-from undertow.reproduction.batches import Flown
 from undertow.thrusters.electromechanical import ElectromechanicalThruster
 from undertow.thrusters.motor import DCMotor
 
@@ -16,7 +16,7 @@ RCAFC, RAFC = 500.0, 0.0  # gamma_eps of Table 1, and of Eq. (61)
 
 CONTROLLERS = {"rcafc": RCAFC, "rafc": RAFC}
 
-RUNGS = ("ideal", "static", "shaft", "electromechanical")
+FIDELITIES = ("ideal", "static", "shaft", "electromechanical")
 
 # Once the loop with the whole motor is unstable, the drag of its propellers is too stiff for fixed steps of 1 ms.
 _METHODS = {"electromechanical": "adaptive"}
@@ -25,7 +25,7 @@ _METHODS = {"electromechanical": "adaptive"}
 def scenario(
     description: str,
     *,
-    rung: str = "ideal",
+    fidelity: str = "ideal",
     composite: float = RCAFC,
     controller: dict[str, Any] | None = None,
     **changes: Any,
@@ -34,21 +34,21 @@ def scenario(
 
     Args:
         description: what the scenario shows.
-        rung: of the fidelity ladder. On `ideal` the speed sensor is perfect (Example 1), elsewhere there is none.
+        fidelity: of the fidelity ladder. On `ideal` the speed sensor is perfect (Example 1), elsewhere there is none.
         composite: gamma_eps; 0 is RAFC.
         controller: further options of the law.
         changes: other keys of the scenario, replacing the paper's.
     """
-    thruster = {"kind": "paper_table3", "rung": rung}
+    thruster = {"kind": "paper_table3", "fidelity": fidelity}
     plant = {"kind": "hybrid_vehicle", "vehicle": "odin", "thruster": thruster, "ledger": False}  # these runs are timed
     return {
         "description": description,
         "plant": plant,
-        "model": {"speed_sensor": rung == "ideal"},
+        "model": {"speed_sensor": fidelity == "ideal"},
         "controller": {"kind": "rcaf", "composite": composite, **(controller or {})},
         "reference": {"kind": "setpoint", "position": GOAL},
         "disturbance": {"kind": "u1"},
-        "loop": {"kind": "continuous", "duration": 20.0, "method": _METHODS.get(rung, "rk4")},
+        "loop": {"kind": "continuous", "duration": 20.0, "method": _METHODS.get(fidelity, "rk4")},
     } | changes
 
 
@@ -63,7 +63,7 @@ HAND_TUNED: dict[str, Any] = {
     "weights_bound": 40,
 }
 
-# Six independent axes x_ddot = u + d: what rung `ideal` amounts to for a law whose model is exact.
+# Six independent axes x_ddot = u + d: what fidelity `ideal` amounts to for a law whose model is exact.
 SIX_AXES = {
     "plant": {"kind": "double_integrator", "axes": 6},
     "model": {},
@@ -71,16 +71,16 @@ SIX_AXES = {
 }
 
 
-def law_of(run: Executed | Flown) -> RCAF:
+def law_of(run: Executed | BatchResult) -> RCAF:
     """The law that ran."""
     return cast(RCAF, run.built.closed_loop.controller)
 
 
-def plant_of(run: Executed | Flown) -> HybridVehicle:
+def plant_of(run: Executed | BatchResult) -> HybridVehicle:
     """The vehicle that was run."""
     return cast(HybridVehicle, run.built.closed_loop.plant)
 
 
-def motor_of(run: Executed | Flown) -> DCMotor:
+def motor_of(run: Executed | BatchResult) -> DCMotor:
     """The motor of its thrusters."""
     return cast(ElectromechanicalThruster, plant_of(run).thruster).motor

@@ -52,13 +52,13 @@ class ThrusterResponse(NamedTuple):
 
 
 @functools.cache  # a figure and a claim ask for the same
-def thruster_response(rung: str = "electromechanical") -> ThrusterResponse:
+def thruster_response(fidelity: str = "electromechanical") -> ThrusterResponse:
     """Drive the motor of Table 3 with the two voltages of Fig. 2 and fit the static laws. Eqs. (8)-(11).
 
     Args:
-        rung: electromechanical (default, unmodelled Delta_o left out) or shaft (Delta_L left out, so L = 0 too).
+        fidelity: electromechanical (default, unmodelled Delta_o left out) or shaft (Delta_L left out, so L = 0 too).
     """
-    thruster = paper_table3(rung)
+    thruster = paper_table3(fidelity)
     long, short = (_steady_period(thruster, frequency) for frequency in (LONG, SHORT))
     laws = (
         _law("T = c_0 V", "N/V", lambda p: (p.voltage, p.thrust), long, short),
@@ -75,19 +75,19 @@ def _steady_period(thruster: AbstractThruster, frequency: float) -> Period:
 
 
 @eqx.filter_jit
-def _drive(thruster: AbstractThruster, frequency: Float[Array, ""]):
+def _actuators(thruster: AbstractThruster, frequency: Float[Array, ""]):
     """Time, voltage, thrust and current over all periods, from rest."""
     dt = 2 * jnp.pi / frequency / _STEPS
     voltage = lambda t: AMPLITUDE * jnp.sin(frequency * t)[None]
     field = lambda t, state: thruster.dynamics(state, voltage(t))
 
-    def tick(state, t):
+    def step(state, t):
         volts = voltage(t)
         seen = (t, volts[0], thruster.thrust(state, volts)[0], thruster.current(state, volts)[0])
         return rk4(field, t, state, dt), seen
 
     times = dt * jnp.arange(_PERIODS * _STEPS, dtype=dt.dtype)
-    return jax.lax.scan(tick, thruster.initial_state(1), times)[1]
+    return jax.lax.scan(step, thruster.initial_state(1), times)[1]
 
 
 def _law(text: str, unit: str, pick, long: Period, short: Period) -> Law:

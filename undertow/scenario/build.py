@@ -14,10 +14,10 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import check_fit, check_times, placed, rounded_times
+from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
 from undertow.scenario.step_size import step_advice
-from undertow.scenario.part_cache import Workshop
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -53,9 +53,9 @@ class Built(NamedTuple):
         late = f"the steady window starts at {start:g} s, the run ends at {end:g} s: no steady metrics"
         plant = self.closed_loop.plant
         fast = step_advice(plant.thruster, self.scenario.loop) if isinstance(plant, HybridVehicle) else ()
-        loop, ticks = self.scenario.loop, self.scenario.loop.duration / self.scenario.loop.dt
+        loop, steps = self.scenario.loop, self.scenario.loop.duration / self.scenario.loop.dt
         times = rounded_times(loop)
-        if self.scenario.precision == "float32" and loop.method != "adaptive" and ticks > _TOLD_APART:
+        if self.scenario.precision == "float32" and loop.method != "adaptive" and steps > _TOLD_APART:
             times += (f"float32 tells no instants apart beyond {_TOLD_APART} steps, {_TOLD_APART * loop.dt:.6g} s",)
         return plant.advice() + fast + times + ((late,) if start >= end else ())
 
@@ -64,12 +64,12 @@ class Built(NamedTuple):
         return self.scenario.steady.of_run(self.scenario.loop.duration)
 
 
-def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) -> Built:
+def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None) -> Built:
     """Objects described by a scenario, made on the processor: the same bits whether or not there is a GPU.
 
     Args:
         source: a scenario as read from a file, or as Python data.
-        workshop: where many similar scenarios are built, so that what they share is made once.
+        part_cache: where many similar scenarios are built, so that what they share is made once.
 
     Raises:
         BadInput: anything wrong with it, with key path and place.
@@ -77,25 +77,25 @@ def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) ->
     text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
     with runtime.on_processor(), runtime.in_precision(scenario.precision):
-        return _build(text, scenario, workshop or Workshop())
+        return _build(text, scenario, part_cache or PartCache())
 
 
-def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
+def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     resolved = scenario.model_dump(include={"description", "loop", "initial", "seed", "precision"})
 
     start, stop = scenario.steady.of_run(scenario.loop.duration)
-    resolved["steady"] = {"start": start, "stop": stop, "every_tick": scenario.steady.every_tick}
+    resolved["steady"] = {"start": start, "stop": stop, "every_step": scenario.steady.every_step}
 
-    circumstances: dict[str, Any] = {"sampling_time": scenario.loop.dt}
+    context: dict[str, Any] = {"sampling_time": scenario.loop.dt}
 
     def make(key: str, given: tuple = ()) -> Any:
         part, resolved[key] = one(key, key, getattr(scenario, key), given)
         return part
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
-        told = {"part": part.model_dump(), "circumstances": circumstances}
-        new = lambda: factory.make(f"{key}s", told["part"], text.folder, given, circumstances)
-        return placed(text, where, lambda: workshop.part(where, told, given, new))
+        told = {"part": part.model_dump(), "context": context}
+        new = lambda: factory.make(f"{key}s", told["part"], text.folder, given, context)
+        return placed(text, where, lambda: part_cache.part(where, told, given, new))
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):
@@ -106,9 +106,9 @@ def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
 
     plant = make("plant")
     known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
-    model, resolved["model"] = placed(text, "model", lambda: workshop.part("model", scenario.model, (plant,), known))
+    model, resolved["model"] = placed(text, "model", lambda: part_cache.part("model", scenario.model, (plant,), known))
     sensor = make("sensor")
-    circumstances["velocity_noise"] = np.asarray(sensor.velocity_noise(scenario.loop.dt)).tolist()
+    context["velocity_noise"] = np.asarray(sensor.velocity_noise(scenario.loop.dt)).tolist()
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), sensor)
     resolved["sensor"] = resolved.pop("sensor")  # in the order of the scenario
@@ -116,5 +116,5 @@ def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
         placed(text, "loop", lambda: continuous.check(loop))
     check_times(text, scenario.loop, scenario.steady)
     shape = (loop, [value and len(value) for _, value in scenario.initial])
-    workshop.check_once(shape, lambda: check_fit(text, loop, scenario.initial))
-    return Built(loop.beginning_at(scenario.initial.position), scenario, resolved)
+    part_cache.check_once(shape, lambda: check_fit(text, loop, scenario.initial))
+    return Built(loop.starting_at(scenario.initial.position), scenario, resolved)

@@ -17,7 +17,7 @@ from undertow.scenario.schema import Initial, Loop, Window
 
 # A record takes about a kilobyte, a sampling time some microseconds.
 MOST_RECORDS = 1_000_000
-MOST_TICKS = 2_000_000_000
+MOST_STEPS = 2_000_000_000
 
 # Of a time: multiples of decimal steps are met to this share.
 _ROUNDING = 1e-9
@@ -52,7 +52,7 @@ def check_times(text: Text, loop: Loop, window: Window) -> None:
     if loop.duration < shortest:
         must, got = f"be at least one record ({shortest:g} s)", f"{loop.duration:g} s"
         raise BadInput("loop.duration", must, got, where=text.where(("loop", "duration")))
-    for key, most, what in (("record", MOST_RECORDS, "records"), ("dt", MOST_TICKS, "sampling times")):
+    for key, most, what in (("record", MOST_RECORDS, "records"), ("dt", MOST_STEPS, "sampling times")):
         step = getattr(loop, key)
         if loop.duration / step > most and (stepped or key == "record"):
             must = f"be at least {loop.duration / most:g} s, so that the run has at most {most} {what}"
@@ -99,15 +99,22 @@ def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
     if target.position.shape != (axes,):
         must, got = f"have {axes} entries, one per output of the plant", f"of shape {target.position.shape}"
         raise BadInput("reference.position", must, got, where=text.where(("reference", "position")))
-    drawn = _traced(text, "disturbance", loop.draw, jax.random.PRNGKey(0))
-    x, z = _traced(text, "sensor", lambda drawn: drawn.start(), drawn)
-    load = _traced(text, "disturbance", lambda drawn, x: drawn.load(zero, x), drawn, x)
+    realization = _traced(text, "disturbance", loop.draw, jax.random.PRNGKey(0))
+    x, z = _traced(text, "sensor", lambda realization: realization.start(), realization)
+    load = _traced(text, "disturbance", lambda realization, x: realization.load(zero, x), realization, x)
     if not isinstance(load, Load):
         raise BadInput("disturbance", "give a Load", "something else", where=text.where(("disturbance",)))
     if any(signal.shape != (axes,) for signal in load[:2]):
         got = f"of shapes {[signal.shape for signal in load[:2]]}"
         raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
-    _traced(text, "controller", lambda drawn, x, z: drawn.decide(zero, x, z, drawn.listen(x)), drawn, x, z)
+    _traced(
+        text,
+        "controller",
+        lambda realization, x, z: realization.decide(zero, x, z, realization.initial_measuring(x)),
+        realization,
+        x,
+        z,
+    )
 
 
 def _traced(text: Text, key: str, function: Callable[..., Any], *arguments: Any) -> Any:

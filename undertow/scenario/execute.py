@@ -10,18 +10,18 @@ import jax
 import numpy as np
 import xarray as xr
 
+from simdjit.errors import Unsupported
 from undertow.analysis.metrics import Metrics
 from undertow.core import runtime
 from undertow.core.status import Status
-from simdjit.errors import Unsupported
-from undertow.loop import continuous, simd_batch, sampled
+from undertow.loop import continuous, sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.foreign_code import code_hashes
-from undertow.scenario.results import label
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
+from undertow.scenario.results import label
 from undertow.scenario.schema import Initial, Loop
 from undertow.scenario.step_size import step_failure
 
@@ -53,7 +53,7 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
 @in_its_precision
 def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
-    gathered = (Metrics(*built.window()),) if scenario.steady.every_tick else ()
+    gathered = (Metrics(*built.window()),) if scenario.steady.every_step else ()
     outcome, left_to_xla = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
     why = step_failure(built.closed_loop, scenario.loop, outcome)
     attributes = (

@@ -13,11 +13,11 @@ import numpy as np
 from undertow.core import catalogue, checks, contracts
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.user_code import python_says
-from undertow.sensors.sensor import AbstractInstrument
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
 from undertow.scenario.values import checked
 from undertow.scenario.vehicle_file import is_vehicle_file, make_vehicle
+from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 
@@ -27,7 +27,7 @@ INNER = {
     "thruster": ("thrusters", "paper_table3"),
     "battery": ("power", "battery"),
     "esc": ("power", "esc"),
-    "instruments": ("instruments", ("imu", "dvl", "depth", "compass", "position_fix")),
+    "sensors": ("sensors", ("imu", "dvl", "depth", "compass", "position_fix")),
 }
 
 # Kinds that are data: every declared parameter of theirs may be changed by name.
@@ -41,8 +41,8 @@ _CONTRACTS = {
     "controllers": contracts.AbstractController,
     "disturbances": contracts.AbstractDisturbance,
     "references": contracts.AbstractReference,
-    "instruments": AbstractInstrument,
-    "sensors": contracts.AbstractSensor,
+    "sensors": AbstractSensor,
+    "sensors": contracts.AbstractNavigation,
 }
 
 _VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
@@ -53,7 +53,7 @@ def make(
     description: str | Mapping[str, Any],
     folder: Path,
     given: tuple[Any, ...] = (),
-    circumstances: Mapping[str, Any] | None = None,
+    context: Mapping[str, Any] | None = None,
 ) -> tuple[Any, dict[str, Any]]:
     """A part, and its description with every default filled in.
 
@@ -62,7 +62,7 @@ def make(
         description: name, or mapping of `kind` (the name) and options; a vehicle's name may be that of a YAML file.
         folder: where relative file names start.
         given: leading arguments that are not the user's.
-        circumstances: options that follow from the rest of a scenario where the user says nothing about them.
+        context: options that follow from the rest of a scenario where the user says nothing about them.
 
     Raises:
         BadInput: anything wrong with the description; key names start at the part.
@@ -79,7 +79,7 @@ def make(
         raise BadInput("kind", error.must, error.got, hint=error.hint) from error.__cause__
     function, preset = _preset(function, options)
     own = inspect.signature(function).parameters
-    options = {key: value for key, value in (circumstances or {}).items() if key in own} | options
+    options = {key: value for key, value in (context or {}).items() if key in own} | options
     changes, table = {}, {}
     if kind in _ADJUSTABLE:
         changes = {key: options.pop(key) for key in list(options) if key not in own}

@@ -10,7 +10,7 @@ import jax
 _MOST = 512  # parts that are remembered
 
 
-class Workshop:
+class PartCache:
     """Makes a part once for each description, and lets loops of the same shape be checked once."""
 
     def __init__(self) -> None:

@@ -76,7 +76,7 @@ class Window(Strict):
 
     start: float | None = Field(default=None, ge=0, description="s; half of the duration unless given")
     stop: float | None = Field(default=None, gt=0, description="s; the end unless given")
-    every_tick: bool = Field(
+    every_step: bool = Field(
         default=False, description="count every control step, as campaigns do, and not only the recorded ones (sampled)"
     )
 
@@ -86,7 +86,7 @@ class Window(Strict):
         return start, duration if self.stop is None else self.stop
 
 
-class Tries(Strict):
+class TrainingRuns(Strict):
     """Runs that gains are tried on: every parameter set with every seed."""
 
     seeds: int = Field(2, ge=1, le=1000, description="number of seeds")
@@ -117,9 +117,9 @@ class Tune(Strict):
     position_scale: float = Field(0.05, gt=0, description="error that costs one, m")
     angle_scale: float = Field(0.05, gt=0, description="error that costs one, rad")
     iterations: int = Field(100, ge=1, le=100_000, description="at most")
-    train: Tries = Field(default_factory=Tries, description="runs that the gains are found on")
-    held_out: Tries = Field(
-        default_factory=lambda: Tries.model_validate({"seeds": 4}),
+    train: TrainingRuns = Field(default_factory=TrainingRuns, description="runs that the gains are found on")
+    held_out: TrainingRuns = Field(
+        default_factory=lambda: TrainingRuns.model_validate({"seeds": 4}),
         description="other runs that they are judged by; 4 seeds unless given",
     )
     weights: Weights = Field(default_factory=Weights, description="of the cost")

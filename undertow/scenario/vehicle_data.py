@@ -10,7 +10,17 @@ from undertow.checks.vehicle_lint.facts import Facts
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.scenario.thruster_poses import poses
-from undertow.scenario.vehicle_keys import (MATRICES, SCALARS, VECTORS, check_keys, matrix_at, number_at, printed_matrix, text_at, vector_at)
+from undertow.scenario.vehicle_keys import (
+    MATRICES,
+    SCALARS,
+    VECTORS,
+    check_keys,
+    matrix_at,
+    number_at,
+    printed_matrix,
+    text_at,
+    vector_at,
+)
 from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
 from undertow.vehicles.vehicle import Vehicle
 

@@ -1,4 +1,4 @@
-"""Instruments: what a vehicle carries to know where it is. One file each; `navigation` makes a sensor of them."""
+"""Sensors: what a vehicle carries to know where it is. One file each; `navigation` makes a sensor of them."""
 
 from undertow.core.catalogue import publish
 

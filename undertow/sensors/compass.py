@@ -3,11 +3,11 @@
 import jax.numpy as jnp
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractInstrument
 from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 
-class Compass(AbstractInstrument):
+class Compass(AbstractSensor):
     """Yaw, rad."""
 
     def reading(self, motion: Motion):

@@ -1,13 +1,13 @@
 """Depth from pressure."""
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractInstrument
 from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 _DOWN = slice(2, 3)
 
 
-class Depth(AbstractInstrument):
+class Depth(AbstractSensor):
     """Down, m. The sensor is at the body origin, and waves do not press on it."""
 
     def reading(self, motion: Motion):

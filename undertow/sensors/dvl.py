@@ -2,13 +2,13 @@
 
 import jax.numpy as jnp
 
-from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractInstrument
-from undertow.sensors.sampling import Sampling
 from undertow.numerics.linear import matvec
+from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 
-class DVL(AbstractInstrument):
+class DVL(AbstractSensor):
     """u, v, w over the ground, m/s."""
 
     def reading(self, motion: Motion):

@@ -1,4 +1,4 @@
-"""What the vehicle really does, as instruments feel it, and what the observer believes of it."""
+"""What the vehicle really does, as sensors feel it, and what the observer believes of it."""
 
 from typing import Any, NamedTuple
 
@@ -7,9 +7,19 @@ from jaxtyping import Array, Float
 
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement
-from undertow.sensors.sampling import Sampling
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import (Kinematics, Matrix3, Quaternion, Vector3, euler_from_rotation, quaternion_from_euler, quaternion_rate, rotation_from_euler, rotation_from_quaternion)
+from undertow.numerics.rotations import (
+    Kinematics,
+    Matrix3,
+    Quaternion,
+    Vector3,
+    euler_from_rotation,
+    quaternion_from_euler,
+    quaternion_rate,
+    rotation_from_euler,
+    rotation_from_quaternion,
+)
+from undertow.sensors.sampling import Sampling
 
 
 def gravity() -> Vector3:
@@ -85,7 +95,7 @@ class Estimate(NamedTuple):
 
 
 def motion_of(truth: Measurement, velocity_before: Vector3, elapsed) -> Motion:
-    """What instruments feel.
+    """What sensors feel.
 
     Args:
         truth: outputs (m, rad) of a body and their rates.

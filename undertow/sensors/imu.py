@@ -3,14 +3,14 @@
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.sensors.estimate import Estimate, Motion, gravity
-from undertow.sensors.sensor import AbstractInstrument
-from undertow.sensors.sampling import Sampling
 from undertow.numerics.linear import matvec
+from undertow.sensors.estimate import Estimate, Motion, gravity
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 
-class IMU(AbstractInstrument):
-    """Roll, pitch (rad), p, q, r (rad/s), specific force (m/s^2, body axes, the mean since the last tick)."""
+class IMU(AbstractSensor):
+    """Roll, pitch (rad), p, q, r (rad/s), specific force (m/s^2, body axes, the mean since the last step)."""
 
     def reading(self, motion: Motion):
         return jnp.concatenate([motion.angles[:2], motion.rates, motion.specific_force])
@@ -18,7 +18,7 @@ class IMU(AbstractInstrument):
     def velocity_noise(self):
         return jnp.full(6, jnp.inf).at[3:].set(self.sampling.noise[2:5])
 
-    def foretell(self, estimate: Estimate, reading) -> Estimate:
+    def predict(self, estimate: Estimate, reading) -> Estimate:
         acceleration = matvec(estimate.rotation(), reading[5:]) + gravity()
         return estimate._replace(rates=reading[2:5], acceleration=acceleration)
 

@@ -1,13 +1,13 @@
 """Position fixes: acoustic positioning (USBL, LBL), or a satellite receiver at the surface."""
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractInstrument
 from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 _LEVEL = slice(0, 2)
 
 
-class PositionFix(AbstractInstrument):
+class PositionFix(AbstractSensor):
     """North and east, m."""
 
     def reading(self, motion: Motion):

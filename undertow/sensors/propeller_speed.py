@@ -2,11 +2,11 @@
 
 from undertow.core.errors import BadInput
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractInstrument
 from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 
-class PropellerSpeed(AbstractInstrument):
+class PropellerSpeed(AbstractSensor):
     """Speed of every propeller, rad/s; its rate of change is told from successive readings.
 
     Raises:
@@ -15,7 +15,7 @@ class PropellerSpeed(AbstractInstrument):
 
     def reading(self, motion: Motion):
         if motion.actuator is None:
-            hint = "Take rung: shaft or electromechanical, on which it is reported, or leave propeller_speed out"
+            hint = "Take fidelity: shaft or electromechanical, on which it is reported, or leave propeller_speed out"
             raise BadInput("propeller_speed", "have propellers that turn", "thrusters without a speed", hint=hint)
         return motion.actuator.speed
 

@@ -1,4 +1,4 @@
-"""When an instrument speaks, and how wrong it is: rate, noise, bias, resolution, delay, dropout."""
+"""When an sensor speaks, and how wrong it is: rate, noise, bias, resolution, delay, dropout."""
 
 import math
 from typing import NamedTuple
@@ -16,12 +16,12 @@ from undertow.core.param import param
 
 Reading = Float[Array, " width"]
 
-# Of a sampling period: instants of the loop are products of a tick, and no product is exact.
+# Of a sampling period: instants of the loop are products of a step, and no product is exact.
 _EARLY = 1e-6
 
 
-class Spoken(NamedTuple):
-    """What is under way from the instrument to its listener."""
+class SensorState(NamedTuple):
+    """What is under way from the sensor to its listener."""
 
     taken: Int[Array, ""]  # number of the last sample taken, from 0
     arrived: Int[Array, ""]  # number of the last sample delivered
@@ -30,7 +30,7 @@ class Spoken(NamedTuple):
     offset: Reading  # of this run
 
 
-class Arrival(NamedTuple):
+class Delivery(NamedTuple):
     """What the listener gets at one instant."""
 
     reading: Reading
@@ -38,11 +38,11 @@ class Arrival(NamedTuple):
 
 
 class Sampling(eqx.Module):
-    """Sample k is taken at k period, or at the first tick of the loop after it, and delivered a delay later.
+    """Sample k is taken at k period, or at the first step of the loop after it, and delivered a delay later.
 
     reading = resolution round((truth + bias + noise) / resolution). The noise is new for every sample and depends on
     its number only, not on the rate of the loop; the bias is drawn once for a run. Where several samples fall between
-    two ticks, the newest is delivered. In single precision more than 2^24 samples are too many to be told apart.
+    two steps, the newest is delivered. In single precision more than 2^24 samples are too many to be told apart.
 
     Raises:
         BadInput: a period not positive, a probability of one or more, anything else negative.
@@ -65,7 +65,7 @@ class Sampling(eqx.Module):
         if not self.slots:
             self.slots = math.ceil(float(np.asarray(self.delay) / np.asarray(self.period)) - _EARLY) + 1
 
-    def init(self, reading: Reading, chance: Reading) -> Spoken:
+    def init(self, reading: Reading, chance: Reading) -> SensorState:
         """Nothing taken yet.
 
         Args:
@@ -74,23 +74,25 @@ class Sampling(eqx.Module):
         """
         nothing = jnp.asarray(-1, dtype=int)
         readings = jnp.zeros((self.slots, *reading.shape), reading.dtype)
-        return Spoken(nothing, nothing, readings, jnp.zeros(self.slots, dtype=bool), self.bias * chance)
+        return SensorState(nothing, nothing, readings, jnp.zeros(self.slots, dtype=bool), self.bias * chance)
 
     def number(self, t) -> Int[Array, ""]:
         """Number of the newest sample taken by time t, from 0."""
         return jnp.floor(t / self.period + _EARLY).astype(int)
 
-    def hear(self, state: Spoken, t, truth: Reading, chance: Float[Array, " width+1"]) -> tuple[Arrival, Spoken]:
+    def deliver(
+        self, state: SensorState, t, truth: Reading, chance: Float[Array, " width+1"]
+    ) -> tuple[Delivery, SensorState]:
         """What is delivered at time t, and the state afterwards.
 
         Args:
             state: after the instant before.
             t: s.
-            truth: what a perfect instrument would read now.
+            truth: what a perfect sensor would read now.
             chance: standard normal numbers of sample `number(t)`: one per entry, one for being lost.
         """
         newest, due = self.number(t), self.number(t - self.delay)
-        # Numbers that passed between two ticks are all answered with the present truth.
+        # Numbers that passed between two steps are all answered with the present truth.
         numbers = newest - (newest - jnp.arange(self.slots)) % self.slots
         new = numbers > state.taken
         readings = jnp.where(
@@ -99,8 +101,8 @@ class Sampling(eqx.Module):
         lost = jnp.where(new, chance[-1] < ndtri(self.dropout), state.lost)
         slot = due % self.slots
         fresh = (due > state.arrived) & (due >= 0) & ~lost[slot]
-        spoken = Spoken(newest, jnp.maximum(due, state.arrived), readings, lost, state.offset)
-        return Arrival(readings[slot], fresh), spoken
+        state = SensorState(newest, jnp.maximum(due, state.arrived), readings, lost, state.offset)
+        return Delivery(readings[slot], fresh), state
 
     def _rounded(self, exact: Reading) -> Reading:
         step = jnp.where(self.resolution > 0, self.resolution, 1.0)

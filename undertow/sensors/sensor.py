@@ -1,4 +1,4 @@
-"""The contract of an instrument."""
+"""The contract of an sensor."""
 
 import abc
 
@@ -13,7 +13,7 @@ from undertow.sensors.estimate import Estimate, Motion
 from undertow.sensors.sampling import Reading, Sampling
 
 
-class AbstractInstrument(eqx.Module):
+class AbstractSensor(eqx.Module):
     """Reads something of the motion, and knows how a reading corrects what the observer believes.
 
     Raises:
@@ -36,7 +36,7 @@ class AbstractInstrument(eqx.Module):
         """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for what it does not read."""
         return jnp.full(6, jnp.inf)
 
-    def foretell(self, estimate: Estimate, reading: Reading) -> Estimate:
+    def predict(self, estimate: Estimate, reading: Reading) -> Estimate:
         """Estimate with what this reading says about the time since the last one; before the prediction."""
         return estimate
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.actuator_model import DirectDrive, LaggedDrive
+from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.first_order import LaggedThrust
@@ -80,8 +80,8 @@ class CommandedThrust(AbstractMotorlessThruster):
         hint = "It takes newtons, whatever turns inside. Preset `robust` knows its lag"
         raise BadInput("speed_sensor", "be false with thruster commanded_thrust", "true", hint=hint)
 
-    def drive(self, count: int, measured: bool) -> LaggedDrive:
-        return LaggedDrive(DirectDrive(self.linear_gain, *self.limits()), self.time_constant, count)
+    def actuator_model(self, count: int, measured: bool) -> LaggedActuator:
+        return LaggedActuator(DirectActuator(self.linear_gain, *self.limits()), self.time_constant, count)
 
     def advice(self):
         if float(jnp.max(self.power_per_thrust)) > 0:

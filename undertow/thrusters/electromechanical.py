@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.motor_speed_control import MotorDrive
+from undertow.thrusters.motor_speed_control import SpeedControlledMotor
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
 
 
@@ -58,8 +58,8 @@ class ElectromechanicalThruster(AbstractThruster):
     def speed_term(self, report: PropellerReport) -> PerThruster:
         return self.motor.speed_term(report.speed, report.acceleration)
 
-    def drive(self, count: int, measured: bool) -> MotorDrive:
-        return MotorDrive(self, count, measured)
+    def actuator_model(self, count: int, measured: bool) -> SpeedControlledMotor:
+        return SpeedControlledMotor(self, count, measured)
 
     def advice(self):
         return self.motor.advice()

@@ -10,7 +10,7 @@ from undertow.thrusters.shaft import ShaftThruster
 from undertow.thrusters.static import StaticThruster
 from undertow.thrusters.thruster import AbstractThruster
 
-RUNGS = {
+FIDELITIES = {
     "ideal": IdealThruster,
     "static": StaticThruster,
     "shaft": ShaftThruster,
@@ -18,28 +18,28 @@ RUNGS = {
 }
 
 
-def on_rung(
+def with_fidelity(
     motor: DCMotor,
-    rung: str,
+    fidelity: str,
     supply: float = float(jnp.inf),
     dead_zone: float = 0.0,
     dead_zone_kind: str = "pass",
 ) -> AbstractThruster:
-    """The motor on a rung of the ladder.
+    """The motor on a fidelity of the ladder.
 
     Args:
         motor: constants.
-        rung: ideal, static, shaft or electromechanical.
+        fidelity: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; infinite by default.
         dead_zone: voltage below which nothing turns, V.
         dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
 
     Raises:
-        BadInput: unknown rung or kind, supply not positive, dead zone negative, no inductance on `electromechanical`.
+        BadInput: unknown fidelity or kind, supply not positive, dead zone negative, no inductance on `electromechanical`.
     """
-    checks.choice("rung", rung, tuple(RUNGS))
+    checks.choice("fidelity", fidelity, tuple(FIDELITIES))
     if not supply > 0:
         checks.positive("supply", supply, "V")
-    if rung == "electromechanical":
+    if fidelity == "electromechanical":
         checks.positive("inductance", motor.inductance, "H")
-    return RUNGS[rung](motor=motor, supply=supply, dead_zone=dead_zone, dead_zone_kind=dead_zone_kind)
+    return FIDELITIES[fidelity](motor=motor, supply=supply, dead_zone=dead_zone, dead_zone_kind=dead_zone_kind)

@@ -8,12 +8,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.actuator_model import LaggedDrive
+from undertow.core.actuator_model import LaggedActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.memoryless import MemorylessThruster
 from undertow.thrusters.motorless import AbstractMotorlessThruster
-from undertow.thrusters.quasi_static_actuator import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import PerThruster
 
 _OF_STEADY_STATE = (
@@ -81,8 +81,8 @@ class FirstOrderThruster(AbstractMotorlessThruster):
         hint = "This thruster has no propeller speed. Describe its motor (DCMotor); preset `robust` knows its lag"
         raise BadInput("speed_sensor", "be false with thruster first_order", "true", hint=hint)
 
-    def drive(self, count: int, measured: bool) -> LaggedDrive:
-        return LaggedDrive(SteadyDrive(self.settled()), self.time_constant, count)
+    def actuator_model(self, count: int, measured: bool) -> LaggedActuator:
+        return LaggedActuator(QuasiStaticActuator(self.settled()), self.time_constant, count)
 
     def advice(self):
         return ()

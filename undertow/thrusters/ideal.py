@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.quasi_static_actuator import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
@@ -56,8 +56,8 @@ class IdealThruster(AbstractThruster):
         """V, V, that gives a thrust in N."""
         return self.commanded(self.motor.ideal_voltage(thrust))
 
-    def drive(self, count: int, measured: bool) -> SteadyDrive:
-        return SteadyDrive(self)
+    def actuator_model(self, count: int, measured: bool) -> QuasiStaticActuator:
+        return QuasiStaticActuator(self)
 
     def advice(self):
         return self.motor.advice()

@@ -8,7 +8,7 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motorless import AbstractMotorlessThruster
-from undertow.thrusters.quasi_static_actuator import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import PerThruster
 
 _LEAST = 1e-30  # stands for 0, where a power has no slope
@@ -56,8 +56,8 @@ class MemorylessThruster(AbstractMotorlessThruster):
         """V, V, that gives a thrust in N."""
         return self.commanded(_signed_power(thrust / self._coefficient(thrust), 1 / self.power))
 
-    def drive(self, count: int, measured: bool) -> SteadyDrive:
-        return SteadyDrive(self)
+    def actuator_model(self, count: int, measured: bool) -> QuasiStaticActuator:
+        return QuasiStaticActuator(self)
 
     def advice(self):
         return ()

@@ -5,11 +5,11 @@ from typing import NamedTuple, Protocol
 import equinox as eqx
 import jax.numpy as jnp
 
-from undertow.core.actuator_model import AbstractDrive
+from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.numerics.integrators import rk4
 from undertow.thrusters.motor import DCMotor
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.static import StaticThruster
-from undertow.thrusters.quasi_static_actuator import SteadyDrive
 from undertow.thrusters.thruster import PerThruster
 
 # How much faster the current is made to follow than the speed that it drives.
@@ -43,7 +43,7 @@ class WithMotor(Protocol):
         ...
 
 
-class MotorDrive(AbstractDrive):
+class SpeedControlledMotor(AbstractActuatorModel):
     """The current for a wanted torque, Eq. (8), and the voltage for that current, Eq. (9). Section X9 of the theory.
 
     Speeds are the reported ones where they are measured, else those that the same equations predict from the voltages
@@ -54,7 +54,7 @@ class MotorDrive(AbstractDrive):
     count: int = eqx.field(static=True)
     measured: bool = eqx.field(static=True)
 
-    def quickest(self, sampled):
+    def max_bandwidth(self, sampled):
         motor = self.thruster.motor
         winding = jnp.min(motor.resistance / jnp.maximum(motor.inductance, 1e-12))
         driven = jnp.where(winding > _CURRENT_FASTER * sampled, 1.0, _DRIVEN) * sampled
@@ -70,7 +70,7 @@ class MotorDrive(AbstractDrive):
     def init(self) -> MotorState:
         return MotorState(jnp.zeros(self.count), jnp.zeros(self.count))
 
-    def heard(self, state: MotorState, report) -> MotorState:
+    def update_from_report(self, state: MotorState, report) -> MotorState:
         return state._replace(speed=report.speed) if self.measured else state
 
     def range(self, state: MotorState, rate) -> tuple[PerThruster, PerThruster]:
@@ -94,7 +94,7 @@ class MotorDrive(AbstractDrive):
         held = motor.resistance * wanted + motor.back_emf_constant * state.speed
         return self.thruster.commanded(held + self._boost(rate) * (wanted - state.current))
 
-    def aim(self, state: MotorState, u, rate) -> PerThruster:
+    def target_of(self, state: MotorState, u, rate) -> PerThruster:
         motor, boost = self.thruster.motor, self._boost(rate)
         free = self.thruster.terminal(u) - motor.back_emf_constant * state.speed + boost * state.current
         pull = (free / (motor.resistance + boost) - motor.steady_current(state.speed)) * motor.torque_constant
@@ -111,9 +111,9 @@ class MotorDrive(AbstractDrive):
         speed = rk4(turning, jnp.zeros(()), state.speed, dt)
         return MotorState(speed, settled + (state.current - settled) * jnp.exp(-fading))
 
-    def steady(self) -> SteadyDrive:
+    def quasi_static(self) -> QuasiStaticActuator:
         names = ("motor", "supply", "dead_zone", "dead_zone_kind")
-        return SteadyDrive(StaticThruster(**{name: getattr(self.thruster, name) for name in names}))
+        return QuasiStaticActuator(StaticThruster(**{name: getattr(self.thruster, name) for name in names}))
 
     def _boost(self, rate) -> PerThruster:
         """By itself the current comes at R / L; where that is too slow, more voltage makes it faster, ohm."""

@@ -2,24 +2,24 @@
 
 import math
 
-from undertow.thrusters.fidelity import on_rung
+from undertow.thrusters.fidelity import with_fidelity
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import AbstractThruster
 
 
 def paper_table3(
-    rung: str = "electromechanical",
+    fidelity: str = "electromechanical",
     supply: float = math.inf,
     dead_zone: float = 0.0,
     dead_zone_kind: str = "pass",
     inductance: float = 0.01,
 ) -> AbstractThruster:
-    """Thruster of Table 3, as printed, on a rung of the fidelity ladder.
+    """Thruster of Table 3, as printed, on a fidelity of the fidelity ladder.
 
     An impossible motor: k_t / k_e is 117, so the shaft gives several times the power the supply puts in.
 
     Args:
-        rung: ideal, static, shaft or electromechanical.
+        fidelity: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; infinite by default.
         dead_zone: voltage below which nothing turns, V.
         dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
@@ -36,4 +36,4 @@ def paper_table3(
         torque_coefficient=0.00232,
         sources={"*": "the paper, Table 3", "friction": "the paper, Table 3 (unit printed as N s)"},
     )
-    return on_rung(motor, rung, supply, dead_zone, dead_zone_kind)
+    return with_fidelity(motor, fidelity, supply, dead_zone, dead_zone_kind)

@@ -4,7 +4,7 @@ from typing import Protocol
 
 import jax.numpy as jnp
 
-from undertow.core.actuator_model import AbstractDrive
+from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.thrusters.thruster import PerThruster
 
 
@@ -22,12 +22,12 @@ class Invertible(Protocol):
         ...
 
 
-class SteadyDrive(AbstractDrive):
+class QuasiStaticActuator(AbstractActuatorModel):
     """Thrust at once, by the curve that the thruster itself has."""
 
     thruster: Invertible
 
-    def quickest(self, sampled):
+    def max_bandwidth(self, sampled):
         return sampled
 
     def time_constant(self):
@@ -36,7 +36,7 @@ class SteadyDrive(AbstractDrive):
     def init(self) -> tuple[()]:
         return ()
 
-    def heard(self, state, report) -> tuple[()]:
+    def update_from_report(self, state, report) -> tuple[()]:
         return ()
 
     def range(self, state, rate) -> tuple[PerThruster, PerThruster]:
@@ -52,7 +52,7 @@ class SteadyDrive(AbstractDrive):
     def command(self, state, force, rate) -> PerThruster:
         return self.thruster.voltage_for(force)
 
-    def aim(self, state, u, rate) -> PerThruster:
+    def target_of(self, state, u, rate) -> PerThruster:
         return self.thruster.thrust((), u)
 
     def advance(self, state, u, dt) -> tuple[()]:

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.motor_speed_control import MotorDrive
+from undertow.thrusters.motor_speed_control import SpeedControlledMotor
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
 
 
@@ -58,14 +58,14 @@ class ShaftThruster(AbstractThruster):
     def speed_term(self, report):
         raise BadInput(
             "speed_sensor",
-            "be false on rung `shaft`",
+            "be false on fidelity `shaft`",
             "true",
             hint="There Om_dot depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1. "
-            "Use preset: robust, which needs the speed only, or rung: electromechanical, where states give Om_dot",
+            "Use preset: robust, which needs the speed only, or fidelity: electromechanical, where states give Om_dot",
         )
 
-    def drive(self, count: int, measured: bool) -> MotorDrive:
-        return MotorDrive(self, count, measured)
+    def actuator_model(self, count: int, measured: bool) -> SpeedControlledMotor:
+        return SpeedControlledMotor(self, count, measured)
 
     def advice(self):
         return self.motor.advice()

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.quasi_static_actuator import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
@@ -49,7 +49,7 @@ class StaticThruster(AbstractThruster):
     def speed_term(self, report):
         raise BadInput(
             "speed_sensor",
-            "be false on rung `static`",
+            "be false on fidelity `static`",
             "true",
             hint="There phi depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1",
         )
@@ -58,8 +58,8 @@ class StaticThruster(AbstractThruster):
         """V, V, that gives a thrust in N."""
         return self.commanded(self.motor.steady_voltage(self.motor.speed_at(thrust)))
 
-    def drive(self, count: int, measured: bool) -> SteadyDrive:
-        return SteadyDrive(self)
+    def actuator_model(self, count: int, measured: bool) -> QuasiStaticActuator:
+        return QuasiStaticActuator(self)
 
     def advice(self):
         return self.motor.advice()

@@ -1,7 +1,7 @@
 """Blue Robotics T200: one brushed-DC equivalent for the manufacturer's whole table, 10-20 V."""
 
 from undertow.core import checks
-from undertow.thrusters.fidelity import on_rung
+from undertow.thrusters.fidelity import with_fidelity
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import DEAD_ZONES, AbstractThruster
 
@@ -15,9 +15,9 @@ _FITS = {
 
 
 def t200(
-    rung: str = "shaft", supply: float = 16.0, dead_zone: float = 1.2, dead_zone_kind: str = "pass"
+    fidelity: str = "shaft", supply: float = 16.0, dead_zone: float = 1.2, dead_zone_kind: str = "pass"
 ) -> AbstractThruster:
-    """Blue Robotics T200 on a rung of the fidelity ladder: within 2.5 N, 0.8 A and 15 rad/s rms of its table.
+    """Blue Robotics T200 on a fidelity of the fidelity ladder: within 2.5 N, 0.8 A and 15 rad/s rms of its table.
 
     A motor with k_t = k_e. The bench: duty = (PWM - 1500) / 400, V = duty times supply. How the loss divides into
     copper and shaft cannot be read from such a table; this set gives the propeller a credible figure of merit of 0.65
@@ -29,7 +29,7 @@ def t200(
     With an inductance of 0.154 mH the winding settles in 0.4 ms: on `electromechanical` take steps of 0.2 ms.
 
     Args:
-        rung: ideal, static, shaft or electromechanical.
+        fidelity: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; the table ends at 20 V.
         dead_zone: voltage below which nothing turns, V; the table's bands are 1.0 to 1.4 V.
         dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
@@ -54,4 +54,4 @@ def t200(
             "reverse_torque_coefficient": "as forward: the table shows no difference that matters",
         },
     )
-    return on_rung(motor, rung, supply, dead_zone, dead_zone_kind)
+    return with_fidelity(motor, fidelity, supply, dead_zone, dead_zone_kind)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.actuator_model import AbstractDrive, DirectDrive
+from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
 
 PerThruster = Float[Array, " N"]
 
@@ -40,7 +40,7 @@ class AbstractThruster(eqx.Module):
     dead_zone: eqx.AbstractVar[Float[Array, ""]]  # V; smaller voltages turn nothing
     dead_zone_kind = "pass"  # one of DEAD_ZONES; a field where a thruster offers both
     input_unit = "V"  # of what it is commanded with; where this is not V, read every voltage below in that unit
-    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, rungs `ideal` and `static`.
+    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, fidelities `ideal` and `static`.
     has_prescribed_acceleration: eqx.AbstractVar[bool]
 
     def __check_init__(self):
@@ -83,14 +83,14 @@ class AbstractThruster(eqx.Module):
     def speed_term(self, report: Any) -> PerThruster | Float[Array, ""]:
         """phi of Eq. (15), N, from a speed sensor."""
 
-    def drive(self, count: int, measured: bool) -> AbstractDrive:
+    def actuator_model(self, count: int, measured: bool) -> AbstractActuatorModel:
         """What a controller may know of `count` of them, to make them obey; T = alpha V where nothing better is known.
 
         Args:
             count: N.
             measured: whether propeller speeds are reported.
         """
-        return DirectDrive(self.voltage_gain(), *self.limits(), at_once=False)
+        return DirectActuator(self.voltage_gain(), *self.limits(), at_once=False)
 
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:

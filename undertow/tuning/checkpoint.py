@@ -1,7 +1,7 @@
 """Everything that was computed, on disk as soon as it is known: what an interrupted tuning goes on from.
 
 The methods are functions of what they are answered, so a tuning is resumed by asking again: the answers come from the
-journal as far as it goes. The result is the same as without the interruption, bit for bit.
+checkpoint as far as it goes. The result is the same as without the interruption, bit for bit.
 """
 
 import json
@@ -22,12 +22,12 @@ class OutOfTime(Exception):
     """The budget does not allow for another question."""
 
 
-class Journal:
+class Checkpoint:
     """Questions and answers, in order.
 
     Args:
         path: of the file, one answer per line; the first says what was tuned.
-        about: what is tuned; an earlier journal must be about the same.
+        about: what is tuned; an earlier checkpoint must be about the same.
         budget: s, of all sessions together.
         resume: whether to go on from what is there.
         started: `time.perf_counter()` of the beginning, so that preparations count.
@@ -58,7 +58,7 @@ class Journal:
         return self.elapsed > self._budget
 
     def ask(self, what: str, at: np.ndarray, compute: Callable[[], Any], must: bool = False) -> Any:
-        """The answer, from the journal or computed and written down.
+        """The answer, from the checkpoint or computed and written down.
 
         Args:
             what: kind of question.
@@ -90,7 +90,7 @@ class Journal:
 
 
 def has_answers(path: Path) -> bool:
-    """Whether a journal holds an answer, so that there is something to go on from."""
+    """Whether a checkpoint holds an answer, so that there is something to go on from."""
     try:
         return path.read_bytes().count(b"\n") > 1
     except OSError:
@@ -111,7 +111,7 @@ def _read(path: Path, about: str, resume: bool) -> list[dict[str, Any]]:
         known = [{key: entry[key] for key in _KEYS} for entry in entries[1:]]
     except (ValueError, KeyError, TypeError) as error:
         hint = "Remove it to begin anew"
-        raise BadInput("--resume", "find a journal that can be read", f"{path}: {error!r}", hint=hint) from None
+        raise BadInput("--resume", "find a checkpoint that can be read", f"{path}: {error!r}", hint=hint) from None
     if entries[:1] not in ([], [{"about": about}]):  # a process may have been killed while it wrote the first line
         raise BadInput("--resume", "go on with the same scenario and method", "another one")
     path.write_text("".join(line for line in lines if line.endswith("\n")), encoding="utf-8")

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.param import param
-from undertow.loop.closed_loop import Sample
+from undertow.loop.closed_loop import Signals
 from undertow.loop.sampled import AbstractAccumulator
 from undertow.scenario.schema import Weights
 
@@ -47,23 +47,23 @@ class Shares(NamedTuple):
 
 
 class CostSums(AbstractAccumulator):
-    """What `Shares` needs, gathered tick by tick from `start` on."""
+    """What `Shares` needs, gathered step by step from `start` on."""
 
     start: Scalar = param("s", "first time that counts")
     error_scale: Float[Array, " n"] = param("m, rad", "errors that cost one")
     input_scale: Scalar = param("unit of the input", "input that costs one")
 
-    def init(self, sample: Sample) -> Sums:
+    def init(self, sample: Signals) -> Sums:
         zero = jnp.zeros(())
         return Sums(zero, zero, zero, zero, zero, (zero, jnp.zeros_like(sample.voltage), zero))
 
-    def update(self, state: Sums, t: Scalar, sample: Sample) -> Sums:
+    def update(self, state: Sums, t: Scalar, sample: Signals) -> Sums:
         inside = jnp.where(t >= self.start - _HAIR, 1.0, 0.0)
         last_t, last_share, last_inside = state.last
         share, between = sample.voltage / self.input_scale, inside * last_inside
         step = jnp.sqrt((share - last_share) ** 2 + _SMOOTH**2) - _SMOOTH
         return Sums(
-            samples=state.samples + inside,
+            samples=state.signals + inside,
             tracking=state.tracking + inside * _bounded(((sample.error / self.error_scale) ** 2).mean(), _MOST**2),
             effort=state.effort + inside * _bounded((share**2).mean(), _MOST**2),
             variation=state.variation + between * step.mean(),
@@ -80,7 +80,7 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
         ended: when it failed, else its duration, s.
         duration: s.
     """
-    rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.samples, 1.0) + _SMOOTH**2)
+    rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.signals, 1.0) + _SMOOTH**2)
     variation = sums.variation / jnp.maximum(sums.span, _SMOOTH)
     found = Shares(rms(sums.tracking), rms(sums.effort), _bounded(variation, _MOST), 1 - ended / duration)
     return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in found))

@@ -58,7 +58,7 @@ class Bench(NamedTuple):
     ) -> Shares:
         """One closed loop; smooth for a slope that means something."""
         loop = self.with_parts(plant, law, size)
-        # Differentiated as they are, rounding instruments would look as if they were cut off.
+        # Differentiated as they are, rounding sensors would look as if they were cut off.
         loop = without(loop, _STEPS) if smooth else loop
         outcome = sampled.simulate(
             loop,

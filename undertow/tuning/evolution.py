@@ -11,10 +11,10 @@ _HOPELESS = 1e6  # cost of what is not certified
 _SPREAD = 1e-3  # of the population's costs, relative: it has come together
 
 
-def spread_points(count: int, dials: int, seed: int) -> np.ndarray:
+def spread_points(count: int, parameters: int, seed: int) -> np.ndarray:
     """Points that fill the box evenly, by Sobol's sequence."""
     with np.errstate(all="ignore"):
-        sequence = qmc.Sobol(dials, rng=np.random.default_rng(seed))
+        sequence = qmc.Sobol(parameters, rng=np.random.default_rng(seed))
         return sequence.random_base2(int(np.ceil(np.log2(count))))[:count]
 
 
@@ -27,12 +27,12 @@ def search(objective: Objective, start: np.ndarray, iterations: int, seed: int) 
         iterations: generations, at most.
         seed: of everything random.
     """
-    dials = len(start)
-    population = AT_ONCE * max(2, int(np.ceil(2 * dials / AT_ONCE)))
-    first = np.vstack([start, spread_points(population - 1, dials, seed)])
+    parameters = len(start)
+    population = AT_ONCE * max(2, int(np.ceil(2 * parameters / AT_ONCE)))
+    first = np.vstack([start, spread_points(population - 1, parameters, seed)])
     differential_evolution(
         lambda points: np.minimum(objective.costs(points.T), _HOPELESS),
-        [(0.0, 1.0)] * dials,
+        [(0.0, 1.0)] * parameters,
         init=first,
         maxiter=iterations,
         tol=_SPREAD,

@@ -6,8 +6,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from jaxtyping import Float
 
+from undertow.tuning.checkpoint import Checkpoint
 from undertow.tuning.stability import Certificate
-from undertow.tuning.checkpoint import Journal
 
 Points = Float[np.ndarray, "p k"]
 
@@ -38,19 +38,19 @@ Watch = Callable[[Step, int], None]  # the best so far, evaluations so far
 
 
 class Objective:
-    """Costs by way of a journal. Nothing is accepted without a certificate.
+    """Costs by way of a checkpoint. Nothing is accepted without a certificate.
 
     Args:
         computes: costs and slopes.
         certify: point -> certificate.
-        journal: what is known already.
+        checkpoint: what is known already.
         watch: told after every batch.
     """
 
     def __init__(
-        self, computes: Computes, certify: Callable[[np.ndarray], Certificate], journal: Journal, watch: Watch
+        self, computes: Computes, certify: Callable[[np.ndarray], Certificate], checkpoint: Checkpoint, watch: Watch
     ):
-        self._computes, self._certify, self._journal, self._watch = computes, certify, journal, watch
+        self._computes, self._certify, self._journal, self._watch = computes, certify, checkpoint, watch
         self.evaluations = 0
         self.steps: list[Step] = []
         self.refused = 0
@@ -64,7 +64,7 @@ class Objective:
         """Cost of each point; one that would be the best, but is not certified, costs infinitely much.
 
         Args:
-            points: shape (points, dials).
+            points: shape (points, parameters).
             must: whether they are computed even if time is up.
 
         Raises:

@@ -1,4 +1,4 @@
-"""From a scenario to a tuning problem: dials, laws, trials and what is counted."""
+"""From a scenario to a tuning problem: parameters, laws, trials and what is counted."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -14,12 +14,12 @@ from undertow.scenario import factory
 from undertow.scenario.build import Built, build
 from undertow.scenario.consistency import placed
 from undertow.scenario.reading import Text, key_path
-from undertow.tuning import tunable_parameters as dials_
+from undertow.tuning import tunable_parameters as tunable_parameters
 from undertow.tuning.cost import CostSums
 from undertow.tuning.defaults import SHARED, Law, law_of, now
-from undertow.tuning.tunable_parameters import Dial
 from undertow.tuning.evaluator import Bench
 from undertow.tuning.training_runs import Trials, training_and_held_out
+from undertow.tuning.tunable_parameters import TunableParameter
 
 _LONGEST = 20.0  # s, of a run, where nothing is said
 _DIGITS = 5  # of a tuned gain
@@ -30,7 +30,7 @@ class Problem(NamedTuple):
     """What is tuned, and on what."""
 
     built: Built
-    dials: list[Dial]
+    parameters: list[TunableParameter]
     law: Callable[[Mapping[str, Any]], AbstractController]  # of tuned options
     start: np.ndarray  # the given gains as a point; those beyond the bounds at the nearer one
     bench: Bench
@@ -39,7 +39,7 @@ class Problem(NamedTuple):
 
     def options(self, point: Any) -> dict[str, Any]:
         """Options at a point."""
-        return dials_.options(self.dials, point, len(self.built.closed_loop.controller.model.angles))
+        return tunable_parameters.options(self.parameters, point, len(self.built.closed_loop.controller.model.angles))
 
     def rounded(self, point: np.ndarray) -> dict[str, Any]:
         """Options at a point as a scenario has them."""
@@ -69,7 +69,7 @@ def problem(text: Text) -> Problem:
     known, dt, angles = _law_of(built), scenario.loop.dt, loop.controller.model.angles
     function, given = _controller(text, built)
     try:
-        chosen = _dials(known, function, tune, dt, angles)
+        chosen = _parameters(known, function, tune, dt, angles)
         train, held_out = training_and_held_out(text, built)
     except BadInput as error:
         raise error.at(where=text.where(key_path(error.name))) from error.__cause__
@@ -84,7 +84,7 @@ def problem(text: Text) -> Problem:
     bench = Bench(loop, scenario.loop, duration, places, sums, tune.weights)
     model = loop.controller.model
     law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))
-    begin = [dial.share(_mean(known, loop.controller, given, dial)) for dial in chosen]
+    begin = [parameter.share(_mean(known, loop.controller, given, parameter)) for parameter in chosen]
     found = Problem(built, chosen, law, np.array(begin), bench, train, held_out)
     placed(text, "controller", lambda: found.law(found.options(found.start)))
     return found
@@ -103,7 +103,9 @@ def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractControl
     return (function if preset is None else factory.presets_of(function)[preset]), options
 
 
-def _dials(known: Law, function: Callable[..., Any], tune: Any, dt: float, angles: tuple[bool, ...]) -> list[Dial]:
+def _parameters(
+    known: Law, function: Callable[..., Any], tune: Any, dt: float, angles: tuple[bool, ...]
+) -> list[TunableParameter]:
     ranges = tune.parameters or known.ranges(dt)
     if not ranges:
         raise BadInput("tune.parameters", "be given for this controller", hint="As `gain: [low, high]`")
@@ -112,8 +114,8 @@ def _dials(known: Law, function: Callable[..., Any], tune: Any, dt: float, angle
         if name.partition("[")[0] not in options:
             hint = did_you_mean(name, options)
             raise BadInput(f"tune.parameters.{name}", "be an option of the controller", "unknown", hint=hint)
-    chosen = dials_.dials(ranges, _groups(tune.per, angles), SHARED)
-    dials_.whole(chosen)
+    chosen = tunable_parameters.parameters(ranges, _groups(tune.per, angles), SHARED)
+    tunable_parameters.whole(chosen)
     return chosen
 
 
@@ -132,17 +134,17 @@ def _left_out(known: Law, options: Mapping[str, Any]) -> dict[str, None]:
     return {other: None for option in options for other in known.instead.get(option, ())}
 
 
-def _mean(known: Law, law: AbstractController, given: Mapping[str, Any], dial: Dial) -> float:
-    """What a dial stands at in a law: the geometric mean over its axes; half-way where nothing is known."""
-    name = dial.option if dial.entry is None else f"{dial.option}[{dial.entry}]"
-    value = now(known, law, name, given.get(dial.option))
+def _mean(known: Law, law: AbstractController, given: Mapping[str, Any], parameter: TunableParameter) -> float:
+    """What a parameter stands at in a law: the geometric mean over its axes; half-way where nothing is known."""
+    name = parameter.option if parameter.entry is None else f"{parameter.option}[{parameter.entry}]"
+    value = now(known, law, name, given.get(parameter.option))
     if value is None:
-        return float(np.sqrt(dial.low * dial.high))
+        return float(np.sqrt(parameter.low * parameter.high))
     numbers = np.asarray(value, dtype=float)
-    if name not in known.now and dial.entry is not None:
-        numbers = numbers[..., dial.entry]
-    of_axes = numbers[list(dial.axes)] if numbers.ndim and dial.axes else numbers
-    return float(np.exp(np.log(np.maximum(of_axes, dial.low)).mean()))
+    if name not in known.now and parameter.entry is not None:
+        numbers = numbers[..., parameter.entry]
+    of_axes = numbers[list(parameter.axes)] if numbers.ndim and parameter.axes else numbers
+    return float(np.exp(np.log(np.maximum(of_axes, parameter.low)).mean()))
 
 
 def _input_scale(plant: AbstractPlant, law: AbstractController) -> float:

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractDisturbance, Factors, Load, Payload, Water
+from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling, Payload, Water
 from undertow.core.param import param
 
 
@@ -13,17 +13,17 @@ class Scaled(AbstractDisturbance):
     inner: AbstractDisturbance
     size: Float[Array, ""] = param("", "1 leaves the disturbance as it is")
 
-    def draw(self, key):
-        return self.inner.draw(key)
+    def realize(self, key):
+        return self.inner.realize(key)
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        whole, size = self.inner.at(path, t, place, calm), self.size
-        water, factors = whole.water, whole.factors
+    def at(self, realization, t, pose, calm: Load) -> Load:
+        whole, size = self.inner.at(realization, t, pose, calm), self.size
+        water, factors = whole.water, whole.scaling
         return Load(
             acceleration=calm.acceleration + size * (whole.acceleration - calm.acceleration),
             wrench=calm.wrench + size * (whole.wrench - calm.wrench),
             water=water and Water(size * water.velocity, size * water.acceleration),
-            factors=factors and Factors(*(factor**size for factor in factors)),
+            factors=factors and ModelScaling(*(factor**size for factor in factors)),
             payloads=tuple(Payload(size * each.mass, size * each.weight, each.point) for each in whole.payloads),
         )
 

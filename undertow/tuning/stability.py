@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.linearization import margins
-from undertow.analysis.linearization.equilibrium import rest
-from undertow.analysis.linearization.disturbance_profile import surroundings
+from undertow.analysis.linearization.disturbance_profile import disturbance_profile
+from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.core.contracts import AbstractController
 from undertow.core.errors import BadInput
 from undertow.tuning.evaluator import Bench
@@ -20,10 +20,10 @@ _SHARES = (0.1, 0.5, 0.9)
 
 
 class Certificate(NamedTuple):
-    """Spectral radii of the closed loop from tick to tick, one per operating point, and which plant it was."""
+    """Spectral radii of the closed loop from step to step, one per operating point, and which plant it was."""
 
     radii: tuple[float, ...]
-    truths: tuple[str, ...]
+    variants: tuple[str, ...]
 
     @property
     def worst(self) -> float:
@@ -31,9 +31,9 @@ class Certificate(NamedTuple):
         return max(self.radii)
 
     @property
-    def worst_truth(self) -> str:
+    def worst_variant(self) -> str:
         """Parameter set of the plant that has it; "" where there is but one."""
-        return self.truths[self.radii.index(self.worst)]
+        return self.variants[self.radii.index(self.worst)]
 
     @property
     def holds(self) -> bool:
@@ -53,8 +53,8 @@ class Certifier:
     def __init__(self, bench: Bench, trials: Trials, first: AbstractController):
         self._bench = bench
         self._position = np.asarray(bench.loop.reference.at(jnp.asarray(bench.duration / 2)).position)
-        self._truths = tuple(dict.fromkeys(trials.truths))
-        once = [trials.truths.index(name) for name in self._truths]
+        self._variants = tuple(dict.fromkeys(trials.variants))
+        once = [trials.variants.index(name) for name in self._variants]
         self._plants = [_plant(trials, i) for i in once]
         pairs = zip(self._plants, once, strict=True)
         self._loads = [self._operating_loads(plant, trials.keys[i], first) for plant, i in pairs]
@@ -63,17 +63,17 @@ class Certifier:
         """Certificate of a law."""
         dt = self._bench.settings.dt
         radii: list[float] = []
-        truths: list[str] = []
-        for name, plant, loads in zip(self._truths, self._plants, self._loads, strict=True):
+        variants: list[str] = []
+        for name, plant, loads in zip(self._variants, self._plants, self._loads, strict=True):
             found = margins.certify(self._bench.with_parts(plant, law), dt, self._position, loads)
             radii += [radius if np.isfinite(radius) else float("inf") for radius in found]
-            truths += [name] * len(found)
-        return Certificate(tuple(radii), tuple(truths))
+            variants += [name] * len(found)
+        return Certificate(tuple(radii), tuple(variants))
 
     def _operating_loads(self, plant: Any, key: Any, law: AbstractController) -> np.ndarray:
         loop, dt = self._bench.with_parts(plant, law), self._bench.settings.dt
-        at = rest(loop, dt, self._position, np.zeros_like(self._position))
-        around = surroundings(loop, at, key, round(self._bench.duration / dt), dt)
+        at = equilibrium(loop, dt, self._position, np.zeros_like(self._position))
+        around = disturbance_profile(loop, at, key, round(self._bench.duration / dt), dt)
         return around.operating_loads(_SHARES)
 
 
@@ -88,7 +88,7 @@ def refusal(given: Certificate, tried: int) -> BadInput:
         given: certificate of the gains of the scenario.
         tried: how many points were tried.
     """
-    truth = f" with the parameter set {given.worst_truth} as the truth" if given.worst_truth else ""
+    truth = f" with the parameter set {given.worst_variant} as the truth" if given.worst_variant else ""
     sets = ", tell the controller another set or leave this one out of tune.train.sets" if truth else ""
     hint = f"As given, the loop has a spectral radius of {given.worst:.4g}{truth}. Widen the ranges{sets}"
     must, got = "allow gains with which the loop is stable", f"so that none of {tried} points is certified"

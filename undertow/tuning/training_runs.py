@@ -16,7 +16,7 @@ from undertow.core.errors import BadInput
 from undertow.scenario import factory
 from undertow.scenario.build import Built
 from undertow.scenario.reading import Text
-from undertow.scenario.schema import Tries
+from undertow.scenario.schema import TrainingRuns
 
 _HELD_OUT_SEEDS = 1_000_000  # far from those of the training
 
@@ -27,18 +27,18 @@ class Trials(NamedTuple):
     plants: AbstractPlant
     keys: Array
     sizes: Float[Array, " trials"]
-    truths: tuple[str, ...]  # name of the true parameter set of each; "" where there is but one
+    variants: tuple[str, ...]  # name of the true parameter set of each; "" where there is but one
 
     @property
     def number(self) -> int:
         """How many."""
-        return len(self.truths)
+        return len(self.variants)
 
     def part(self, chosen: Any) -> "Trials":
         """Some of them, by their numbers; numbers may repeat."""
         pick = lambda tree: jax.tree.map(lambda leaf: leaf[chosen], eqx.filter(tree, eqx.is_array))
         plants = eqx.combine(pick(self.plants), eqx.filter(self.plants, eqx.is_array, inverse=True))
-        return Trials(plants, self.keys[chosen], self.sizes[chosen], tuple(self.truths[i] for i in chosen))
+        return Trials(plants, self.keys[chosen], self.sizes[chosen], tuple(self.variants[i] for i in chosen))
 
 
 def training_and_held_out(text: Text, built: Built) -> tuple[Trials, Trials]:
@@ -56,7 +56,7 @@ def training_and_held_out(text: Text, built: Built) -> tuple[Trials, Trials]:
     return train, trials(text, built, tune.held_out, own, "held_out", built.scenario.seed + _HELD_OUT_SEEDS)
 
 
-def trials(text: Text, built: Built, wanted: Tries, default: Sequence[str], key: str, first_seed: int) -> Trials:
+def trials(text: Text, built: Built, wanted: TrainingRuns, default: Sequence[str], key: str, first_seed: int) -> Trials:
     """Every set with every seed; sizes of the disturbance take turns with the seeds.
 
     Args:
@@ -84,7 +84,7 @@ def trials(text: Text, built: Built, wanted: Tries, default: Sequence[str], key:
         plants=stacked([plants[name] for name, _ in each]),
         keys=jnp.stack([jax.random.PRNGKey((first_seed + seed) % 2**32) for _, seed in each]),
         sizes=jnp.asarray([wanted.sizes[seed % len(wanted.sizes)] for _, seed in each], dtype=float),
-        truths=tuple(name for name, _ in each),
+        variants=tuple(name for name, _ in each),
     )
 
 

@@ -10,13 +10,13 @@ from jaxtyping import Array, Float
 
 from undertow.core.errors import BadInput
 
-Point = Float[Array, " k"]  # of the tuning: 0 at the lower bound of a dial, 1 at the upper
+Point = Float[Array, " k"]  # of the tuning: 0 at the lower bound of a parameter, 1 at the upper
 
 _NAME = re.compile(r"(\w+)(?:\[(\d+)\])?")
 _WIDTHS = {"feedback": 2, "gains": 3}  # options of which an axis has several, and how many
 
 
-class Dial(NamedTuple):
+class TunableParameter(NamedTuple):
     """One number to be found, shared by a group of axes."""
 
     option: str
@@ -41,10 +41,10 @@ class Dial(NamedTuple):
         return float(np.log(inside / self.low) / np.log(self.high / self.low))
 
 
-def dials(
+def parameters(
     ranges: Mapping[str, Sequence[float]], groups: Sequence[tuple[int, ...]], shared: Sequence[str] = ()
-) -> list[Dial]:
-    """A dial per option and group of axes; one for an option that all axes share.
+) -> list[TunableParameter]:
+    """A parameter per option and group of axes; one for an option that all axes share.
 
     Args:
         ranges: low and high by option; `feedback[0]` for the first of several numbers per axis.
@@ -59,39 +59,39 @@ def dials(
         option, entry = _parsed(name)
         low, high = _bounds(name, bounds)
         for axes in [()] if option in shared else groups:
-            found.append(Dial(option, entry, axes, low, high))
+            found.append(TunableParameter(option, entry, axes, low, high))
     return found
 
 
-def options(chosen: Sequence[Dial], point: Point, axes: int) -> dict[str, Array]:
+def options(chosen: Sequence[TunableParameter], point: Point, axes: int) -> dict[str, Array]:
     """Options at a point; may be traced.
 
     Args:
-        chosen: the dials, in the order of the point's entries.
+        chosen: the parameters, in the order of the point's entries.
         point: shape (k,).
         axes: n.
     """
     found: dict[str, Any] = {}
-    for share, dial in zip(point, chosen, strict=True):
-        value = dial.value(share)
-        if not dial.axes:
-            found[dial.option] = value
+    for share, parameter in zip(point, chosen, strict=True):
+        value = parameter.value(share)
+        if not parameter.axes:
+            found[parameter.option] = value
             continue
-        shape = (axes,) if dial.entry is None else (axes, _WIDTHS[dial.option])
-        held = found.get(dial.option, jnp.zeros(shape))
-        place = (np.array(dial.axes),) if dial.entry is None else (np.array(dial.axes), dial.entry)
-        found[dial.option] = held.at[place].set(value)
+        shape = (axes,) if parameter.entry is None else (axes, _WIDTHS[parameter.option])
+        held = found.get(parameter.option, jnp.zeros(shape))
+        place = (np.array(parameter.axes),) if parameter.entry is None else (np.array(parameter.axes), parameter.entry)
+        found[parameter.option] = held.at[place].set(value)
     return found
 
 
-def whole(chosen: Sequence[Dial], key: str = "tune.parameters") -> None:
+def whole(chosen: Sequence[TunableParameter], key: str = "tune.parameters") -> None:
     """Whether every option is covered: all of several numbers per axis, or none.
 
     Raises:
         BadInput: some of them are missing.
     """
     for option, width in _WIDTHS.items():
-        entries = {dial.entry for dial in chosen if dial.option == option}
+        entries = {parameter.entry for parameter in chosen if parameter.option == option}
         missing = [f"{option}[{i}]" for i in range(width) if i not in entries] if entries else []
         if missing:
             raise BadInput(key, f"name {', '.join(missing)}, too", f"without, beside {option}[{min(entries)}]")

@@ -12,14 +12,14 @@ from undertow.core.errors import BadInput
 from undertow.scenario.build import in_its_precision
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
-from undertow.tuning.stability import Certificate, Certifier, refusal
+from undertow.tuning.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.cost import Shares
-from undertow.tuning.gradient_descent import descend
 from undertow.tuning.evaluator import AT_ONCE, Evaluation
-from undertow.tuning.checkpoint import Journal, OutOfTime
+from undertow.tuning.evolution import search, spread_points
+from undertow.tuning.gradient_descent import descend
 from undertow.tuning.objective import Objective, Step, Watch
 from undertow.tuning.problem import Problem, problem
-from undertow.tuning.evolution import search, spread_points
+from undertow.tuning.stability import Certificate, Certifier, refusal
 
 METHODS = ("gradient", "search")
 
@@ -63,7 +63,7 @@ class Tuned(NamedTuple):
 @in_its_precision
 def tune(
     text: Text,
-    journal: Path,
+    checkpoint: Path,
     *,
     method: str = "gradient",
     budget: float = 240.0,
@@ -76,10 +76,10 @@ def tune(
 
     Args:
         text: the scenario.
-        journal: file that an interrupted tuning goes on from.
+        checkpoint: file that an interrupted tuning goes on from.
         method: gradient, downhill by forward differentiation, or search, differential evolution.
         budget: s, all told; what is begun is finished, and the first points are tried whatever it takes.
-        resume: whether to go on from the journal.
+        resume: whether to go on from the checkpoint.
         beside: other choices of options, by name, to be judged like the given and the tuned ones.
         say: told the stage.
         watch: told the best so far after every batch.
@@ -93,7 +93,7 @@ def tune(
     about = text_hash(
         dump({"method": method, "tune": wanted.built.scenario.tune.model_dump(), **wanted.built.resolved})
     )
-    notes = Journal(journal, about, _FOR_THE_SEARCH * budget, resume, begun)
+    notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
     make = lambda point: wanted.law(wanted.options(point))
     first = make(wanted.start)
     evaluation = Evaluation(wanted.bench, make, first, wanted.train)
@@ -103,7 +103,7 @@ def tune(
     objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
     say("compiling, and looking for a beginning")
     seed = wanted.built.scenario.seed
-    others = spread_points(_BEGINNINGS - 1, len(wanted.dials), seed)
+    others = spread_points(_BEGINNINGS - 1, len(wanted.parameters), seed)
     objective.costs(np.vstack([wanted.start, others]), must=True)  # however long compiling takes: or nothing is found
     start = objective.best
     if start is None:

@@ -11,12 +11,12 @@ from undertow.tuning.tune import Judged, Tuned
 def as_scenario(found: Tuned) -> str:
     """YAML that `undertow simulate` takes, with the certificate above it."""
     tuned = found.judged[-1]
-    sets = list(dict.fromkeys(name for name in found.problem.train.truths if name))
+    sets = list(dict.fromkeys(name for name in found.problem.train.variants if name))
     points = f"{len(tuned.certificate.radii)} operating points" + (f" of {', '.join(sets)}" if sets else "")
     head = (
         f"# Gains found by `undertow tune`, method {found.method}.\n"
         f"# Certificate: linearised exactly, the closed loop has a spectral radius of {tuned.certificate.worst:.6f},\n"
-        f"# below 1, from tick to tick: the largest at {points}.\n"
+        f"# below 1, from step to step: the largest at {points}.\n"
         f"# Cost {tuned.train_cost:.6g} on the training, {tuned.held_out_cost:.6g} on held-out runs.\n"
     )
     return head + dump(found.scenario)
@@ -31,9 +31,12 @@ def as_data(found: Tuned) -> dict[str, Any]:
         "finished": found.finished,
         "evaluations": found.evaluations,
         "refused": found.refused,
-        "dials": [{"name": dial.name, "low": dial.low, "high": dial.high} for dial in found.problem.dials],
+        "parameters": [
+            {"name": parameter.name, "low": parameter.low, "high": parameter.high}
+            for parameter in found.problem.parameters
+        ],
         "trials": {
-            name: {"truths": list(trials.truths), "sizes": np.asarray(trials.sizes).tolist()}
+            name: {"variants": list(trials.variants), "sizes": np.asarray(trials.sizes).tolist()}
             for name, trials in sets.items()
         },
         "gains": {one.name: _judged(one) for one in found.judged},

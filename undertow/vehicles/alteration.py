@@ -6,12 +6,12 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import Factors, Payload
+from undertow.core.contracts import ModelScaling, Payload
 from undertow.numerics.elimination import inverse_symmetric
 from undertow.vehicles.body import Body, rigid_body_mass
 
 
-def altered(body: Body, factors: Factors | None, payloads: tuple[Payload, ...]) -> Body:
+def altered(body: Body, scaling: ModelScaling | None, payloads: tuple[Payload, ...]) -> Body:
     """The body with its coefficients scaled, and then with payloads attached; None and () leave it as it is."""
     if factors is not None:
         body = _scaled(body, factors)
@@ -23,7 +23,7 @@ def point_inertia(mass: Float[Array, ""], point: Float[Array, "3"]) -> Float[Arr
     return mass * ((point @ point) * jnp.eye(3) - jnp.outer(point, point))
 
 
-def _scaled(body: Body, factors: Factors) -> Body:
+def _scaled(body: Body, scaling: ModelScaling) -> Body:
     return eqx.tree_at(
         lambda b: (
             b.mass_matrix,

@@ -10,8 +10,8 @@ from undertow.controllers.robust.estimator import Estimator
 # max over s of s (1 - tanh s).
 _TANH = 0.27846454
 
-# An impulse response is added up until it has fallen to this share, over this many ticks at most.
-_FORGOTTEN, _TICKS = 1e-12, 20_000
+# An impulse response is added up until it has fallen to this share, over this many steps at most.
+_FORGOTTEN, _STEPS = 1e-12, 20_000
 
 
 def residual(law: RCAF, axes: int) -> float:
@@ -44,10 +44,10 @@ def estimation_error(estimator: Estimator, dt: float, rate: np.ndarray) -> np.nd
     """
     step = transition(estimator, dt, len(rate))
     slowest = np.abs(np.linalg.eigvals(step)).max()
-    ticks = _TICKS if slowest >= 1 else min(_TICKS, int(np.ceil(np.log(_FORGOTTEN) / np.log(slowest))) + 2)
+    steps = _STEPS if slowest >= 1 else min(_STEPS, int(np.ceil(np.log(_FORGOTTEN) / np.log(slowest))) + 2)
     rows, row = np.zeros(step.shape[:1] + (2,)), np.tile([[0.0, 1.0]], (len(rate), 1))
-    for _ in range(ticks):
+    for _ in range(steps):
         rows += np.abs(row)
         row = np.einsum("ni,nij->nj", row, step)
-    # In one tick d moves by rate dt; its mean over the tick is off by half of that, and eps by dt times as much.
+    # In one step d moves by rate dt; its mean over the step is off by half of that, and eps by dt times as much.
     return rate * dt * (rows[:, 1] + dt / 2 * rows[:, 0])

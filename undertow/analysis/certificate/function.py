@@ -40,7 +40,7 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
     """
     matrix = gramian(law.estimator, dt, run.sizes["axis"])
     d_til = run["estimate"].values - run["uncertainty"].values
-    eps, rho = run["modelling_error"].values, float(law.estimator.fuzzy.gathering())
+    eps, rho = run["modelling_error"].values, float(law.estimator.fuzzy.basis_norm_squared())
     per_axis = matrix[:, 0, 0] * eps**2 + 2 * matrix[:, 0, 1] * eps * d_til + matrix[:, 1, 1] * rho * _departure(run)
     share = np.broadcast_to(law.tracking_share, eps.shape[1:])
     if not (share > 0).all():
@@ -51,16 +51,16 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
 
 
 def transition(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
-    """Matrix of (eps, d_hat - d) from one tick to the next, per axis, for constant d and basis: poles at exp(p T)."""
+    """Matrix of (eps, d_hat - d) from one step to the next, per axis, for constant d and basis: poles at exp(p T)."""
     of_rates, of_estimate = (np.broadcast_to(gain, axes) for gain in estimator.gains(np.asarray(dt)))
     one = np.ones(axes)
     return np.stack([np.stack([1 - of_rates, dt * one], -1), np.stack([-of_estimate, one], -1)], -2)
 
 
 def gramian(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
-    """W per axis with l_1 sum of eps^2 over this and all later ticks = x^T W x, x = (eps, d_hat - d), l_1 = 1 - A_11.
+    """W per axis with l_1 sum of eps^2 over this and all later steps = x^T W x, x = (eps, d_hat - d), l_1 = 1 - A_11.
 
-    So x^T W x falls by exactly l_1 eps^2 per tick, at any sampling time. For short ones W comes to
+    So x^T W x falls by exactly l_1 eps^2 per step, at any sampling time. For short ones W comes to
     diag(1, 1 / (gamma gamma_eps |xi|^2)) / 2.
     """
     step = transition(estimator, dt, axes)

@@ -58,7 +58,7 @@ def of_robust(law: RobustRCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """What the discrete function asks of the basis, and what bounds the estimation error where d moves."""
     fuzzy, eps = law.estimator.fuzzy, run["modelling_error"].values
     rho = (np.asarray(fuzzy.basis(eps.reshape(-1, 1))) ** 2).sum(-1).reshape(eps.shape)
-    still = (np.abs(rho / float(fuzzy.gathering()) - 1) <= _SAME_BASIS).all(-1)
+    still = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
     yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", still)
     yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records")
 

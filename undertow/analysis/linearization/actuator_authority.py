@@ -7,16 +7,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.analysis.linearization.equilibrium import Rest
+from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.loop.closed_loop import ClosedLoop
 
-_SETTLING, _STEP = 800, 5e-3  # ticks and s that an actuator is given to come to its limit
+_SETTLING, _STEP = 800, 5e-3  # steps and s that an actuator is given to come to its limit
 _WHOLE = 1e6  # weight of the direction: what is held is held in full proportion
 _LOOKED_AT = 400  # loads, evenly over the run
 
 
-class Reach(NamedTuple):
+class ActuatorAuthority(NamedTuple):
     """Demand against what there is.
 
     Attributes:
@@ -36,19 +36,19 @@ class Reach(NamedTuple):
         return float((self.share > 1 - 1e-6).mean())
 
 
-def reach(loop: ClosedLoop, at: Rest, loads: np.ndarray) -> Reach:
+def actuator_authority(loop: ClosedLoop, at: Equilibrium, loads: np.ndarray) -> ActuatorAuthority:
     """What the loads (accelerations of the outputs, one per row) ask of the actuators where the loop rests."""
     x, _ = at.parts.states(at.at)
     chosen = loads[np.unique(np.linspace(0, len(loads) - 1, _LOOKED_AT).round().astype(int))]
     found = _reach(loop, x, jnp.asarray(chosen))
-    return Reach(*map(np.asarray, found))
+    return ActuatorAuthority(*map(np.asarray, found))
 
 
 @eqx.filter_jit
 def _reach(loop: ClosedLoop, x, loads):
-    plant, model = loop.plant, loop.controller.model.own_axes()
-    y, drive = plant.output(jnp.zeros(()), x), model.drive()
-    effect = model.effect(y)
+    plant, model = loop.plant, loop.controller.model.in_body_axes()
+    y, drive = plant.output(jnp.zeros(()), x), model.actuators()
+    effect = model.acceleration_per_force(y)
     inputs = jnp.zeros(plant.inputs())
 
     def at_limit(side):
@@ -63,7 +63,9 @@ def _reach(loop: ClosedLoop, x, loads):
     low, high = at_limit(-1.0), at_limit(1.0)
 
     def wanted(load):
-        return model.spread(y, -model.drift(y) - model.seen(y, load) + model.seen(y, jnp.zeros_like(load)))
+        return model.force_for(
+            y, -model.drift(y) - model.rates_derivative(y, load) + model.rates_derivative(y, jnp.zeros_like(load))
+        )
 
     forces = jax.vmap(wanted)(loads)
     given = jax.vmap(lambda force: allocate(effect, force, low, high, jnp.asarray(_WHOLE)))(forces)

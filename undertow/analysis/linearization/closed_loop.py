@@ -5,15 +5,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.analysis.linearization.jacobians import SIGNALS
-from undertow.analysis.linearization.equilibrium import Rest
 
 # Where something enters: a load (m/s^2, rad/s^2), errors of position and velocity, and an error of the input.
 ENTRIES = ("load", "noise", "input")
 
 
 class LinearLoop(NamedTuple):
-    """s+ = A s + B w, q = C s + D w, from tick to tick.
+    """s+ = A s + B w, q = C s + D w, from step to step.
 
     Attributes:
         matrix: A.
@@ -30,8 +30,8 @@ class LinearLoop(NamedTuple):
     dt: float
 
 
-def close_sampled(at: Rest, dt: float, delay: float = 0.0, lag: float = 0.0, gain: float = 1.0) -> LinearLoop:
-    """The sampled loop: the plant exactly between two ticks with the input held, the law as it steps.
+def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0.0, gain: float = 1.0) -> LinearLoop:
+    """The sampled loop: the plant exactly between two steps with the input held, the law as it steps.
 
     Args:
         at: loop at rest; its slopes must have been taken with the same dt.
@@ -89,7 +89,7 @@ def close_sampled(at: Rest, dt: float, delay: float = 0.0, lag: float = 0.0, gai
     return LinearLoop(matrix, entries, signals, direct, dt)
 
 
-def close_continuous(at: Rest, dt: float) -> LinearLoop:
+def close_continuous(at: Equilibrium, dt: float) -> LinearLoop:
     """The loop as one differential equation, followed exactly over dt (s); law and input change all the time."""
     slopes, acting = at.local.slopes, at.acting
     seen = lambda name: slopes[name]["plant"][:, acting]

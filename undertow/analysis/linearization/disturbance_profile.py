@@ -8,12 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PRNGKeyArray
 
-from undertow.analysis.linearization.equilibrium import Rest
+from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.loop.closed_loop import ClosedLoop
 
 
-class Surroundings(NamedTuple):
-    """Along the reference, one row per tick.
+class DisturbanceProfile(NamedTuple):
+    """Along the reference, one row per step.
 
     Attributes:
         time: s.
@@ -34,44 +34,50 @@ class Surroundings(NamedTuple):
         return self.load[order[[round(share * (len(order) - 1)) for share in shares]]]
 
 
-def surroundings(loop: ClosedLoop, at: Rest, key: PRNGKeyArray, ticks: int, dt: float) -> Surroundings:
+def disturbance_profile(
+    loop: ClosedLoop, at: Equilibrium, key: PRNGKeyArray, steps: int, dt: float
+) -> DisturbanceProfile:
     """What acts along the reference, with the same chances as in a run with this key.
 
     Args:
         loop: the five roles.
         at: the loop at rest; what is unknown is told as seen from there.
         key: of everything random in the run.
-        ticks: how many, from t = 0.
+        steps: how many, from t = 0.
         dt: s.
     """
     x, _ = at.parts.states(at.at)
-    unknown, noise = _along(loop, key, x, jnp.asarray(at.at["u"]), jnp.asarray(dt, dtype=float), ticks)
-    return Surroundings(np.arange(ticks) * dt, np.asarray(unknown), np.asarray(noise))
+    unknown, noise = _along(loop, key, x, jnp.asarray(at.at["u"]), jnp.asarray(dt, dtype=float), steps)
+    return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise))
 
 
 @eqx.filter_jit
-def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, ticks: int):
-    drawn, plant, model, zero = loop.draw(key), loop.plant, loop.controller.model, jnp.zeros(())
+def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
+    realization, plant, model, zero = loop.realize(key), loop.plant, loop.controller.model, jnp.zeros(())
 
     def unknown(t, x, load):
         y = plant.output(t, x)
-        return model.seen(y, plant.acceleration(t, x, u, load)) - model.drift(y) - model.gain(y) @ u
+        return model.rates_derivative(y, plant.acceleration(t, x, u, load)) - model.drift(y) - model.gain(y) @ u
 
     y_rest = plant.output(zero, x_rest)
     at_rest = unknown(zero, x_rest, plant.no_load())
     still = jnp.zeros_like(y_rest.position)
-    scale = jax.jacfwd(lambda a: model.seen(y_rest, a))(still)  # outputs -> axes of the law, where the loop rests
+    scale = jax.jacfwd(lambda a: model.rates_derivative(y_rest, a))(
+        still
+    )  # outputs -> axes of the law, where the loop rests
 
-    def look(heard, k):
+    def look(measuring, k):
         t = k * dt
         r = loop.reference.at(t)
         x = plant.initial_state(r.position, r.velocity)
         truth = plant.output(t, x)
-        y, heard = loop.sensor.measure(drawn.sensor_path, heard, t, truth)
+        y, measuring = loop.sensor.measure(realization.sensor_realization, measuring, t, truth)
         wrong = jnp.concatenate([model.difference(y.position, truth.position), y.velocity - truth.velocity])
         wrong = jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
-        return heard, (jnp.linalg.solve(scale, unknown(t, x, drawn.load(t, x)) - at_rest), wrong)
+        return measuring, (jnp.linalg.solve(scale, unknown(t, x, realization.load(t, x)) - at_rest), wrong)
 
     start = loop.reference.at(zero)
-    heard = loop.sensor.init(drawn.sensor_path, plant.output(zero, plant.initial_state(start.position, start.velocity)))
-    return jax.lax.scan(look, heard, jnp.arange(ticks, dtype=float))[1]
+    measuring = loop.sensor.init(
+        realization.sensor_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
+    )
+    return jax.lax.scan(look, measuring, jnp.arange(steps, dtype=float))[1]

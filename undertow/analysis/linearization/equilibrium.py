@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.analysis.linearization.newton import Balance
 from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
+from undertow.analysis.linearization.newton import Balance
 from undertow.core.contracts import AbstractModel, Measurement
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.reachability import lost_directions
@@ -16,7 +16,7 @@ _FIRST_SHARE, _SMALLEST_SHARE = 0.25, 0.02  # of a load that is put on little by
 _SETTLING = 400  # sampling times that an actuator is given to come to a force
 
 
-class Rest(NamedTuple):
+class Equilibrium(NamedTuple):
     """A loop at rest.
 
     Attributes:
@@ -39,7 +39,7 @@ class Rest(NamedTuple):
         return self.moving < 1e-5
 
 
-def rest(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Rest:
+def equilibrium(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Equilibrium:
     """The loop at rest at a reference, under a constant load.
 
     Args:
@@ -49,7 +49,7 @@ def rest(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Rest:
         load: acceleration of the outputs, m/s^2 and rad/s^2.
     """
     parts, start = take_apart(loop, position)
-    load, model, y = np.asarray(load, dtype=float), parts.loop.controller.model.own_axes(), _output(parts, start)
+    load, model, y = np.asarray(load, dtype=float), parts.loop.controller.model.in_body_axes(), _output(parts, start)
     balance = Balance(parts, dt, _acting(parts.differentiate(start, dt)), _steered(model, y))
     from_afar = lambda load: _from_afar(balance, start | {"load": load, "u": _holding_input(model, y, load)})
     found = from_afar(load)
@@ -66,8 +66,8 @@ def rest(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Rest:
     return found
 
 
-def _from_afar(balance: Balance, at: dict) -> Rest:
-    """Rest from actuators that stand still, with an input that is about right.
+def _from_afar(balance: Balance, at: dict) -> Equilibrium:
+    """Equilibrium from actuators that stand still, with an input that is about right.
 
     The plant first, so that actuators turn (with the input held, else the shortest way to rest is to switch them off);
     then what the law learns and believes at that plant; then both together.
@@ -78,13 +78,13 @@ def _from_afar(balance: Balance, at: dict) -> Rest:
     return _together(balance, at)
 
 
-def _together(balance: Balance, at: dict) -> Rest:
-    """Rest of plant and law from a point near it."""
+def _together(balance: Balance, at: dict) -> Equilibrium:
+    """Equilibrium of plant and law from a point near it."""
     unknown, still = ("plant", "law", "u"), ("plant", "law", "command")
     at = balance.solve(at, unknown, still)
     local = balance.parts.differentiate(at, balance.dt)
     remaining = balance.residual(local, at, unknown, still)[0]
-    return Rest(balance.parts, at, local, float(np.abs(remaining).max(initial=0.0)), balance.acting)
+    return Equilibrium(balance.parts, at, local, float(np.abs(remaining).max(initial=0.0)), balance.acting)
 
 
 def _output(parts: Parts, start: dict) -> Measurement:
@@ -101,7 +101,9 @@ def _steered(model: AbstractModel, y: Measurement) -> np.ndarray:
 @jax.jit
 def _reach(model: AbstractModel, y: Measurement):
     """From accelerations of the outputs to the axes of the law; and what the forces give there."""
-    return jax.jacfwd(lambda a: model.seen(y, a))(jnp.zeros_like(y.position)), model.effect(y)
+    return jax.jacfwd(lambda a: model.rates_derivative(y, a))(jnp.zeros_like(y.position)), model.acceleration_per_force(
+        y
+    )
 
 
 def _holding_input(model: AbstractModel, y: Measurement, load: np.ndarray) -> np.ndarray:
@@ -111,8 +113,8 @@ def _holding_input(model: AbstractModel, y: Measurement, load: np.ndarray) -> np
 @jax.jit
 def _settled_input(model: AbstractModel, y: Measurement, load):
     """Input that gives the forces against drift and load, once the actuators have come to them."""
-    needed = -model.drift(y) - (model.seen(y, load) - model.seen(y, jnp.zeros_like(load)))
-    drive, forces = model.drive(), model.spread(y, needed)
+    needed = -model.drift(y) - (model.rates_derivative(y, load) - model.rates_derivative(y, jnp.zeros_like(load)))
+    drive, forces = model.actuators(), model.force_for(y, needed)
     rate, step = jnp.asarray(20.0), jnp.asarray(5e-3)
     settle = lambda _, state: drive.advance(state, drive.command(state, forces, rate), step)
     return drive.command(jax.lax.fori_loop(0, _SETTLING, settle, drive.init()), forces, rate)

@@ -94,8 +94,10 @@ def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.nda
 
 def without(loop: ClosedLoop, parameters: tuple[str, ...]) -> ClosedLoop:
     """Same loop with every parameter of these names at zero: dead zones and resolutions have no slope."""
-    named = lambda path: getattr(path[-1], "name", "") in parameters
-    return jax.tree_util.tree_map_with_path(lambda path, leaf: jnp.zeros_like(leaf) if named(path) else leaf, loop)
+    named = lambda realization: getattr(realization[-1], "name", "") in parameters
+    return jax.tree_util.tree_map_with_path(
+        lambda realization, leaf: jnp.zeros_like(leaf) if named(realization) else leaf, loop
+    )
 
 
 @eqx.filter_jit
@@ -128,7 +130,8 @@ def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array
         "estimate": telemetry.estimate,
         "robust": telemetry.robust,
         "modelling_error": telemetry.modelling_error,
-        "uncertainty": law.model.seen(truth, plant.acceleration(zero, x, u, pushed)) - law.known(z, truth, u),
+        "uncertainty": law.model.rates_derivative(truth, plant.acceleration(zero, x, u, pushed))
+        - law.known_acceleration(z, truth, u),
     }
     if isinstance(law, AbstractContinuousController):
         values["flow"] = ravel_pytree(law.flow(z, y, r, u))[0]

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from undertow.analysis.small_signal import first_crossing
 from undertow.analysis.linearization.closed_loop import LinearLoop, close_continuous, close_sampled
-from undertow.analysis.linearization.equilibrium import Rest, rest
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.minimal_realization import multipliers, visible
+from undertow.analysis.small_signal import first_crossing
 from undertow.core.errors import BadInput
 from undertow.loop.closed_loop import ClosedLoop
 
@@ -21,7 +21,7 @@ _FADING = 1 - 1e-9  # so that what rounding leaves of modes that nothing excites
 _STABLE = 1 + 1e-9  # a spectral radius of one, and rounding
 
 
-def closed(at: Rest, dt: float, kind: str = "sampled", **between: float) -> LinearLoop:
+def closed(at: Equilibrium, dt: float, kind: str = "sampled", **between: float) -> LinearLoop:
     """The closed loop of a scenario's kind; see `close_sampled` for what may stand `between` law and plant.
 
     Raises:
@@ -42,29 +42,29 @@ def poles(loop: LinearLoop) -> np.ndarray:
 
 
 def spectral_radius(loop: LinearLoop) -> float:
-    """Largest absolute value of the poles that control can move, from tick to tick; below 1 it is stable."""
+    """Largest absolute value of the poles that control can move, from step to step; below 1 it is stable."""
     return float(np.abs(multipliers(loop, _REACHED_BY, _SHOWN_BY)).max(initial=0.0))
 
 
-def largest_delay(at: Rest, dt: float, most: float) -> float:
+def largest_delay(at: Equilibrium, dt: float, most: float) -> float:
     """Delay, s, from the law to the actuators at which the sampled loop becomes unstable; infinite beyond `most`."""
     return _largest(lambda delay: close_sampled(at, dt, delay=delay), dt / 50, most)
 
 
-def largest_lag(at: Rest, dt: float, most: float) -> float:
+def largest_lag(at: Equilibrium, dt: float, most: float) -> float:
     """Further first-order lag of the actuators, s, at which it becomes unstable; infinite beyond `most`."""
     return _largest(lambda lag: close_sampled(at, dt, lag=lag), dt / 50, most)
 
 
-def gain_range(at: Rest, dt: float, most: float = 100.0) -> tuple[float, float]:
-    """Factors on what the input does, below and above which the sampled loop is unstable: 0 and infinite where none
+def gain_range(at: Equilibrium, dt: float, most: float = 100.0) -> tuple[float, float]:
+    """ModelScaling on what the input does, below and above which the sampled loop is unstable: 0 and infinite where none
     from 1 / most to most is; 1 and 1 where it is unstable as it is."""
     above = _largest(lambda gain: close_sampled(at, dt, gain=gain), 1.0, most)
     below = _largest(lambda inverse: close_sampled(at, dt, gain=1 / inverse), 1.0, most)
     return 1 / max(below, 1.0), max(above, 1.0)
 
 
-def largest_sampling_time(at: Rest, dt: float, most: float) -> float:
+def largest_sampling_time(at: Equilibrium, dt: float, most: float) -> float:
     """Sampling time, s, at which the loop with these gains becomes unstable; infinite beyond `most`.
 
     Where a loop rests does not depend on its sampling time. The search starts well below dt, the present one.
@@ -74,7 +74,7 @@ def largest_sampling_time(at: Rest, dt: float, most: float) -> float:
 
 
 def noise_gain(loop: LinearLoop, signal: str, deviations: np.ndarray) -> np.ndarray:
-    """Standard deviations of a signal under white noise on the measurement, new at every tick.
+    """Standard deviations of a signal under white noise on the measurement, new at every step.
 
     From the discrete Lyapunov equation P = A P A^T + B R B^T. Infinite where the loop is unstable.
 
@@ -113,7 +113,7 @@ def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = 
         loads: accelerations of the outputs, m/s^2 and rad/s^2, one per row.
         kind: sampled or continuous.
     """
-    found = [at for load in np.atleast_2d(loads) if (at := rest(loop, dt, position, load)).found]
+    found = [at for load in np.atleast_2d(loads) if (at := equilibrium(loop, dt, position, load)).found]
     return [spectral_radius(closed(at, dt, kind)) for at in found] or [float("inf")]
 
 

@@ -42,7 +42,7 @@ def visible(loop: LinearLoop, entries: tuple[str, ...], signals: tuple[str, ...]
 
 
 def multipliers(loop: LinearLoop, entries: tuple[str, ...], signals: tuple[str, ...]) -> np.ndarray:
-    """Eigenvalues, from tick to tick, of the modes that the entries excite and the signals show."""
+    """Eigenvalues, from step to step, of the modes that the entries excite and the signals show."""
     small = visible(loop, entries, signals)
     values, left, right = cast(tuple[np.ndarray, ...], eig(small.matrix, left=True, right=True))
     into = np.hstack([small.entries[name] for name in entries])

@@ -1,4 +1,4 @@
-"""The metrics of a run, foretold: the linearised loop driven by what acts along the reference."""
+"""The metrics of a run, predicted: the linearised loop driven by what acts along the reference."""
 
 from typing import NamedTuple
 
@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.linearization.closed_loop import LinearLoop
-from undertow.analysis.linearization.equilibrium import Rest
-from undertow.analysis.linearization.disturbance_profile import Surroundings
+from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile
+from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.analysis.linearization.minimal_realization import visible
 
 _ENTRIES = ("load", "noise")
@@ -17,7 +17,7 @@ _SIGNALS = ("error", "estimate", "uncertainty", "modelling_error", "robust", "u"
 
 
 class Comparison(NamedTuple):
-    """One metric, foretold and found."""
+    """One metric, predicted and found."""
 
     name: str
     predicted: float
@@ -30,7 +30,7 @@ class Comparison(NamedTuple):
 
 
 def signals_within(
-    at: Rest, loop: LinearLoop, around: Surroundings, window: tuple[float, float], every: int = 1
+    at: Equilibrium, loop: LinearLoop, around: DisturbanceProfile, window: tuple[float, float], every: int = 1
 ) -> dict[str, np.ndarray]:
     """Predicted signals at the records of a window, arrays (records, entries) by name.
 
@@ -39,7 +39,7 @@ def signals_within(
         loop: the same, closed, with a start; see `from_start`.
         around: what acts.
         window: start and stop, s.
-        every: ticks per record; metrics are those of the records, as in a run.
+        every: steps per record; metrics are those of the records, as in a run.
     """
     small = visible(loop, (*_ENTRIES, _START), _SIGNALS)
     entry = np.hstack([small.entries[name] for name in _ENTRIES])
@@ -71,7 +71,7 @@ def metrics_of(signals: dict[str, np.ndarray]) -> dict[str, float]:
     }
 
 
-def from_start(loop: LinearLoop, at: Rest, plant: np.ndarray, law: np.ndarray) -> LinearLoop:
+def from_start(loop: LinearLoop, at: Equilibrium, plant: np.ndarray, law: np.ndarray) -> LinearLoop:
     """The loop with states of plant and law at the first instant, as vectors of `Parts`."""
     away = np.concatenate([(plant - at.at["plant"])[at.acting], law - at.at["law"]])
     return loop._replace(entries=loop.entries | {_START: away[:, None]})
@@ -88,7 +88,7 @@ def _direct(loop: LinearLoop, signal: str, entry: str) -> np.ndarray:
 
 @jax.jit
 def _driven(start, matrix, entry, driven):
-    """States at each tick."""
+    """States at each step."""
 
     def step(state, w):
         return matrix @ state + entry @ w, state

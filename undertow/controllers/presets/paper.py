@@ -6,8 +6,8 @@ from undertow.controllers.composite_law import FUZZY_INPUTS, RCAF
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel
 from undertow.core.errors import BadInput
-from undertow.estimation.tsk import gaussian_sets
 from undertow.estimation.series_parallel import SeriesParallel
+from undertow.estimation.tsk import gaussian_sets
 
 # Outermost sets of each fuzzy input. The paper leaves centres and widths blank: eps in m/s and rad/s as fixed by
 # the benchmark; for the state input, wide enough for the paper's step of 4 m and its velocities.

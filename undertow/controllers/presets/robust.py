@@ -6,9 +6,9 @@ from jax.core import Tracer
 
 from undertow.controllers.bandwidths import Axis, Bandwidths, alike, axes_of, robust_bandwidths
 from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.robust_law import RobustRCAF
-from undertow.controllers.robust.reference_filter import ReferenceFilter
 from undertow.controllers.robust.fuzzy_sets import widened
+from undertow.controllers.robust.reference_filter import ReferenceFilter
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel
 from undertow.core.errors import BadInput
@@ -50,7 +50,7 @@ def robust(
     Args:
         model: what the controller may know, from `plant.model()`.
         sampling_time: of the loop, s; a scenario gives it.
-        velocity_noise: standard deviation of the measured velocities at each tick, m/s and rad/s; one number or one
+        velocity_noise: standard deviation of the measured velocities at each step, m/s and rad/s; one number or one
             per axis; a scenario's sensor gives it.
         load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s); counts where there is noise only.
         delay: of measurement and input together that nothing makes up for, s.
@@ -85,8 +85,8 @@ def robust(
     fuzzy = gaussian_sets(sets, tuple(np.ravel(1.0 if reach is None else reach)), width)
     letters = {"pole": pole, "adaptation": adaptation, "composite": composite}
     if any(value is not None for value in letters.values()):
-        bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.gathering()), bandwidth)
-    model = model.own_axes()
+        bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.basis_norm_squared()), bandwidth)
+    model = model.in_body_axes()
     if feedback is not None and tracking is not None:
         raise BadInput("tracking", "be left out when there is `feedback`", tracking)
     if any(rate is None for rate in (bandwidth, tracking, actuator_rate)):
@@ -126,11 +126,11 @@ def _bandwidths(axes: list[Axis], bandwidth, tracking, actuator_rate):
         given = jnp.asarray(bandwidth, dtype=float)
         slowest, fastest = _TRACKING_SHARES
         beside = jnp.clip(chosen.tracking, slowest * given, fastest * given)
-        rate = jnp.minimum(axes[0].quickest, _ACTUATORS_FASTER * jnp.max(given))
+        rate = jnp.minimum(axes[0].max_bandwidth, _ACTUATORS_FASTER * jnp.max(given))
     return bandwidth, beside if tracking is None else tracking, rate if actuator_rate is None else actuator_rate
 
 
-def _from_letters(letters: dict, gathering: float, bandwidth):
+def _from_letters(letters: dict, basis_norm_squared: float, bandwidth):
     """(bandwidth, damping, tracking share) of Table 1's letters: section 3.12 of the theory."""
     for name, value in letters.items():
         if value is None:
@@ -140,5 +140,5 @@ def _from_letters(letters: dict, gathering: float, bandwidth):
     pole, adaptation, composite = (np.asarray(value, dtype=float) for value in letters.values())
     if not (composite > 0).all():
         raise BadInput("composite", "be positive", composite, hint="The sound law has no case gamma_eps = 0 (RAFC)")
-    natural = np.sqrt(adaptation * composite * gathering)
+    natural = np.sqrt(adaptation * composite * basis_norm_squared)
     return natural, pole / (2 * natural), 1 / composite

@@ -64,7 +64,7 @@ class Estimator(eqx.Module):
         """Nothing learnt."""
         return EstimatorState(rates, jnp.zeros((rates.shape[0], self.fuzzy.rules)))
 
-    def look(self, state: EstimatorState, rates: PerAxis) -> Estimate:
+    def estimate(self, state: EstimatorState, rates: PerAxis) -> Estimate:
         """Modelling error and estimate at measured rates."""
         error = state.rates - rates
         basis = self.fuzzy.basis(error[:, None])

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import largest_forces
-from undertow.controllers.diagnostics import COLUMNS, tracking_books, weight_books
+from undertow.controllers.diagnostics import COLUMNS, tracking_diagnostics, weight_diagnostics
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter, Room
@@ -33,14 +33,14 @@ class RobustState(NamedTuple):
     """State z of the law."""
 
     estimator: EstimatorState
-    drive: Any  # what is believed of the actuators
+    actuators: Any  # what is believed of the actuators
     filter: FilterState | None
 
 
 class Plan(NamedTuple):
     """All that is decided at one instant."""
 
-    drive: Any
+    actuators: Any
     seen: Estimate
     off: Tracking  # from the target, smoothed if there is a filter
     robust: PerAxis  # u_r
@@ -93,13 +93,13 @@ class RobustRCAF(AbstractController):
 
     def init(self, y: Measurement, r: Target) -> RobustState:
         smoothing = None if self.filter is None else self.filter.init(y.position)
-        return RobustState(self.estimator.init(self.model.rates(y)), self.model.drive().init(), smoothing)
+        return RobustState(self.estimator.init(self.model.rates(y)), self.model.actuators().init(), smoothing)
 
     def command(self, z: RobustState, y: Measurement, r: Target):
         plan = self._plan(z, y, r)
-        drive, effect = self.model.drive(), self.model.effect(y)
-        forces = allocate(effect, plan.forces, *drive.range(plan.drive, self.actuator_rate), self.direction)
-        u = drive.command(plan.drive, forces, self.actuator_rate)
+        actuators, effect = self.model.actuators(), self.model.acceleration_per_force(y)
+        forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, self.actuator_rate), self.direction)
+        u = actuators.command(plan.actuators, forces, self.actuator_rate)
         telemetry = Telemetry(
             estimate=plan.seen.uncertainty,
             robust=plan.robust,
@@ -107,39 +107,42 @@ class RobustRCAF(AbstractController):
             predicted_position=y.position,
             predicted_velocity=z.estimator.rates,
             weights=z.estimator.weights,
-            books=tracking_books(plan.off, self.lyapunov(), self.weight)
-            | weight_books(z.estimator.weights, self.estimator.bound)
+            diagnostics=tracking_diagnostics(plan.off, self.lyapunov(), self.weight)
+            | weight_diagnostics(z.estimator.weights, self.estimator.bound)
             | {"attained_share": attained(effect, plan.forces, forces)},
         )
         return u, telemetry
 
     def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
-        plan, drive = self._plan(z, y, r), self.model.drive()
+        plan, actuators = self._plan(z, y, r), self.model.actuators()
         # While limits bind, the reference waits, and the tracking error says nothing about d.
-        going, effect = drive.aim(plan.drive, u_applied, self.actuator_rate), self.model.effect(y)
+        going, effect = (
+            actuators.target_of(plan.actuators, u_applied, self.actuator_rate),
+            self.model.acceleration_per_force(y),
+        )
         share = attained(effect, plan.forces, going)
         learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
-        known = self._known(plan.drive, y, u_applied)
+        known = self._known(plan.actuators, y, u_applied)
         return RobustState(
             estimator=self.estimator.advance(z.estimator, plan.seen, known, learnt, dt),
-            drive=drive.advance(plan.drive, u_applied, dt),
+            actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=self.filter and self.filter.advance(z.filter, r, self.model, share, dt, self._room(y, plan.off)),
         )
 
     def _room(self, y: Measurement, off: Tracking) -> Room:
         """What the actuators can do for each output, and what of the error is out of their reach."""
-        force, effect = largest_forces(self.model.drive()), self.model.effect(y)
+        force, effect = largest_forces(self.model.actuators()), self.model.acceleration_per_force(y)
         reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
         away = jnp.abs(off.error) > reach
-        outward = lambda motion: self.model.outward(y, motion)
+        outward = lambda motion: self.model.output_rates(y, motion)
         return Room(
             most=matvec(jnp.abs(jax.vmap(outward, 1, 1)(effect)), force),
             excess=outward(off.error - jnp.clip(off.error, -reach, reach)),
             pace=outward(jnp.where(away, off.rate, 0.0)),
         )
 
-    def known(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:
-        return self._known(self.model.drive().heard(z.drive, y.actuator), y, u_applied)
+    def known_acceleration(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:
+        return self._known(self.model.actuators().update_from_report(z.actuators, y.actuator), y, u_applied)
 
     def columns(self):
         return COLUMNS
@@ -148,15 +151,17 @@ class RobustRCAF(AbstractController):
         """P of Eq. (21)."""
         return companion_lyapunov(self.feedback, self.weight)
 
-    def _known(self, drive: Any, y: Measurement, u_applied) -> PerAxis:
-        return self.model.drift(y) + matvec(self.model.effect(y), self.model.drive().force(drive, u_applied))
+    def _known(self, actuators: Any, y: Measurement, u_applied) -> PerAxis:
+        return self.model.drift(y) + matvec(
+            self.model.acceleration_per_force(y), self.model.actuators().force(actuators, u_applied)
+        )
 
     def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
         model = self.model
-        drive = model.drive().heard(z.drive, y.actuator)
+        actuators = model.actuators().update_from_report(z.actuators, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
         off = tracking(model, self.lyapunov(), y, target)
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
-        seen = self.estimator.look(z.estimator, model.rates(y))
+        seen = self.estimator.estimate(z.estimator, model.rates(y))
         demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - model.drift(y)
-        return Plan(drive, seen, off, u_r, model.spread(y, demand))
+        return Plan(actuators, seen, off, u_r, model.force_for(y, demand))

@@ -41,7 +41,7 @@ def fly(
 
     Args:
         body: the vehicle in MuJoCo.
-        thruster: on rung `shaft` or `static`.
+        thruster: on fidelity `shaft` or `static`.
         controller: any, made from the model of an undertow plant.
         reference: what to follow.
         duration: s, rounded to whole sampling times.
@@ -63,11 +63,11 @@ def fly(
     propellers = Propellers(thruster, body.model.nu)
     start = np.zeros(6) if position is None else np.asarray(position, dtype=float)
     body.place(start, np.zeros(6))
-    reference = reference.beginning_at(jnp.asarray(start))
+    reference = reference.starting_at(jnp.asarray(start))
     command, advance, wanted = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
-    z, rows, ticks, status = None, [], round(duration / dt), Status.OK
-    for tick in range(ticks + 1):
-        t = tick * dt
+    z, rows, steps, status = None, [], round(duration / dt), Status.OK
+    for step in range(steps + 1):
+        t = step * dt
         y, r = _measured(body, propellers), wanted(jnp.asarray(t))
         z = controller.init(y, r) if z is None else z
         volts, _ = command(z, y, r)
@@ -76,7 +76,7 @@ def fly(
         if status != Status.OK:
             break
         rows.append((t, body.position(), body.velocity(), np.asarray(r.position), applied))
-        if tick < ticks:
+        if step < steps:
             thrusts = propellers.turn(applied, dt, 2 * steps)
             # Runge-Kutta asks at the ends and in the middle of each step.
             body.advance(lambda now, t=t, thrusts=thrusts: thrusts[round(2 * (now - t) / timestep)], steps)

@@ -13,7 +13,7 @@ class Propellers:
     """N equal propellers on DC motors without inductance; `speed` (rad/s) is their state.
 
     Args:
-        thruster: on rung `shaft` (rotor inertia) or `static` (always in the steady state).
+        thruster: on fidelity `shaft` (rotor inertia) or `static` (always in the steady state).
         count: N.
 
     Raises:
@@ -22,8 +22,8 @@ class Propellers:
 
     def __init__(self, thruster: AbstractThruster, count: int):
         if not isinstance(thruster, ShaftThruster | StaticThruster):
-            hint = "Others are not written a second time; take rung: shaft"
-            raise BadInput("thruster", "be on rung `shaft` or `static`", type(thruster).__name__, hint=hint)
+            hint = "Others are not written a second time; take fidelity: shaft"
+            raise BadInput("thruster", "be on fidelity `shaft` or `static`", type(thruster).__name__, hint=hint)
         motor = thruster.motor
         self._resistance = np.asarray(motor.resistance)
         self._torque_constant = np.asarray(motor.torque_constant)

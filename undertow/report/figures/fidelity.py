@@ -19,24 +19,24 @@ _SHOWN = {
 }
 _MARKS = {"rcafc": "o", "rafc": "s"}
 
-Runs = Mapping[str, Mapping[str, xr.Dataset]]  # rung, controller
+Runs = Mapping[str, Mapping[str, xr.Dataset]]  # fidelity, controller
 
 
 def ladder_figure(ladder: Mapping[str, Mapping[str, Any]], datasets: Runs | None = None) -> Figure:
-    """Error against time on every rung, and metrics over the rungs.
+    """Error against time on every fidelity, and metrics over the fidelities.
 
     Args:
-        ladder: by rung and controller, `status`, `diverged_at` (s or None), `steady` (metrics or None).
-        datasets: the runs, by rung and controller; without them only the metrics are drawn.
+        ladder: by fidelity and controller, `status`, `diverged_at` (s or None), `steady` (metrics or None).
+        datasets: the runs, by fidelity and controller; without them only the metrics are drawn.
     """
     runs = datasets or {}
     tall = 1.75 if runs else 0.0
     figure = style.blank(9.6, 0.55 + tall + 1.95)
     style.head(figure, "Fidelity ladder: one law, four thrusters", dict(style.CONTROLLERS.values()))
-    for number, rung in enumerate(rung for rung in ladder if rung in runs):
+    for number, fidelity in enumerate(fidelity for fidelity in ladder if fidelity in runs):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.58, 1.75, 1.25)
-        _errors(panel, rung, ladder[rung], runs[rung])
-        style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", rung)
+        _errors(panel, fidelity, ladder[fidelity], runs[fidelity])
+        style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", fidelity)
     for number, (metric, text) in enumerate(_SHOWN.items()):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.68 + tall, 1.75, 1.35)
         _metric(panel, ladder, metric)
@@ -44,7 +44,7 @@ def ladder_figure(ladder: Mapping[str, Mapping[str, Any]], datasets: Runs | None
     return figure
 
 
-def _errors(panel: Axes, rung: str, entries: Mapping[str, Any], runs: Mapping[str, xr.Dataset]) -> None:
+def _errors(panel: Axes, fidelity: str, entries: Mapping[str, Any], runs: Mapping[str, xr.Dataset]) -> None:
     """Root mean square over the axes of the tracking error; a cross where a run ended early."""
     panel.set_yscale("log", nonpositive="mask")
     panel.yaxis.set_minor_locator(NullLocator())
@@ -59,7 +59,7 @@ def _errors(panel: Axes, rung: str, entries: Mapping[str, Any], runs: Mapping[st
             linestyle=look.dashes,
             linewidth=look.width,
             zorder=look.order,
-            label=f"{name}, {rung}",
+            label=f"{name}, {fidelity}",
         )
         if entries[key]["status"] != "ok":
             panel.plot(time[-1], size[-1], "X", color=look.colour, markersize=6, zorder=5)
@@ -67,15 +67,15 @@ def _errors(panel: Axes, rung: str, entries: Mapping[str, Any], runs: Mapping[st
 
 
 def _metric(panel: Axes, ladder: Mapping[str, Mapping[str, Any]], metric: str) -> None:
-    rungs = list(ladder)
+    fidelities = list(ladder)
     panel.set_yscale("log")
     panel.yaxis.set_major_locator(LogLocator(numticks=5))
     panel.yaxis.set_minor_locator(NullLocator())
     for key, (name, look) in style.CONTROLLERS.items():
-        entries = [ladder[rung].get(key) or {} for rung in rungs]
+        entries = [ladder[fidelity].get(key) or {} for fidelity in fidelities]
         values = [(entry.get("steady") or {}).get(metric, np.nan) for entry in entries]
         panel.plot(
-            range(len(rungs)),
+            range(len(fidelities)),
             values,
             color=look.colour,
             linestyle=look.dashes,
@@ -91,8 +91,10 @@ def _metric(panel: Axes, ladder: Mapping[str, Mapping[str, Any]], metric: str) -
                 panel.plot(place, 0.93, "X", transform=top, color=look.colour, markersize=6)
                 words = {"transform": top, "fontsize": style.TINY, "ha": "right", "va": "center"}
                 panel.text(place - 0.15, 0.93, f"{name} {_ending(entry)}", **words)
-    panel.set_xticks(range(len(rungs)), [rung.replace("electromechanical", "electro-\nmech.") for rung in rungs])
-    panel.set_xlim(-0.3, len(rungs) - 0.7)
+    panel.set_xticks(
+        range(len(fidelities)), [fidelity.replace("electromechanical", "electro-\nmech.") for fidelity in fidelities]
+    )
+    panel.set_xlim(-0.3, len(fidelities) - 0.7)
     low, high = panel.get_ylim()
     panel.set_ylim(low, high * (high / low) ** 0.25)  # room for what failed
 

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from undertow.report.figures import style
 from undertow.prediction.predict import Prediction
+from undertow.report.figures import style
 
 _MARKS = ("o", "s", "^")
 _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#7a5c00")

@@ -36,7 +36,7 @@ ASSUMED = (
     ),
     Html(
         "<b>What d contains.</b> In the two examples the prescribed d(t) includes the kinematic term J&#775;&nu;, "
-        "as the paper's Remark 2 has it, although it could be computed. On the two upper rungs of the ladder the "
+        "as the paper's Remark 2 has it, although it could be computed. On the two upper fidelities of the ladder the "
         "body moves as it is, and d(t) is added. Either way d is measured from the run."
     ),
 )

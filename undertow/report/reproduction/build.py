@@ -29,7 +29,7 @@ def draw(found: Reproduction) -> dict[str, Figure]:
     numbers = {claim["id"]: claim["numbers"] for claim in found.results["claims"]}
     ladder = found.results["ladder"]
     figures = paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
-        "ladder": ladder_figure(ladder, {rung: found.datasets(rung) for rung in ladder}),
+        "ladder": ladder_figure(ladder, {fidelity: found.datasets(fidelity) for fidelity in ladder}),
         "sweep": sweep_figure(numbers["C6"]["sweep"]),
         "horizons": horizons_figure(found.results["horizons"]["rows"], found.results["horizons"]["duration"]),
         "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),

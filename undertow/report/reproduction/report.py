@@ -6,11 +6,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from undertow.report.reproduction import horizon_section
-from undertow.report.reproduction import tables
 from undertow.report.figures.writing import save
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
+from undertow.report.reproduction import horizon_section, tables
 from undertow.report.reproduction.background import ASSUMED, INTRODUCTION, LEFT_OPEN
 from undertow.report.reproduction.captions import captions
 from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, sound_section

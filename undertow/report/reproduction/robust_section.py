@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from undertow.report.reproduction import robust_tables as tables
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, tag
+from undertow.report.reproduction import robust_tables as tables
 
 FIGURES = ("sound_ladder", "ablations")
 

@@ -72,18 +72,18 @@ def table2(results: dict[str, Any]) -> Html:
 
 
 def ladder(results: dict[str, Any]) -> Html:
-    """What happens to both controllers on every rung, and why."""
+    """What happens to both controllers on every fidelity, and why."""
     rows = []
-    for rung, entries in results.items():
+    for fidelity, entries in results.items():
         for key, entry in entries.items():
             steady = entry.get("steady") or {}
             figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "input_variation")]
             lasted = entry["status"] == "ok"
             said = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
             ended = tag("span", said, class_=f"chip {'holds' if lasted else 'fails'}")
-            place = join(tag("b", rung), tag("span", _RUNGS.get(rung, ""), class_="said"))
+            place = join(tag("b", fidelity), tag("span", _RUNGS.get(fidelity, ""), class_="said"))
             rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
-    head = ("rung", "controller", "how it ended", "tracking rms", "estimation rms", "voltage variation, V/s", "why")
+    head = ("fidelity", "controller", "how it ended", "tracking rms", "estimation rms", "voltage variation, V/s", "why")
     return table(head, rows, numeric=(3, 4, 5), wide=True)
 
 

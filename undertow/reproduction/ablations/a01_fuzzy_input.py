@@ -4,7 +4,7 @@ from functools import partial
 
 from undertow.controllers.presets.paper import paper
 from undertow.reproduction.ablations.ablation import Answer, Variant, answer
-from undertow.reproduction.ablations.on_axes import gathering, loop
+from undertow.reproduction.ablations.on_axes import basis_norm_squared, loop
 
 QUESTION = "Modelling error or state as fuzzy input?"
 PREDICTION = "At equal gamma the state is worse by the ratio of |xi|^2; at equal gamma |xi|^2 they are the same."
@@ -12,7 +12,7 @@ LONG = True
 METRICS = ("estimation_rms", "tracking_rms")
 LEFT_OUT = "loads that repeat with position, which only the state could learn"
 
-_MATCHED = 100.0 * gathering() / gathering(fuzzy_input="state")
+_MATCHED = 100.0 * basis_norm_squared() / basis_norm_squared(fuzzy_input="state")
 
 
 def variants(quick: bool) -> tuple[Variant, ...]:

@@ -4,7 +4,7 @@ from functools import partial
 
 from undertow.controllers.presets.paper import paper
 from undertow.reproduction.ablations.ablation import Answer, Variant, answer
-from undertow.reproduction.ablations.on_axes import gathering, loop
+from undertow.reproduction.ablations.on_axes import basis_norm_squared, loop
 
 QUESTION = "How many fuzzy sets, and how wide?"
 PREDICTION = "The same once gamma |xi|^2 is the same."
@@ -23,7 +23,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
 
 
 def _variant(name: str, options: dict) -> Variant:
-    gamma = 100.0 * gathering() / gathering(**options)
+    gamma = 100.0 * basis_norm_squared() / basis_norm_squared(**options)
     text = ", ".join(f"{key}: {value}" for key, value in {**options, "adaptation": round(gamma, 2)}.items())
     return Variant(name, text.replace("(", "[").replace(",)", "]"), loop(partial(paper, adaptation=gamma, **options)))
 

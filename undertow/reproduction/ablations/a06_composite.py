@@ -30,7 +30,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
     found = []
     for name, law in laws.items():
         best = tuned(lambda a, b, law=law: loop(partial(law, a, b), sensor=_NOISE), _GRID, Schedule())
-        gain, term = best.factors
+        gain, term = best.scaling
         text = f"loop gain times {gain:g}, robust term times {term:g}"
         limited = loop(partial(law, gain, term), gentle, _NOISE, _GOAL, _LIMIT)
         found.append(Variant(f"{name}, tuned", text, best.loop))

@@ -27,7 +27,7 @@ _LAWS = {
 
 
 def variants(quick: bool) -> tuple[Variant, ...]:
-    """A step of 2 m on six axes at each limit; the paper's step on ODIN, rung `ideal`, at each voltage."""
+    """A step of 2 m on six axes at each limit; the paper's step on ODIN, fidelity `ideal`, at each voltage."""
     gentle = random_suite(0.2, 0.3, 1.0, step=0.3)
     axes = [
         Variant(
@@ -44,7 +44,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
     vehicle = [
         Variant(
             f"{name}, {volts:g} V",
-            f"ODIN, rung: ideal, supply: {volts:g}",
+            f"ODIN, fidelity: ideal, supply: {volts:g}",
             on_odin.loop(law, supply=volts, size=0.2, goal=GOAL),
             _LONG,
         )

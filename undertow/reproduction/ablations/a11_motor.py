@@ -17,17 +17,17 @@ _SLOW = {"pole": 60.0, "adaptation": 900.0 / 0.4047 / 500.0, "robust_gain": 0.0,
 
 
 def variants(quick: bool) -> tuple[Variant, ...]:
-    """Table 1 on each rung; on the whole motor also RAFC, a slow observer and `robust`."""
+    """Table 1 on each fidelity; on the whole motor also RAFC, a slow observer and `robust`."""
     whole = "electromechanical"
     found = [
-        Variant("Table 1, ideal", "rung: ideal", loop(paper)),
-        Variant("Table 1, whole motor", f"rung: {whole}", loop(paper, whole)),
+        Variant("Table 1, ideal", "fidelity: ideal", loop(paper)),
+        Variant("Table 1, whole motor", f"fidelity: {whole}", loop(paper, whole)),
         Variant("RAFC, whole motor", "composite: 0", loop(partial(paper, composite=0.0), whole)),
         Variant("30 rad/s, whole motor", "pole: 60, robust_gain: 0", loop(partial(paper, **_SLOW), whole)),
         Variant("robust, whole motor", "preset: robust", loop(robust, whole)),
     ]
     if not quick:
-        found.append(Variant("Table 1, no winding", "rung: shaft", loop(paper, "shaft")))
+        found.append(Variant("Table 1, no winding", "fidelity: shaft", loop(paper, "shaft")))
         measured = loop(robust, whole, speed_sensor=True)
         found.append(Variant("robust, speeds measured", "preset: robust, speed_sensor: true", measured))
     return tuple(found)

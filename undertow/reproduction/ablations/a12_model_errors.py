@@ -23,9 +23,9 @@ _ERRORS = {
 
 
 def variants(quick: bool) -> tuple[Variant, ...]:
-    """Table 1 and `robust`, rung `ideal`."""
+    """Table 1 and `robust`, fidelity `ideal`."""
     return tuple(
-        Variant(f"{name}, {what}", f"ODIN, rung: ideal, parameter_error {what}", loop(law, errors=error))
+        Variant(f"{name}, {what}", f"ODIN, fidelity: ideal, parameter_error {what}", loop(law, errors=error))
         for name, law in {"Table 1": paper, "robust": robust}.items()
         for what, error in _ERRORS.items()
     )

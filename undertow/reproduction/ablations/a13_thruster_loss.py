@@ -23,9 +23,9 @@ _LOST = 0.1  # m, rad
 
 
 def variants(quick: bool) -> tuple[Variant, ...]:
-    """Table 1 and `robust`, rung `ideal`; which thrusters fail, at 2 s, is drawn for every seed."""
+    """Table 1 and `robust`, fidelity `ideal`; which thrusters fail, at 2 s, is drawn for every seed."""
     return tuple(
-        Variant(f"{name}, {what}", f"ODIN, rung: ideal, {what} from 2 s", loop(law, loss=loss))
+        Variant(f"{name}, {what}", f"ODIN, fidelity: ideal, {what} from 2 s", loop(law, loss=loss))
         for name, law in {"Table 1": paper, "robust": robust}.items()
         for what, loss in _LOSSES.items()
     )

@@ -18,7 +18,7 @@ _FITTED = {
 
 
 def variants(quick: bool) -> tuple[Variant, ...]:
-    """Table 1, rung `ideal`; four are all of one plane."""
+    """Table 1, fidelity `ideal`; four are all of one plane."""
     chosen = (8, 6) if quick else tuple(_FITTED)
     return tuple(
         Variant(f"N = {count}", f"thrusters: {_FITTED[count] or 'all'}", loop(paper, thrusters=_FITTED[count]))

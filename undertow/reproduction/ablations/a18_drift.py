@@ -7,7 +7,7 @@ from undertow.core.contracts import AbstractModel
 from undertow.disturbances.random_suite import random_suite
 from undertow.reproduction.ablations.ablation import Answer, Schedule, Variant, answer
 from undertow.reproduction.ablations.forgetting import Forgetting
-from undertow.reproduction.ablations.on_axes import gathering, loop
+from undertow.reproduction.ablations.on_axes import basis_norm_squared, loop
 from undertow.reproduction.ablations.rough_sensor import RoughSensor
 
 QUESTION = "What keeps the weights from drifting in noise?"
@@ -36,7 +36,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
         Variant(name, _text(options, cure), loop(partial(_law, options, cure), still, noisy), long)
         for name, (options, cure) in _CURES.items()
     ]
-    matched = 100 * gathering(**_SETS)
+    matched = 100 * basis_norm_squared(**_SETS)
     one = partial(paper, sets=1, adaptation=matched)
     return (*cured, Variant("one set", f"sets: 1, adaptation: {matched:.4g}", loop(one, still, noisy), long))
 

@@ -12,7 +12,7 @@ PREDICTION = (
 LONG = True
 METRICS = ("tracking_rms", "input_rms", "input_variation")
 
-_MOTOR = {"rung": "electromechanical", "supply": 24.0}
+_MOTOR = {"fidelity": "electromechanical", "supply": 24.0}
 
 
 def variants(quick: bool) -> tuple[Variant, ...]:

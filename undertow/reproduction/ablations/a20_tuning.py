@@ -14,7 +14,7 @@ LONG = True
 METRICS = ("tracking_rms", "input_rms", "input_variation")
 LEFT_OUT = f"other costs than {COST}; 12 trials on 4 other seeds per law"
 
-_SEA = {"rung": "electromechanical", "supply": 24.0, "noise": 2e-3}
+_SEA = {"fidelity": "electromechanical", "supply": 24.0, "noise": 2e-3}
 _BANDWIDTHS = (15.0, 30.0, 60.0, 120.0)  # rad/s
 _TERMS, _RATES = (0.0, 0.3, 1.0), (15.0, 50.0, 150.0)  # m/s^2, 1/s
 _RHO = 0.4047  # |xi|^2 of five sets
@@ -27,10 +27,10 @@ def variants(quick: bool) -> tuple[Variant, ...]:
         Variant("robust", "no gain given", loop(robust, **_SEA)),
     ]
     best = tuned(lambda *point: loop(partial(_paper, *point), **_SEA), (_BANDWIDTHS, _TERMS), Schedule())
-    text = f"bandwidth {best.factors[0]:g} rad/s, damping 1, robust_gain: {best.factors[1]:g}"
+    text = f"bandwidth {best.scaling[0]:g} rad/s, damping 1, robust_gain: {best.scaling[1]:g}"
     found.append(Variant("paper's law, searched", text, best.loop))
     best = tuned(lambda *point: loop(partial(_robust, *point), **_SEA), (_BANDWIDTHS, _RATES), Schedule())
-    text = f"preset: robust, bandwidth: {best.factors[0]:g}, actuator_rate: {best.factors[1]:g}"
+    text = f"preset: robust, bandwidth: {best.scaling[0]:g}, actuator_rate: {best.scaling[1]:g}"
     found.append(Variant("robust, searched", text, best.loop))
     return tuple(found)
 

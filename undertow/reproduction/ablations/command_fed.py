@@ -24,5 +24,5 @@ class CommandFed(AbstractController):
         commanded, _ = self.law.command(z, y, r)
         return self.law.advance(z, y, r, commanded, dt)
 
-    def known(self, z: Any, y: Measurement, u_applied):
-        return self.law.known(z, y, u_applied)
+    def known_acceleration(self, z: Any, y: Measurement, u_applied):
+        return self.law.known_acceleration(z, y, u_applied)

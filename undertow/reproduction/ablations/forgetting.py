@@ -36,5 +36,5 @@ class Forgetting(AbstractController):
         forgotten = dt * self.law.adaptation * (self.leakage + self.e_mod * size) * z.weights
         return after._replace(weights=learnt - forgotten)
 
-    def known(self, z: Any, y: Measurement, u_applied):
-        return self.law.known(z, y, u_applied)
+    def known_acceleration(self, z: Any, y: Measurement, u_applied):
+        return self.law.known_acceleration(z, y, u_applied)

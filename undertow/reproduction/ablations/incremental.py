@@ -34,7 +34,7 @@ class Incremental(AbstractController):
 
     def command(self, z: FilterState, y: Measurement, r: Target):
         model, missing = self.model, z.acceleration - z.known
-        velocity, acceleration = model.wanted(y, r)
+        velocity, acceleration = model.desired_motion(y, r)
         demand = acceleration + self.feedback[0] * model.error(y, r) + self.feedback[1] * (velocity - model.rates(y))
         telemetry = Telemetry(
             estimate=missing,

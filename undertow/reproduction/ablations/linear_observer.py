@@ -31,7 +31,7 @@ class LinearObserver(AbstractController):
 
     def command(self, z: ObserverState, y: Measurement, r: Target):
         model = self.model
-        velocity, acceleration = model.wanted(y, r)
+        velocity, acceleration = model.desired_motion(y, r)
         demand = acceleration + self.feedback[0] * model.error(y, r) + self.feedback[1] * (velocity - model.rates(y))
         telemetry = Telemetry(
             estimate=z.estimate,

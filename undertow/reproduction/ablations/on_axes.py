@@ -38,7 +38,7 @@ def loop(
     return ClosedLoop(plant, law(plant.model()), setpoint([goal] * AXES), load, sensor or RoughSensor())
 
 
-def gathering(**options) -> float:
+def basis_norm_squared(**options) -> float:
     """|xi(0)|^2 of the paper's law with other sets."""
     law: RCAF = paper(double_integrator(1).model(), **options)
-    return float(law.fuzzy.gathering())
+    return float(law.fuzzy.basis_norm_squared())

@@ -20,7 +20,7 @@ _EXACT = (1.0, 1.0)
 
 def loop(
     law: Law,
-    rung: str = "ideal",
+    fidelity: str = "ideal",
     *,
     supply: float = math.inf,
     dead_zone: float = 0.0,
@@ -36,7 +36,7 @@ def loop(
 
     Args:
         law: from a model to a controller.
-        rung: of the fidelity ladder.
+        fidelity: of the fidelity ladder.
         supply, dead_zone: of the thrusters, V.
         size: of the random suite, sinusoids and levels, m/s^2 and rad/s^2.
         errors: ranges of `parameter_error`; a factor that is not named is 1.
@@ -46,7 +46,7 @@ def loop(
         noise: standard deviation of the velocity's, m/s and rad/s.
         model: what the law is told, `speed_sensor` or `rate_term`.
     """
-    plant = hybrid_vehicle(odin(), paper_table3(rung, supply, dead_zone), thrusters, ledger=False)
+    plant = hybrid_vehicle(odin(), paper_table3(fidelity, supply, dead_zone), thrusters, ledger=False)
     exact = dict.fromkeys(("mass", "damping", "restoring", "thrust"), _EXACT)
     left, number = loss
     load = (

@@ -5,9 +5,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractDisturbance, Factors, Load
+from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling
 from undertow.core.param import param
-from undertow.disturbances.adding import with_factors
+from undertow.disturbances.adding import with_scaling
 
 
 class ThrusterLoss(AbstractDisturbance):
@@ -18,14 +18,14 @@ class ThrusterLoss(AbstractDisturbance):
     time: Float[Array, ""] = param("s", "when", default=2.0)
     thrusters: int = eqx.field(static=True, default=8)
 
-    def draw(self, key) -> Float[Array, " N"]:
+    def realize(self, key) -> Float[Array, " N"]:
         """Share that is left of each."""
-        place = jax.random.permutation(key, self.thrusters).astype(self.left.dtype)
-        return jnp.where(place < self.number, self.left, 1.0)
+        pose = jax.random.permutation(key, self.thrusters).astype(self.left.dtype)
+        return jnp.where(pose < self.number, self.left, 1.0)
 
-    def at(self, path, t, place, calm: Load) -> Load:
+    def at(self, realization, t, pose, load: Load) -> Load:
         one = jnp.ones(())
-        return with_factors(calm, place, Factors(one, one, one, jnp.where(t >= self.time, path, 1.0)))
+        return with_scaling(load, pose, ModelScaling(one, one, one, jnp.where(t >= self.time, realization, 1.0)))
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return (float(self.time),) if 0 < float(self.time) < duration else ()

@@ -10,8 +10,8 @@ import pkgutil
 from collections.abc import Mapping
 from typing import Any
 
+from undertow.reproduction.batches import BatchResult
 from undertow.scenario.execute import Executed
-from undertow.reproduction.batches import Flown
 
 _MODULES = [
     importlib.import_module(f"{__name__}.{info.name}")
@@ -31,7 +31,7 @@ def batched(quick: bool) -> dict[str, dict[str, Any]]:
     return {name: one for scenarios in found for name, one in scenarios.items()}
 
 
-def audit(runs: Mapping[str, Executed], long: Mapping[str, Flown]) -> list[dict[str, Any]]:
+def audit(runs: Mapping[str, Executed], long: Mapping[str, BatchResult]) -> list[dict[str, Any]]:
     """Verdicts with evidence, as they stand in results.json.
 
     Args:

@@ -3,7 +3,7 @@
 from undertow.reproduction.claims.finding import Finding, Runs
 from undertow.reproduction.horizons import Long, name_of
 from undertow.reproduction.lag_map import windings
-from undertow.reproduction.setup import RUNGS
+from undertow.reproduction.setup import FIDELITIES
 
 CLAIM = "The tracking error converges to a small neighbourhood of zero."
 
@@ -17,7 +17,7 @@ def scenarios(quick: bool) -> dict:
 
 def judge(runs: Runs, long: Long) -> Finding:
     """On every level of the ladder, for 20 s and for the long horizon; and against the inductance of the winding."""
-    lasting = {level: long[name] for level in RUNGS if (name := name_of(level, "rcafc")) in long}
+    lasting = {level: long[name] for level in FIDELITIES if (name := name_of(level, "rcafc")) in long}
     short = {level: one.windows[0] for level, one in lasting.items()}
     horizon = max(one.built.scenario.loop.duration for one in lasting.values())
     said = []

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from undertow.reproduction.batches import Flown
+from undertow.reproduction.batches import BatchResult
 from undertow.reproduction.claims.finding import Finding, Runs, steady
 from undertow.reproduction.horizons import Long, sampled
 from undertow.reproduction.matching import same_loop_gain
-from undertow.reproduction.setup import RUNGS, scenario
+from undertow.reproduction.setup import FIDELITIES, scenario
 
 CLAIM = "With the modelling error as input fewer rules are needed than with the state, and the estimate is better."
 
@@ -30,12 +30,12 @@ def batched(quick: bool) -> dict:
     return {
         _name(level, law): scenario(
             f"Table 1 on {level}, fuzzy input: {words}, the same gamma |xi|^2",
-            rung=level,
+            fidelity=level,
             controller=options | {"weights_bound": float("inf")},
             disturbance={"kind": "u2"},  # which is U1 for 20 s
             loop=sampled(20.0),
         )
-        for level in (RUNGS[2:3] if quick else RUNGS)
+        for level in (FIDELITIES[2:3] if quick else FIDELITIES)
         for law, (words, options) in _LAWS.items()
     }
 
@@ -43,7 +43,7 @@ def batched(quick: bool) -> dict:
 def judge(runs: Runs, long: Long) -> Finding:
     """Estimation error and chattering on every level; at the printed gamma on `ideal`."""
     same_gamma = steady(runs["table2_rcafc_state"])["estimation_rms"], steady(runs["ideal_rcafc"])["estimation_rms"]
-    levels = [level for level in RUNGS if _name(level, "error_5") in long]
+    levels = [level for level in FIDELITIES if _name(level, "error_5") in long]
     found = {level: {law: _metrics(long[_name(level, law)]) for law in _LAWS} for level in levels}
     said = [
         f"{level}: " + "; ".join(f"{_LAWS[law][0]} {_shown(long[_name(level, law)])}" for law in _LAWS)
@@ -76,12 +76,12 @@ def _name(level: str, law: str) -> str:
     return f"c05_{level}_{law}"
 
 
-def _metrics(run: Flown) -> dict[str, float] | None:
+def _metrics(run: BatchResult) -> dict[str, float] | None:
     found = run.windows[0]
     return found and {metric: found[metric] for metric in ("tracking_rms", "estimation_rms", "input_variation")}
 
 
-def _shown(run: Flown) -> str:
+def _shown(run: BatchResult) -> str:
     found = _metrics(run)
     if found is None:
         return f"ends at {run.ended:.2g} s"

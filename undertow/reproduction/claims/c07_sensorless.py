@@ -15,7 +15,7 @@ def scenarios(quick: bool) -> dict:
     return {
         _SENSOR: scenario(
             "RCAFC with measured propeller speeds on the whole motor, 1 kHz",
-            rung="electromechanical",
+            fidelity="electromechanical",
             model={"speed_sensor": True},
             loop={"kind": "sampled", "duration": 20.0},
         )

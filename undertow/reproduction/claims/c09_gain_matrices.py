@@ -28,7 +28,7 @@ def scenarios(quick: bool) -> dict:
             plant={
                 "kind": "hybrid_vehicle",
                 "vehicle": "odin",
-                "thruster": {"kind": "paper_table3", "rung": "ideal"},
+                "thruster": {"kind": "paper_table3", "fidelity": "ideal"},
                 "thrusters": numbers,
             },
         )

@@ -7,10 +7,10 @@ import jax.numpy as jnp
 
 from undertow.core.status import Status
 from undertow.plants.magnetic_levitation import MagneticLevitation
-from undertow.scenario.execute import Executed
 from undertow.reproduction.claims.finding import Finding, Runs, steady
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import scenario
+from undertow.scenario.execute import Executed
 
 CLAIM = "The method works for other systems x_ddot = f + G u + d (pendulum, magnetic levitation)."
 
@@ -69,10 +69,10 @@ def _at(gap: int) -> str:
     return f"c14_levitation_{gap}mm"
 
 
-def _levitation(rung: str, gap: int) -> dict:
+def _levitation(fidelity: str, gap: int) -> dict:
     return scenario(
-        f"Table 1 on a ball levitated {gap} mm below the magnet, rung {rung}",
-        plant={"kind": "magnetic_levitation", "rung": rung},
+        f"Table 1 on a ball levitated {gap} mm below the magnet, fidelity {fidelity}",
+        plant={"kind": "magnetic_levitation", "fidelity": fidelity},
         model={},
         reference={"kind": "sine", "amplitude": 1e-3, "frequency": 1.0, "offset": gap / 1e3},
         disturbance="none",

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from undertow.reproduction.batches import Flown
+from undertow.reproduction.batches import BatchResult
 from undertow.reproduction.horizons import BOUND, Long, sampled
 from undertow.reproduction.matching import equal_gain
 from undertow.reproduction.setup import RAFC, RCAFC, scenario
@@ -74,12 +74,12 @@ def _noisy(law: str) -> str:
     return f"c02_{law}_noise"
 
 
-def _steady(run: Flown, metric: str) -> float | None:
+def _steady(run: BatchResult, metric: str) -> float | None:
     found = run.windows[0]
     return None if found is None else found[metric]
 
 
-def _shown(run: Flown) -> str:
+def _shown(run: BatchResult) -> str:
     error = _steady(run, "tracking_rms")
     return f"an early end at {run.ended:.1f} s" if error is None else f"{error:.2g}"
 

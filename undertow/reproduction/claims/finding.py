@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from undertow.scenario.execute import Executed
 from undertow.reproduction.matching import equal_gain_ratio
+from undertow.scenario.execute import Executed
 
 Runs = Mapping[str, Executed]
 

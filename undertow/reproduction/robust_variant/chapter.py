@@ -5,11 +5,11 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from undertow.scenario.execute import Executed
 from undertow.reproduction.ablations import study
 from undertow.reproduction.experiments import run_all
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
+from undertow.scenario.execute import Executed
 
 Progress = Callable[[str, float], None]
 
@@ -29,7 +29,7 @@ def chapter(folder: Path, quick: bool, progress: Progress) -> Chapter:
 
     Args:
         folder: where `scenarios/` and `runs/` are.
-        quick: fewer rungs, ablations and seeds.
+        quick: fewer fidelities, ablations and seeds.
         progress: told a message and the share done.
     """
     wanted = [module for module in study.modules() if not (quick and study.is_long(module))]

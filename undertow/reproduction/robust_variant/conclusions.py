@@ -1,6 +1,6 @@
 """What the numbers of the chapter say, in sentences."""
 
-from undertow.reproduction.robust_variant import weaknesses, strengths
+from undertow.reproduction.robust_variant import strengths, weaknesses
 from undertow.reproduction.robust_variant.lookup import Numbers, Rows
 
 _KINDS = {"wins": strengths.WINS, "same": strengths.SAME, "loses": weaknesses.LOSES, "neither": weaknesses.NEITHER}

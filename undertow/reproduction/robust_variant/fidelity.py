@@ -1,4 +1,4 @@
-"""The ladder again: preset `robust` beside the paper's laws on every rung, and at sea beside a PID too; all sampled."""
+"""The ladder again: preset `robust` beside the paper's laws on every fidelity, and at sea beside a PID too; all sampled."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -7,9 +7,9 @@ import numpy as np
 import xarray as xr
 
 from undertow.core.status import Status
-from undertow.scenario.execute import Executed
-from undertow.reproduction.setup import HAND_TUNED, RAFC, RCAFC, RUNGS, scenario
 from undertow.reproduction.robust_variant import station_keeping
+from undertow.reproduction.setup import FIDELITIES, HAND_TUNED, RAFC, RCAFC, scenario
+from undertow.scenario.execute import Executed
 
 LAWS = {
     "rcafc": ("RCAFC, Table 1", {"kind": "rcaf", "composite": RCAFC}),
@@ -18,7 +18,7 @@ LAWS = {
     "measured": ("robust, speeds measured", {"kind": "rcaf", "preset": "robust"}),
 }
 
-WHOLE = RUNGS[-1]
+WHOLE = FIDELITIES[-1]
 _SAMPLED = {"kind": "sampled", "duration": 20.0}
 
 # What the thrusters get, and what they have to bear: name -> words, supply in V, factor on suite U1.
@@ -63,9 +63,9 @@ class Place(NamedTuple):
 def places(quick: bool) -> dict[str, Place]:
     """Every place, from the easiest to the most real; quick: the whole motor only."""
     found = {}
-    for rung in (WHOLE,) if quick else RUNGS:
-        words = "whole motor, no limit" if rung == WHOLE else rung
-        found[rung] = Place(words, _laws(words, rung, {"kind": "u1"}, quick=quick))
+    for fidelity in (WHOLE,) if quick else FIDELITIES:
+        words = "whole motor, no limit" if fidelity == WHOLE else fidelity
+        found[fidelity] = Place(words, _laws(words, fidelity, {"kind": "u1"}, quick=quick))
     for name, (words, volts, scale) in _SUPPLIES.items():
         found[name] = Place(words, _laws(words, WHOLE, {"kind": "u1", "scale": scale}, volts, quick))
     if not quick:
@@ -73,11 +73,11 @@ def places(quick: bool) -> dict[str, Place]:
         two = {key: one for key, one in _laws(words, WHOLE, _OVERLOAD, 24.0).items() if key in ("rcafc", "robust")}
         two = {key: (name, one | {"steady": {"start": _JUDGED}}) for key, (name, one) in two.items()}
         found["overload"] = Place(words, two)
-        words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own instruments"
+        words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own sensors"
         found["sea"] = Place(
             words,
             {
-                key: (name, at_sea(f"{name}: BlueROV2 Heavy at sea, from its own instruments", law))
+                key: (name, at_sea(f"{name}: BlueROV2 Heavy at sea, from its own sensors", law))
                 for key, (name, law) in _AT_SEA.items()
             },
         )
@@ -113,14 +113,14 @@ def _name(place: str, law: str) -> str:
 
 
 def _laws(
-    words: str, rung: str, load: Any, supply: float | None = None, quick: bool = False
+    words: str, fidelity: str, load: Any, supply: float | None = None, quick: bool = False
 ) -> dict[str, tuple[str, dict]]:
     found = {}
     for key, (name, law) in LAWS.items():
-        if key == "measured" and (quick or rung != WHOLE):
+        if key == "measured" and (quick or fidelity != WHOLE):
             continue
-        sensor = {"speed_sensor": rung == "ideal" or key == "measured"}
-        one = scenario(f"{name}: {words}", rung=rung, loop=_SAMPLED, disturbance=load, model=sensor)
+        sensor = {"speed_sensor": fidelity == "ideal" or key == "measured"}
+        one = scenario(f"{name}: {words}", fidelity=fidelity, loop=_SAMPLED, disturbance=load, model=sensor)
         one["controller"] = law
         if supply is not None:
             one["plant"]["thruster"]["supply"] = supply
@@ -130,7 +130,7 @@ def _laws(
 
 def at_sea(description: str, law: dict[str, Any]) -> dict[str, Any]:
     """As examples/bluerov2_heavy.yaml, with a law to be compared; speed workload W2, too."""
-    instruments = [
+    sensors = [
         "imu",
         {"kind": "dvl", "period": 0.125, "noise": 0.005, "delay": 0.05},
         "depth",
@@ -147,7 +147,7 @@ def at_sea(description: str, law: dict[str, Any]) -> dict[str, Any]:
             {"kind": "current", "velocity": [0.3, 0.2, 0]},
             {"kind": "waves", "height": 0.5, "period": 5},
         ],
-        "sensor": {"kind": "navigation", "instruments": instruments},
+        "sensor": {"kind": "navigation", "sensors": sensors},
         "loop": {"kind": "sampled", "dt": 0.01, "duration": 120, "record": 0.05},
     }
 

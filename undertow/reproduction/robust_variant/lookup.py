@@ -22,6 +22,6 @@ class Numbers:
         one = self._variants[ablation, variant]
         return one["failures"], one["seeds"]
 
-    def rung(self, place: str, law: str) -> dict[str, Any]:
+    def fidelity(self, place: str, law: str) -> dict[str, Any]:
         """A row of the ladder."""
         return self._ladder[place, law]

@@ -31,7 +31,7 @@ def _wrong_model(n: Numbers) -> str:
 
 
 def _one_design(n: Numbers) -> str:
-    motor, sea = n.rung("electromechanical", "robust"), n.rung("sea", "robust")
+    motor, sea = n.fidelity("electromechanical", "robust"), n.fidelity("sea", "robust")
     if not (motor["steady"] and sea["steady"]):
         return ""
     return (

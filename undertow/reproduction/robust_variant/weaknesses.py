@@ -6,7 +6,7 @@ _RECOVERED = 0.01  # m, rad
 
 
 def _motor(n: Numbers) -> str:
-    paper, sound = n.rung("electromechanical", "rcafc"), n.rung("electromechanical", "robust")
+    paper, sound = n.fidelity("electromechanical", "rcafc"), n.fidelity("electromechanical", "robust")
     if paper["status"] == "ok":
         return ""
     kept = sound["steady"]["tracking_rms"]
@@ -17,7 +17,7 @@ def _motor(n: Numbers) -> str:
 
 
 def _supply(n: Numbers) -> str:
-    paper, sound = (n.rung("24V_03", law)["steady"] for law in ("rcafc", "robust"))
+    paper, sound = (n.fidelity("24V_03", law)["steady"] for law in ("rcafc", "robust"))
     return (
         f"A supply. At 24 V and U1 x 0.3 Table 1 is at its limit {100 * paper['saturated_fraction']:.0f} % of the time "
         f"and {paper['tracking_rms']:.2g} off; `robust` {100 * sound['saturated_fraction']:.0f} % and "
@@ -57,7 +57,7 @@ def _frequency(n: Numbers) -> str:
 
 
 def _at_sea(n: Numbers) -> str:
-    paper, hand, sound = (n.rung("sea", law) for law in ("table1", "hand_tuned", "robust"))
+    paper, hand, sound = (n.fidelity("sea", law) for law in ("table1", "hand_tuned", "robust"))
     if paper["status"] == "ok":
         return ""
     return (
@@ -68,8 +68,8 @@ def _at_sea(n: Numbers) -> str:
 
 
 def _navigation(n: Numbers) -> str:
-    pid, sound = (n.rung("station", law) for law in ("pid", "robust"))
-    known = [n.rung("station_known", law) for law in ("pid", "robust")]
+    pid, sound = (n.fidelity("station", law) for law in ("pid", "robust"))
+    known = [n.fidelity("station_known", law) for law in ("pid", "robust")]
     if not all(row["steady"] for row in (pid, sound, *known)):
         return ""
     without, ours = (row["position_rms"] for row in known)
@@ -83,7 +83,7 @@ def _navigation(n: Numbers) -> str:
 
 
 def _recovery(n: Numbers) -> str:
-    paper, sound = n.rung("overload", "rcafc"), n.rung("overload", "robust")
+    paper, sound = n.fidelity("overload", "rcafc"), n.fidelity("overload", "robust")
     if not (sound["steady"] and paper["steady"]):
         return ""
     after = sound["steady"]["tracking_rms"]
@@ -96,7 +96,7 @@ def _recovery(n: Numbers) -> str:
 
 
 def _beyond(n: Numbers) -> str:
-    paper, sound = (n.rung("24V", law)["steady"]["tracking_rms"] for law in ("rcafc", "robust"))
+    paper, sound = (n.fidelity("24V", law)["steady"]["tracking_rms"] for law in ("rcafc", "robust"))
     return (
         f"What nobody can do. U1 at full size asks for more than 24 V gives: Table 1 is {paper:.2g} off, `robust` "
         f"{sound:.2g}; no law holds it."
