@@ -33,7 +33,7 @@ from undertow.campaign.executors import by_dask, in_threads
 from undertow.campaign.fingerprint import Identity
 from undertow.campaign.layout import Layout
 from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE, conduct
+from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.campaign.store import Store
 from undertow.reproduction.setup import scenario
 from undertow.scenario.reading import dump
@@ -63,8 +63,8 @@ def memory(trials: int) -> dict:
     held, began = [], time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         campaign = prepared(Path(name), trials, 1.0, 256)
-        engine = lambda function, work: in_threads(function, work, 2)
-        conduct(campaign, Path(name), engine, lambda tally: held.append((tally.done, _resident())))
+        executor = lambda function, work: in_threads(function, work, 2)
+        run_campaign(campaign, Path(name), executor, lambda tally: held.append((tally.done, _resident())))
         taken = time.perf_counter() - began
         size = sum(file.stat().st_size for file in (Path(name) / STORE).rglob("*") if file.is_file())
     tenth = next(mebibytes for done, mebibytes in held if done >= trials / 10)
@@ -142,7 +142,7 @@ def dask(trials: int) -> dict:
                 campaign = prepared(folder, trials, 20.0, 256)
                 client.run(task.fly, campaign.text, str(campaign.folder), range(8))
                 start = time.perf_counter()
-                conduct(campaign, folder, lambda f, work, c=client: by_dask(f, work, c), lambda *_: None)
+                run_campaign(campaign, folder, lambda f, work, c=client: by_dask(f, work, c), lambda *_: None)
                 times[workers].append(time.perf_counter() - start)
                 files = sorted(file for file in (folder / STORE).rglob("*") if file.is_file())
                 stores.append({str(file.relative_to(folder)): file.read_bytes() for file in files})

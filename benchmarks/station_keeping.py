@@ -43,7 +43,7 @@ SEA = {
     "model": {"rate_term": True},
     "reference": {"kind": "setpoint", "position": [0.0] * 6},
     "disturbance": [{"kind": "current", "velocity": [0.4, 0.3, 0.0]}, {"kind": "waves", "height": 0.5, "depth": 3.0}],
-    "sensor": {"kind": "navigation"},
+    "navigation": {"kind": "observer"},
     "loop": {"dt": 0.01, "duration": DURATION, "record": 0.05},
     "tune": {
         "duration": 20.0,
@@ -97,7 +97,7 @@ def fly(scenario, seeds):
     loop, several = built.closed_loop, trials(text, built, wanted, (), "train", FIRST_SEED)
 
     def run(plant, key):
-        whole = ClosedLoop(plant, loop.controller, loop.reference, loop.disturbance, loop.sensor)
+        whole = ClosedLoop(plant, loop.controller, loop.reference, loop.disturbance, loop.navigation)
         found = sampled.simulate(whole, duration=DURATION, dt=0.01, key=key, record_every=0, accumulators=(Station(),))
         sums = found.accumulated[0]
         rms = lambda squares: jnp.sqrt(squares / sums.signals)
@@ -119,7 +119,7 @@ def fly(scenario, seeds):
 def at_sea(name, fix_noise):
     """The scenario with a law as it comes."""
     if fix_noise == 0:
-        return {**copy.deepcopy(SEA), "controller": LAWS[name], "sensor": {"kind": "perfect"}}
+        return {**copy.deepcopy(SEA), "controller": LAWS[name], "navigation": {"kind": "perfect"}}
     fix = {"kind": "position_fix", "noise": fix_noise}
     if fix_noise != 0.05:
         fix |= {"period": 0.1, "delay": 0.01}
@@ -127,7 +127,7 @@ def at_sea(name, fix_noise):
     return {
         **copy.deepcopy(SEA),
         "controller": LAWS[name],
-        "sensor": {"kind": "navigation", "sensors": sensors},
+        "navigation": {"kind": "observer", "sensors": sensors},
     }
 
 

@@ -67,7 +67,7 @@ def scenario(vehicle, controller):
         "controller": {"kind": "rcaf", **controller},
         "reference": {"kind": "setpoint", "position": [2.0, 1.0, 1.0, 0.0, 0.0, 0.5], "settling": 15.0},
         "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0.0]}, {"kind": "waves", "height": 0.5}],
-        "sensor": {"kind": "navigation", "sensors": INSTRUMENTS},
+        "navigation": {"kind": "observer", "sensors": INSTRUMENTS},
         "loop": {"dt": 0.02, "duration": 60.0, "record": 0.1},
         "tune": {"duration": 16.0, "train": {"sets": sets and sets[:2]}, "held_out": {"sets": sets}},
     }

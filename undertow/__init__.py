@@ -11,9 +11,15 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from undertow import controllers, disturbances, plants, power, references, thrusters, vehicles
-    from undertow import navigation as sensors
+    from undertow import controllers as controllers
+    from undertow import disturbances as disturbances
+    from undertow import navigation as navigation
+    from undertow import plants as plants
+    from undertow import power as power
+    from undertow import references as references
     from undertow import sensors as sensors
+    from undertow import thrusters as thrusters
+    from undertow import vehicles as vehicles
     from undertow.controllers.rcaf import rcaf as rcaf
     from undertow.core.errors import BadInput as BadInput
     from undertow.plants.hybrid_vehicle import HybridVehicle as HybridVehicle
@@ -37,7 +43,7 @@ _HOMES = {
 _PACKAGES = (
     "controllers",
     "disturbances",
-    "sensors",
+    "navigation",
     "plants",
     "power",
     "references",

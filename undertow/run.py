@@ -125,7 +125,7 @@ def simulate(
         "controller": (controller, AbstractController),
         "reference": (reference, AbstractReference),
         "disturbance": (none() if disturbance is None else disturbance, AbstractDisturbance),
-        "sensor": (perfect() if sensor is None else sensor, AbstractNavigation),
+        "navigation": (perfect() if sensor is None else sensor, AbstractNavigation),
     }
     for name, (part, contract) in roles.items():
         if not isinstance(part, contract):

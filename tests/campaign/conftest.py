@@ -12,7 +12,7 @@ SCENARIO = {
     "controller": {"kind": "pid", "frequency": 2.0},
     "reference": {"kind": "setpoint", "position": [0.0]},
     "disturbance": {"kind": "sinusoid", "amplitude": 1.0},
-    "sensor": {"kind": "white_noise", "velocity": 0.01},
+    "navigation": {"kind": "white_noise", "velocity": 0.01},
     "loop": {"duration": 2.0, "dt": 0.02, "record": 0.1},
 }
 CAMPAIGN = {
@@ -44,11 +44,11 @@ def campaign_file(tmp_path, campaign):
     return write
 
 
-@pytest.fixture(params=["lanes", "xla"])
-def engine(request, monkeypatch):
+@pytest.fixture(params=["simd", "xla"])
+def backend(request, monkeypatch):
     """Programs of lanes, and what is used where there is no such program."""
     monkeypatch.setattr(batches, "_WIDTH", 8)
-    monkeypatch.setitem(SCENARIO["loop"], "engine", request.param)
+    monkeypatch.setitem(SCENARIO["loop"], "backend", request.param)
     site.cache_clear()
     yield request.param
     site.cache_clear()

@@ -8,7 +8,7 @@ import pytest
 from command import VEHICLE, contents
 
 from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE, conduct
+from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.cli.main import run
 from undertow.core.disk import alone
 from undertow.scenario.reading import dump
@@ -82,7 +82,7 @@ from undertow.scenario.reading import dump
         ),
         ({"cross": {"seed": [1, 2]}}, r"`cross.seed` must be left out \(small.yaml, line \d+\). Every trial has one"),
         (
-            {"vary": {"sensor.velocity": {"uniform": [0.0, 1.0]}, "sensor": {"choice": ["perfect"]}}},
+            {"vary": {"sensor.velocity": {"uniform": [0.0, 1.0]}, "navigation": {"choice": ["perfect"]}}},
             r"`sensor.velocity` must not be beside sensor, which it is a part of",
         ),
         (
@@ -256,7 +256,7 @@ def test_the_status_of_what_was_stopped_at_once(campaign_file, tmp_path, capsys)
     """No row is written yet, or not even what the campaign is."""
     path, out = campaign_file(trials=4), tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
-        conduct(prepare(path), out, stopped, lambda tally: None)
+        run_campaign(prepare(path), out, stopped, lambda tally: None)
     assert run(["campaign", "status", str(out)]) == 0
     assert capsys.readouterr().out == "0 of 4 trials done\n"
     (out / STORE / "zarr.json").write_text('{"zarr_format": 3, "node_type": "group", "attributes": {}}')
@@ -266,7 +266,7 @@ def test_the_status_of_what_was_stopped_at_once(campaign_file, tmp_path, capsys)
 
 
 def stopped(function, work):
-    """An engine that is stopped at once."""
+    """An executor that is stopped at once."""
     raise KeyboardInterrupt
 
 

@@ -32,7 +32,7 @@ def columns(data, rows):
     return fly(text_of(data), "", rows)
 
 
-def test_rows_are_runs(campaign, engine):
+def test_rows_are_runs(campaign, backend):
     found = columns(campaign(), range(3))
     for trial in range(3):
         built = build(made(campaign()).data(trial))
@@ -44,7 +44,7 @@ def test_rows_are_runs(campaign, engine):
         assert found["vary:disturbance.amplitude"][trial] == float(built.closed_loop.disturbance.amplitude)
 
 
-def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, engine):
+def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, backend):
     """Tasks of 1, 7 and 40 trials, backwards; fewer and more than there are lanes."""
     two = campaign(cross={"controller": [{"kind": "pid", "frequency": 2.0}, {"kind": "rcaf", "preset": "robust"}]})
     at_once = columns(two, range(80))
@@ -94,7 +94,7 @@ def test_a_trial_unlike_all_probes(campaign):
     assert found["tracking_rms"][0] == pytest.approx(results(run.accumulated[0])["tracking_rms"], rel=1e-9)
 
 
-def test_a_run_that_fails_costs_no_other(campaign, engine):
+def test_a_run_that_fails_costs_no_other(campaign, backend):
     """Gains that are far too fast for the sampling time diverge; their neighbours do not notice."""
     unlimited = lambda *frequencies: campaign(
         cross={"plant.limit": [1e30], "controller.frequency": list(frequencies)}, trials=4
@@ -128,7 +128,7 @@ def test_series_are_those_of_the_runs(campaign):
 
 def test_single_precision(campaign):
     """Without noise, which is drawn differently."""
-    scenario = campaign()["scenario"] | {"sensor": "perfect"}
+    scenario = campaign()["scenario"] | {"navigation": "perfect"}
     single = text_of(campaign(scenario=scenario | {"precision": "float32"}))
     found = fly(single, "", range(9))
     wanted = columns(campaign(scenario=scenario), range(9))

@@ -134,10 +134,10 @@ def test_other_requirements_need_no_flight(campaign_file, tmp_path, capsys):
 
 def test_what_is_drawn_from_words_is_told_apart(campaign_file, tmp_path):
     """By choice: as many trials as drew it, and the quantiles of those."""
-    path = campaign_file(vary={"sensor": {"choice": ["perfect", {"kind": "white_noise", "velocity": 0.5}]}}, seed=3)
+    path = campaign_file(vary={"navigation": {"choice": ["perfect", {"kind": "white_noise", "velocity": 0.5}]}}, seed=3)
     out = tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
-    found = json.loads((out / "summary.json").read_text())["choices"]["sensor"]
+    found = json.loads((out / "summary.json").read_text())["choices"]["navigation"]
     rows = xr.open_zarr(out / STORE, consolidated=False).load()
     for number, one in enumerate(found.values()):
         chosen = rows["tracking_rms"].values[rows["vary:sensor"].values == number]
@@ -189,12 +189,12 @@ def test_every_file_that_trials_name_belongs_to_the_campaign(campaign_file, tmp_
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
 
 
-@pytest.mark.parametrize("engine, number", [("lanes", 0), ("xla", 4)])
-def test_what_flew_is_told(campaign, campaign_file, tmp_path, capsys, engine, number):
+@pytest.mark.parametrize("backend, number", [("simd", 0), ("xla", 4)])
+def test_what_flew_is_told(campaign, campaign_file, tmp_path, capsys, backend, number):
     scenario, out = campaign()["scenario"], tmp_path / "out"
-    scenario["loop"]["engine"] = engine
+    scenario["loop"]["backend"] = backend
     assert run(["campaign", str(campaign_file(scenario=scenario, trials=4, requirements={})), "--out", str(out)]) == 0
     sentence = f"{number} trials were flown by XLA: slower than in lanes"
     assert (sentence in capsys.readouterr().out) == (sentence in (out / "campaign.html").read_text()) == bool(number)
-    column = xr.open_zarr(out / STORE, consolidated=False)["engine"]
-    assert column.attrs["flag_meanings"].split()[int(column[0])] == engine
+    column = xr.open_zarr(out / STORE, consolidated=False)["backend"]
+    assert column.attrs["flag_meanings"].split()[int(column[0])] == backend

@@ -14,7 +14,7 @@ from command import contents
 from undertow.campaign.executors import in_threads
 from undertow.campaign.fingerprint import identity
 from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE, conduct
+from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.campaign.store_results import load
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
@@ -23,18 +23,18 @@ quiet = lambda tally: None
 threads = partial(in_threads, threads=2)
 
 
-def flown(path, out, engine=threads, watch=quiet):
-    conduct(prepare(path), out, engine, watch)
+def flown(path, out, executor=threads, watch=quiet):
+    run_campaign(prepare(path), out, executor, watch)
     return contents(out)
 
 
 def nothing(function, work):
-    """An engine that flies nothing."""
+    """An executor that flies nothing."""
     return iter(())
 
 
 def backwards(function, work):
-    """An engine that takes the last task first."""
+    """An executor that takes the last task first."""
     for i in reversed(range(len(work))):
         yield i, function(*work[i])
 
@@ -77,15 +77,15 @@ def test_what_is_done_is_not_flown_again(small, tmp_path):
 
 
 def stop_after(count):
-    """An engine whose machine dies after some tasks."""
+    """An executor whose machine dies after some tasks."""
 
-    def engine(function, work):
+    def executor(function, work):
         for i, one in enumerate(work):
             if i == count:
                 raise KeyboardInterrupt
             yield i, function(*one)
 
-    return engine
+    return executor
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])

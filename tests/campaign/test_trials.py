@@ -22,12 +22,12 @@ def test_values_stand_where_the_key_path_says(campaign):
         "disturbance[0].velocity[1]": 5.0,
         "disturbance[1].height": 0.7,
         "initial.position": [1.0],
-        "sensor": "perfect",
+        "navigation": "perfect",
     }
     data |= {"vary": {}, "cross": {key: [value] for key, value in put.items()}}
     found = made(data).data(0)
     assert found["disturbance"] == [{"kind": "current", "velocity": [0.1, 5.0, 0.3]}, {"kind": "waves", "height": 0.7}]
-    assert found["initial"] == {"position": [1.0]} and found["sensor"] == "perfect"
+    assert found["initial"] == {"position": [1.0]} and found["navigation"] == "perfect"
     assert data["scenario"]["disturbance"] is LIST and LIST[0]["velocity"][1] == 0.2
 
 

@@ -232,7 +232,7 @@ MISTAKES = {
     ),
     "negative noise": (
         "seed: 3",
-        "sensor: {kind: white_noise, velocity: -1}",
+        "navigation: {kind: white_noise, velocity: -1}",
         "`sensor.velocity` must be zero or positive, but is -1 (s.yaml, line 11)",
     ),
     "two sources of samples": (

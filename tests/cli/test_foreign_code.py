@@ -101,7 +101,7 @@ def hash_of(folder):
         ("plant.thruster.kind", "thruster: {kind: paper_table3", "thruster: {kind: ./x.py:f"),
         ("reference.kind", "kind: setpoint", "kind: ./x.py:f"),
         ("disturbance[0].kind", "disturbance: {kind: u1}", "disturbance: [{kind: ./x.py:f}]"),
-        ("sensor", "seed: 3", "sensor: ./x.py:f"),
+        ("navigation", "seed: 3", "navigation: ./x.py:f"),
     ],
 )
 def test_it_is_found_wherever_it_stands(refused, tmp_path, key, old, new):

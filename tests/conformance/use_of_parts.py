@@ -86,13 +86,15 @@ def references(reference, v):
     return reference.at(5.0 + v[0])
 
 
-def sensors(sensor, v):
+def navigation(filter_, v):
     truth = Measurement(v[:6], v[6:12])
-    path = sensor.realize(jax.random.PRNGKey(2))
-    return sensor.measure(path, sensor.init(path, Measurement(v[13:19], v[19:25])), jnp.abs(v[12]), truth)
+    realization = filter_.realize(jax.random.PRNGKey(2))
+    return filter_.measure(
+        realization, filter_.init(realization, Measurement(v[13:19], v[19:25])), jnp.abs(v[12]), truth
+    )
 
 
-KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, sensors)
+KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation)
 USES = {use.__name__: use for use in KINDS}
 
 

@@ -107,14 +107,14 @@ MISTAKES = [
         "Error: `Wash` must be usable as its contract says, but is not: TypeError: add got incompatible shapes",
     ),
     (
-        "sensor",
+        "navigation",
         "altimeter",
         "motion.position[2:]",
         "motion.position[2]",
         "Error: `reading` must give an array of one axis, but is of shape ()",
     ),
     (
-        "sensor",
+        "navigation",
         "altimeter",
         "set(self.bottom - reading[0] - then)",
         "set(reading[0] - then)",
@@ -122,7 +122,7 @@ MISTAKES = [
         "0.26 in entry 3",
     ),
     (
-        "sensor",
+        "navigation",
         "altimeter",
         "set(self.bottom - reading[0] - then)",
         "set(then + reading[0] - self.bottom)",
@@ -152,7 +152,7 @@ def test_line_of_ones_own_file_is_named(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err.startswith(f"{said} line 3")
 
 
-@pytest.mark.parametrize("part", ["thrusters", "sensors", "sensors"])
+@pytest.mark.parametrize("part", ["thrusters", "sensors", "navigation"])
 def test_the_catalogue_keeps_its_own_contracts(part, capsys):
     from undertow.core import catalogue
 

@@ -31,7 +31,7 @@ from undertow.vehicles import bluerov2_heavy
 DT = 0.01
 NAN, INF = float("nan"), float("inf")
 AMPLITUDE, FREQUENCY = 0.5, 1.0  # of the load, m/s^2 and rad/s
-BACK_ENDS = {"xla": sampled.simulate, "lanes": simd_batch.simulate}
+BACK_ENDS = {"xla": sampled.simulate, "simd": simd_batch.simulate}
 LAWS = {
     "robust": lambda model: rcaf(model, preset="robust", sampling_time=DT, bandwidth=0.35 / DT),
     "pid": lambda model: pid(model, sampling_time=DT, frequency=3.0),
@@ -168,7 +168,7 @@ def broken(value, after=0.5):
 
 WAYS = {
     "xla": partial(sampled.simulate, duration=1.0, dt=DT),
-    "lanes": partial(simd_batch.simulate, duration=1.0, dt=DT),
+    "simd": partial(simd_batch.simulate, duration=1.0, dt=DT),
     "continuous": partial(continuous.simulate, duration=1.0, dt=DT, record_step=0.1),
 }
 

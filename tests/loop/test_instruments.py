@@ -46,7 +46,7 @@ def test_a_period_between_ticks_waits_for_the_next_tick():
 def test_faster_than_the_loop_the_newest_is_heard():
     times, readings, fresh = initial_measuring(Sampling(0.01, delay=0.03), 0.05, 1.0)
     assert fresh[1:].all() and not fresh[0]
-    # Signals (t - delay) falls between two steps and is answered with the truth at the step after it.
+    # Sample (t - delay) falls between two steps and is answered with the truth at the step after it.
     np.testing.assert_allclose(readings[fresh], times[fresh], atol=1e-12)
 
 

@@ -24,7 +24,7 @@ SCENARIO = {
     "controller": {"kind": "pid", "frequency": 2.0},
     "reference": {"kind": "setpoint", "position": [1.0]},
     "disturbance": {"kind": "sinusoid", "amplitude": 1.0},
-    "sensor": {"kind": "white_noise", "velocity": 0.01},
+    "navigation": {"kind": "white_noise", "velocity": 0.01},
     "loop": {"duration": 1.0, "dt": 0.01, "record": 0.02},
 }
 PROGRAM = """
@@ -36,12 +36,12 @@ print(execute(read(Path(sys.argv[1]))).dataset.attrs["content_hash"])
 """
 
 
-def scenario(precision, engine="lanes"):
-    return SCENARIO | {"precision": precision, "loop": SCENARIO["loop"] | {"engine": engine}}
+def scenario(precision, backend="simd"):
+    return SCENARIO | {"precision": precision, "loop": SCENARIO["loop"] | {"backend": backend}}
 
 
-def content(precision, engine="lanes"):
-    found = execute(scenario(precision, engine))
+def content(precision, backend="simd"):
+    found = execute(scenario(precision, backend))
     assert found.outcome.signals.position.dtype == precision == str(found.dataset["position"].dtype)
     return found.dataset.attrs["content_hash"]
 

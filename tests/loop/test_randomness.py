@@ -44,8 +44,10 @@ def test_no_two_parts_share_a_key(seed):
     plant = double_integrator()
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, navigation(sensors))
     realization = loop.realize(jax.random.PRNGKey(seed))
-    keys = [*jax.tree.leaves(realization.disturbance_realization), *realization.sensor_realization]
-    samples = [numbered(key, jnp.asarray(k)) for key in realization.sensor_realization for k in (-1, 0, 1, 2, 3, 4, 5)]
+    keys = [*jax.tree.leaves(realization.disturbance_realization), *realization.navigation_realization]
+    samples = [
+        numbered(key, jnp.asarray(k)) for key in realization.navigation_realization for k in (-1, 0, 1, 2, 3, 4, 5)
+    ]
     assert len(keys) == 9 + len(sensors) and all(isinstance(one, AbstractSensor) for one in sensors)
     assert len({tuple(np.asarray(key).tolist()) for key in (*keys, *samples)}) == len(keys) + len(samples)
 
@@ -68,7 +70,7 @@ def noise_of_a_run(duration, dt, simulate=sampled.simulate):
     return np.asarray(samples.measured_position - samples.position)[:-1, 0]
 
 
-@pytest.mark.parametrize("simulate", [sampled.simulate, simd_batch.simulate], ids=["xla", "lanes"])
+@pytest.mark.parametrize("simulate", [sampled.simulate, simd_batch.simulate], ids=["xla", "simd"])
 @pytest.mark.parametrize(("duration", "dt"), [(6e3, 1.0), (1e7, 2e3), (5e-4, 1e-7)])
 def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
     """Beyond 2^32 microseconds, to four months, and below a microsecond."""

@@ -47,7 +47,7 @@ def test_runs_that_ended_early_are_infinitely_bad():
 
 
 def test_seeds_together_are_the_runs_one_by_one():
-    loop = on_axes.loop(paper, sensor=RoughSensor(noise=1e-3))
+    loop = on_axes.loop(paper, navigation=RoughSensor(noise=1e-3))
     together = runner.run(loop, SHORT, 3)
     keys = runner.keys(runner.HELD_OUT, 3)
     for key, error, miss in zip(keys, together["tracking_rms"], together["estimation_rms"], strict=True):

@@ -22,7 +22,7 @@ RISE = 1e-10  # of V(0)
 FAST = {"preset": "robust", "sets": 1}
 
 
-def flown(d, law=None, axes=1, limit=np.inf, goal=2.0, dt=1e-3, duration=2.0, sensor=None, loop="sampled"):
+def flown(d, law=None, axes=1, limit=np.inf, goal=2.0, dt=1e-3, duration=2.0, navigation=None, loop="sampled"):
     """A run on independent axes, recorded at every step; `law` are choices of the controller."""
     plant = double_integrator(axes, limit)
     choices = dict(law or {})
@@ -33,7 +33,7 @@ def flown(d, law=None, axes=1, limit=np.inf, goal=2.0, dt=1e-3, duration=2.0, se
         rcaf(plant.model(), **choices),
         ut.references.setpoint([goal] * axes),
         disturbance=d,
-        sensor=sensor,
+        navigation=navigation,
         duration=duration,
         dt=dt,
         record=dt,
@@ -165,7 +165,7 @@ def test_rises_under_saturation_only():
 def test_weights_leave_the_interior_under_noise():
     """Drift (3.8 of the theory) brings the paper's weights to their box: the share of time inside it falls."""
     law = {"sets": 5, "reach": (0.1,), "weights_bound": 20.0}
-    quiet, noisy = (flown(constant([0.5]), law, goal=0.0, sensor=s) for s in (None, white_noise(0, 0.01)))
+    quiet, noisy = (flown(constant([0.5]), law, goal=0.0, navigation=s) for s in (None, white_noise(0, 0.01)))
     assert hypothesis(quiet, "weights")["whole"] == 1.0
     weights = hypothesis(noisy, "weights")
     assert weights["steady"] < weights["whole"] < 1 and weights["first_failure"] > 0.2

@@ -109,7 +109,7 @@ ROWS = {
     "motor": {},
     "motor, 24 V": {"supply": 24.0},
     "speed sensor": {"speed_sensor": True},
-    "speed sensor, 24 V": {"speed_sensor": True, "supply": 24.0},
+    "speed navigation, 24 V": {"speed_sensor": True, "supply": 24.0},
     "rafc": {"composite": 0.0},
     "rafc, 24 V": {"composite": 0.0, "supply": 24.0},
     "inner loop, 24 V": {"inner": 60.0, "supply": 24.0},
@@ -159,7 +159,7 @@ def test_table_1_on_its_own_motor(rows):
     for name, seconds in (("motor", 3.0), ("speed sensor", 1.5)):
         status, ended, _, _ = rows[name]
         assert status != int(Status.OK) and ended < seconds, name
-    for name, error in (("motor, 24 V", 16e-3), ("speed sensor, 24 V", 11e-3)):
+    for name, error in (("motor, 24 V", 16e-3), ("speed navigation, 24 V", 11e-3)):
         status, _, found, _ = rows[name]
         assert status == int(Status.OK), name
         assert found["V"] > 0.9 * 24.0 and found["variation"] > 500.0, "from stop to stop, for ever"

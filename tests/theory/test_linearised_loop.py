@@ -177,7 +177,7 @@ SCENARIOS = {
     },
     "noise, sampled": {
         "controller": {"kind": "rcaf", "preset": "paper", "sets": 1},  # with more, noise drives the weights
-        "sensor": {"kind": "white_noise", "velocity": 0.003},
+        "navigation": {"kind": "white_noise", "velocity": 0.003},
         "loop": {"duration": 40.0, "dt": 0.002},
     },
     "one ODE": {

@@ -63,7 +63,7 @@ def flown(loop):
     return run.status, jnp.sqrt((late.error[half:] ** 2).mean()), swings
 
 
-def error(thruster, nominal, make=robust, sensor=None):
+def error(thruster, nominal, make=robust, navigation=None):
     """Rms error over the second half, m and rad; it must have lasted, and not swing (V/s)."""
     plant = hybrid_vehicle(bluerov2_heavy(), thruster, ledger=False)
     law = make(plant.model(rate_term=True, thruster=nominal), sampling_time=DT)
@@ -90,8 +90,8 @@ def test_a_lag_that_is_wrong_by_three_costs_little(make):
 def test_delay_and_noise_that_nobody_tells_of():
     """Four sampling times of delay, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
     for sensor in (Late(4), white_noise(0.0, 0.01)):
-        own, _ = error(t200(), None, robust, sensor)
-        other, _ = error(t200(), None, pid, sensor)
+        own, _ = error(t200(), None, robust, navigation)
+        other, _ = error(t200(), None, pid, navigation)
         exact, _ = error(t200(), None, robust)
-        print(f"{type(sensor).__name__}: robust {own:.3g}, pid {other:.3g}, robust without {exact:.3g}")
+        print(f"{type(navigation).__name__}: robust {own:.3g}, pid {other:.3g}, robust without {exact:.3g}")
         assert own < other and own < 3 * exact

@@ -33,7 +33,7 @@ AXIS = {
     "controller": {"kind": "pid", "frequency": 3.0},
     "reference": {"kind": "setpoint", "position": [0.0]},
     "disturbance": {"kind": "sinusoid", "amplitude": 1.0, "frequency": 1.0},
-    "sensor": {"kind": "white_noise", "velocity": 0.01},
+    "navigation": {"kind": "white_noise", "velocity": 0.01},
     "loop": {"duration": 6.0, "dt": 0.02, "record": 0.1},
     "tune": {"parameters": {"frequency": [0.5, 12], "damping": [0.4, 2]}, "train": {"seeds": 2}},
 }
@@ -117,7 +117,7 @@ def test_slopes_are_taken_without_steps():
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0] * 6), sinusoid(), sensor)
     smooth = without(loop, ("resolution", "dead_zone"))
     assert float(smooth.plant.thruster.dead_zone) == 0.0 and float(loop.plant.thruster.dead_zone) == 1.2
-    pairs = zip(loop.sensor.sensors, smooth.sensor.sensors, strict=True)
+    pairs = zip(loop.navigation.sensors, smooth.navigation.sensors, strict=True)
     assert [(float(a.sampling.resolution), float(b.sampling.resolution)) for a, b in pairs] == [(0.0, 0.0)] + [
         (1e-3, 0.0)
     ] * 2
@@ -160,7 +160,7 @@ def test_ranges_that_cannot_be(ranges, said):
 
 
 def test_one_ode_is_not_what_a_vehicle_runs():
-    ode = {"controller": {"kind": "rcaf"}, "sensor": "perfect", "loop": {"kind": "continuous", "duration": 1.0}}
+    ode = {"controller": {"kind": "rcaf"}, "navigation": "perfect", "loop": {"kind": "continuous", "duration": 1.0}}
     with pytest.raises(BadInput, match=r"^`loop.kind` must be sampled, for gains to be used on a vehicle"):
         problem(from_data(AXIS | ode))
 

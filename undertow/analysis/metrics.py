@@ -17,7 +17,7 @@ from undertow.loop.sampled import AbstractAccumulator
 PerAxis = Float[Array, " n"]
 Scalar = Float[Array, ""]
 
-# Signals times are k * dt in floating point: a window takes its borders in.
+# Sampling times are k * dt in floating point: a window takes its borders in.
 _HAIR = 1e-9  # s
 
 # Share of the way to the last target that the error must leave no more to be settled.
@@ -114,7 +114,7 @@ class Metrics(AbstractAccumulator):
         power, between = sample.power.sum(), inside * last_inside
         size, applied = jnp.abs(sample.error), sample.voltage
         return MetricsState(
-            samples=state.signals + inside,
+            samples=state.samples + inside,
             squares={name: state.squares[name] + inside * pick(sample) ** 2 for name, pick in _SIGNALS.items()},
             largest_error=jnp.maximum(state.largest_error, inside * size),
             input_squares=state.input_squares + inside * (applied**2).mean(),
@@ -177,7 +177,7 @@ def measure(outcome: Outcome, start: float = 0.0, stop: float = float("inf")) ->
 
 
 @eqx.filter_jit
-def _over_series(metrics: Metrics, time: Array, signals: Signals) -> MetricsState:
+def _over_series(metrics: Metrics, time: Array, samples: Signals) -> MetricsState:
     first = jax.tree.map(lambda series: series[0], samples)
     step = lambda state, at: (metrics.update(state, *at), None)
     return jax.lax.scan(step, metrics.init(first), (time, samples))[0]

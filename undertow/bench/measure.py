@@ -19,7 +19,7 @@ from undertow.bench import plain_numpy, workload
 from undertow.bench.workload import W1, W2, Workload
 from undertow.core import runtime
 from undertow.loop import sampled
-from undertow.loop.vmap_batch import BatchRunner as Vmapped
+from undertow.loop.vmap_batch import BatchRunner as VmapBatchRunner
 
 # Runs of a batch, and how often everything is done; the shortest time counts.
 _BATCH, _BATCH_W2 = 64, 16
@@ -32,7 +32,7 @@ Watch = Callable[[str, float], None]
 
 
 def measure(watch: Watch) -> dict[str, Any]:
-    """Nanoseconds per step, and per run where several fly at once; seconds of compiling; operations of one step.
+    """Nanoseconds per step, and per run where several execute at once; seconds of compiling; operations of one step.
 
     Args:
         watch: told what is being done, and the share done.
@@ -89,7 +89,7 @@ def _in_a_lane(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, floa
 def _by_xla(one: Workload) -> dict[str, float]:
     run, plan = one
 
-    def run():
+    def execute():
         at = dict(zip(("position", "velocity"), run.start, strict=True))
         return jax.block_until_ready(
             sampled.simulate(
@@ -102,8 +102,8 @@ def _by_xla(one: Workload) -> dict[str, float]:
             )
         )
 
-    _, first = _timed(fly)
-    shortest = _shortest(fly)
+    _, first = _timed(execute)
+    shortest = _shortest(execute)
     return {"single_xla_compile_s": first - shortest * 1e-9, "single_xla_ns": shortest / plan.steps}
 
 
@@ -139,12 +139,12 @@ def on_gpu(one: Workload, driver: Driver, runs: int) -> dict[str, float]:
     program, compiling = _timed(lambda: workload.batch(one, driver=driver))
     numbers = workload.several(one.run, runs)
     each = _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)
-    return {"compile_s": compiling, "ns": each, "ticks_per_second": 1e9 / each}
+    return {"compile_s": compiling, "ns": each, "steps_per_second": 1e9 / each}
 
 
 def vmapped_ns(one: Workload, runs: int) -> float:
     """Nanoseconds per step and run by `jax.vmap` on the device that JAX uses."""
-    program = Vmapped(one.run, one.plan, width=runs)
+    program = VmapBatchRunner(one.run, one.plan, width=runs)
     numbers = jax.tree.map(jnp.asarray, workload.several(one.run, runs))
     return _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)
 

@@ -23,7 +23,7 @@ from undertow.scenario.part_cache import structure
 from undertow.scenario.schema import Scenario
 
 # What flies a trial. By XLA it takes longer, and alone it is repeated to rounding only.
-LANES, XLA = 0, 1
+SIMD, XLA = 0, 1
 
 
 class BatchResult(NamedTuple):
@@ -32,7 +32,7 @@ class BatchResult(NamedTuple):
     metrics: dict[str, np.ndarray]  # over the steady window; NaN where a run did not last
     status: np.ndarray
     ended: np.ndarray  # s
-    engine: np.ndarray  # LANES or XLA
+    backend: np.ndarray  # SIMD or XLA
     series: dict[str, np.ndarray]  # (trials, records, ...)
 
 
@@ -42,7 +42,7 @@ class _Kind(NamedTuple):
     structure: Any
     plan: Plan
     usual: bool  # numbers that were the same in all probes are the same here
-    engine: str
+    backend: str
     precision: str
 
 
@@ -68,7 +68,7 @@ class ProgramCache:
         self._programs: dict[_Kind, Any] = {}
         self._lock = threading.Lock()
 
-    def fly(self, built: Iterable[Built], asked: Series | None = None) -> BatchResult:
+    def run(self, built: Iterable[Built], asked: Series | None = None) -> BatchResult:
         """Run trials; those of one kind together.
 
         Args:
@@ -106,10 +106,10 @@ class ProgramCache:
         flown = self._programs[kind].run(jax.tree.unflatten(tree, numbers))
         lasted = flown.status == int(Status.OK)
         metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(flown.accumulated[0]).items()}
-        engine = np.full(
-            count, LANES if isinstance(self._programs[kind], simd_batch.BatchRunner) else XLA, dtype=np.int8
+        backend = np.full(
+            count, SIMD if isinstance(self._programs[kind], simd_batch.BatchRunner) else XLA, dtype=np.int8
         )
-        return BatchResult(metrics, flown.status.astype(np.int8), flown.ended, engine, flown.series)
+        return BatchResult(metrics, flown.status.astype(np.int8), flown.ended, backend, flown.series)
 
     def _common(self, kind: _Kind, count: int) -> list[np.ndarray | None]:
         """Numbers that are built into the program of a kind, in the order of the leaves of its runs; None elsewhere."""
@@ -123,7 +123,7 @@ class ProgramCache:
             shared is None or leaf is shared or np.array_equal(leaf, shared)
             for leaf, shared in zip(numbers, common, strict=True)
         )
-        return _Kind(form, plan, usual, scenario.loop.engine, scenario.precision)
+        return _Kind(form, plan, usual, scenario.loop.backend, scenario.precision)
 
     def _commons(self) -> dict[Any, list[np.ndarray | None]]:
         """Numbers that all probes of a structure share, by structure: None for those that differ."""
@@ -134,7 +134,7 @@ class ProgramCache:
 
 
 def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
-    if kind.engine == "lanes":
+    if kind.backend == "simd":
         for driver in dict.fromkeys((nvidia.gpu(), None)):
             with contextlib.suppress(Unsupported):
                 return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver)

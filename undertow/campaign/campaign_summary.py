@@ -31,7 +31,7 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
         "trials": results.total,
         "done": results.rows.sizes["trial"],
         "status": endings(results.rows),
-        "by_xla": int((results.rows["engine"].values == XLA).sum()),
+        "by_xla": int((results.rows["backend"].values == XLA).sum()),
         "refused": [one._asdict() for one in refusals(several, refused)],
         "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
         "sensitivity": correlations(results),

@@ -7,7 +7,7 @@ import xarray as xr
 
 from undertow.analysis.metric_meanings import MEANINGS, unit_of
 from undertow.analysis.metrics import OVERALL
-from undertow.campaign.batch_runner import LANES, XLA
+from undertow.campaign.batch_runner import SIMD, XLA
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.labels import is_number, words
 from undertow.campaign.layout import DRAWS
@@ -18,9 +18,9 @@ from undertow.core.status import Status
 from undertow.loop import record
 from undertow.scenario.build import Built
 
-# Codes of the columns `status` and `engine`, and their words.
+# Codes of the columns `status` and `backend`, and their words.
 ENDINGS = {int(status): status.word for status in Status} | {REFUSED: "refused"}
-ENGINES = {LANES: "lanes", XLA: "xla", REFUSED: "none"}
+BACKENDS = {SIMD: "simd", XLA: "xla", REFUSED: "none"}
 
 _AFTER = "a run that failed stays where it was: see `ended`"
 
@@ -39,7 +39,7 @@ ALWAYS: dict[str, dict[str, Any]] = {
     "trial": {"long_name": "number, as in the names of files of the worst"},
     "seed": {"long_name": "seed of everything random"},
     "status": _codes("how the run ended", ENDINGS),
-    "engine": _codes("what flew it", ENGINES),
+    "backend": _codes("what flew it", BACKENDS),
     "ended": {"long_name": "when the run ended", "units": "s"},
 } | {name: _said(*MEANINGS[name]) for name in OVERALL}
 
@@ -59,7 +59,7 @@ class Label(NamedTuple):
 
 
 FLAGS = Label(("task",), {"long_name": "1 for what is written"}, "uint8")
-_DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "engine": "int8"}
+_DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "backend": "int8"}
 
 
 def labels(several: Trials, built: Built) -> dict[str, Label]:

@@ -16,7 +16,7 @@ from undertow.campaign.store import Store
 
 STORE = "trials.zarr"
 
-Engine = Callable[[Callable[..., Columns], Sequence[Work]], Iterator[tuple[int, Columns]]]
+Executor = Callable[[Callable[..., Columns], Sequence[Work]], Iterator[tuple[int, Columns]]]
 
 
 class Tally(NamedTuple):
@@ -37,13 +37,13 @@ class Tally(NamedTuple):
 Watch = Callable[[Tally], None]
 
 
-def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None:
+def run_campaign(prepared: Prepared, out: Path, executor: Executor, watch: Watch) -> None:
     """Fly what is missing; what is done stays done.
 
     Args:
         prepared: the campaign.
         out: folder of the store.
-        engine: flies tasks.
+        executor: flies tasks.
         watch: told after each task.
 
     Raises:
@@ -63,7 +63,7 @@ def conduct(prepared: Prepared, out: Path, engine: Engine, watch: Watch) -> None
         tally = Tally(several.number, several.number - sum(map(store.layout.count, missing)), 0, 0)
         watch(tally)
         work = [(text, str(folder), store.layout, number) for number in missing]
-        for i, columns in engine(tasks.run_block, work):
+        for i, columns in executor(tasks.run_block, work):
             store.write(missing[i], columns)
             tally = tally.after(columns["status"])
             watch(tally)

@@ -77,7 +77,7 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     spread = functools.partial(_spread, len(rows), where)
     columns["status"] = spread(flown.status, REFUSED)
     columns["ended"] = spread(flown.ended, np.nan)
-    columns["engine"] = spread(flown.engine, REFUSED)
+    columns["backend"] = spread(flown.backend, REFUSED)
     found = flown.metrics | {f"series:{name}": values for name, values in flown.series.items()}
     if "precision" in (*here.trials.campaign.vary, *here.trials.campaign.cross):  # one array holds both
         found = {name: values.astype(np.float64) for name, values in found.items()}

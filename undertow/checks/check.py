@@ -124,7 +124,7 @@ def _of_scenario(text: Text) -> list[Report]:
         around = of_plant(loop.plant)
         reports += [
             _report(check_contract(part, around))
-            for part in (loop.reference, loop.disturbance, loop.sensor, loop.controller)
+            for part in (loop.reference, loop.disturbance, loop.navigation, loop.controller)
         ]
     return reports
 

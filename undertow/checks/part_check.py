@@ -85,40 +85,40 @@ def _controller(controller: AbstractController, around: DisturbanceProfile) -> I
 
 def _disturbance(disturbance: AbstractDisturbance, around: DisturbanceProfile) -> Iterator[Finding]:
     n, pose = len(around.truth.position), around.pose
-    calm = Load(jnp.zeros(n), jnp.zeros(n))
+    still = Load(jnp.zeros(n), jnp.zeros(n))
     busy = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
-    path, again = (disturbance.realize(jax.random.PRNGKey(0)) for _ in range(2))
-    yield from alike("draw", again, path, "give the same path for the same key")
-    if not all(map(np.array_equal, jax.tree.leaves(path), jax.tree.leaves(again))):
-        yield error("contract", "draw", "give the same path for the same key", "another one")
-    at = jax.jit(lambda t, calm: disturbance.at(path, t, pose, calm))
-    form = jax.eval_shape(at, jnp.zeros(()), calm)
+    realization, again = (disturbance.realize(jax.random.PRNGKey(0)) for _ in range(2))
+    yield from alike("realize", again, realization, "give the same realization for the same key")
+    if not all(map(np.array_equal, jax.tree.leaves(realization), jax.tree.leaves(again))):
+        yield error("contract", "realize", "give the same realization for the same key", "another one")
+    at = jax.jit(lambda t, still: disturbance.at(realization, t, pose, still))
+    form = jax.eval_shape(at, jnp.zeros(()), still)
     wrong = list(is_a("at", form, Load))
     wrong = wrong or [*shaped("at", form.acceleration, (n,)), *shaped("at", form.wrench, (n,))]
     if wrong:
         yield from wrong
         return
     for t in map(jnp.asarray, _TIMES):
-        load, more = at(t, calm), at(t, busy)
+        load, more = at(t, still), at(t, busy)
         yield from (finding for value in load[:2] for finding in shaped("at", value, (n,)))
         for name in ("acceleration", "wrench"):
             gained = getattr(more, name) - getattr(load, name)
-            yield from agree("at", gained, getattr(busy, name), f"what was there already: add to `calm.{name}`")
+            yield from agree("at", gained, getattr(busy, name), f"what was there already: add to `load.{name}`")
     jumps = disturbance.jumps(10.0)
     if not isinstance(jumps, tuple) or not all(0 < jump < 10 for jump in jumps):
         yield error("contract", "jumps", "be a tuple of times between 0 and the duration", f"{jumps} for 10 s")
 
 
-def _sensor(sensor: AbstractNavigation, around: DisturbanceProfile) -> Iterator[Finding]:
-    path = jax.eval_shape(sensor.draw, jax.random.PRNGKey(0))
-    state = jax.eval_shape(sensor.init, path, around.truth)
-    y, after = jax.eval_shape(sensor.measure, path, state, jnp.zeros(()), around.truth)
+def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> Iterator[Finding]:
+    realization = jax.eval_shape(navigation.realize, jax.random.PRNGKey(0))
+    state = jax.eval_shape(navigation.init, realization, around.truth)
+    y, after = jax.eval_shape(navigation.measure, realization, state, jnp.zeros(()), around.truth)
     yield from alike("measure", after, state, "give the state in the form of `init`")
     wrong, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
     yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
 
 
-def _instrument(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
+def _sensor(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
     """Tried on a body at rest, so that a delay makes no difference."""
     report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
     truth = Measurement(around.truth.position, jnp.zeros(6), report)
@@ -158,7 +158,7 @@ _USES: dict[type, Callable[[Any, DisturbanceProfile], Iterator[Finding]]] = {
     AbstractController: _controller,
     AbstractDisturbance: _disturbance,
     AbstractReference: _reference,
-    AbstractNavigation: _sensor,
-    AbstractSensor: _instrument,
+    AbstractNavigation: _navigation,
+    AbstractSensor: _sensor,
     AbstractThruster: lambda thruster, around: check_thruster(thruster),
 }

@@ -16,7 +16,7 @@ from undertow.campaign.campaign_summary import endings, summary
 from undertow.campaign.clusters import check_cluster, cluster
 from undertow.campaign.executors import by_dask, in_threads
 from undertow.campaign.prepare import Prepared, prepare
-from undertow.campaign.run_campaign import STORE, Engine, Tally, Watch, conduct
+from undertow.campaign.run_campaign import STORE, Executor, Tally, Watch, run_campaign
 from undertow.campaign.store_results import load
 from undertow.campaign.task import build_trial
 from undertow.cli.campaign_folder import check_folder, clear_folder
@@ -59,9 +59,9 @@ def campaign(
             typer.echo(f"Advice: {sentence}", err=True)
         if not resume:
             clear_folder(folder)
-        with _engine(where, count) as engine, _live(console) as watch:
+        with _executor(where, count) as executor, _live(console) as watch:
             try:
-                interruptible(lambda: conduct(prepared, folder, engine, watch))
+                interruptible(lambda: run_campaign(prepared, folder, executor, watch))
             except (KeyboardInterrupt, OSError):
                 if (folder / STORE).is_dir():
                     typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
@@ -115,7 +115,7 @@ def status(folder: Path, options: Sequence[str]) -> int:
 
 
 @contextlib.contextmanager
-def _engine(where: str | None, count: int) -> Iterator[Engine]:
+def _executor(where: str | None, count: int) -> Iterator[Executor]:
     if where is None:
         yield partial(in_threads, threads=count)
         return

@@ -6,7 +6,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from undertow.checks import check
+from undertow.checks import check as checks
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.tables import wide_console
 from undertow.core.errors import BadInput
@@ -15,7 +15,7 @@ from undertow.scenario.yaml_text import load
 
 def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
     """Print what a check finds and what follows from the numbers; exit code."""
-    report = check.check(thing, dict(map(_option, options)), allow_code)
+    report = checks.check(thing, dict(map(_option, options)), allow_code)
     console = wide_console()
     for sentence in report.sentences:
         print(sentence)

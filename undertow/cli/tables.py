@@ -25,9 +25,9 @@ def metrics_table(
     table.add_column("unit")
     for name in MEANINGS:
         if name in whole:
-            predicted = [_number(predicted[name]) if name in predicted else ""] if predicted else []
+            shown = [_number(predicted[name]) if name in predicted else ""] if predicted else []
             late = _number(steady[name]) if steady and name in steady else "-"
-            table.add_row(name, *predicted, late, _number(whole[name]), unit_of(name, input_unit))
+            table.add_row(name, *shown, late, _number(whole[name]), unit_of(name, input_unit))
     return table
 
 

@@ -28,8 +28,12 @@ KINDS = (
     "disturbances",
     "references",
     "sensors",
-    "sensors",
+    "navigation",
 )
+
+# Key of a scenario -> kind of its part.
+KIND_OF = {"plant": "plants", "controller": "controllers", "reference": "references"}
+KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation"}
 
 Part = Callable[..., Any]
 

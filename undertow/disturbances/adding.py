@@ -56,10 +56,10 @@ def with_force(load: Load, pose: Pose | None, force: Vector3, point: Vector3) ->
 
 
 def with_scaling(load: Load, pose: Pose | None, scaling: ModelScaling) -> Load:
-    """A body that also differs by these factors."""
+    """A body that also differs by these scaling."""
     body_of(pose)
     product = (
-        factors if load.scaling is None else ModelScaling(*(a * b for a, b in zip(load.scaling, factors, strict=True)))
+        scaling if load.scaling is None else ModelScaling(*(a * b for a, b in zip(load.scaling, scaling, strict=True)))
     )
     return load._replace(scaling=product)
 

@@ -16,7 +16,7 @@ _RANGES = ("mass", "damping", "restoring", "thrust")
 
 
 class ParameterError(AbstractDisturbance):
-    """ModelScaling on M, D, g and thrust of the true vehicle, each drawn uniformly from a range; the model keeps 1.
+    """Factors on M, D, g and thrust of the true vehicle, each drawn uniformly from a range; the model keeps 1.
 
     Raises:
         BadInput: a range that is not low <= high, or a mass not positive.

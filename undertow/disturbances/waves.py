@@ -73,7 +73,7 @@ class Waves(AbstractDisturbance):
         speed = amplitude * realization.frequency * jnp.exp(-number * jnp.maximum(self.depth + down, 0.0))
         along, up = speed * jnp.cos(angle), speed * jnp.sin(angle)
         velocity = jnp.stack([(along * cosine).sum(), (along * sine).sum(), -up.sum()])
-        gain_along, gain_up = realization.frequency * up, -path.frequency * along
+        gain_along, gain_up = realization.frequency * up, -realization.frequency * along
         acceleration = jnp.stack([(gain_along * cosine).sum(), (gain_along * sine).sum(), -gain_up.sum()])
         return with_water(load, pose, velocity, acceleration)
 

@@ -54,7 +54,7 @@ class Signals(NamedTuple):
 class MeasurementState(NamedTuple):
     """What is remembered of measurements."""
 
-    sensor: PyTree  # state of the sensor
+    navigation: PyTree  # its state
     expected: Expected | None  # None for a smooth sensor, whose readings are numbers wherever the truth is
 
 
@@ -70,13 +70,13 @@ class Decision(NamedTuple):
 
 
 class ClosedLoop(eqx.Module):
-    """Plant, controller, reference, disturbance and sensor, ready to be run by either loop."""
+    """Plant, controller, reference, disturbance and navigation, ready to be run by either loop."""
 
     plant: AbstractPlant
     controller: AbstractController
     reference: AbstractReference
     disturbance: AbstractDisturbance
-    sensor: AbstractNavigation
+    navigation: AbstractNavigation
 
     def outputs_at_start(self, position: Any, velocity: Any) -> tuple[Outputs, Outputs]:
         """Outputs at t = 0 as arrays, zero where None: one compiled program serves every start."""
@@ -88,12 +88,12 @@ class ClosedLoop(eqx.Module):
         """This loop with its reference beginning where the plant does; at zero where None."""
         start, _ = self.outputs_at_start(position, None)
         reference = self.reference.starting_at(start)
-        return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.sensor)
+        return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.navigation)
 
     def realize(self, key: PRNGKeyArray) -> "Realization":
         """Draw everything random once."""
-        of_disturbance, of_sensor = jax.random.split(key)
-        return Realization(self, self.disturbance.realize(of_disturbance), self.sensor.realize(of_sensor))
+        of_disturbance, of_navigation = jax.random.split(key)
+        return Realization(self, self.disturbance.realize(of_disturbance), self.navigation.realize(of_navigation))
 
 
 class Realization(NamedTuple):
@@ -101,7 +101,7 @@ class Realization(NamedTuple):
 
     loop: ClosedLoop
     disturbance_realization: PyTree
-    sensor_realization: PyTree
+    navigation_realization: PyTree
 
     def start(self, position: Outputs | None = None, velocity: Outputs | None = None) -> tuple[PyTree, PyTree]:
         """States of plant and controller at t = 0, from the outputs there."""
@@ -112,12 +112,12 @@ class Realization(NamedTuple):
 
     def initial_measuring(self, x: PyTree) -> MeasurementState:
         """What is remembered of measurements at t = 0."""
-        zero, sensor = jnp.zeros(()), self.loop.sensor
+        zero, navigation = jnp.zeros(()), self.loop.navigation
         truth = self.loop.plant.output(zero, x)
-        state = sensor.init(self.sensor_realization, truth)
-        if sensor.smooth is True:  # traced in a part whose field is not static; guarded then
+        state = navigation.init(self.navigation_realization, truth)
+        if navigation.smooth is True:  # traced in a part whose field is not static; guarded then
             return MeasurementState(state, None)
-        y, _ = sensor.measure(self.sensor_realization, state, zero, truth)
+        y, _ = navigation.measure(self.navigation_realization, state, zero, truth)
         return MeasurementState(state, at_start(self.loop.controller.model, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
@@ -126,7 +126,7 @@ class Realization(NamedTuple):
         return self.loop.disturbance.at(self.disturbance_realization, t, plant.pose(x), plant.no_load())
 
     def decide(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Decision:
-        """Measure, compare, command, limit; `measuring` of a sensor with a memory, and where readings may be no numbers."""
+        """Measure, compare, command, limit; `measuring` as after the step before."""
         y, measuring = self._read(t, self.loop.plant.output(t, x), measuring)
         r = self.loop.reference.at(t)
         command, telemetry = self.loop.controller.command(z, y, r)
@@ -134,10 +134,10 @@ class Realization(NamedTuple):
 
     def _read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
         """What the law is given, and what is remembered afterwards."""
-        measure = self.loop.sensor.measure
+        measure = self.loop.navigation.measure
         if not isinstance(measuring, MeasurementState):
-            return measure(self.sensor_realization, measuring, t, truth)
-        y, state = measure(self.sensor_realization, measuring.sensor, t, truth)
+            return measure(self.navigation_realization, measuring, t, truth)
+        y, state = measure(self.navigation_realization, measuring.navigation, t, truth)
         if measuring.expected is None:
             return y, MeasurementState(state, None)
         y, expected = measuring.expected.repaired(self.loop.controller.model, y)
@@ -178,7 +178,7 @@ class Realization(NamedTuple):
         """Readings so far that were no numbers: left out by the sensor, or replaced for the law."""
         if not isinstance(measuring, MeasurementState) or measuring.expected is None:
             return jnp.zeros((), dtype=int)
-        return measuring.expected.replaced + self.loop.sensor.ignored(measuring.sensor)
+        return measuring.expected.replaced + self.loop.navigation.ignored(measuring.navigation)
 
     def record(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Signals:
         """`sample` of the decision taken at time t."""

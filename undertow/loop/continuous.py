@@ -76,7 +76,7 @@ def check(loop: ClosedLoop) -> None:
     """
     for obstacle, what in (
         (not isinstance(loop.controller, AbstractContinuousController), "controller, which exists only sampled"),
-        (not loop.sensor.smooth, "sensor, whose noise is new at every sample"),
+        (not loop.navigation.smooth, "navigation, whose noise is new at every sample"),
     ):
         if obstacle:
             raise BadInput("kind", f"be sampled with this {what}", "continuous")

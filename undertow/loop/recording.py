@@ -50,7 +50,7 @@ def freeze_on_failure(
     dt: Float[Array, ""],
     command: Inputs | None = None,
 ) -> tuple[Any, Ending]:
-    """States (x, z, ...) after a control_step from t to t + dt: the new ones, or for ever the old ones once something is wrong.
+    """States (x, z, ...) at t + dt: the new ones, or the last valid ones for good once something is wrong.
 
     Args:
         loop: the five roles.

@@ -1,4 +1,4 @@
-"""The sampled loop for many runs by `jax.vmap`: for what `in_lanes` cannot do."""
+"""The sampled loop for many runs by `jax.vmap`: for what `simd_batch` cannot do."""
 
 from collections.abc import Callable
 from functools import partial

@@ -1,4 +1,4 @@
-"""Sensors: what stands between the truth and the measurement. One file each."""
+"""Navigation: what makes the state that a controller gets out of readings. One file each."""
 
 from undertow.core.catalogue import publish
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.analysis.linearization import margins
-from undertow.analysis.linearization.actuator_authority import ActuatorAuthority
+from undertow.analysis.linearization.actuator_authority import ActuatorAuthority, actuator_authority
 from undertow.analysis.linearization.closed_forms import (
     ClosedForm,
     closed_form_poles,
@@ -77,7 +77,7 @@ class Prediction(NamedTuple):
     forms: list[ClosedForm]
     estimators: list[tuple[str, float, float, float | None]]  # axis, w_o rad/s, zeta, |d_til| per |d_dot| s
     drift: tuple[float, float] | None  # largest gain that weights in their box add, and the one that breaks, 1/s
-    reach: ActuatorAuthority
+    authority: ActuatorAuthority
     lost: tuple[str, ...]
     metrics: dict[str, float] | None  # of the steady window
     why_not: str  # a sentence where there are none
@@ -98,7 +98,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     points = tuple(_point(known, *each) for each in zip(SHARES, known.around.operating_loads(SHARES), strict=True))
     worst = max(points, key=lambda point: point.radius).at
     progress("margins", 0.6)
-    bears = _margins(worst, settings.dt)
+    found = _margins(worst, settings.dt)
     progress("noise and disturbances", 0.9)
     frequency = np.geomspace(_SLOWEST, _HIGHEST / settings.dt, 300)
     error, estimation = _responses(known.linear, frequency)
@@ -109,7 +109,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     return Prediction(
         operating_point=known,
         points=points,
-        margins=bears,
+        margins=found,
         noise=_noise(known),
         frequency=frequency,
         error=error,
@@ -117,7 +117,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
         forms=closed_form_poles(law, margins.poles(known.linear), names),
         estimators=[(names[i], *found, ramp_error(law, i)) for i in axes if (found := estimator(law, i))],
         drift=max((found for i in axes if (found := drift_bound(law, i, settings.dt))), default=None),
-        reach=reach(loop, known.mean, known.around.load),
+        authority=actuator_authority(loop, known.mean, known.around.load),
         lost=open_loop_advice("the gain matrix", gains, names),
         metrics=metrics,
         why_not=why_not,

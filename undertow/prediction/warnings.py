@@ -41,11 +41,11 @@ def _stability(prediction: Prediction) -> tuple[str, ...]:
 
 
 def _actuators(prediction: Prediction) -> tuple[str, ...]:
-    said, reach = [], prediction.reach
-    if reach.held < 1:
+    said, authority = [], prediction.authority
+    if authority.held < 1:
         said.append(
-            f"the actuators hold the demand for {reach.held:.0%} of the time only: at worst they give "
-            f"{reach.share.min():.0%} of it. Ask for less, or take larger ones"
+            f"the actuators hold the demand for {authority.held:.0%} of the time only: at worst they give "
+            f"{authority.share.min():.0%} of it. Ask for less, or take larger ones"
         )
     lost = [point for point in prediction.points if not point.found]
     if lost:

@@ -29,7 +29,7 @@ def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path
     for name, vector in saved.vectors.items():
         said = _CAPTIONS[name]
         drawn.append(figure(vector.read_text(encoding="utf-8"), name, said, said))
-    title = prediction.ground.built.scenario.description or "a closed loop"
+    title = prediction.operating_point.built.scenario.description or "a closed loop"
     warnings = [tag("h2", "Advice"), bullets([prose(sentence) for sentence in advice])] if advice else []
     page = document(
         f"Prediction: {title}",

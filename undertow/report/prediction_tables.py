@@ -44,7 +44,7 @@ def _points(prediction: Prediction) -> Rows:
 
 
 def _margins(prediction: Prediction) -> Rows:
-    known, dt = prediction.margins, prediction.ground.linear.dt
+    known, dt = prediction.margins, prediction.operating_point.linear.dt
     rows = [
         ("sampling time, these gains", _time(known["sampling_time"]), f"now {_time(dt)}"),
         ("delay from law to actuators", _time(known["delay"]), "unknown to the law"),
@@ -74,7 +74,7 @@ def _estimators(prediction: Prediction) -> Rows:
 
 
 def _errors(prediction: Prediction) -> Rows:
-    frequency, names = prediction.frequency, prediction.ground.built.closed_loop.plant.outputs
+    frequency, names = prediction.frequency, prediction.operating_point.built.closed_loop.plant.outputs
     rows = []
     for i, name in enumerate(names):
         error, missed = prediction.error[:, i], prediction.estimation[:, i]
@@ -97,7 +97,7 @@ def _errors(prediction: Prediction) -> Rows:
 
 
 def _noise(prediction: Prediction) -> Rows:
-    noise, unit = prediction.noise, prediction.ground.built.closed_loop.plant.input_unit
+    noise, unit = prediction.noise, prediction.operating_point.built.closed_loop.plant.input_unit
     rows = [
         (f"input, {unit} per cm/s or 0.01 rad/s", _number(0.01 * noise.of_input.max())),
         ("estimate, m/s^2 or rad/s^2 per the same", _number(0.01 * noise.of_estimate.max())),
@@ -124,15 +124,15 @@ def _closed_forms(prediction: Prediction) -> Rows:
 
 
 def _reach(prediction: Prediction) -> Rows:
-    reach = prediction.reach
-    finite = np.isfinite(reach.high).any()
+    authority = prediction.authority
+    finite = np.isfinite(authority.high).any()
     rows = [
-        ("demand held whole, share of the time", f"{reach.held:.0%}"),
-        ("smallest share of a demand", f"{reach.share.min():.0%}"),
-        ("largest force that one actuator is asked for", _number(float(reach.demand.max()))),
+        ("demand held whole, share of the time", f"{authority.held:.0%}"),
+        ("smallest share of a demand", f"{authority.share.min():.0%}"),
+        ("largest force that one actuator is asked for", _number(float(authority.demand.max()))),
         (
             "it can give, forward / reverse",
-            f"{_number(reach.high.min())} / {_number(-reach.low.max())}" if finite else "-",
+            f"{_number(authority.high.min())} / {_number(-authority.low.max())}" if finite else "-",
         ),
     ]
     return Rows(
@@ -141,7 +141,7 @@ def _reach(prediction: Prediction) -> Rows:
 
 
 def _metrics(prediction: Prediction) -> Rows:
-    of_input = prediction.ground.built.closed_loop.plant.input_unit
+    of_input = prediction.operating_point.built.closed_loop.plant.input_unit
     rows = [(name, _number(value), unit_of(name, of_input)) for name, value in (prediction.metrics or {}).items()]
     return Rows(
         "Metrics predicted for the steady window",

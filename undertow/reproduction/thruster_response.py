@@ -69,7 +69,7 @@ def thruster_response(fidelity: str = "electromechanical") -> ThrusterResponse:
 
 
 def _steady_period(thruster: AbstractThruster, frequency: float) -> Period:
-    time, *signals = (np.asarray(series) for series in _drive(thruster, jnp.asarray(frequency)))
+    time, *signals = (np.asarray(series) for series in _actuators(thruster, jnp.asarray(frequency)))
     last = slice(-_STEPS, None, _KEEP)
     return Period(frequency, time[last] - time[-_STEPS], *(series[last] for series in signals))
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar
 import numpy as np
 
 from undertow.core import runtime
+from undertow.core.catalogue import KIND_OF
 from undertow.core.contracts import AbstractDisturbance
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
@@ -94,7 +95,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
         told = {"part": part.model_dump(), "context": context}
-        new = lambda: factory.make(f"{key}s", told["part"], text.folder, given, context)
+        new = lambda: factory.make(KIND_OF[key], told["part"], text.folder, given, context)
         return placed(text, where, lambda: part_cache.part(where, told, given, new))
 
     def disturbance() -> AbstractDisturbance:
@@ -107,11 +108,11 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     plant = make("plant")
     known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
     model, resolved["model"] = placed(text, "model", lambda: part_cache.part("model", scenario.model, (plant,), known))
-    sensor = make("sensor")
-    context["velocity_noise"] = np.asarray(sensor.velocity_noise(scenario.loop.dt)).tolist()
+    navigation = make("navigation")
+    context["velocity_noise"] = np.asarray(navigation.velocity_noise(scenario.loop.dt)).tolist()
     controller = make("controller", (model,))
-    loop = ClosedLoop(plant, controller, make("reference"), disturbance(), sensor)
-    resolved["sensor"] = resolved.pop("sensor")  # in the order of the scenario
+    loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
+    resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario
     if scenario.loop.kind == "continuous":
         placed(text, "loop", lambda: continuous.check(loop))
     check_times(text, scenario.loop, scenario.steady)

@@ -99,8 +99,8 @@ def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
     if target.position.shape != (axes,):
         must, got = f"have {axes} entries, one per output of the plant", f"of shape {target.position.shape}"
         raise BadInput("reference.position", must, got, where=text.where(("reference", "position")))
-    realization = _traced(text, "disturbance", loop.draw, jax.random.PRNGKey(0))
-    x, z = _traced(text, "sensor", lambda realization: realization.start(), realization)
+    realization = _traced(text, "disturbance", loop.realize, jax.random.PRNGKey(0))
+    x, z = _traced(text, "navigation", lambda realization: realization.start(), realization)
     load = _traced(text, "disturbance", lambda realization, x: realization.load(zero, x), realization, x)
     if not isinstance(load, Load):
         raise BadInput("disturbance", "give a Load", "something else", where=text.where(("disturbance",)))

@@ -97,7 +97,7 @@ def run_loop(
         "accumulators": accumulators,
     }
     lacking = {}
-    if settings.engine == "lanes":
+    if settings.backend == "simd":
         try:
             return simd_batch.simulate(loop, **common), {}
         except Unsupported as error:

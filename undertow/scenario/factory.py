@@ -42,7 +42,7 @@ _CONTRACTS = {
     "disturbances": contracts.AbstractDisturbance,
     "references": contracts.AbstractReference,
     "sensors": AbstractSensor,
-    "sensors": contracts.AbstractNavigation,
+    "navigation": contracts.AbstractNavigation,
 }
 
 _VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)

@@ -56,8 +56,8 @@ class Loop(Strict):
         "rk4", description="integration: rk4; euler (sampled); adaptive, to rtol and atol (continuous)"
     )
     substeps: int = Field(1, ge=1, le=100, description="plant steps per dt (sampled)")
-    engine: Literal["lanes", "xla"] = Field(
-        "lanes",
+    backend: Literal["simd", "xla"] = Field(
+        "simd",
         description="what compiles it (sampled): lanes, the same bits everywhere; xla, also for what lanes lack",
     )
     rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (adaptive)")
@@ -136,7 +136,7 @@ class Scenario(Strict):
     controller: Annotated[Part, _named("rcaf")] = Field(Part(kind="rcaf"), description="the law")
     reference: NamedPart = Field(description="what to follow")
     disturbance: OneOrMore = Field(Part(kind="none"), description="what the surroundings do; several as a list")
-    sensor: NamedPart = Field(Part(kind="perfect"), description="what stands before the measurement")
+    navigation: NamedPart = Field(Part(kind="perfect"), description="what stands before the measurement")
     loop: Loop = Field(default_factory=Loop, description="how it is run")
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")
     steady: Window = Field(default_factory=Window, description="window of the steady metrics")

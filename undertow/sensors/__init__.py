@@ -1,4 +1,4 @@
-"""Sensors: what a vehicle carries to know where it is. One file each; `navigation` makes a sensor of them."""
+"""Sensors that a vehicle carries. One file each; `navigation/observer.py` makes a state of their readings."""
 
 from undertow.core.catalogue import publish
 

@@ -35,7 +35,8 @@ def with_fidelity(
         dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
 
     Raises:
-        BadInput: unknown fidelity or kind, supply not positive, dead zone negative, no inductance on `electromechanical`.
+        BadInput: unknown fidelity or kind, supply not positive, dead zone negative, or no inductance on
+            `electromechanical`.
     """
     checks.choice("fidelity", fidelity, tuple(FIDELITIES))
     if not supply > 0:

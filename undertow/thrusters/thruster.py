@@ -40,7 +40,7 @@ class AbstractThruster(eqx.Module):
     dead_zone: eqx.AbstractVar[Float[Array, ""]]  # V; smaller voltages turn nothing
     dead_zone_kind = "pass"  # one of DEAD_ZONES; a field where a thruster offers both
     input_unit = "V"  # of what it is commanded with; where this is not V, read every voltage below in that unit
-    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, fidelities `ideal` and `static`.
+    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, `ideal` and `static`.
     has_prescribed_acceleration: eqx.AbstractVar[bool]
 
     def __check_init__(self):

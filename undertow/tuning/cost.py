@@ -63,7 +63,7 @@ class CostSums(AbstractAccumulator):
         share, between = sample.voltage / self.input_scale, inside * last_inside
         step = jnp.sqrt((share - last_share) ** 2 + _SMOOTH**2) - _SMOOTH
         return Sums(
-            samples=state.signals + inside,
+            samples=state.samples + inside,
             tracking=state.tracking + inside * _bounded(((sample.error / self.error_scale) ** 2).mean(), _MOST**2),
             effort=state.effort + inside * _bounded((share**2).mean(), _MOST**2),
             variation=state.variation + between * step.mean(),
@@ -80,7 +80,7 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
         ended: when it failed, else its duration, s.
         duration: s.
     """
-    rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.signals, 1.0) + _SMOOTH**2)
+    rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.samples, 1.0) + _SMOOTH**2)
     variation = sums.variation / jnp.maximum(sums.span, _SMOOTH)
     found = Shares(rms(sums.tracking), rms(sums.effort), _bounded(variation, _MOST), 1 - ended / duration)
     return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in found))

@@ -51,7 +51,7 @@ class Bench(NamedTuple):
     def with_parts(self, plant: AbstractPlant, law: AbstractController, size: Any = 1.0) -> ClosedLoop:
         """The loop of a plant and a law, with a disturbance of some size."""
         loop = self.loop
-        return ClosedLoop(plant, law, loop.reference, scaled(loop.disturbance, size), loop.sensor)
+        return ClosedLoop(plant, law, loop.reference, scaled(loop.disturbance, size), loop.navigation)
 
     def run(
         self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""], smooth: bool = False

@@ -16,14 +16,14 @@ class Scaled(AbstractDisturbance):
     def realize(self, key):
         return self.inner.realize(key)
 
-    def at(self, realization, t, pose, calm: Load) -> Load:
-        whole, size = self.inner.at(realization, t, pose, calm), self.size
+    def at(self, realization, t, pose, load: Load) -> Load:
+        whole, size = self.inner.at(realization, t, pose, load), self.size
         water, factors = whole.water, whole.scaling
         return Load(
-            acceleration=calm.acceleration + size * (whole.acceleration - calm.acceleration),
-            wrench=calm.wrench + size * (whole.wrench - calm.wrench),
+            acceleration=load.acceleration + size * (whole.acceleration - load.acceleration),
+            wrench=load.wrench + size * (whole.wrench - load.wrench),
             water=water and Water(size * water.velocity, size * water.acceleration),
-            factors=factors and ModelScaling(*(factor**size for factor in factors)),
+            scaling=factors and ModelScaling(*(factor**size for factor in factors)),
             payloads=tuple(Payload(size * each.mass, size * each.weight, each.point) for each in whole.payloads),
         )
 

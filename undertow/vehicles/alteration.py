@@ -1,4 +1,4 @@
-"""A body that is not what the controller was told: coefficients off by factors, or a load carried along."""
+"""A body that is not what the controller was told: coefficients off by scaling, or a load carried along."""
 
 import functools
 
@@ -13,8 +13,8 @@ from undertow.vehicles.body import Body, rigid_body_mass
 
 def altered(body: Body, scaling: ModelScaling | None, payloads: tuple[Payload, ...]) -> Body:
     """The body with its coefficients scaled, and then with payloads attached; None and () leave it as it is."""
-    if factors is not None:
-        body = _scaled(body, factors)
+    if scaling is not None:
+        body = _scaled(body, scaling)
     return functools.reduce(_carrying, payloads, body)
 
 
@@ -36,13 +36,13 @@ def _scaled(body: Body, scaling: ModelScaling) -> Body:
         ),
         body,
         (
-            factors.mass * body.mass_matrix,
-            body.inverse_mass_matrix / factors.mass,
-            factors.damping * body.linear_damping,
-            factors.damping * body.quadratic_damping,
-            factors.restoring * body.weight,
-            factors.restoring * body.buoyancy,
-            factors.restoring * body.gravity,  # mass = weight / gravity stays
+            scaling.mass * body.mass_matrix,
+            body.inverse_mass_matrix / scaling.mass,
+            scaling.damping * body.linear_damping,
+            scaling.damping * body.quadratic_damping,
+            scaling.restoring * body.weight,
+            scaling.restoring * body.buoyancy,
+            scaling.restoring * body.gravity,  # mass = weight / gravity stays
         ),
     )
 

@@ -71,13 +71,13 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
         r = loop.reference.at(t)
         x = plant.initial_state(r.position, r.velocity)
         truth = plant.output(t, x)
-        y, measuring = loop.sensor.measure(realization.sensor_realization, measuring, t, truth)
+        y, measuring = loop.navigation.measure(realization.navigation_realization, measuring, t, truth)
         wrong = jnp.concatenate([model.difference(y.position, truth.position), y.velocity - truth.velocity])
         wrong = jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
         return measuring, (jnp.linalg.solve(scale, unknown(t, x, realization.load(t, x)) - at_rest), wrong)
 
     start = loop.reference.at(zero)
-    measuring = loop.sensor.init(
-        realization.sensor_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
+    measuring = loop.navigation.init(
+        realization.navigation_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
     )
     return jax.lax.scan(look, measuring, jnp.arange(steps, dtype=float))[1]

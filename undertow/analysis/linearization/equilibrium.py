@@ -67,7 +67,7 @@ def equilibrium(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Equili
 
 
 def _from_afar(balance: Balance, at: dict) -> Equilibrium:
-    """Equilibrium from actuators that stand still, with an input that is about right.
+    """Start from actuators that stand still, with an input that is about right.
 
     The plant first, so that actuators turn (with the input held, else the shortest way to rest is to switch them off);
     then what the law learns and believes at that plant; then both together.

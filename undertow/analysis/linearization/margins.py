@@ -57,7 +57,7 @@ def largest_lag(at: Equilibrium, dt: float, most: float) -> float:
 
 
 def gain_range(at: Equilibrium, dt: float, most: float = 100.0) -> tuple[float, float]:
-    """ModelScaling on what the input does, below and above which the sampled loop is unstable: 0 and infinite where none
+    """Factors on what the input does, below and above which the sampled loop is unstable: 0 and infinite where none
     from 1 / most to most is; 1 and 1 where it is unstable as it is."""
     above = _largest(lambda gain: close_sampled(at, dt, gain=gain), 1.0, most)
     below = _largest(lambda inverse: close_sampled(at, dt, gain=1 / inverse), 1.0, most)

@@ -18,7 +18,7 @@ _DASHES = ("-", (0, (4, 1.6)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (2, 1))
 def prediction_drawings(prediction: Prediction) -> dict[str, Callable[[], Figure]]:
     """What makes each figure, by name: poles, frequency, actuators (where inputs have limits)."""
     figures = {"poles": lambda: _poles(prediction), "frequency": lambda: _frequency(prediction)}
-    if np.isfinite(prediction.reach.high).any():
+    if np.isfinite(prediction.authority.high).any():
         figures["actuators"] = lambda: _actuators(prediction)
     return figures
 
@@ -63,7 +63,7 @@ def _frequency(prediction: Prediction) -> Figure:
     style.head(figure, "Answer to a disturbance, by its frequency", {})
     error = _log(figure, 0.75)
     missed = _log(figure, 5.55)
-    names = prediction.ground.built.closed_loop.plant.outputs
+    names = prediction.operating_point.built.closed_loop.plant.outputs
     for i, name in enumerate(names):
         look = {"color": _COLOURS[i % 6], "linestyle": _DASHES[i % 6], "linewidth": 1.2, "label": name}
         error.plot(prediction.frequency, np.maximum(prediction.error[:, i], 1e-12), **look)
@@ -78,16 +78,19 @@ def _frequency(prediction: Prediction) -> Figure:
 
 
 def _actuators(prediction: Prediction) -> Figure:
-    reach = prediction.reach
+    authority = prediction.authority
     figure = style.blank(9.6, 2.9)
     style.head(figure, "Largest force asked of each actuator, and what it can hold", {})
     panel = style.place(figure, 0.75, 0.55, 8.6, 1.85)
-    number = np.arange(1, len(reach.demand) + 1)
-    panel.bar(number, reach.demand, width=0.5, color=style.SOLID.colour, label="asked for, at most")
-    for side, dashes, what in ((reach.high, "-", "forward limit"), (-reach.low, (0, (4, 1.6)), "reverse limit")):
+    number = np.arange(1, len(authority.demand) + 1)
+    panel.bar(number, authority.demand, width=0.5, color=style.SOLID.colour, label="asked for, at most")
+    for side, dashes, what in (
+        (authority.high, "-", "forward limit"),
+        (-authority.low, (0, (4, 1.6)), "reverse limit"),
+    ):
         panel.hlines(side, number - 0.38, number + 0.38, color=style.INK, linestyle=dashes, linewidth=1.4, label=what)
     panel.set_xticks(number)
-    panel.set_ylim(0, 1.25 * max(reach.demand.max(), np.max(reach.high[np.isfinite(reach.high)])))
+    panel.set_ylim(0, 1.25 * max(authority.demand.max(), np.max(authority.high[np.isfinite(authority.high)])))
     panel.legend(fontsize=style.SMALL, frameon=False, ncols=3, loc="upper center")
     style.label(panel, "actuator", "force")
     return figure

@@ -29,7 +29,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
         Variant(
             name + tail,
             text + (f", noise {noise:g} m/s" if noise else ""),
-            loop(partial(paper, **options), sensor=RoughSensor(noise=noise)),
+            loop(partial(paper, **options), navigation=RoughSensor(noise=noise)),
         )
         for tail, noise in sensors.items()
         for name, (text, options) in _LAWS.items()

@@ -29,8 +29,8 @@ def variants(quick: bool) -> tuple[Variant, ...]:
     laws = {"RCAFC": partial(_fuzzy, 500.0), "RAFC": partial(_fuzzy, 0.0), "linear observer": _linear}
     found = []
     for name, law in laws.items():
-        best = tuned(lambda a, b, law=law: loop(partial(law, a, b), sensor=_NOISE), _GRID, Schedule())
-        gain, term = best.scaling
+        best = tuned(lambda a, b, law=law: loop(partial(law, a, b), navigation=_NOISE), _GRID, Schedule())
+        gain, term = best.factors
         text = f"loop gain times {gain:g}, robust term times {term:g}"
         limited = loop(partial(law, gain, term), gentle, _NOISE, _GOAL, _LIMIT)
         found.append(Variant(f"{name}, tuned", text, best.loop))

@@ -29,8 +29,8 @@ def variants(quick: bool) -> tuple[Variant, ...]:
     slow = partial(robust, reference_frequency=0, bandwidth=20.0)
     for delay in _DELAYS:
         late, text = RoughSensor(delay=float(delay)), f"all measured {delay} ms late, 1 kHz"
-        found.append(Variant(f"Table 1, {delay} ms", text, loop(paper, sensor=late)))
-        found.append(Variant(f"robust 20 rad/s, {delay} ms", f"bandwidth: 20, {text}", loop(slow, sensor=late)))
+        found.append(Variant(f"Table 1, {delay} ms", text, loop(paper, navigation=late)))
+        found.append(Variant(f"robust 20 rad/s, {delay} ms", f"bandwidth: 20, {text}", loop(slow, navigation=late)))
     return tuple(found)
 
 

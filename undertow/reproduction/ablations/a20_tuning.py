@@ -27,10 +27,10 @@ def variants(quick: bool) -> tuple[Variant, ...]:
         Variant("robust", "no gain given", loop(robust, **_SEA)),
     ]
     best = tuned(lambda *point: loop(partial(_paper, *point), **_SEA), (_BANDWIDTHS, _TERMS), Schedule())
-    text = f"bandwidth {best.scaling[0]:g} rad/s, damping 1, robust_gain: {best.scaling[1]:g}"
+    text = f"bandwidth {best.factors[0]:g} rad/s, damping 1, robust_gain: {best.factors[1]:g}"
     found.append(Variant("paper's law, searched", text, best.loop))
     best = tuned(lambda *point: loop(partial(_robust, *point), **_SEA), (_BANDWIDTHS, _RATES), Schedule())
-    text = f"preset: robust, bandwidth: {best.scaling[0]:g}, actuator_rate: {best.scaling[1]:g}"
+    text = f"preset: robust, bandwidth: {best.factors[0]:g}, actuator_rate: {best.factors[1]:g}"
     found.append(Variant("robust, searched", text, best.loop))
     return tuple(found)
 

@@ -20,7 +20,7 @@ Law = Callable[[AbstractModel], AbstractController]
 def loop(
     law: Law,
     load: RandomSuite | None = None,
-    sensor: RoughSensor | None = None,
+    navigation: RoughSensor | None = None,
     goal: float = 0.0,
     limit: float = math.inf,
 ) -> ClosedLoop:
@@ -29,13 +29,13 @@ def loop(
     Args:
         law: from a model to a controller.
         load: d; None for 2 m/s^2 rms of sinusoids of 0.3 to 10 rad/s on levels of 2 m/s^2, new ones every 2 s.
-        sensor: None for a perfect one.
+        navigation: None for a perfect one.
         goal: wanted position of every axis, m.
         limit: of the input, m/s^2.
     """
     plant = double_integrator(AXES, limit)
     load = random_suite() if load is None else load
-    return ClosedLoop(plant, law(plant.model()), setpoint([goal] * AXES), load, sensor or RoughSensor())
+    return ClosedLoop(plant, law(plant.model()), setpoint([goal] * AXES), load, navigation or RoughSensor())
 
 
 def basis_norm_squared(**options) -> float:

@@ -37,14 +37,14 @@ class RoughSensor(AbstractNavigation):
     smooth: bool = eqx.field(static=True, default=False)
 
     def realize(self, key) -> Float[Array, "samples 2 n"]:
-        return jax.random.normal(key, (self.signals, 2, self.axes), dtype=self.noise.dtype)
+        return jax.random.normal(key, (self.samples, 2, self.axes), dtype=self.noise.dtype)
 
     def init(self, realization, truth: Measurement) -> RoughState:
         now = jnp.stack([truth.position, truth.velocity])
         return RoughState(jnp.zeros((), dtype=int), jnp.broadcast_to(now, (self.depth, *now.shape)), now)
 
     def measure(self, realization, state: RoughState, t, truth: Measurement):
-        chance = realization[state.step % self.signals]
+        chance = realization[state.step % self.samples]
         velocity = truth.velocity + self.bias + self.noise * chance[1]
         step = jnp.where(self.resolution > 0, self.resolution, 1.0)
         velocity = jnp.where(self.resolution > 0, step * jnp.round(velocity / step), velocity)

@@ -52,7 +52,7 @@ def batched(quick: bool) -> dict:
         f"{_NOISE}_{seed}": scenario(
             "RCAFC with velocity noise of 1 cm/s, 1 kHz: the weights drift until it diverges",
             disturbance="none",
-            sensor={"kind": "white_noise", "velocity": 0.01},
+            navigation={"kind": "white_noise", "velocity": 0.01},
             loop=sampled(_NOISY),
             seed=seed,
             **SIX_AXES,

@@ -33,7 +33,7 @@ def scenarios() -> dict[str, dict[str, Any]]:
             one["plant"]["thruster"]["supply"] = volts
             found[_limited(law, volts)] = one
         noise = {"kind": "white_noise", "velocity": NOISE}
-        found[_noisy(law)] = scenario(f"{words}, 1 cm/s of velocity noise", sensor=noise, **common)
+        found[_noisy(law)] = scenario(f"{words}, 1 cm/s of velocity noise", navigation=noise, **common)
     return found
 
 

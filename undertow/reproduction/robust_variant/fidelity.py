@@ -1,4 +1,4 @@
-"""The ladder again: preset `robust` beside the paper's laws on every fidelity, and at sea beside a PID too; all sampled."""
+"""Preset `robust` beside the paper's laws on every fidelity level, and at sea beside a PID too; all sampled."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -147,7 +147,7 @@ def at_sea(description: str, law: dict[str, Any]) -> dict[str, Any]:
             {"kind": "current", "velocity": [0.3, 0.2, 0]},
             {"kind": "waves", "height": 0.5, "period": 5},
         ],
-        "sensor": {"kind": "navigation", "sensors": sensors},
+        "navigation": {"kind": "observer", "sensors": sensors},
         "loop": {"kind": "sampled", "dt": 0.01, "duration": 120, "record": 0.05},
     }
 

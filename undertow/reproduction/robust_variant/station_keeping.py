@@ -68,7 +68,7 @@ def _scenario(description: str, law: dict[str, Any], sensor: str) -> dict[str, A
             {"kind": "current", "velocity": [0.4, 0.3, 0]},
             {"kind": "waves", "height": 0.5, "depth": 3},
         ],
-        "sensor": sensor,
+        "navigation": sensor,
         "loop": {"kind": "sampled", "dt": 0.01, "duration": _END, "record": 0.05},
         "steady": {"start": _START},
     }

@@ -11,8 +11,8 @@ from undertow.scenario.execute import execute
 FILE = Path(__file__).with_name("user_parts.py")
 
 PARTS = {
-    "kalman": {"sensor": {"kind": f"{FILE}:kalman"}},
-    "network": {"sensor": {"kind": f"{FILE}:network"}},
+    "kalman": {"navigation": {"kind": f"{FILE}:kalman"}},
+    "network": {"navigation": {"kind": f"{FILE}:network"}},
     "predictive": {"controller": {"kind": f"{FILE}:predictive"}},
     **{
         by: {"disturbance": {"kind": f"{FILE}:pushed", "by": by}}
@@ -33,7 +33,7 @@ def scenario(name, backend):
         "plant": "inverted_pendulum",
         "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},
         "initial": {"position": [0.05]},
-        "loop": {"duration": 0.3, "dt": 1e-3, "record": 1e-2, "engine": backend},
+        "loop": {"duration": 0.3, "dt": 1e-3, "record": 1e-2, "backend": backend},
         **PARTS[name],
     }
 
@@ -44,7 +44,7 @@ SLOW = ("chosen", "of_bytes", "by_python")
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in PARTS])
 def test_the_same_figures_and_the_reason_where_it_is_left_to_xla(name):
     with jax.numpy_dtype_promotion("standard"):  # users are not as strict as these tests
-        found, wanted = (execute(scenario(name, backend)).dataset for backend in ("lanes", "xla"))
+        found, wanted = (execute(scenario(name, backend)).dataset for backend in ("simd", "xla"))
     assert found.attrs.get("left_to_xla") == LEFT.get(name)
     assert "left_to_xla" not in wanted.attrs
     for signal in ("position", "velocity", "voltage"):
