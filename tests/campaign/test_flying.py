@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from lanes.emulated_gpu import EmulatedGpu
+from batch_compiler.emulated_gpu import EmulatedGpu
 
 from simdjit import nvidia
 from simdjit.cuda import Driver

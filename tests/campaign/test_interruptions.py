@@ -19,7 +19,7 @@ from distributed import Client, LocalCluster
 from undertow.campaign.clusters import cluster
 from undertow.campaign.executors import by_dask
 from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE, conduct
+from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.cli.main import run
 
 
@@ -68,7 +68,7 @@ def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
             if len(seen) == 3:
                 os.kill(workers[0], signal.SIGKILL)
 
-        conduct(prepare(path), tmp_path / "cluster", lambda f, work: by_dask(f, work, client), watch)
+        run_campaign(prepare(path), tmp_path / "cluster", lambda f, work: by_dask(f, work, client), watch)
     assert seen[-1] == 200 and len(seen) == 11  # no task twice
     assert contents(tmp_path / "cluster") == contents(tmp_path / "whole")
 
@@ -121,7 +121,7 @@ def test_a_dead_scheduler_loses_nothing(campaign_file, tmp_path):
                 scheduler.kill()
 
         with pytest.raises(OSError, match="Dask cluster is gone"):
-            conduct(prepare(path), out, lambda f, work: by_dask(f, work, client), watch)
+            run_campaign(prepare(path), out, lambda f, work: by_dask(f, work, client), watch)
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
     assert contents(out) == contents(tmp_path / "whole")
 

@@ -12,7 +12,7 @@ from undertow.core.contracts import AbstractDisturbance
 from undertow.core.status import Status
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.outcome import status
+from undertow.loop.outcome import status_of
 from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
@@ -97,7 +97,9 @@ def test_a_state_whose_square_overflows_is_not_finite(kind, most, share, code):
     """sqrt(1.798e308) and sqrt(3.403e38): a controller that grows to there in silence gives metrics that are infinite."""
     loop = loop_with(0.5)
     x, _ = loop.realize(jax.random.PRNGKey(0)).start(*loop.outputs_at_start(None, None))
-    assert int(status(loop, x, (jnp.zeros(2, dtype=kind), jnp.asarray([0.0, share * most], dtype=kind)))) == int(code)
+    assert int(status_of(loop, x, (jnp.zeros(2, dtype=kind), jnp.asarray([0.0, share * most], dtype=kind)))) == int(
+        code
+    )
 
 
 def test_neighbours_are_not_hurt(batch):

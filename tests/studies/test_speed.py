@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from lanes.emulated_gpu import EmulatedGpu
+from batch_compiler.emulated_gpu import EmulatedGpu
 
 from simdjit import nvidia
 from simdjit.cuda import Driver

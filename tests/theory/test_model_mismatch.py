@@ -89,7 +89,7 @@ def test_a_lag_that_is_wrong_by_three_costs_little(make):
 
 def test_delay_and_noise_that_nobody_tells_of():
     """Four sampling times of delay, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
-    for sensor in (Late(4), white_noise(0.0, 0.01)):
+    for navigation in (Late(4), white_noise(0.0, 0.01)):
         own, _ = error(t200(), None, robust, navigation)
         other, _ = error(t200(), None, pid, navigation)
         exact, _ = error(t200(), None, robust)

@@ -1,4 +1,5 @@
-"""The fuzzy system that carries the estimate of everything unknown."""
+"""Estimation of the lumped uncertainty: the fuzzy system, and the identification model whose error drives it."""
 
+from undertow.estimation.series_parallel import SeriesParallel as SeriesParallel
 from undertow.estimation.tsk import FuzzySystem as FuzzySystem
 from undertow.estimation.tsk import gaussian_sets as gaussian_sets

@@ -12,7 +12,7 @@ from undertow.loop.simd_batch import Ended, Plan, Run
 
 
 class BatchRunner:
-    """Runs of one kind, compiled once; `fly` runs them, given their arrays with a leading axis over runs.
+    """Runs of one kind, compiled once; `run` runs them, given their arrays with a leading axis over runs.
 
     Args:
         run: one of them.
@@ -22,7 +22,7 @@ class BatchRunner:
 
     def __init__(self, run: Run, plan: Plan, width: int = 0):
         numbers, rest = eqx.partition(run, eqx.is_array)
-        self.fly: Callable[[Any], Ended] = batched(partial(_one, rest, plan), numbers, width)
+        self.run: Callable[[Any], Ended] = batched(partial(_one, rest, plan), numbers, width)
 
 
 def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:

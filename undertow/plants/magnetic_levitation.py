@@ -17,7 +17,7 @@ FIDELITIES = ("ideal", "coil")
 
 
 class LevitationState(NamedTuple):
-    """Position of the ball (m, down from the upper magnet), its speed (m/s), and currents (A; none on fidelity `ideal`)."""
+    """Position of the ball (m, down from the upper magnet), its speed (m/s), and currents (A; none for `ideal`)."""
 
     z: Float[Array, "1"]
     speed: Float[Array, "1"]

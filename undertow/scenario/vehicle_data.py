@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from undertow.checks.vehicle_lint.facts import Facts
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.scenario.thruster_poses import poses
@@ -21,6 +20,7 @@ from undertow.scenario.vehicle_keys import (
     text_at,
     vector_at,
 )
+from undertow.vehicles.facts import Facts
 from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
 from undertow.vehicles.vehicle import Vehicle
 

@@ -11,8 +11,8 @@ leaks between runs (tests/loop/test_sampled_to_continuous.py: run twice, same bi
 from undertow.checks.finding import Finding
 from undertow.checks.vehicle_lint import copied, hydrodynamics, layout, mass, printed_matrix, statics
 from undertow.checks.vehicle_lint.derived import derived as derived
-from undertow.checks.vehicle_lint.facts import Facts as Facts
-from undertow.checks.vehicle_lint.facts import facts_of as facts_of
+from undertow.vehicles.facts import Facts as Facts
+from undertow.vehicles.facts import facts_of as facts_of
 
 _RULES = (
     *mass.RULES,

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice
-from undertow.checks.vehicle_lint.facts import Facts, facts_of
 from undertow.core import catalogue
+from undertow.vehicles.facts import Facts, facts_of
 from undertow.vehicles.published import inertia_about_origin
 
 _DIGITS = 1e-3  # of the largest entry

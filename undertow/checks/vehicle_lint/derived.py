@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from undertow.checks.vehicle_lint.facts import Facts
 from undertow.checks.vehicle_lint.layout import scaled
+from undertow.vehicles.facts import Facts
 
 
 def derived(facts: Facts) -> tuple[tuple[str, str, str], ...]:

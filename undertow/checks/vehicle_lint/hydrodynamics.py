@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
-from undertow.checks.vehicle_lint.facts import FREEDOMS, FRESH_WATER, Facts
+from undertow.vehicles.facts import FREEDOMS, FRESH_WATER, Facts
 
 _SAMPLES = 4000
 _SPHERE = 0.5  # added mass of a sphere per displaced mass

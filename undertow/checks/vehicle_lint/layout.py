@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
-from undertow.checks.vehicle_lint.facts import FREEDOMS, Facts
 from undertow.plants.reachability import open_loop_advice
+from undertow.vehicles.facts import FREEDOMS, Facts
 
 _ROUNDING = 5e-3
 _WORST_CONDITION = 10.0

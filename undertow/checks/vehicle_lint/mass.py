@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
-from undertow.checks.vehicle_lint.facts import Facts
+from undertow.vehicles.facts import Facts
 
 _AXES = ("roll", "pitch", "yaw")
 # A uniform box has a radius of gyration of 0.58 of one with all its mass in the corners.

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, error
-from undertow.checks.vehicle_lint.facts import FREEDOMS, Facts
+from undertow.vehicles.facts import FREEDOMS, Facts
 
 _ROUNDING = 0.02  # of the largest entry of a row: printed matrices have two or three digits
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
-from undertow.checks.vehicle_lint.facts import FRESH_WATER, Facts
+from undertow.vehicles.facts import FRESH_WATER, Facts
 
 _EARTH = (9.76, 9.84)  # m/s^2, from the equator to the poles, rounded outward
 _MOST_TRIM = 10.0  # degrees

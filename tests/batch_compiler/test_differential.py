@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from lanes.programs import LARGE, SIZE, STEPS, number, program
+from batch_compiler.programs import LARGE, SIZE, STEPS, number, program
 
 from simdjit.beginning import inputs
 from simdjit.graph import Graph
