@@ -61,9 +61,9 @@ def test_python_api(capsys):
     assert "tracking_rms" in capsys.readouterr().out
 
 
-def test_mujoco_flight(capsys, tmp_path):
+def test_mujoco_comparison(capsys, tmp_path):
     """Not worse than docs/independent-physics.md says."""
-    found = example("mujoco_flight").main(fast=True, figure=str(tmp_path / "agreement.png"))
+    found = example("mujoco_comparison").main(fast=True, figure=str(tmp_path / "agreement.png"))
     said = {"nu_dot": 1e-12, "position": 1e-7, "attitude": 1e-7, "voltage": 1e-5}
     assert len(found) == 4
     assert all(difference < said[name.split()[0]] for name, difference in found.items())

@@ -1,4 +1,4 @@
-"""An undertow controller flies MuJoCo's vehicle as it flies undertow's."""
+"""One undertow controller controls MuJoCo's vehicle and undertow's: the same motion."""
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +8,7 @@ import pytest
 import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.interop.mujoco_engine import Submerged, Water, fly
+from undertow.interop.mujoco_engine import Submerged, Water, run_in_mujoco
 from undertow.interop.mujoco_engine.propellers import Propellers
 from undertow.numerics.integrators import rk4
 
@@ -38,18 +38,18 @@ def test_closed_loops_agree(parts):
     current = ut.disturbances.current(FLOW)
     run = ut.simulate(plant, law, reference, disturbance=current, duration=5.0, dt=0.01, record=0.01)
     body = Submerged(plant.vehicle, water=Water(FLOW))
-    flight = fly(body, thruster, law, reference, duration=5.0, dt=0.01)
-    assert flight.status == Status.OK
-    np.testing.assert_allclose(flight.time, run.dataset.time, atol=1e-12)
-    assert np.ptp(flight.position[:, 0]) > 0.9 and np.abs(flight.voltage).max() > 3
-    np.testing.assert_allclose(flight.position, run.dataset.position, atol=1e-7)
-    np.testing.assert_allclose(flight.velocity, run.dataset.velocity, atol=1e-6)
-    np.testing.assert_allclose(flight.voltage, run.dataset.voltage, atol=1e-5)
+    mujoco_run = run_in_mujoco(body, thruster, law, reference, duration=5.0, dt=0.01)
+    assert mujoco_run.status == Status.OK
+    np.testing.assert_allclose(mujoco_run.time, run.dataset.time, atol=1e-12)
+    assert np.ptp(mujoco_run.position[:, 0]) > 0.9 and np.abs(mujoco_run.voltage).max() > 3
+    np.testing.assert_allclose(mujoco_run.position, run.dataset.position, atol=1e-7)
+    np.testing.assert_allclose(mujoco_run.velocity, run.dataset.velocity, atol=1e-6)
+    np.testing.assert_allclose(mujoco_run.voltage, run.dataset.voltage, atol=1e-5)
 
 
-def test_flights_repeat_bit_for_bit(parts):
+def test_runs_repeat_bit_for_bit(parts):
     plant, thruster, law, reference = parts
-    first, second = (fly(Submerged(plant.vehicle), thruster, law, reference, duration=0.5) for _ in range(2))
+    first, second = (run_in_mujoco(Submerged(plant.vehicle), thruster, law, reference, duration=0.5) for _ in range(2))
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 
 
@@ -77,21 +77,21 @@ def test_propellers_at_once():
     np.testing.assert_allclose(thrusts, np.tile(thruster.thrust((), jnp.asarray(volts)), (3, 1)), rtol=1e-13)
 
 
-def test_a_flight_that_fails_says_so(parts):
+def test_a_run_that_fails_says_so(parts):
     """A feedback far too fast for the motor: the loop is unstable in both worlds."""
     plant, _, _, reference = parts
     wild = ut.rcaf(plant.model(rate_term=True), composite=5e4, adaptation=1e4)
-    flight = fly(Submerged(plant.vehicle), ut.thrusters.t200(supply=1e5), wild, reference, duration=20.0)
-    assert flight.status in (Status.DIVERGED, Status.NOT_FINITE)
-    assert 0 < len(flight.time) < 2001 and np.isfinite(flight.position).all()
+    mujoco_run = run_in_mujoco(Submerged(plant.vehicle), ut.thrusters.t200(supply=1e5), wild, reference, duration=20.0)
+    assert mujoco_run.status in (Status.DIVERGED, Status.NOT_FINITE)
+    assert 0 < len(mujoco_run.time) < 2001 and np.isfinite(mujoco_run.position).all()
 
 
 def test_what_does_not_fit_is_refused(parts):
     plant, thruster, law, reference = parts
     with pytest.raises(BadInput, match=r"`dt` must be a whole number of the engine's steps \(0.004 s\)"):
-        fly(Submerged(plant.vehicle, timestep=4e-3), thruster, law, reference)
+        run_in_mujoco(Submerged(plant.vehicle, timestep=4e-3), thruster, law, reference)
     with pytest.raises(BadInput, match="`thruster` must be on fidelity `shaft` or `static`, but is Memoryless"):
-        fly(Submerged(plant.vehicle), ut.thrusters.linear_voltage(), law, reference)
+        run_in_mujoco(Submerged(plant.vehicle), ut.thrusters.linear_voltage(), law, reference)
     with pytest.raises(BadInput, match="`added_mass` must be one of force, body, but is ghost"):
         Submerged(plant.vehicle, added_mass="ghost")
     with pytest.raises(BadInput, match=r"`velocity` must have 3 entries \(north, east, down\), but is 2 long"):

@@ -1,6 +1,6 @@
-"""Two worlds: undertow's vehicles, and the same ones in MuJoCo's C engine. Do they agree, and does one law fly both?
+"""Compare undertow's vehicles, and a closed loop, with the same ones in MuJoCo's C engine.
 
-python examples/mujoco_flight.py [FIGURE.png]          needs the extra: pip install ".[mujoco]"
+python examples/mujoco_comparison.py [FIGURE.png]          needs the extra: pip install ".[mujoco]"
 """
 
 import sys
@@ -10,13 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 
 import undertow as ut
-from undertow.interop.mujoco_engine import Flight, Submerged, Water, fly
+from undertow.interop.mujoco_engine import MujocoRun, Submerged, Water, run_in_mujoco
 
 CURRENT = [0.3, 0.2, 0.0]  # m/s: north, east, down
 
 
 def main(fast: bool = False, figure: str | None = None) -> dict[str, float]:
-    """Print what agrees, and how well; `fast` takes one vehicle, fewer states, and stops the flight early.
+    """Print the differences; `fast` takes one vehicle, fewer states and a shorter run.
 
     Returns:
         Differences by the names that are printed.
@@ -24,16 +24,16 @@ def main(fast: bool = False, figure: str | None = None) -> dict[str, float]:
     found = {}
     for name in ("odin",) if fast else ("odin", "bluerov2_heavy", "rexrov"):
         found[f"nu_dot of {name}"] = accelerations(getattr(ut.vehicles, name)(), states=5 if fast else 50)
-    run, flight = flights(duration=1.0 if fast else 12.0)
-    gap = np.abs(flight.position - run.dataset.position.values).max(axis=0)
-    found["position in flight, m"] = float(gap[:3].max())
-    found["attitude in flight, rad"] = float(gap[3:].max())
-    found["voltage in flight, V"] = float(np.abs(flight.voltage - run.dataset.voltage.values).max())
+    run, mujoco_run = both_runs(duration=1.0 if fast else 12.0)
+    gap = np.abs(mujoco_run.position - run.dataset.position.values).max(axis=0)
+    found["position, m"] = float(gap[:3].max())
+    found["attitude, rad"] = float(gap[3:].max())
+    found["voltage, V"] = float(np.abs(mujoco_run.voltage - run.dataset.voltage.values).max())
     for name, difference in found.items():
         print(f"{name:<26}{difference:8.0e}")
-    print(f"flight of {flight.time[-1]:g} s: undertow {run.status.word}, MuJoCo {flight.status.word}")
+    print(f"run of {mujoco_run.time[-1]:g} s: undertow {run.status.word}, MuJoCo {mujoco_run.status.word}")
     if figure:
-        draw(run, flight, figure)
+        plot(run, mujoco_run, figure)
     return found
 
 
@@ -53,8 +53,8 @@ def accelerations(vehicle, states: int) -> float:
     return float(worst)
 
 
-def flights(duration: float) -> tuple[ut.Run, Flight]:
-    """A BlueROV2 Heavy in a current, 2 m away and about, at 100 Hz: in undertow, and in MuJoCo."""
+def both_runs(duration: float) -> tuple[ut.Run, MujocoRun]:
+    """A BlueROV2 Heavy moves 2 m in a current, controlled at 100 Hz: in undertow, and in MuJoCo."""
     thruster = ut.thrusters.t200(supply=16.0)
     plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster)
     law = ut.rcaf(  # gains that a motor with a lag of 0.1 s allows
@@ -71,20 +71,20 @@ def flights(duration: float) -> tuple[ut.Run, Flight]:
     current = ut.disturbances.current(CURRENT)
     run = ut.simulate(plant, law, reference, disturbance=current, duration=duration, dt=0.01, record=0.01)
     body = Submerged(plant.vehicle, water=Water(CURRENT))
-    return run, fly(body, thruster, law, reference, duration=duration, dt=0.01)
+    return run, run_in_mujoco(body, thruster, law, reference, duration=duration, dt=0.01)
 
 
-def draw(run: ut.Run, flight: Flight, figure: str) -> None:
+def plot(run: ut.Run, mujoco_run: MujocoRun, figure: str) -> None:
     """Both paths, and the difference between them."""
     import matplotlib.pyplot as plt
 
     here = run.dataset.position.values
     _, (path, gap) = plt.subplots(2, 1, sharex=True, layout="constrained")
-    path.plot(flight.time, flight.position[:, :3], label=["north", "east", "down"])
-    path.plot(flight.time, here[:, :3], "k:")
+    path.plot(mujoco_run.time, mujoco_run.position[:, :3], label=["north", "east", "down"])
+    path.plot(mujoco_run.time, here[:, :3], "k:")
     path.set(ylabel="m", title="MuJoCo (lines) and undertow (dots)")
     path.legend()
-    gap.semilogy(flight.time[1:], np.abs(flight.position - here)[1:, :3])
+    gap.semilogy(mujoco_run.time[1:], np.abs(mujoco_run.position - here)[1:, :3])
     gap.set(xlabel="time, s", ylabel="difference, m")
     plt.savefig(figure)
     plt.close()

@@ -1,4 +1,4 @@
-"""An undertow controller at the helm of MuJoCo's vehicle: the same object, measurements in, volts out."""
+"""A sampled closed loop of an undertow controller and a vehicle in MuJoCo."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from undertow.interop.mujoco_engine.submerged import Submerged
 from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 
 
-class Flight(NamedTuple):
+class MujocoRun(NamedTuple):
     """What happened, at each sampling time of the controller; rows as in an undertow dataset."""
 
     time: NDArray  # s, shape (K,)
@@ -24,10 +24,10 @@ class Flight(NamedTuple):
     velocity: NDArray  # m/s, rad/s, shape (K, 6)
     target: NDArray  # m, rad, shape (K, 6)
     voltage: NDArray  # applied, V, shape (K, N)
-    status: Status  # of the end; series end with the last sound state
+    status: Status  # of the end; series end with the last valid state
 
 
-def fly(
+def run_in_mujoco(
     body: Submerged,
     thruster: AbstractThruster,
     controller: AbstractController,
@@ -36,7 +36,7 @@ def fly(
     duration: float = 20.0,
     dt: float = 1e-2,
     position: ArrayLike | None = None,
-) -> Flight:
+) -> MujocoRun:
     """Run a sampled closed loop with MuJoCo as the plant: command, move with the volts held, then adapt.
 
     Args:
@@ -49,7 +49,7 @@ def fly(
         position: north, east, down (m), roll, pitch, yaw (rad) at t = 0, at rest; None for zero.
 
     Returns:
-        Flight. One that fails says so in its status; nothing is raised.
+        MujocoRun. One that fails says so in its status; nothing is raised.
 
     Raises:
         BadInput: times that do not go together, or another kind of thruster.
@@ -64,11 +64,11 @@ def fly(
     start = np.zeros(6) if position is None else np.asarray(position, dtype=float)
     body.place(start, np.zeros(6))
     reference = reference.starting_at(jnp.asarray(start))
-    command, advance, wanted = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
+    command, advance, desired = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
     z, rows, steps, status = None, [], round(duration / dt), Status.OK
     for step in range(steps + 1):
         t = step * dt
-        y, r = _measured(body, propellers), wanted(jnp.asarray(t))
+        y, r = _measured(body, propellers), desired(jnp.asarray(t))
         z = controller.init(y, r) if z is None else z
         volts, _ = command(z, y, r)
         applied = propellers.admissible(np.asarray(volts))
@@ -81,7 +81,7 @@ def fly(
             # Runge-Kutta asks at the ends and in the middle of each step.
             body.advance(lambda now, t=t, thrusts=thrusts: thrusts[round(2 * (now - t) / timestep)], steps)
             z = advance(z, y, r, jnp.asarray(applied), jnp.asarray(dt))
-    return Flight(*map(np.array, zip(*rows, strict=True)), status=status)
+    return MujocoRun(*map(np.array, zip(*rows, strict=True)), status=status)
 
 
 def _measured(body: Submerged, propellers: Propellers) -> Measurement:
