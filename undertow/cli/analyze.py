@@ -1,4 +1,4 @@
-"""`undertow analyze`: what will happen, before anything is run."""
+"""`undertow analyze`: predict closed-loop performance and stability margins."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ _WRITTEN = ("prediction.html", "prediction.json", "figures")
 
 
 def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool) -> int:
-    """Exit code of a prediction whose page went to `out`, or to a folder under runs/ that was free."""
+    """Predict a scenario and write the page to `out`, or to a free folder under runs/; return the exit code."""
     console = wide_console()
     with (
         output_folder(out, Path("runs") / f"{scenario.stem}-prediction") as folder,
@@ -36,12 +36,12 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool)
         warnings = (*built.advice(), *advice(prediction))
         text = to_json(summary(prediction), indent=1) + "\n"
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
-        draft.publish()  # whatever becomes of the figures
+        draft.publish()  # before the figures, which may fail
         warn_of(write_prediction(prediction, warnings, draft.path))
     for rows in tables(prediction):
         console.print(_table(rows))
     if prediction.why_not:
-        console.print(f"No metrics predicted: {prediction.why_not}.", highlight=False, soft_wrap=True)
+        console.print(f"No metrics are predicted: {prediction.why_not}.", highlight=False, soft_wrap=True)
     for sentence in dict.fromkeys(warnings):
         typer.echo(f"Advice: {sentence}", err=True)
     console.print(f"Page: {folder / 'prediction.html'}", highlight=False, soft_wrap=True)

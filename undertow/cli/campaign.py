@@ -1,4 +1,4 @@
-"""`undertow campaign`: thousands of runs, resumable, and what they say."""
+"""`undertow campaign`: run a Monte Carlo study or a parameter sweep, and summarise it."""
 
 import contextlib
 import os
@@ -43,7 +43,7 @@ def campaign(
     overwrite: bool,
     allow_code: bool,
 ) -> int:
-    """Exit code of a campaign whose results went to `out`, or to a folder under runs/ that was free."""
+    """Run a campaign and write the results to `out`, or to a free folder under runs/; return the exit code."""
     count = os.cpu_count() or 1 if workers is None else workers
     checks.positive("--workers", count)
     if where is not None:
@@ -64,13 +64,13 @@ def campaign(
                 interruptible(lambda: run_campaign(prepared, folder, executor, watch))
             except (KeyboardInterrupt, OSError):
                 if (folder / STORE).is_dir():
-                    typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
+                    typer.echo(f"Stopped. To resume: undertow campaign {path} --out {folder} --resume", err=True)
                 raise
         return _conclude(console, stages, prepared, folder)
 
 
 def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path) -> int:
-    """Write page, summary and the scenarios of the worst trials; show the short of it."""
+    """Write page, summary and the scenarios of the worst trials; print the summary."""
     with stages("summary and page"):
         results = load(folder)
         found = summary(results, prepared.trials)
@@ -87,21 +87,21 @@ def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path
 
 
 def refuse_second(argument: Path) -> NoReturn:
-    """A second argument, which only `status` has."""
+    """Reject a second argument, which only `status` takes."""
     raise BadInput(
-        "DIR", "follow the word `status`", str(argument), hint=f"Results go to a folder by `--out {argument}`"
+        "DIR", "follow the word `status`", str(argument), hint=f"To choose the results folder, use `--out {argument}`"
     )
 
 
 def status(folder: Path, options: Sequence[str]) -> int:
-    """How far the campaign in a folder is.
+    """Print the progress of the campaign in a folder.
 
     Args:
-        folder: of the campaign.
-        options: that were given, though there are none.
+        folder: the folder of the campaign.
+        options: options given by mistake; `status` takes none.
     """
     if options:
-        raise BadInput(options[0], "be left out with `status`", "given", hint="undertow campaign status DIR")
+        raise BadInput(options[0], "be left out with `status`", "given", hint="Run: undertow campaign status DIR")
     try:
         results = load(folder)
     except FileNotFoundError:
@@ -125,7 +125,7 @@ def _executor(where: str | None, count: int) -> Iterator[Executor]:
 
 @contextlib.contextmanager
 def _live(console: Console) -> Iterator[Watch]:
-    """Trials done, how fast, and how long it will take."""
+    """Show the number of finished trials, their rate and the remaining time."""
     begun, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
 
@@ -133,10 +133,10 @@ def _live(console: Console) -> Iterator[Watch]:
             nonlocal first
             first = tally.done if first is None else first
             rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
-            refused = f", {tally.refused} refused" if tally.refused else ""
-            waiting = "compiling" if tally.done < tally.trials else "nothing is missing"
-            said = f"{rate:.3g} per second, {tally.failed} failed{refused}" if tally.done > first else waiting
-            progress(f"{tally.done} of {tally.trials} trials, {said}", tally.done / tally.trials)
+            invalid = f", {tally.invalid} invalid" if tally.invalid else ""
+            waiting = "compiling" if tally.done < tally.trials else "all trials are done"
+            text = f"{rate:.3g} per second, {tally.failed} failed{invalid}" if tally.done > first else waiting
+            progress(f"{tally.done} of {tally.trials} trials, {text}", tally.done / tally.trials)
 
         yield watch
 
@@ -146,7 +146,7 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     folder.mkdir()
     part_cache = PartCache()
     for trial in trials:
-        data = build_trial(prepared.trials, part_cache, trial).resolved  # with the contents of files that it names
+        data = build_trial(prepared.trials, part_cache, trial).resolved  # includes the contents of named files
         data = data | {"steady": data["steady"] | {"every_step": True}}
         text = f"# Trial {trial} of the campaign.\n{dump(data)}"
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The folder of a campaign: whether it may be written to, and what is removed from it."""
+"""Checks and cleans the results folder of a campaign."""
 
 import shutil
 from pathlib import Path
@@ -12,25 +12,26 @@ _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
 
 def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
-    """That a campaign may be written to a folder.
+    """Check that a campaign may be written to a folder.
 
     Raises:
-        BadInput: it may not.
+        BadInput: the folder cannot be used.
     """
     if resume and overwrite:
-        raise BadInput("--resume", "be without --overwrite", "beside it", hint="One goes on, the other begins anew")
+        hint = "--resume continues the campaign, --overwrite replaces it"
+        raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
     if not resume:
-        hint = "Add --resume to go on with it, or --overwrite to begin anew"
+        hint = "Add --resume to continue it, or --overwrite to replace it"
         results_folder.check_folder(folder, _WRITTEN, STORE, overwrite, hint)
     elif not (folder / STORE).exists():
-        raise BadInput("--resume", "find a campaign to go on with", f"none in {folder}")
+        raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
 
 
 def clear_folder(folder: Path) -> None:
-    """Leave nothing of a campaign that is replaced.
+    """Remove all files of a campaign that is replaced.
 
     Raises:
-        BadInput: it is being flown.
+        BadInput: another process is running it.
     """
     if not folder.exists():
         return

@@ -1,4 +1,4 @@
-"""The short of a campaign, for the terminal."""
+"""The summary of a campaign, for the terminal."""
 
 from rich.table import Table
 
@@ -7,15 +7,15 @@ from undertow.report.campaign_tables import by_xla
 
 
 def table(results: Results, found: dict) -> Table:
-    """A row for each combination."""
-    table = Table(title="Median [5 %, 95 %] of the trials that lasted", title_justify="left", title_style="bold")
-    crossed = list(results.campaign.cross)
-    counts = ("trials", "failed", "refused") if found["refused"] else ("trials", "failed")
-    for column in (*crossed, *counts, "tracking rms", "input rms"):
+    """One row per combination of the swept values."""
+    table = Table(title="Median [5 %, 95 %] of completed trials", title_justify="left", title_style="bold")
+    swept = list(results.campaign.cross)
+    counts = ("trials", "failed", "invalid") if found["invalid"] else ("trials", "failed")
+    for column in (*swept, *counts, "tracking rms", "input rms"):
         table.add_column(column)
     for one in found["combinations"]:
         cells = [_spread(one["metrics"].get(name)) for name in ("tracking_rms", "input_rms")]
-        table.add_row(*(one["values"][key] for key in crossed), *(str(one[count]) for count in counts), *cells)
+        table.add_row(*(one["values"][key] for key in swept), *(str(one[count]) for count in counts), *cells)
     return table
 
 
@@ -27,17 +27,18 @@ def _spread(quantiles: dict | None) -> str:
 
 
 def sentences(found: dict) -> list[str]:
-    """Endings and verdicts in words."""
+    """The numbers of trials by status, and the verdict on each requirement."""
     ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
-    said = [f"{found['done']} trials: {ended}."]
-    said += [sentence for sentence in (by_xla(found),) if sentence]
-    said += [f"Refused, {one['trials']} as here: {one['why']}." for one in found["refused"]]
+    text = [f"{found['done']} trials: {ended}."]
+    text += [sentence for sentence in (by_xla(found),) if sentence]
+    text += [f"Invalid trials ({one['trials']} with this error): {one['why']}." for one in found["invalid"]]
     for one in found["combinations"]:
         of = "".join(f", {key} {value}" for key, value in one["values"].items())
-        for wanted in one["requirements"]:
-            low, high = wanted["interval"]
-            asked = f"{wanted['metric']} < {wanted['below']:g} in {100 * wanted['share']:g} % of the trials{of}"
-            said.append(
-                f"{asked}: {wanted['verdict']}; {100 * wanted['kept']:.1f} % did [{100 * low:.1f}, {100 * high:.1f}]."
+        for requirement in one["requirements"]:
+            low, high = (100 * bound for bound in requirement["interval"])
+            bound = f"{requirement['metric']} < {requirement['below']:g}"
+            text.append(
+                f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{of}: {requirement['verdict']}; "
+                f"kept by {100 * requirement['kept']:.1f} % (95 % interval {low:.1f} to {high:.1f} %)."
             )
-    return said
+    return text

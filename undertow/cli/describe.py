@@ -1,4 +1,4 @@
-"""`undertow describe`: one part, the scenario file, or the metrics."""
+"""`undertow describe`: show a part, the scenario file, or the metrics."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from undertow.scenario.schema import keys
 
 
 def describe(name: str) -> None:
-    """Print what is known about a part, the keys of a scenario, or the metrics."""
+    """Print the description of a part, the keys of a scenario, or the metrics."""
     console = wide_console()
     if name == "scenario":
         rows = [(key.path, key.type, _text(key.default), key.meaning) for key in keys()]
@@ -53,7 +53,7 @@ def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: li
 
 
 def _text(value: Any) -> str:
-    """A value in few characters; diagonal matrices by their diagonal."""
+    """A short text for a value; a diagonal matrix is shown as its diagonal."""
     if isinstance(value, str) or value is None:
         return "none" if value is None else value
     if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):

@@ -1,4 +1,4 @@
-"""`undertow list`: what there is."""
+"""`undertow list`: list the available parts."""
 
 from rich.table import Table
 from rich.text import Text
@@ -10,10 +10,10 @@ from undertow.scenario.describing import summary
 
 
 def list_parts(kind: str | None) -> None:
-    """Print every part with one line about it; of one kind, or of all."""
+    """Print the parts of one kind, or of all kinds, with one line each."""
     if kind is not None and kind not in catalogue.KINDS:
         raise BadInput("KIND", "be a kind of part", kind, hint=did_you_mean(kind, catalogue.KINDS))
-    table = Table("kind", "name", "what it is")
+    table = Table("kind", "name", "description")
     for shown in (kind,) if kind else catalogue.KINDS:
         for name, part in sorted(catalogue.names(shown).items()):
             table.add_row(shown, name, Text(summary(part)))

@@ -1,4 +1,4 @@
-"""`undertow reproduce`: the paper, whole."""
+"""`undertow reproduce`: reproduce the paper."""
 
 import json
 from pathlib import Path
@@ -31,8 +31,8 @@ def reproduce(out: Path, quick: bool) -> None:
 def _watched(console: Console, draft: Draft, quick: bool) -> Path:
     with shares(console) as progress:
         found = interruptible(lambda: study.reproduce(draft.path, quick, progress))
-        progress("drawing", 0.9)
-        draft.publish()  # whatever becomes of the figures
+        progress("figures and report", 0.9)
+        draft.publish()  # before the figures, which may fail
         return interruptible(lambda: write(found, draft.path))
 
 

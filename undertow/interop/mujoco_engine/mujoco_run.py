@@ -65,8 +65,8 @@ def run_in_mujoco(
     body.place(start, np.zeros(6))
     reference = reference.starting_at(jnp.asarray(start))
     command, advance, desired = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
-    z, rows, steps, status = None, [], round(duration / dt), Status.OK
-    for step in range(steps + 1):
+    z, rows, control_steps, status = None, [], round(duration / dt), Status.OK
+    for step in range(control_steps + 1):
         t = step * dt
         y, r = _measured(body, propellers), desired(jnp.asarray(t))
         z = controller.init(y, r) if z is None else z
@@ -76,7 +76,7 @@ def run_in_mujoco(
         if status != Status.OK:
             break
         rows.append((t, body.position(), body.velocity(), np.asarray(r.position), applied))
-        if step < steps:
+        if step < control_steps:
             thrusts = propellers.turn(applied, dt, 2 * steps)
             # Runge-Kutta asks at the ends and in the middle of each step.
             body.advance(lambda now, t=t, thrusts=thrusts: thrusts[round(2 * (now - t) / timestep)], steps)
