@@ -127,7 +127,7 @@ def _resident() -> float:
 
 
 def dask(trials: int) -> dict:
-    """One worker and two, in turn; the shortest of five times each. All fly some first: compiling is not counted."""
+    """One worker and two, in turn; the shortest of five times each. All run_trials some first: compiling is not counted."""
     times: dict[int, list[float]] = {1: [], 2: []}
     stores = []
     with contextlib.ExitStack() as stack:
@@ -140,7 +140,7 @@ def dask(trials: int) -> dict:
                 folder = Path(name) / f"{workers}-{number}"
                 folder.mkdir()
                 campaign = prepared(folder, trials, 20.0, 256)
-                client.run(task.fly, campaign.text, str(campaign.folder), range(8))
+                client.run(task.run_trials, campaign.text, str(campaign.folder), range(8))
                 start = time.perf_counter()
                 run_campaign(campaign, folder, lambda f, work, c=client: by_dask(f, work, c), lambda *_: None)
                 times[workers].append(time.perf_counter() - start)

@@ -83,7 +83,7 @@ from undertow.scenario.reading import dump
         ({"cross": {"seed": [1, 2]}}, r"`cross.seed` must be left out \(small.yaml, line \d+\). Every trial has one"),
         (
             {"vary": {"sensor.velocity": {"uniform": [0.0, 1.0]}, "navigation": {"choice": ["perfect"]}}},
-            r"`sensor.velocity` must not be beside sensor, which it is a part of",
+            r"`sensor.velocity` must not be given together with sensor, which contains it",
         ),
         (
             {"requirements": {"tracking_rms": {"below": 1.0, "share": 1.0}}},
@@ -194,7 +194,7 @@ def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
     torn.write_bytes(torn.read_bytes()[:-1] + b"?")
     capsys.readouterr()
     assert run(["campaign", "status", str(out)]) == 4
-    assert re.search(r"is damaged .* --resume` mends what can be mended\n$", capsys.readouterr().err)
+    assert re.search(r"is damaged .* --resume` repairs it where possible\n$", capsys.readouterr().err)
     torn.unlink()
     assert run(["campaign", "status", str(out)]) == 0
     assert capsys.readouterr().out == "4 of 8 trials done\n  ok: 4\n"
@@ -221,7 +221,7 @@ def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     before = contents(out)
     assert run(["campaign", str(path), "--out", str(out)]) == 2
-    assert "Add --resume to go on with it, or --overwrite to begin anew" in capsys.readouterr().err
+    assert "Add --resume to continue it, or --overwrite to replace it" in capsys.readouterr().err
     assert contents(out) == before
     assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 0
     assert contents(out) == before
@@ -274,8 +274,8 @@ def test_trials_that_will_be_refused_are_told_before(campaign_file, tmp_path, ca
     vary = {"controller.frequency": {"uniform": [-1.0, 2.0]}}
     assert run(["campaign", str(campaign_file(trials=12, vary=vary, seed=5)), "--out", str(tmp_path / "out")]) == 1
     said = capsys.readouterr()
-    assert re.fullmatch(r"Advice: 1 of the first 4 trials are refused: `controller.frequency` .*\n", said.err)
-    assert re.search(r"100% 12 of 12 trials, [\d.]+ per second, 0 failed, [2-6] refused\n", said.out)
+    assert re.fullmatch(r"Advice: 1 of the first 4 trials are invalid: `controller.frequency` .*\n", said.err)
+    assert re.search(r"100% 12 of 12 trials, [\d.]+ per second, 0 failed, [2-6] invalid\n", said.out)
 
 
 def test_a_share_that_so_few_trials_cannot_show_is_told(campaign_file, tmp_path, capsys):
@@ -285,7 +285,7 @@ def test_a_share_that_so_few_trials_cannot_show_is_told(campaign_file, tmp_path,
     for trials in (35, 36):
         out = tmp_path / str(trials)
         assert run(["campaign", str(campaign_file(trials=trials, requirements=required)), "--out", str(out)]) == 0
-        told = "35 trials cannot show it even if all keep to it; 36 can" in capsys.readouterr().err
+        told = "which takes at least 36 trials without a failure to demonstrate; `trials` is 35" in capsys.readouterr().err
         combination = json.loads((out / "summary.json").read_text())["combinations"][0]
         verdicts.append((combination["requirements"][0]["verdict"], told))
     assert verdicts == [("open", True), ("holds", False)]

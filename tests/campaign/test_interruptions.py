@@ -90,7 +90,7 @@ def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):
     os.killpg(process.pid, signal.SIGINT)
     complaint = process.communicate(timeout=60)[1].decode()
     assert process.returncode == 130
-    assert complaint == f"Stopped. `undertow campaign {path} --out {out} --resume` goes on.\n"
+    assert complaint == f"Stopped. To resume: undertow campaign {path} --out {out} --resume\n"
     waited = time.monotonic() + 60
     with pytest.raises(ProcessLookupError):  # soon nobody is left
         while time.monotonic() < waited:
@@ -120,7 +120,7 @@ def test_a_dead_scheduler_loses_nothing(campaign_file, tmp_path):
             if len(seen) == 3:
                 scheduler.kill()
 
-        with pytest.raises(OSError, match="Dask cluster is gone"):
+        with pytest.raises(OSError, match="the connection to the Dask cluster is lost"):
             run_campaign(prepare(path), out, lambda f, work: by_dask(f, work, client), watch)
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
     assert contents(out) == contents(tmp_path / "whole")

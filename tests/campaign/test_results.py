@@ -49,7 +49,7 @@ def test_rows_stand_by_what_is_crossed_and_drawn(campaign_file, tmp_path):
     path, out = campaign_file(cross=cross, trials=5), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     rows = xr.open_zarr(out / STORE, consolidated=False).load()
-    assert rows["tracking_rms"].sizes == {key: 2 for key in cross} | {"draw": 5}
+    assert rows["tracking_rms"].sizes == {key: 2 for key in cross} | {"sample": 5}
     several = prepare(path).trials
     for number in rows["trial"].values.flat:
         (place,) = np.argwhere(rows["trial"].values == number)
@@ -61,12 +61,12 @@ def test_rows_stand_by_what_is_crossed_and_drawn(campaign_file, tmp_path):
         assert float(row["vary:disturbance.amplitude"]) == values["disturbance.amplitude"]
         assert int(row["seed"]) == several.seed(int(number))
     errors = rows["tracking_rms"].sel({"controller.frequency": ["calm", "brisk"]})
-    assert (errors.diff("controller.frequency") < 0).all()  # pair by pair, as both meet the same draws
+    assert (errors.diff("controller.frequency") < 0).all()  # pair by pair, as both meet the same samples
     found = json.loads((out / "summary.json").read_text())["combinations"]
     for one in found:
         limit, frequency, feedforward = one["values"].values()
         own = errors.sel({"plant.limit": float(limit), "controller.feedforward": feedforward == "True"})
-        middle = own.sel({"controller.frequency": frequency}).median("draw")
+        middle = own.sel({"controller.frequency": frequency}).median("sample")
         assert one["metrics"]["tracking_rms"]["0.5"] == float(middle)
 
 
@@ -105,16 +105,16 @@ def test_trials_that_cannot_be_built_are_neither_worst_nor_a_failure_of_the_law(
     assert run(["campaign", str(path), "--out", str(out)]) == 1
     found = json.loads((out / "summary.json").read_text())
     rows = xr.open_zarr(out / STORE, consolidated=False).load()
-    flown = rows["status"].values == 0
-    assert 0 < found["status"]["refused"] == (~flown).sum() < 7
-    assert flown[found["worst"]].all() and len(found["worst"]) == 5
-    share = (rows["tracking_rms"].values[flown] < 0.2).mean()
+    ran = rows["status"].values == 0
+    assert 0 < found["status"]["invalid"] == (~ran).sum() < 7
+    assert ran[found["worst"]].all() and len(found["worst"]) == 5
+    share = (rows["tracking_rms"].values[ran] < 0.2).mean()
     assert found["combinations"][0]["requirements"][0]["kept"] == pytest.approx(share)
-    first = int(np.argmin(flown))
-    (refused,) = found["refused"]
-    assert refused["trials"] == (~flown).sum()
-    assert re.fullmatch(rf"`controller.frequency` must be positive, .*, line 13, trial {first}\)", refused["why"])
-    assert refused["why"] in capsys.readouterr().out
+    first = int(np.argmin(ran))
+    (invalid,) = found["invalid"]
+    assert invalid["trials"] == (~ran).sum()
+    assert re.fullmatch(rf"`controller.frequency` must be positive, .*, line 13, trial {first}\)", invalid["why"])
+    assert invalid["why"] in capsys.readouterr().out
 
 
 def test_other_requirements_need_no_flight(campaign_file, tmp_path, capsys):
@@ -194,7 +194,7 @@ def test_what_flew_is_told(campaign, campaign_file, tmp_path, capsys, backend, n
     scenario, out = campaign()["scenario"], tmp_path / "out"
     scenario["loop"]["backend"] = backend
     assert run(["campaign", str(campaign_file(scenario=scenario, trials=4, requirements={})), "--out", str(out)]) == 0
-    sentence = f"{number} trials were flown by XLA: slower than in lanes"
+    sentence = f"{number} trials were ran by XLA: slower than in lanes"
     assert (sentence in capsys.readouterr().out) == (sentence in (out / "campaign.html").read_text()) == bool(number)
     column = xr.open_zarr(out / STORE, consolidated=False)["backend"]
     assert column.attrs["flag_meanings"].split()[int(column[0])] == backend

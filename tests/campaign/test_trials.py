@@ -36,10 +36,10 @@ def test_every_combination_flies_the_same_draws_and_seeds(campaign):
     assert several.number == 20
     assert [several.values(i)["controller"] for i in range(4)] == ["pid", "pid", "rcaf", "rcaf"]
     assert [several.values(i)["loop.dt"] for i in range(4)] == [0.01, 0.02, 0.01, 0.02]
-    for draw in range(5):
-        same = [several.values(4 * draw + i)["disturbance.amplitude"] for i in range(4)]
+    for sample in range(5):
+        same = [several.values(4 * sample + i)["disturbance.amplitude"] for i in range(4)]
         assert len(set(same)) == 1
-        assert len({several.seed(4 * draw + i) for i in range(4)}) == 1
+        assert len({several.seed(4 * sample + i) for i in range(4)}) == 1
 
 
 def test_parts_have_names(campaign):

@@ -72,7 +72,7 @@ ALLOWED = {
 
 # Phrases in which a retired word is the field's word, or somebody else's name.
 PHRASES = re.compile(
-    r"docs/lanes\.md|\(lanes\.md\)|journal article|journal: Nonlinear Dynamics|Journal of|tick_params|ticklabel|charge drawn|speed of sound"
+    r"admin\.tick\.interval|docs/lanes\.md|\(lanes\.md\)|journal article|journal: Nonlinear Dynamics|Journal of|tick_params|ticklabel|charge drawn|speed of sound"
     r"|Nonlinear Dynamics|sounding|fly[- ]?wheel",
     re.I,
 )

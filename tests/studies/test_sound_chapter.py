@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from undertow.report.figures.ablations import ablations_figure
-from undertow.report.figures.robust_fidelity import sound_ladder_figure
+from undertow.report.figures.robust_fidelity import robust_fidelity_figure
 from undertow.report.reproduction.report import write_report
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
@@ -107,7 +107,7 @@ def test_dots_stand_at_the_medians():
 
 
 def test_a_run_that_ended_early_is_a_cross():
-    panel = sound_ladder_figure(ROWS, {}).axes[0]
+    panel = robust_fidelity_figure(ROWS, {}).axes[0]
     assert sorted(line.get_marker() for line in panel.lines) == ["X", "^", "^", "o"]
 
 

@@ -1,1 +1,1 @@
-"""Thousands of runs of a scenario: what varies, how it is flown in batches, where the results stand, what they say."""
+"""Monte Carlo studies and parameter sweeps: sampling, batches of runs, the results store and its evaluation."""

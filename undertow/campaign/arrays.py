@@ -1,4 +1,4 @@
-"""Arrays of a store as zarr keeps them: a file for every chunk, with a checksum."""
+"""Zarr arrays of a results store: one file per chunk, with a checksum."""
 
 import contextlib
 import json
@@ -17,23 +17,23 @@ try:
 except ModuleNotFoundError:
     raise BadInput("campaign", "find zarr installed", "not", hint="pip install 'undertow[campaign]'") from None
 
-# Its checksum tells a chunk that was torn apart.
+# The checksum reveals a chunk that was written only in part.
 _CODEC = ZstdCodec(level=3, checksum=True)
 
-# A chunk of nothing but zeros is a file, too: one that is gone is noticed.
+# A chunk of zeros is written as a file too, so that a missing chunk is noticed.
 _CONFIG: Any = {"write_empty_chunks": True}
 
 
 def opened(path: Path) -> Any:
-    """The group of a store, made when missing.
+    """The group of a store, created if missing.
 
     Raises:
-        BadInput: what is there is none.
+        BadInput: the store is damaged.
     """
     try:
         return zarr.open_group(path, mode="a")
     except Exception as error:  # whatever zarr says of metadata that is no JSON, or not of a group
-        got, hint = f"{path.parent}: zarr.json is damaged ({error})", "--overwrite begins anew"
+        got, hint = f"{path.parent}: zarr.json is damaged ({error})", "Use --overwrite to start again"
         raise BadInput("--out", "hold a store that can be read", got, hint=hint) from error
 
 
@@ -47,7 +47,7 @@ def to_be_read(path: Path) -> Any:
 
 
 def found_array(group: Any, name: str) -> Any:
-    """An array of an earlier process; nothing where it is gone or cannot be read: it is made anew."""
+    """An array of an earlier process; None where it is missing or unreadable, and then created again."""
     try:
         return group[name].with_config(_CONFIG)
     except Exception:  # whatever zarr says of metadata that are none
@@ -55,7 +55,7 @@ def found_array(group: Any, name: str) -> Any:
 
 
 def check_array(array: Any, label: Label, chunks: tuple[int, ...], path: Path) -> None:
-    """That the metadata of an array are those that it was made with: with others, its chunks say something else.
+    """Check that the metadata of an array are those it was created with: others would change the meaning of its chunks.
 
     Args:
         array: as found; its shape may have grown.
@@ -64,15 +64,15 @@ def check_array(array: Any, label: Label, chunks: tuple[int, ...], path: Path) -
         path: of the store, for messages.
 
     Raises:
-        BadInput: they are not.
+        BadInput: the metadata differ.
     """
     chunks = (*chunks, *array.shape[len(chunks) :])
     made = new_array(zarr.open_group(MemoryStore()), "made", array.shape, chunks, label)
-    found, wanted = array.metadata.to_dict(), made.metadata.to_dict()
-    other = [key for key in wanted | found if _written(found.get(key)) != _written(wanted.get(key))]
+    found, expected = array.metadata.to_dict(), made.metadata.to_dict()
+    other = [key for key in expected | found if _written(found.get(key)) != _written(expected.get(key))]
     if other:
         got = f"{path / array.basename / 'zarr.json'} with another {', '.join(other)}"
-        hint = f"Put it back as it was, or remove {array.basename}/: --resume makes it again"
+        hint = f"Restore it, or remove {array.basename}/ and use --resume to compute it again"
         raise BadInput("--out", "hold a store as it was written", got, hint=hint)
 
 
@@ -81,7 +81,7 @@ def _written(value: Any) -> str:
 
 
 def flags(array: Any, count: int) -> np.ndarray:
-    """Which of the first tasks are done; one whose flag cannot be read is not."""
+    """Which of the first tasks are done; a task whose flag cannot be read is not."""
     try:
         return np.asarray(array[:count]) != 0
     except Exception:  # whatever a codec says of a torn chunk: it is looked for
@@ -93,7 +93,7 @@ def flags(array: Any, count: int) -> np.ndarray:
 
 
 def new_array(group: Any, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], label: Label) -> Any:
-    """An array of a group, in place of what a killed process may have left of it."""
+    """A new array of a group, replacing what a killed process may have left."""
     dtype = np.dtype(label.dtype)
     return group.create_array(
         name,
@@ -110,5 +110,5 @@ def new_array(group: Any, name: str, shape: tuple[int, ...], chunks: tuple[int, 
 
 
 def chunk_file(path: Path, name: str, block: tuple[int, ...], dimensions: int) -> Path:
-    """Where zarr keeps a block of an array; of one that is gone it says that it is full of zeros."""
+    """File of a block of an array; zarr reads a missing file as zeros."""
     return path.joinpath(name, "c", *map(str, block), *["0"] * (dimensions - len(block)))

@@ -1,4 +1,4 @@
-"""Trials flown many at once: those that differ in their numbers only share a compiled program."""
+"""Runs trials in batches: trials that differ only in numbers share one compiled program."""
 
 import contextlib
 import threading
@@ -22,14 +22,14 @@ from undertow.scenario.build import Built
 from undertow.scenario.part_cache import structure
 from undertow.scenario.schema import Scenario
 
-# What flies a trial. By XLA it takes longer, and alone it is repeated to rounding only.
+# Backend of a trial. XLA is slower, and a single run repeats such a trial only up to rounding.
 SIMD, XLA = 0, 1
 
 
 class BatchResult(NamedTuple):
-    """What is kept of trials, one entry each."""
+    """Results of trials, one entry per trial."""
 
-    metrics: dict[str, np.ndarray]  # over the steady window; NaN where a run did not last
+    metrics: dict[str, np.ndarray]  # over the steady window; NaN for failed runs
     status: np.ndarray
     ended: np.ndarray  # s
     backend: np.ndarray  # SIMD or XLA
@@ -37,7 +37,7 @@ class BatchResult(NamedTuple):
 
 
 class _Kind(NamedTuple):
-    """What trials of one program have in common."""
+    """Properties that trials of one program share."""
 
     structure: Any
     plan: Plan
@@ -50,16 +50,16 @@ class _Group(NamedTuple):
     """Trials of one kind in a task."""
 
     first: Run
-    members: list[int]  # their places in the task
-    numbers: list[list[np.ndarray]]  # of each what is not the same in all
+    members: list[int]  # their indices in the task
+    numbers: list[list[np.ndarray]]  # the numbers that differ between trials
 
 
 class ProgramCache:
-    """Programs that were compiled, for any number of threads.
+    """Compiled programs, shared by any number of threads.
 
     Args:
-        probes: some trials; numbers that are the same in all of one structure are built into its program. Which
-            program flies a trial is then a matter of the campaign, not of the task that it is in.
+        probes: some trials; numbers that are equal in all probes of one structure become constants of its program. The
+            program of a trial then depends on the campaign only, not on the task.
     """
 
     def __init__(self, probes: Callable[[], Sequence[Built]]):
@@ -69,11 +69,11 @@ class ProgramCache:
         self._lock = threading.Lock()
 
     def run(self, built: Iterable[Built], asked: Series | None = None) -> BatchResult:
-        """Run trials; those of one kind together.
+        """Run trials in batches of one kind.
 
         Args:
-            built: the trials, sampled loops; only numbers that differ are kept of each.
-            asked: series that are kept.
+            built: the trials, sampled loops; only the numbers that differ are kept in memory.
+            asked: series to record.
         """
         groups: dict[_Kind, _Group] = {}
         for i, one in enumerate(built):
@@ -85,7 +85,7 @@ class ProgramCache:
             pairs = zip(numbers, self._common(kind, len(numbers)), strict=True)
             # Copies: views would keep JAX's arrays, and those ten times the memory.
             group.numbers.append([np.array(leaf) for leaf, shared in pairs if shared is None])
-        if not groups:  # none of them, as one would be
+        if not groups:  # no trials: the arrays of one trial, cut to length zero
             return jax.tree.map(lambda kept: kept[:0], self.run(self._probes()[:1], asked))
         pieces = []
         for kind, group in groups.items():
@@ -103,16 +103,16 @@ class ProgramCache:
         repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
         numbers = [next(own) if shared is None else repeated(shared) for shared in common]
         tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
-        flown = self._programs[kind].run(jax.tree.unflatten(tree, numbers))
-        lasted = flown.status == int(Status.OK)
-        metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(flown.accumulated[0]).items()}
+        found = self._programs[kind].run(jax.tree.unflatten(tree, numbers))
+        lasted = found.status == int(Status.OK)
+        metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(found.accumulated[0]).items()}
         backend = np.full(
             count, SIMD if isinstance(self._programs[kind], simd_batch.BatchRunner) else XLA, dtype=np.int8
         )
-        return BatchResult(metrics, flown.status.astype(np.int8), flown.ended, backend, flown.series)
+        return BatchResult(metrics, found.status.astype(np.int8), found.ended, backend, found.series)
 
     def _common(self, kind: _Kind, count: int) -> list[np.ndarray | None]:
-        """Numbers that are built into the program of a kind, in the order of the leaves of its runs; None elsewhere."""
+        """Constants of the program of a kind, in the order of the leaves of its runs; None for the other leaves."""
         found = self._commons().get(kind.structure) if kind.usual else None
         return [None] * count if found is None else found
 
@@ -126,7 +126,7 @@ class ProgramCache:
         return _Kind(form, plan, usual, scenario.loop.backend, scenario.precision)
 
     def _commons(self) -> dict[Any, list[np.ndarray | None]]:
-        """Numbers that all probes of a structure share, by structure: None for those that differ."""
+        """Numbers that all probes of a structure share, by structure; None for numbers that differ."""
         with self._lock:
             if self._shared is None:
                 self._shared = shared_numbers(self._probes())

@@ -1,4 +1,4 @@
-"""What a campaign file may say."""
+"""Keys of a campaign file, their defaults and their checks."""
 
 import math
 import re
@@ -11,22 +11,22 @@ from undertow.core.errors import BadInput
 from undertow.scenario.reading import Text
 from undertow.scenario.schema import Scenario, Strict, complaint
 
-# Entries of lists in brackets only: each key has one spelling, so that two that name it are noticed.
+# List entries in brackets only: each key has one spelling, so that duplicates are noticed.
 _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class Spread(Strict):
-    """How one parameter is drawn: exactly one of these."""
+class Distribution(Strict):
+    """Distribution of one parameter: exactly one of these keys."""
 
     uniform: Pair | None = Field(None, description="low, high")
     log_uniform: Pair | None = Field(None, description="low, high, both positive")
     normal: Pair | None = Field(None, description="mean, standard deviation")
-    choice: list[Any] | None = Field(None, min_length=1, description="one of these, equally likely")
+    choice: list[Any] | None = Field(None, min_length=1, description="one of these values, equally likely")
 
     @model_validator(mode="after")
-    def _one(self) -> "Spread":
+    def _one(self) -> "Distribution":
         given = [name for name in type(self).model_fields if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError("have one of uniform, log_uniform, normal, choice")
@@ -41,26 +41,26 @@ class Spread(Strict):
 
 
 class Requirement(Strict):
-    """What a metric must keep to in a share of all trials."""
+    """A bound on a metric that a share of all trials must keep."""
 
-    below: float = Field(description="the metric must be smaller")
-    share: float = Field(0.95, gt=0, description="in this share of the trials at least")
+    below: float = Field(description="upper bound of the metric")
+    share: float = Field(0.95, gt=0, description="smallest share of the trials that must keep the bound")
 
     @field_validator("share")
     @classmethod
     def _provable(cls, given: float) -> float:
         if given >= 1:
-            raise ValueError("be less than 1, as no number of trials shows that all keep to it; 0.99, for example")
+            raise ValueError("be less than 1, because no number of trials can demonstrate 100 %; 0.99, for example")
         return given
 
 
 class Series(Strict):
-    """Signals that are kept of every trial."""
+    """Signals to record for every trial."""
 
     signals: list[str] = Field(
         ["position", "error"],
         min_length=1,
-        description="names of variables of run.nc, as `undertow simulate` writes them",
+        description="names of variables of run.nc, as written by `undertow simulate`",
     )
     every: float = Field(1.0, gt=0, description="time between records, s")
 
@@ -73,20 +73,23 @@ class Series(Strict):
 
 
 class Campaign(Strict):
-    """One campaign: a scenario, and what varies from trial to trial."""
+    """One campaign: a scenario and what varies from trial to trial."""
 
-    description: str = Field("", description="free text")
-    scenario: str | dict[str, Any] = Field(description="file of the scenario, or the scenario itself")
-    trials: int = Field(1000, ge=1, le=10**9, description="number of draws")
-    design: Literal["random", "latin", "sobol"] = Field("random", description="how draws fill the space of `vary`")
-    vary: dict[str, Spread] = Field(default_factory=dict, description="key path of the scenario -> how it is drawn")
-    cross: dict[str, dict[str, Any]] = Field(
-        default_factory=dict, description="key path -> values, a list or by names; all fly the same draws and seeds"
+    description: str = Field("", description="free text, the title of the page")
+    scenario: str | dict[str, Any] = Field(description="name of a scenario file, or the scenario itself")
+    trials: int = Field(1000, ge=1, le=10**9, description="number of samples")
+    design: Literal["random", "latin", "sobol"] = Field("random", description="sampling of the space of `vary`")
+    vary: dict[str, Distribution] = Field(
+        default_factory=dict, description="Monte Carlo: key path of the scenario -> its distribution"
     )
-    requirements: dict[str, Requirement] = Field(default_factory=dict, description="metric -> what it must keep to")
-    series: Series | None = Field(None, description="signals to keep; metrics only unless given")
-    seed: int = Field(0, ge=0, le=2**32 - 1, description="of all draws and of the seeds of the trials")
-    chunk: int = Field(256, ge=1, le=100_000, description="trials per task; no result depends on it")
+    cross: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="sweep: key path -> values, as a list or by name; all combinations run the same samples and seeds",
+    )
+    requirements: dict[str, Requirement] = Field(default_factory=dict, description="metric -> bound that it must keep")
+    series: Series | None = Field(None, description="signals to record; none by default")
+    seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all samples and of the seeds of the trials")
+    chunk: int = Field(256, ge=1, le=100_000, description="trials per task; it does not affect the results")
 
     @field_validator("scenario", mode="before")
     @classmethod
@@ -107,18 +110,18 @@ class Campaign(Strict):
 
     @property
     def number(self) -> int:
-        """Trials all told: the draws, for every combination of `cross`."""
+        """Number of trials: the samples, for every combination of `cross`."""
         return math.prod(len(entries) for entries in self.cross.values()) * self.trials
 
 
 def validate(text: Text) -> Campaign:
-    """The campaign, or the first complaint about it.
+    """Validate the contents of a campaign file.
 
     Raises:
         BadInput: unknown key, wrong type, value out of range.
     """
     if "scenario" not in text.data and set(text.data) & set(Scenario.model_fields) - set(Campaign.model_fields):
-        hint = f"`undertow simulate` runs it; a campaign has it under `scenario: {text.name or '...'}`"
+        hint = f"Run it with `undertow simulate`, or name it in a campaign file: `scenario: {text.name or '...'}`"
         raise BadInput("CAMPAIGN", "be a campaign", "a scenario", hint=hint, where=text.name)
     try:
         found = Campaign.model_validate(text.data)
@@ -140,13 +143,13 @@ def _check_key(section: str, key: str, every: list[str], where: str) -> None:
     if key.startswith("scenario."):
         raise BadInput(key, "start inside the scenario", hint=f"Write `{key.removeprefix('scenario.')}`", where=where)
     if key == "seed":
-        hint = "Every trial has one of its own; `seed` of the campaign decides which"
+        hint = "Every trial has its own seed, which follows from the `seed` of the campaign"
         raise BadInput(f"{section}.seed", "be left out", hint=hint, where=where)
     if every.count(key) > 1:
-        raise BadInput(f"cross.{key}", "not be in `vary`, too", where=where)
+        raise BadInput(f"cross.{key}", "not be in `vary` as well", where=where)
     for other in every:
         if other.startswith((f"{key}.", f"{key}[")):
-            raise BadInput(other, f"not be beside {key}, which it is a part of", where=where)
+            raise BadInput(other, f"not be given together with {key}, which contains it", where=where)
 
 
 def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
@@ -154,8 +157,8 @@ def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
     name = f"cross.{key}"
     if not entries:
         raise BadInput(name, "have an entry", where=where)
-    if set(entries) <= set(Spread.model_fields):
-        hint = f"`vary` draws; here, write `{key}: [first, second]`, or names and values"
+    if set(entries) <= set(Distribution.model_fields):
+        hint = f"Distributions belong to `vary`. Here, write `{key}: [first, second]`, or names and values"
         raise BadInput(name, "be a list, or values by names", f"{next(iter(entries))} alone", hint=hint, where=where)
     known: dict[str, str] = {}
     for word, entry in entries.items():

@@ -1,4 +1,4 @@
-"""What the results of a campaign say: distributions, what they depend on, requirements, failures, the worst trials."""
+"""Summary of a campaign: distributions, sensitivities, requirements, failures and the worst trials."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import xarray as xr
 
 from undertow.campaign.batch_runner import XLA
 from undertow.campaign.columns import ENDINGS
-from undertow.campaign.invalid_trials import refusals
+from undertow.campaign.invalid_trials import reasons
 from undertow.campaign.requirements import verdict
 from undertow.campaign.sensitivity import by_choice, correlations, quantiles
 from undertow.campaign.store_results import Results
@@ -20,19 +20,19 @@ _RANKED_BY = "tracking_rms"
 
 
 def summary(results: Results, several: Trials) -> dict[str, Any]:
-    """Everything that stands in summary.json.
+    """The contents of summary.json.
 
     Args:
-        results: of the campaign.
-        several: its trials, to say why some were refused.
+        results: results of the campaign.
+        several: its trials, to find out why some were invalid.
     """
-    refused = results.rows["trial"].values[~results.flown]
+    invalid = results.rows["trial"].values[~results.ran]
     return {
         "trials": results.total,
         "done": results.rows.sizes["trial"],
         "status": endings(results.rows),
         "by_xla": int((results.rows["backend"].values == XLA).sum()),
-        "refused": [one._asdict() for one in refusals(several, refused)],
+        "invalid": [one._asdict() for one in reasons(several, invalid)],
         "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
         "sensitivity": correlations(results),
         "choices": by_choice(results),
@@ -41,7 +41,7 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
 
 
 def endings(rows: xr.Dataset) -> dict[str, int]:
-    """How many trials ended how; empty before the first is done."""
+    """Number of trials by status; empty before the first is done."""
     codes = rows["status"].values if "status" in rows else np.zeros(0)
     return {word: int((codes == code).sum()) for code, word in ENDINGS.items() if (codes == code).any()}
 
@@ -49,23 +49,23 @@ def endings(rows: xr.Dataset) -> dict[str, int]:
 def _combination(results: Results, number: int) -> dict[str, Any]:
     """Distributions and requirements of one combination of `cross`."""
     own = results.combinations == number
-    rows, lasted, flown = results.rows.isel(trial=own), results.lasted[own], results.flown[own]
+    rows, lasted, ran = results.rows.isel(trial=own), results.lasted[own], results.ran[own]
     return {
         "values": dict(zip(results.campaign.cross, results.named(number), strict=True)),
         "trials": int(lasted.size),
         "status": endings(rows),
-        "failed": int((flown & ~lasted).sum()),
-        "refused": int((~flown).sum()),
+        "failed": int((ran & ~lasted).sum()),
+        "invalid": int((~ran).sum()),
         "metrics": {name: quantiles(rows[name].values[lasted]) for name in results.metrics} if lasted.any() else {},
         "requirements": [
-            verdict(rows.isel(trial=flown), name, wanted) for name, wanted in results.campaign.requirements.items()
+            verdict(rows.isel(trial=ran), name, required) for name, required in results.campaign.requirements.items()
         ],
     }
 
 
 def _worst(results: Results) -> np.ndarray:
-    """Trials that failed, the earliest first; then those with the largest error. What was refused was not flown."""
-    rows, lasted = results.rows.isel(trial=results.flown), results.lasted[results.flown]
+    """Failed trials, the earliest first; then those with the largest error. Invalid trials are left out."""
+    rows, lasted = results.rows.isel(trial=results.ran), results.lasted[results.ran]
     error = np.where(lasted, rows[_RANKED_BY].values, np.inf)
     order = np.lexsort((rows["ended"].values, -error))
     return rows["trial"].values[order[:_WORST]]

@@ -1,4 +1,4 @@
-"""Clusters of Dask for a campaign: started on this machine, by SLURM, over SSH, or running somewhere already."""
+"""Dask clusters for a campaign: local, SLURM, SSH, or an existing scheduler."""
 
 import contextlib
 import logging
@@ -11,7 +11,7 @@ from undertow.core.errors import BadInput, nearest
 
 CLUSTERS = ("local", "slurm", "ssh")
 
-# A worker may die often; and what Dask notes of itself fifty times a second takes 3 % of a core in every process.
+# Workers may die often. Dask's own monitoring at 50 Hz would take 3 % of a core in every process.
 _DASK = {
     "distributed.scheduler.allowed-failures": 100,
     "distributed.worker.profile.enabled": False,
@@ -19,17 +19,17 @@ _DASK = {
     "distributed.admin.system-monitor.interval": "2s",
 }
 
-# Dask's status pages ask nobody who they are: this machine alone may look at those that are started here.
+# Dask's dashboards have no authentication: those started here listen on this machine only.
 _PAGE = "127.0.0.1:0"
 
 _INSTALL = "pip install 'undertow[campaign]'"
 
 
 def check_cluster(kind: str) -> None:
-    """That there is such a kind of cluster, or that it is an address.
+    """Check that the argument is a kind of cluster or an address.
 
     Raises:
-        BadInput: neither.
+        BadInput: it is neither.
     """
     if "://" not in kind and kind not in CLUSTERS:
         must = f"be one of {', '.join(CLUSTERS)}, or an address such as tcp://10.0.0.1:8786"
@@ -38,12 +38,12 @@ def check_cluster(kind: str) -> None:
 
 @contextlib.contextmanager
 def cluster(kind: str, workers: int) -> Iterator[Any]:
-    """A client of a cluster that is started for this campaign, or of the scheduler at an address.
+    """A client of a cluster started for this campaign, or of the scheduler at an address.
 
     Args:
         kind: local, slurm, ssh (hosts in the environment variable UNDERTOW_HOSTS, separated by commas), or an address
             such as tcp://10.0.0.1:8786.
-        workers: how many are started; on each host where they are several.
+        workers: number of workers to start; on each host, for ssh.
 
     Raises:
         BadInput: Dask is not installed, or no such cluster can be reached.
@@ -79,7 +79,7 @@ def _started(kind: str, workers: int) -> Any:
             preload=[local_worker.__name__],
             host="127.0.0.1",
             dashboard_address=_PAGE,
-            silence_logs=logging.CRITICAL,  # what matters is raised here
+            silence_logs=logging.CRITICAL,  # errors are raised here
         )
     if kind == "ssh":
         return _over_ssh(os.environ.get("UNDERTOW_HOSTS", ""), workers)
@@ -93,7 +93,7 @@ def _over_ssh(names: str, workers: int) -> Any:
     hosts = [name.strip() for name in names.split(",") if name.strip()]
     if not hosts:
         raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
-    logging.getLogger("distributed.deploy").setLevel(logging.ERROR)  # what goes wrong is said once, below
+    logging.getLogger("distributed.deploy").setLevel(logging.ERROR)  # an error is reported once, below
     try:
         return SSHCluster(
             [hosts[0], *hosts],
@@ -102,27 +102,27 @@ def _over_ssh(names: str, workers: int) -> Any:
         )
     except (OSError, Error, RuntimeError) as error:
         reason = error.__cause__ or error
-        hint = "`ssh HOST` must work without a question"
-        raise BadInput("UNDERTOW_HOSTS", "be hosts that let us in", f"{names}: {reason}", hint=hint) from None
+        hint = "`ssh HOST` must work without a prompt"
+        raise BadInput("UNDERTOW_HOSTS", "be hosts that accept the login", f"{names}: {reason}", hint=hint) from None
 
 
 def _in_slurm(workers: int) -> Any:
     from dask import config
     from dask_jobqueue.slurm import SLURMCluster
 
-    try:  # jobs that cannot be queued would be asked for again and again
+    try:  # otherwise Dask would submit jobs that cannot be queued again and again
         subprocess.run(["sinfo", "--noheader"], check=True, capture_output=True, text=True)
     except OSError as error:
-        raise BadInput("--cluster", "find a SLURM here", str(error)) from None
+        raise BadInput("--cluster", "find SLURM on this machine", str(error)) from None
     except subprocess.CalledProcessError as error:
         said = error.stderr.strip().splitlines() or ["sinfo fails"]
         raise BadInput("--cluster", "find a SLURM that answers", said[-1]) from None
-    told = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
+    setting = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
     found = SLURMCluster(
-        cores=told("cores", 1),
-        memory=told("memory", "2 GB"),
-        scheduler_options={"dashboard_address": _PAGE, **(told("scheduler-options", {}))},
-        worker_extra_args=["--dashboard-address", _PAGE, *told("worker-extra-args", [])],
+        cores=setting("cores", 1),
+        memory=setting("memory", "2 GB"),
+        scheduler_options={"dashboard_address": _PAGE, **(setting("scheduler-options", {}))},
+        worker_extra_args=["--dashboard-address", _PAGE, *setting("worker-extra-args", [])],
     )
     found.scale(jobs=workers)
     return found

@@ -1,4 +1,4 @@
-"""What stands in the columns of a store: names of dimensions, meanings, units, codes."""
+"""Columns of a results store: dimensions, meanings, units and codes."""
 
 from typing import Any, NamedTuple
 
@@ -10,19 +10,19 @@ from undertow.analysis.metrics import OVERALL
 from undertow.campaign.batch_runner import SIMD, XLA
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.labels import is_number, words
-from undertow.campaign.layout import DRAWS
+from undertow.campaign.layout import SAMPLES
 from undertow.campaign.runs import planned
-from undertow.campaign.task import REFUSED
-from undertow.campaign.trials import Trials, drawn
+from undertow.campaign.task import INVALID
+from undertow.campaign.trials import Trials, varied_keys
 from undertow.core.status import Status
 from undertow.loop import record
 from undertow.scenario.build import Built
 
 # Codes of the columns `status` and `backend`, and their words.
-ENDINGS = {int(status): status.word for status in Status} | {REFUSED: "refused"}
-BACKENDS = {SIMD: "simd", XLA: "xla", REFUSED: "none"}
+ENDINGS = {int(status): status.word for status in Status} | {INVALID: "invalid"}
+BACKENDS = {SIMD: "simd", XLA: "xla", INVALID: "none"}
 
-_AFTER = "a run that failed stays where it was: see `ended`"
+_AFTER = "a failed run keeps its last value: see `ended`"
 
 
 def _said(meaning: str, unit: str) -> dict[str, Any]:
@@ -30,17 +30,17 @@ def _said(meaning: str, unit: str) -> dict[str, Any]:
 
 
 def _codes(name: str, words: dict[int, str]) -> dict[str, Any]:
-    """Codes and their words as the CF conventions have them."""
+    """Codes and their words, as in the CF conventions."""
     return {"long_name": name, "flag_values": list(words), "flag_meanings": " ".join(words.values())}
 
 
-# Columns of every campaign, with their attributes; those of inputs get the unit of the plant's.
+# Columns of every campaign, with their attributes.
 ALWAYS: dict[str, dict[str, Any]] = {
-    "trial": {"long_name": "number, as in the names of files of the worst"},
-    "seed": {"long_name": "seed of everything random"},
+    "trial": {"long_name": "trial number, as in the file names of the worst trials"},
+    "seed": {"long_name": "seed of all random numbers of the trial"},
     "status": _codes("how the run ended", ENDINGS),
-    "backend": _codes("what flew it", BACKENDS),
-    "ended": {"long_name": "when the run ended", "units": "s"},
+    "backend": _codes("backend that ran the trial", BACKENDS),
+    "ended": {"long_name": "time at which the run ended", "units": "s"},
 } | {name: _said(*MEANINGS[name]) for name in OVERALL}
 
 
@@ -51,14 +51,14 @@ INPUT_UNIT = "input_unit"  # attribute of the store
 
 
 class Label(NamedTuple):
-    """Of one array of the store."""
+    """Description of one array of the store."""
 
     dimensions: tuple[str, ...]
     attributes: dict[str, Any]
-    dtype: str = "float64"  # whatever the precision of the runs: a campaign may cross it
+    dtype: str = "float64"  # independent of the precision of the runs, which a campaign may sweep
 
 
-FLAGS = Label(("task",), {"long_name": "1 for what is written"}, "uint8")
+FLAGS = Label(("task",), {"long_name": "1 for tasks that are written"}, "uint8")
 _DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "backend": "int8"}
 
 
@@ -70,7 +70,7 @@ def labels(several: Trials, built: Built) -> dict[str, Label]:
         built: one of them.
     """
     of_input = built.closed_loop.plant.input_unit
-    found, along = trial_labels(several.campaign, of_input), (*several.campaign.cross, DRAWS)
+    found, along = trial_labels(several.campaign, of_input), (*several.campaign.cross, SAMPLES)
     for name in several.campaign.series.signals if several.campaign.series else ():
         said = _said(*record.meaning(name, built.closed_loop.plant)) | {"comment": _AFTER}
         found[f"series:{name}"] = Label((*along, *record.dimensions(name)), said)
@@ -80,13 +80,13 @@ def labels(several: Trials, built: Built) -> dict[str, Label]:
 def trial_labels(campaign: Campaign, input_unit: str = "") -> dict[str, Label]:
     """Labels of the columns that hold a number for each trial, by name; for a plant whose input has a unit."""
     of_metrics = {name: _said(MEANINGS[name].meaning, unit_of(name, input_unit)) for name in OVERALL}
-    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in drawn(campaign)} | ALWAYS | of_metrics
-    along = (*campaign.cross, DRAWS)
+    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in varied_keys(campaign)} | ALWAYS | of_metrics
+    along = (*campaign.cross, SAMPLES)
     return {name: Label(along, said, _DTYPES.get(name, "float64")) for name, said in of_trials.items()}
 
 
 def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
-    """What stands along dimensions: values of `cross`, or their names; and what series need.
+    """Coordinates of the dimensions: values of `cross`, or their names; and those of recorded series.
 
     Args:
         several: the trials.
@@ -101,7 +101,7 @@ def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
 
 
 def _crossed(entries: dict[str, Any]) -> np.ndarray:
-    """Values where they are numbers, or true and false, and have no other names; else these."""
+    """The values where they are unnamed numbers or booleans; otherwise their names."""
     values, named = list(entries.values()), any(name != words(value) for name, value in entries.items())
     if not named and all(isinstance(value, bool) for value in values):
         return np.array(values)
@@ -109,6 +109,6 @@ def _crossed(entries: dict[str, Any]) -> np.ndarray:
 
 
 def _varied(key: str, entries: dict[str, Any] | None) -> dict[str, Any]:
-    """Of what is drawn; numbers that stand for a choice say which."""
+    """Attributes of a sampled key; for a choice, the list of its entries."""
     said = {"long_name": key}
     return said if entries is None else said | {"choices": list(entries)}

@@ -1,4 +1,4 @@
-"""Who flies the tasks of a campaign: the threads of this process, or the workers of a Dask cluster."""
+"""Executors of the tasks of a campaign: threads of this process, or the workers of a Dask cluster."""
 
 import contextlib
 import itertools
@@ -12,15 +12,15 @@ import numpy as np
 Columns = dict[str, np.ndarray]
 Work = tuple[Any, ...]  # arguments of the function
 
-# Tasks per worker that are under way or waiting: enough to keep it busy, few enough to stay in memory.
+# Tasks per worker that run or wait: enough to keep it busy, few enough to fit in memory.
 _AHEAD = 2
 
-# Before another thread gets its turn, s; with Python's own 5 ms a task takes half a second to write, not a tenth.
+# Switch interval of threads, s; with Python's default of 5 ms, writing a task takes half a second, not a tenth.
 _TURN = 2e-4
 
 
 def in_threads(function: Callable[..., Columns], work: Sequence[Work], threads: int) -> Iterator[tuple[int, Columns]]:
-    """Number and result of each piece of work as it is done, by threads of this process."""
+    """Number and result of each piece of work as it is completed, by threads of this process."""
     with _taking_turns(), ThreadPoolExecutor(threads) as pool:
         waiting = enumerate(work)
         going = {pool.submit(function, *one): i for i, one in itertools.islice(waiting, _AHEAD * threads)}
@@ -39,7 +39,7 @@ def in_threads(function: Callable[..., Columns], work: Sequence[Work], threads: 
 
 @contextlib.contextmanager
 def _taking_turns() -> Iterator[None]:
-    """Let Python change between threads often: one that writes needs hundreds of short turns for every task."""
+    """Switch between threads often: writing a task needs hundreds of short turns."""
     usual = sys.getswitchinterval()
     sys.setswitchinterval(_TURN)
     try:
@@ -49,12 +49,12 @@ def _taking_turns() -> Iterator[None]:
 
 
 def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any) -> Iterator[tuple[int, Columns]]:
-    """Number and result of each piece of work as it is done, by the workers of a `dask.distributed` client.
+    """Number and result of each piece of work as it is completed, by the workers of a `dask.distributed` client.
 
-    A worker that is killed loses nothing: its work is given to another one.
+    The work of a killed worker is given to another one.
 
     Raises:
-        OSError: the cluster is gone.
+        OSError: the connection to the cluster is lost.
     """
     from distributed import as_completed
     from distributed.client import FutureCancelledError
@@ -75,6 +75,6 @@ def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any)
                 done.add(further)
             yield number, result
     except (FutureCancelledError, CommClosedError, TimeoutError) as error:
-        raise OSError(f"the Dask cluster is gone ({error})") from error
+        raise OSError(f"the connection to the Dask cluster is lost ({error})") from error
     if numbers:
-        raise OSError("the Dask cluster is gone")
+        raise OSError("the connection to the Dask cluster is lost")

@@ -1,4 +1,4 @@
-"""What makes a campaign the same one: only as it began may it be gone on with."""
+"""Fingerprint of a campaign: a campaign can be resumed only if nothing that affects its results has changed."""
 
 import functools
 import json
@@ -13,35 +13,35 @@ from undertow.scenario.reading import parse
 
 
 class Identity(NamedTuple):
-    """What a store knows of its campaign.
+    """What a store records about its campaign.
 
     Attributes:
-        asked: everything that is asked, as a file; requirements may change.
-        attributes: what must be the same in a store that is gone on with.
+        asked: the complete campaign file; requirements may change.
+        attributes: attributes that must be equal in a store that is resumed.
     """
 
     asked: str
     attributes: dict[str, str]
 
     def check_same(self, found: Mapping[str, Any], folder: Path) -> None:
-        """That a store is of this campaign, or of this one with fewer draws.
+        """Check that a store belongs to this campaign, or to this campaign with fewer samples.
 
         Args:
             found: attributes of the store.
-            folder: that it is in, for the message.
+            folder: folder of the store, for the message.
 
         Raises:
-            BadInput: it is of another one.
+            BadInput: it belongs to another campaign.
         """
         other = [key for key, value in self.attributes.items() if found.get(key) != value]
         why = self._why(other[0], found) if other else self._fewer(found)
         if why:
-            hint = "Choose another folder, or begin anew with --overwrite"
+            hint = "Choose another folder, or start again with --overwrite"
             must = "be the folder of the same campaign, by the same versions"
             raise BadInput("--out", must, f"another one's: {why} ({folder})", hint=hint)
 
     def _why(self, key: str, found: Mapping[str, Any]) -> str:
-        """What differs, of which this attribute tells that it does."""
+        """The difference that an attribute indicates."""
         if key == "campaign_hash":
             return difference(_decisive(found["campaign"]), _decisive(self.asked))
         if key == "scenario_hash":
@@ -49,33 +49,33 @@ class Identity(NamedTuple):
         return f"`{key}` was {found.get(key)}, is {self.attributes[key]}"
 
     def _fewer(self, found: Mapping[str, Any]) -> str:
-        """That there would be fewer draws than there were; nothing where there would not."""
-        before, now = draws(found["campaign"]), draws(self.asked)
+        """A sentence where there would be fewer samples than before; otherwise empty."""
+        before, now = samples(found["campaign"]), samples(self.asked)
         return f"`trials` was {before}, is {now}" if now < before else ""
 
 
 def identity(asked: str, named: Sequence[Mapping[str, Any]]) -> Identity:
-    """Of a campaign.
+    """Fingerprint of a campaign.
 
     Args:
-        asked: the whole of it as a file.
-        named: scenarios in which all files that it names stand with their contents, which may change, too.
+        asked: the complete campaign file.
+        named: scenarios that include the contents of all files they name, because these may change too.
     """
     deciding = {"campaign": _decisive(asked), "scenario": _as_floats(list(named))}
     hashes = {f"{name}_hash": text_hash(json.dumps(data, sort_keys=True)) for name, data in deciding.items()}
     return Identity(asked, hashes | versions())
 
 
-def draws(asked: str) -> int:
-    """How many draws a campaign asks for."""
+def samples(asked: str) -> int:
+    """Number of samples of a campaign."""
     return _plain(asked)["trials"]
 
 
 def _decisive(asked: str) -> dict[str, Any]:
-    """What decides about the rows; not what is required of them, and how 2 and 2.0 are told apart.
+    """The part of a campaign file that determines the rows, without requirements; 2 and 2.0 are equal.
 
-    How many there are does only in a Latin hypercube, where every point depends on it; the order of keys does where
-    trials are numbered by it.
+    The number of samples is part of it only for a Latin hypercube, where every point depends on it. The order of keys is
+    part of it because it determines the numbers of the trials.
     """
     data: dict[str, Any] = {**_plain(asked), "requirements": {}}
     orders = {"vary": data["vary"], "cross": data["cross"]}
@@ -93,14 +93,14 @@ def _as_floats(value: Any) -> Any:
     return float(value) if is_number(value) else value
 
 
-# What stands in a store, and what is asked now: parsing takes long where much is crossed.
+# The stored file and the current one: parsing is slow for large sweeps.
 @functools.lru_cache(maxsize=2)
 def _plain(asked: str) -> dict[str, Any]:
     return parse(asked, "", Path(), "CAMPAIGN").data
 
 
 def difference(before: Any, now: Any, path: str = "") -> str:
-    """The first key in which two campaigns differ, in words."""
+    """A sentence about the first key in which two campaigns differ."""
     if isinstance(before, dict) and isinstance(now, dict):
         for key in dict.fromkeys([*before, *now]):
             if before.get(key) != now.get(key):

@@ -1,4 +1,4 @@
-"""Why trials were refused: the store has their number only, building them once more says it."""
+"""Why trials are invalid: the store has only their numbers, so a few of them are built again to get the error."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,23 +8,23 @@ from undertow.campaign.trials import Trials
 from undertow.core.errors import BadInput
 from undertow.scenario.part_cache import PartCache
 
-# Trials that are looked at: building one takes milliseconds.
+# Trials that are built again: each takes milliseconds.
 _MOST = 200
 
 
-class Refusal(NamedTuple):
-    """Trials that were refused for the same reason."""
+class InvalidTrials(NamedTuple):
+    """Trials that are invalid for the same reason."""
 
-    why: str  # with the numbers of the first of them
+    why: str  # the error of the first of them
     trials: int
 
 
-def refusals(several: Trials, rows: Sequence[int]) -> tuple[Refusal, ...]:
-    """Reasons, the most frequent first.
+def reasons(several: Trials, rows: Sequence[int]) -> tuple[InvalidTrials, ...]:
+    """The reasons why trials are invalid, the most frequent first.
 
     Args:
         several: the trials.
-        rows: numbers of those that were refused; only the first 200 are looked at.
+        rows: numbers of the invalid trials; only the first 200 are built again.
     """
     part_cache, found = PartCache(), dict[tuple[str, str], list[str]]()
     for row in rows[:_MOST]:
@@ -32,4 +32,4 @@ def refusals(several: Trials, rows: Sequence[int]) -> tuple[Refusal, ...]:
             build_trial(several, part_cache, int(row))
         except BadInput as error:
             found.setdefault((error.name, error.must), []).append(str(error))
-    return tuple(Refusal(each[0], len(each)) for each in sorted(found.values(), key=len, reverse=True))
+    return tuple(InvalidTrials(each[0], len(each)) for each in sorted(found.values(), key=len, reverse=True))

@@ -1,10 +1,10 @@
-"""Values of a scenario in words: names of what is crossed or chosen."""
+"""Labels of the values that a campaign sweeps or chooses."""
 
 from typing import Any
 
 
 def by_name(values: list[Any]) -> dict[str, Any]:
-    """Values under names of their own: a part's kind and preset where those tell it from the others, else all of it."""
+    """Values by unique names: the kind and preset of a part where these are unique, otherwise all its options."""
     short = [_short(value) for value in values]
     names = [name if short.count(name) == 1 else words(value) for name, value in zip(short, values, strict=True)]
     unique = [name if names.count(name) == 1 else f"{name} {i + 1}" for i, name in enumerate(names)]
@@ -12,7 +12,7 @@ def by_name(values: list[Any]) -> dict[str, Any]:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value of a scenario is one; true and false are none."""
+    """Whether a value of a scenario is a number; booleans are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -23,7 +23,7 @@ def _short(value: Any) -> str:
 
 
 def words(value: Any) -> str:
-    """A value of a scenario in a line: parts by their kind and what else is said of them."""
+    """A value of a scenario in one line; a part by its kind and options."""
     if isinstance(value, dict):
         kind = [str(value["kind"])] if "kind" in value else []
         return " ".join(kind + [f"{key}={words(one)}" for key, one in value.items() if key != "kind"])

@@ -1,4 +1,4 @@
-"""Where trials stand in a store: along an axis for every key of `cross`, and one for the draws; a block is a task."""
+"""Layout of a results store: an axis for every key of `cross`, and one for the samples; a block is a task."""
 
 import math
 from typing import NamedTuple
@@ -8,26 +8,26 @@ from jaxtyping import Int
 
 from undertow.campaign.campaign_schema import Campaign
 
-DRAWS = "draw"
+SAMPLES = "sample"
 
 
 class Layout(NamedTuple):
     """Axes of the store, cut into blocks.
 
     Attributes:
-        crossed: number of values of every key of `cross`.
-        draws: number of draws.
-        chunk: size of a block along every axis, that of the draws last.
+        swept: number of values of every key of `cross`.
+        samples: number of samples.
+        chunk: size of a block along every axis, that of the samples last.
     """
 
-    crossed: tuple[int, ...]
-    draws: int
+    swept: tuple[int, ...]
+    samples: int
     chunk: tuple[int, ...]
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Of the whole."""
-        return (*self.crossed, self.draws)
+        return (*self.swept, self.samples)
 
     @property
     def blocks(self) -> tuple[int, ...]:
@@ -40,9 +40,9 @@ class Layout(NamedTuple):
         return math.prod(self.blocks)
 
     def block(self, task: int) -> tuple[int, ...]:
-        """Where the block of a task is. All of the first draws come first: further draws are further tasks."""
-        draw, *crossed = np.unravel_index(task, (self.blocks[-1], *self.blocks[:-1]))
-        return (*map(int, crossed), int(draw))
+        """Index of the block of a task. Tasks of the first samples come first, so that new samples are new tasks."""
+        sample, *swept = np.unravel_index(task, (self.blocks[-1], *self.blocks[:-1]))
+        return (*map(int, swept), int(sample))
 
     def region(self, task: int) -> tuple[slice, ...]:
         """What the block of a task covers."""
@@ -55,21 +55,21 @@ class Layout(NamedTuple):
 
     def trials(self, task: int) -> Int[np.ndarray, " trials"]:
         """Numbers of the trials of a task, in the order of its block."""
-        *crossed, draws = self.region(task)
-        combinations = np.arange(math.prod(self.crossed)).reshape(self.crossed)
-        numbers = np.arange(draws.start, draws.stop) * combinations.size
-        return (combinations[(*crossed, None)] + numbers).reshape(-1)
+        *swept, samples = self.region(task)
+        combinations = np.arange(math.prod(self.swept)).reshape(self.swept)
+        numbers = np.arange(samples.start, samples.stop) * combinations.size
+        return (combinations[(*swept, None)] + numbers).reshape(-1)
 
     def partial(self) -> range:
-        """Tasks that would have more trials if there were more draws."""
+        """Tasks that would contain more trials if there were more samples."""
         beside = math.prod(self.blocks[:-1])
-        return range(self.draws // self.chunk[-1] * beside, self.tasks)
+        return range(self.samples // self.chunk[-1] * beside, self.tasks)
 
 
 def layout(campaign: Campaign) -> Layout:
-    """That of a new store: about as many trials in a task as are asked for, rather draws than combinations."""
-    crossed = tuple(len(entries) for entries in campaign.cross.values())
-    chunk = [min(campaign.chunk, max(campaign.trials, campaign.chunk // math.prod(crossed)))]
-    for count in reversed(crossed):
+    """Layout of a new store: about `chunk` trials per task, preferably along the samples."""
+    swept = tuple(len(entries) for entries in campaign.cross.values())
+    chunk = [min(campaign.chunk, max(campaign.trials, campaign.chunk // math.prod(swept)))]
+    for count in reversed(swept):
         chunk.insert(0, min(count, campaign.chunk // math.prod(chunk)) or 1)
-    return Layout(crossed, campaign.trials, tuple(chunk))
+    return Layout(swept, campaign.trials, tuple(chunk))

@@ -1,4 +1,4 @@
-"""What a Dask worker on this machine does first: Ctrl-C is for the process that conducts, which ends its workers."""
+"""Preload of Dask workers on this machine: they ignore Ctrl-C, and the main process ends them."""
 
 import signal
 from typing import Any

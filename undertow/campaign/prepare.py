@@ -1,4 +1,4 @@
-"""A campaign from its file, with the first trials built: mistakes are told before anything is flown."""
+"""Read a campaign and build its first trials, so that errors appear before the first run."""
 
 import contextlib
 from collections.abc import Iterable, Iterator
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from undertow.analysis.metrics import OVERALL
 from undertow.campaign import task as tasks
 from undertow.campaign.campaign_schema import Campaign
-from undertow.campaign.invalid_trials import refusals
+from undertow.campaign.invalid_trials import reasons
 from undertow.campaign.reading import read_campaign, whole
 from undertow.campaign.requirements import too_few
 from undertow.campaign.trials import Trials, trials
@@ -23,22 +23,22 @@ from undertow.scenario.schema import Loop
 
 
 class Prepared(NamedTuple):
-    """A campaign that could be flown."""
+    """A campaign that is ready to run."""
 
     trials: Trials
     text: str
     folder: Path
     first: Built  # a trial
-    named: tuple[dict[str, Any], ...]  # scenarios in which all files that trials name stand with their contents
-    advice: tuple[str, ...]  # what is odd about it, or about the first trials
+    named: tuple[dict[str, Any], ...]  # scenarios that include the contents of all files they name
+    advice: tuple[str, ...]  # warnings about the campaign or its first trials
 
 
 def prepare(path: Path, allow_code: bool = False) -> Prepared:
-    """Read a campaign, and build the first trials of every combination, so that mistakes are told before anything runs.
+    """Read a campaign and build the first trials of every combination, so that errors appear before the first run.
 
     Args:
-        path: of its file.
-        allow_code: whether the code that an earlier run.nc names may run, if that is its scenario.
+        path: the campaign file.
+        allow_code: whether the code that an earlier run.nc names may run, if the scenario is one.
 
     Raises:
         BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
@@ -54,30 +54,30 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
         _check(campaign, built.scenario.loop)
         for sentence in (*built.advice(), *vehicle_warnings(built)):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
-    told = (*too_few(campaign), *_refused(several, here), *advice.values())
+    advice_given = (*too_few(campaign), *_invalid(several, here), *advice.values())
     named = (*(built.resolved for _, built in firsts), *_chosen(several, here))
-    return Prepared(several, text, folder, firsts[0][1], named, told)
+    return Prepared(several, text, folder, firsts[0][1], named, advice_given)
 
 
 def _chosen(several: Trials, here: tasks.Site) -> Iterator[dict[str, Any]]:
-    """The first trial with each entry of what is chosen, where it can be built: it may name another file."""
+    """The first trial with each entry of every choice, where it can be built: an entry may name another file."""
     for data in several.alternatives():
         with contextlib.suppress(BadInput):
             yield tasks.build_data(several, here.part_cache, data).resolved
 
 
-def _refused(several: Trials, here: tasks.Site) -> tuple[str, ...]:
-    """Why some of the first trials cannot be built: rather now than after a night."""
+def _invalid(several: Trials, here: tasks.Site) -> tuple[str, ...]:
+    """Why some of the first trials cannot be built."""
     rows = several.probes()
-    found = refusals(several, [row for row in rows if row not in here.probes()])
-    return tuple(f"{one.trials} of the first {len(rows)} trials are refused: {one.why}" for one in found)
+    found = reasons(several, [row for row in rows if row not in here.probes()])
+    return tuple(f"{one.trials} of the first {len(rows)} trials are invalid: {one.why}" for one in found)
 
 
 def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Built]:
-    """A trial of a combination that can be built.
+    """The first trial of a combination that can be built.
 
     Raises:
-        BadInput: none of the first can; what is wrong with the very first.
+        BadInput: none of the first trials can be built; the error of the first one.
     """
     rows = several.first(combination)
     for row in rows:
@@ -87,7 +87,7 @@ def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Bu
 
 
 def _check(campaign: Campaign, loop: Loop) -> None:
-    """What a campaign asks of its runs."""
+    """Check what a campaign requires of its runs."""
     if loop.kind != "sampled":
         raise BadInput("scenario.loop.kind", "be sampled in a campaign", loop.kind)
     for name in campaign.requirements:
@@ -97,7 +97,7 @@ def _check(campaign: Campaign, loop: Loop) -> None:
         return
     for key in (*campaign.vary, *campaign.cross):
         if key in ("loop", "loop.dt", "loop.duration"):
-            raise BadInput("series", "be of runs of one length and sampling time", f"beside {key}, which differs")
+            raise BadInput("series", "be of runs of one length and sampling time", f"given together with {key}")
     for i, name in enumerate(campaign.series.signals):
         checks.choice(f"series.signals[{i}]", name, [field for field in Signals._fields if field != "books"])
     if not whole_steps(campaign.series.every, loop.dt):
@@ -108,12 +108,13 @@ def _check(campaign: Campaign, loop: Loop) -> None:
 
 
 def _check_shapes(campaign: Campaign, several: Iterable[Built]) -> None:
-    """That series have the same shape in all trials, as one array holds them."""
+    """Check that series have the same shape in all trials, because one array holds them."""
     if campaign.series is None:
         return
-    hint = "Leave it out, or make a campaign for each of them"
+    hint = "Leave it out, or run a separate campaign for each of them"
     loops = [built.closed_loop for built in several]
     if len({(loop.plant.outputs, loop.plant.inputs()) for loop in loops}) > 1:
         raise BadInput("series", "be of plants with the same outputs and inputs", "of several", hint=hint)
     if "weights" in campaign.series.signals and len({rules(loop) for loop in loops}) > 1:
-        raise BadInput("series.signals", "be without weights where laws have different rules", "with", hint=hint)
+        must = "not contain weights where controllers have different numbers of rules"
+        raise BadInput("series.signals", must, "with weights", hint=hint)

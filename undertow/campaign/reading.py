@@ -1,4 +1,4 @@
-"""Reading campaign files, and writing them down whole: with the scenario inside, so that a store stands alone."""
+"""Read a campaign file, and write it as one self-contained text with the scenario inside."""
 
 from pathlib import Path
 
@@ -7,10 +7,10 @@ from undertow.scenario.reading import Text, dump, parse, read
 
 
 def read_campaign(path: Path) -> tuple[Campaign, Text]:
-    """A campaign from its file, and the text that it stands in.
+    """A campaign from its file, and the text of the file.
 
     Raises:
-        BadInput: anything wrong with it.
+        BadInput: the file is not a valid campaign.
     """
     text = read(path, "CAMPAIGN")
     return validate(text), text
@@ -23,6 +23,6 @@ def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
 
 
 def whole(campaign: Campaign, scenario: dict) -> str:
-    """YAML with everything that is asked; `chunk` and free text say nothing about the results."""
+    """The complete campaign as YAML, without `chunk` and free text, which do not affect the results."""
     data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"})
     return dump(data | {"scenario": scenario})

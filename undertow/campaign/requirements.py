@@ -1,4 +1,4 @@
-"""Whether enough trials keep to what is required of a metric."""
+"""Whether enough trials keep a requirement on a metric."""
 
 import math
 from typing import Any
@@ -11,23 +11,23 @@ from undertow.campaign.campaign_schema import Campaign, Requirement
 _CONFIDENCE = 0.95
 
 
-def verdict(rows: xr.Dataset, name: str, wanted: Requirement) -> dict[str, Any]:
-    """Share of the trials that keep to it, with the interval of Clopper and Pearson (1934), exact for random draws.
+def verdict(rows: xr.Dataset, name: str, required: Requirement) -> dict[str, Any]:
+    """Share of the trials that keep a requirement, with the interval of Clopper and Pearson (1934).
 
-    Trials that failed do not keep to it.
+    The interval is exact for random samples. Failed trials do not keep the requirement.
 
     Args:
-        rows: of the trials that were flown.
-        name: of the metric.
-        wanted: of it.
+        rows: rows of the trials that ran.
+        name: name of the metric.
+        required: the requirement.
     """
-    kept, count = int((rows[name].values < wanted.below).sum()), max(1, rows.sizes["trial"])
+    kept, count = int((rows[name].values < required.below).sum()), max(1, rows.sizes["trial"])
     interval = binomtest(kept, count).proportion_ci(_CONFIDENCE, method="exact")
-    holds = "holds" if interval.low >= wanted.share else "fails" if interval.high < wanted.share else "open"
+    holds = "holds" if interval.low >= required.share else "fails" if interval.high < required.share else "open"
     return {
         "metric": name,
-        "below": wanted.below,
-        "share": wanted.share,
+        "below": required.below,
+        "share": required.share,
         "kept": kept / count,
         "interval": [float(interval.low), float(interval.high)],
         "verdict": holds,
@@ -35,15 +35,15 @@ def verdict(rows: xr.Dataset, name: str, wanted: Requirement) -> dict[str, Any]:
 
 
 def enough(share: float) -> int:
-    """Trials of which all must keep to it for a share to be shown: the interval of n out of n starts there."""
+    """Number of trials without a failure that demonstrates a share: the interval of n out of n starts there."""
     return math.ceil(math.log((1 - _CONFIDENCE) / 2) / math.log(share))
 
 
 def too_few(campaign: Campaign) -> tuple[str, ...]:
-    """A sentence for each requirement that so few trials cannot show to hold."""
+    """A sentence for each requirement that the number of trials cannot demonstrate."""
     return tuple(
-        f"`requirements.{name}.share` is {wanted.share:g}: {campaign.trials} trials cannot show it even if all keep to "
-        f"it; {enough(wanted.share)} can"
-        for name, wanted in campaign.requirements.items()
-        if campaign.trials < enough(wanted.share)
+        f"`requirements.{name}.share` is {required.share:g}, which takes at least {enough(required.share)} trials without a "
+        f"failure to demonstrate; `trials` is {campaign.trials}"
+        for name, required in campaign.requirements.items()
+        if campaign.trials < enough(required.share)
     )

@@ -1,4 +1,4 @@
-"""A campaign from its file to its results: what is missing is flown, whoever flies it."""
+"""Run the missing tasks of a campaign with an executor and write their results to the store."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -20,35 +20,35 @@ Executor = Callable[[Callable[..., Columns], Sequence[Work]], Iterator[tuple[int
 
 
 class Tally(NamedTuple):
-    """How far a campaign is; what was done before it was gone on with counts as done only."""
+    """Progress of a campaign. `failed` and `invalid` do not count trials done before it was resumed."""
 
     trials: int
     done: int
     failed: int
-    refused: int
+    invalid: int
 
     def after(self, status: np.ndarray) -> "Tally":
-        """Once a task more is done."""
-        refused = int(np.count_nonzero(status == tasks.REFUSED))
-        failed = int(np.count_nonzero(status)) - refused
-        return Tally(self.trials, self.done + len(status), self.failed + failed, self.refused + refused)
+        """Progress after one more task."""
+        invalid = int(np.count_nonzero(status == tasks.INVALID))
+        failed = int(np.count_nonzero(status)) - invalid
+        return Tally(self.trials, self.done + len(status), self.failed + failed, self.invalid + invalid)
 
 
 Watch = Callable[[Tally], None]
 
 
 def run_campaign(prepared: Prepared, out: Path, executor: Executor, watch: Watch) -> None:
-    """Fly what is missing; what is done stays done.
+    """Run the missing tasks of a campaign.
 
     Args:
         prepared: the campaign.
         out: folder of the store.
-        executor: flies tasks.
-        watch: told after each task.
+        executor: runs the tasks.
+        watch: called after each task.
 
     Raises:
         BadInput: the folder holds another campaign.
-        OSError: the disk is full, or the cluster is gone; what was done is kept.
+        OSError: the disk is full, or the cluster is lost; finished tasks are kept.
     """
     several, text, folder = prepared.trials, prepared.text, prepared.folder
     store = Store(

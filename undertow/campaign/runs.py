@@ -1,4 +1,4 @@
-"""What is flown of a trial: its numbers, and how."""
+"""The numbers and the plan of a trial."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,19 +25,19 @@ def run_of(built: Built) -> Run:
 
 
 def planned(built: Built, asked: Series | None) -> Plan:
-    """How a trial is flown, and what is kept of it."""
+    """Steps and recorded series of a trial."""
     loop = built.scenario.loop
     every, signals = (round(asked.every / loop.dt), tuple(asked.signals)) if asked else (0, ())
     return Plan(round(loop.duration / loop.dt), loop.dt, every, signals, loop.method, loop.substeps)
 
 
 def leaves(run: Run) -> list[Any]:
-    """The numbers of a trial, in an order of their own."""
+    """The numbers of a trial, in the order of its tree."""
     return [leaf for leaf in jax.tree.leaves(run) if eqx.is_array(leaf)]
 
 
 def shared_numbers(several: Sequence[Built]) -> dict[Any, list[np.ndarray | None]]:
-    """Numbers that are the same in all of a structure, of which there are two at least; None for the others."""
+    """Numbers that are equal in all trials of a structure with at least two trials; None for the others."""
     probes: dict[Any, list[list[Any]]] = {}
     for built in several:
         run = run_of(built)

@@ -1,4 +1,4 @@
-"""Where the draws of a campaign lie: points of the unit cube, and what they stand for."""
+"""Samples of a campaign: points of the unit cube, their seeds, and the parameter values they stand for."""
 
 import functools
 from typing import Any
@@ -8,13 +8,13 @@ from jaxtyping import Float
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from undertow.campaign.campaign_schema import Campaign, Spread
+from undertow.campaign.campaign_schema import Campaign, Distribution
 from undertow.core.errors import BadInput
 
-# Of the seed: what else is drawn from it.
+# Streams of random numbers from one seed.
 _POINTS, _SEEDS = 0, 1
 
-# Draws that are made at once, and how many such blocks are kept. A power of two, as Sobol's sequence likes it.
+# Samples per block, and number of cached blocks. Sobol's sequence needs a power of two.
 _BLOCK, _KEPT = 4096, 8
 _MOST_LATIN = 10_000_000
 
@@ -22,16 +22,16 @@ _MOST_LATIN = 10_000_000
 _EDGE = 2.0**-53
 
 
-class Draws:
-    """Points of the unit cube and seeds: the same for every machine and every way of running.
+class Samples:
+    """Points of the unit cube and seeds, equal on every machine and with every executor.
 
-    A block of them is made when it is asked for: a billion draws take no memory. Only a Latin hypercube is made whole.
+    Blocks are computed on demand, so that a billion samples take no memory. Only a Latin hypercube is computed as a whole.
 
     Args:
-        campaign: how many, how, and from which seed.
+        campaign: number of samples, design and seed.
 
     Raises:
-        BadInput: too many for a Latin hypercube.
+        BadInput: too many samples for a Latin hypercube.
     """
 
     def __init__(self, campaign: Campaign):
@@ -40,20 +40,20 @@ class Draws:
             raise BadInput("trials", f"be at most {_MOST_LATIN} with `design: latin`", campaign.trials, hint=hint)
         self._campaign = campaign
         self._block = campaign.trials if campaign.design == "latin" else _BLOCK
-        self._points = functools.lru_cache(_KEPT)(self._made)
-        self._seeds = functools.lru_cache(_KEPT)(self._sown)
+        self._points = functools.lru_cache(_KEPT)(self._make_points)
+        self._seeds = functools.lru_cache(_KEPT)(self._make_seeds)
 
-    def point(self, draw: int) -> Float[np.ndarray, " k"]:
-        """Of a draw: in [0, 1), in the order of `vary`."""
-        block, row = divmod(draw, self._block)
+    def point(self, sample: int) -> Float[np.ndarray, " k"]:
+        """Point of a sample, shape (k,), in [0, 1), in the order of `vary`."""
+        block, row = divmod(sample, self._block)
         return self._points(block)[row]
 
-    def seed(self, draw: int) -> int:
-        """Of everything random in it."""
-        block, row = divmod(draw, _BLOCK)
+    def seed(self, sample: int) -> int:
+        """Seed of all random numbers of a sample."""
+        block, row = divmod(sample, _BLOCK)
         return int(self._seeds(block)[row])
 
-    def _made(self, block: int) -> Float[np.ndarray, "rows k"]:
+    def _make_points(self, block: int) -> Float[np.ndarray, "rows k"]:
         seed, dimensions = self._campaign.seed, len(self._campaign.vary)
         if not dimensions:
             return np.zeros((self._block, 0))
@@ -67,12 +67,12 @@ class Draws:
             sequence.fast_forward(block * self._block)
         return sequence.random(self._block)
 
-    def _sown(self, block: int) -> np.ndarray:
+    def _make_seeds(self, block: int) -> np.ndarray:
         return np.random.default_rng([self._campaign.seed, _SEEDS, block]).integers(0, 2**32, _BLOCK, dtype=np.uint32)
 
 
-def value(spread: Spread, share: float) -> Any:
-    """What a coordinate in [0, 1) of a point stands for: the quantile of the distribution."""
+def value(spread: Distribution, share: float) -> Any:
+    """Parameter value for a coordinate in [0, 1): the quantile of the distribution."""
     if spread.uniform is not None:
         low, high = spread.uniform
         return low + share * (high - low)

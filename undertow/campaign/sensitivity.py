@@ -1,4 +1,4 @@
-"""What the metrics of a campaign depend on: rank correlations with numbers, distributions by choice."""
+"""Sensitivity of the metrics: rank correlations with sampled numbers, distributions by choice."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 
 def quantiles(values: np.ndarray) -> dict[str, float]:
-    """5 %, median and 95 % of some numbers, those that are not defined left out; some may be infinite."""
+    """5 %, 50 % and 95 % quantiles of numbers, without undefined ones; some may be infinite."""
     known = values[~np.isnan(values)]
     method: Any = "linear" if np.isfinite(known).all() else "higher"
     found = np.quantile(known, QUANTILES, method=method) if known.size else np.full(len(QUANTILES), np.nan)
@@ -19,7 +19,7 @@ def quantiles(values: np.ndarray) -> dict[str, float]:
 
 
 def correlations(results: Results) -> dict[str, dict[str, float]]:
-    """Rank correlation (Spearman) of every metric with every number that is drawn: mean over the combinations."""
+    """Rank correlation (Spearman) of every metric with every sampled number, mean over the combinations."""
     found: dict[str, dict[str, float]] = {}
     groups = [results.lasted & (results.combinations == number) for number in np.unique(results.combinations)]
     for key in results.campaign.vary:
@@ -39,13 +39,13 @@ def correlations(results: Results) -> dict[str, dict[str, float]]:
 
 
 def by_choice(results: Results) -> dict[str, dict[str, Any]]:
-    """For what is drawn from words or parts: trials, failures and metrics with each, over all combinations."""
+    """Trials, failures and metrics for every entry of a choice, over all combinations."""
     found: dict[str, dict[str, Any]] = {}
     for key in results.campaign.vary:
         column = results.rows[f"vary:{key}"]
         for i, word in enumerate(column.attrs.get("choices", ())):
             chosen = column.values == i
-            lasted, failed = chosen & results.lasted, chosen & results.flown & ~results.lasted
+            lasted, failed = chosen & results.lasted, chosen & results.ran & ~results.lasted
             metrics = {name: quantiles(results.rows[name].values[lasted]) for name in results.metrics if lasted.any()}
             counts = {"trials": int(chosen.sum()), "failed": int(failed.sum())}
             found.setdefault(key, {})[word] = counts | {"metrics": metrics}

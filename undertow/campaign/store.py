@@ -1,4 +1,4 @@
-"""Where the results of a campaign stand: one zarr v3 store, a chunk of every array per task, its flag written last.
+"""Results store of a campaign: one zarr v3 store, one chunk of every array per task, with the flag of the task last.
 
 import xarray as xr
 results = xr.open_zarr("runs/my-campaign/trials.zarr", consolidated=False)
@@ -13,7 +13,7 @@ import xarray as xr
 
 from undertow.campaign.arrays import check_array, chunk_file, flags, found_array, new_array, opened
 from undertow.campaign.columns import DONE, FLAGS, INPUT_UNIT, Label
-from undertow.campaign.fingerprint import Identity, draws
+from undertow.campaign.fingerprint import Identity, samples
 from undertow.campaign.layout import Layout
 from undertow.core.disk import alone, sync
 
@@ -22,11 +22,11 @@ class Store:
     """Rows of trials, written by tasks in any order.
 
     Args:
-        path: folder of the store; made when missing.
-        layout: of the trials; a store that is there already keeps its own blocks.
-        identity: of the campaign; a store that is there must be of the same, or of the same with fewer draws.
-        labels: of columns by name.
-        coordinates: along dimensions, by name.
+        path: folder of the store; created if missing.
+        layout: layout of the trials; an existing store keeps its own blocks.
+        identity: fingerprint of the campaign; an existing store must have the same, possibly with fewer samples.
+        labels: labels of the columns, by name.
+        coordinates: coordinates of the dimensions, by name.
 
     Raises:
         BadInput: the folder belongs to another campaign, or another process is writing to it.
@@ -48,8 +48,8 @@ class Store:
             self._held = held.pop_all()
 
     def _open(self, identity: Identity, coordinates: Mapping[str, xr.Variable]) -> None:
-        """What is there of an earlier process, and what is not there yet."""
-        for left in self._path.rglob("*.partial"):  # by a process that was killed while zarr wrote a file
+        """Open the arrays of an earlier process, and create the missing ones."""
+        for left in self._path.rglob("*.partial"):  # from a process killed while zarr wrote a file
             left.unlink()
         self._group = opened(self._path)
         known = dict(self._group.attrs)
@@ -63,14 +63,14 @@ class Store:
             label, chunk = (FLAGS, (1,)) if name == DONE else (self._labels[name], self.layout.chunk)
             check_array(array, label, chunk, self._path)
         if known:
-            self._grow(draws(known["campaign"]))
+            self._grow(samples(known["campaign"]))
         if known.get("campaign") != identity.asked:
-            # All at once, as no process can be killed between two of them; and last, as a growth may be cut short.
+            # In one write, so that no process is killed between two; and last, because growing may be interrupted.
             asked = {"campaign": identity.asked, "chunk": list(self.layout.chunk)}
             if "input_rms" in self._labels:
                 asked[INPUT_UNIT] = self._labels["input_rms"].attributes["units"]
             self._group.update_attributes({**identity.attributes, **asked})
-        for name, one in coordinates.items():  # always: a process may have been killed before their values stood there
+        for name, one in coordinates.items():  # always: an earlier process may have been killed before it wrote the values
             label = Label((name,), one.attrs, one.dtype.str)
             new_array(self._group, name, one.shape, one.shape, label)[:] = one.values
         if DONE not in self._arrays:
@@ -78,9 +78,9 @@ class Store:
         self._settle(*self._arrays, *coordinates)
 
     def _grow(self, before: int) -> None:
-        """Make room for further draws."""
-        if DONE in self._arrays and before < self.layout.draws:
-            for task in self.layout._replace(draws=before).partial():
+        """Make room for more samples."""
+        if DONE in self._arrays and before < self.layout.samples:
+            for task in self.layout._replace(samples=before).partial():
                 self._arrays[DONE][task] = 0
         for name, array in self._arrays.items():
             own = (self.layout.tasks,) if name == DONE else self.layout.shape
@@ -89,19 +89,19 @@ class Store:
                 array.resize(shape)
 
     def missing(self) -> list[int]:
-        """Tasks to be done; those whose rows cannot be read are among them."""
+        """Tasks to run, including those whose rows cannot be read."""
         done = flags(self._arrays[DONE], self.layout.tasks)
         return [task for task in range(self.layout.tasks) if not (done[task] and self._whole(task))]
 
     def write(self, task: int, columns: Mapping[str, np.ndarray]) -> None:
-        """All rows of a task.
+        """Write all rows of a task.
 
         Args:
             task: its number.
             columns: by name, one entry per trial.
 
         Raises:
-            OSError: the disk is full, for example; the task then counts as not done.
+            OSError: for example, the disk is full; the task then counts as not done.
         """
         region = self.layout.region(task)
         covered = [one.stop - one.start for one in region]
@@ -115,11 +115,11 @@ class Store:
         self._arrays[DONE][task] = 1
 
     def close(self) -> None:
-        """Let others write."""
+        """Release the lock."""
         self._held.close()
 
     def _settle(self, *names: str) -> None:
-        """Put the metadata of arrays on the disk: without them all is lost; a torn chunk is noticed and made again."""
+        """Flush the metadata of arrays to disk: without them all chunks are lost; a damaged chunk can be computed again."""
         for folder in (*(self._path / name for name in names), self._path):
             sync(folder / "zarr.json")
             sync(folder)
@@ -131,6 +131,6 @@ class Store:
                 array = self._arrays[name]
                 array[region]
                 chunk_file(self._path, name, block, array.ndim).stat()
-        except Exception:  # whatever a codec says of a torn chunk; for one that is gone zarr has zeros
+        except Exception:  # a codec raises many kinds of errors for a damaged chunk; zarr reads a missing one as zeros
             return False
         return True

@@ -1,4 +1,4 @@
-"""The results of a campaign as they stand in its store."""
+"""Results of a campaign, read from its store."""
 
 import itertools
 from pathlib import Path
@@ -11,33 +11,33 @@ from undertow.analysis.metric_meanings import MEANINGS
 from undertow.campaign.arrays import check_array, chunk_file, flags, to_be_read
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.columns import DONE, FLAGS, INPUT_UNIT, trial_labels
-from undertow.campaign.layout import DRAWS, Layout, layout
+from undertow.campaign.layout import SAMPLES, Layout, layout
 from undertow.campaign.reading import read_text
 from undertow.campaign.run_campaign import STORE
-from undertow.campaign.task import REFUSED
+from undertow.campaign.task import INVALID
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 
 
 class Results(NamedTuple):
-    """A campaign's rows, and what they were asked for."""
+    """The rows of a campaign and its file."""
 
     campaign: Campaign
     rows: xr.Dataset  # of the tasks that are done
 
     @property
     def total(self) -> int:
-        """Trials that were asked for."""
+        """Number of trials of the campaign."""
         return self.campaign.number
 
     @property
     def metrics(self) -> list[str]:
-        """Names of those that are defined for any trial that lasted, in the order of tables."""
+        """Metrics that are defined for at least one completed trial, in the order of tables."""
         known = lambda name: name in self.rows and not np.isnan(self.rows[name].values[self.lasted]).all()
         return [name for name in MEANINGS if known(name)]
 
     def unit(self, metric: str) -> str:
-        """Of a metric; nothing for a plain number."""
+        """Unit of a metric; empty for a dimensionless number."""
         return self.rows[metric].attrs["units"].removesuffix("1") if metric in self.rows else ""
 
     @property
@@ -47,28 +47,28 @@ class Results(NamedTuple):
 
     @property
     def lasted(self) -> np.ndarray:
-        """Which rows are of runs that reached their end."""
+        """Which rows are of completed runs."""
         return self.rows["status"].values == int(Status.OK)
 
     @property
-    def flown(self) -> np.ndarray:
-        """Which rows are of runs that began: their scenario could be built."""
-        return self.rows["status"].values != REFUSED
+    def ran(self) -> np.ndarray:
+        """Which rows are of valid trials: their scenario could be built and ran."""
+        return self.rows["status"].values != INVALID
 
-    def crossed(self, trial: int) -> tuple[str, ...]:
+    def swept(self, trial: int) -> tuple[str, ...]:
         """Names of the values of `cross` in a trial."""
         return self.named(self._combination(trial))
 
     def named(self, combination: int) -> tuple[str, ...]:
-        """Those in a combination."""
+        """Names of the values of `cross` in a combination."""
         return list(itertools.product(*self.campaign.cross.values()))[combination]
 
     def _combination(self, trial: Any) -> Any:
-        """Of one trial or several, as `Trials` numbers them."""
+        """Combination of one trial or several, as numbered by `Trials`."""
         return trial % (self.campaign.number // self.campaign.trials)
 
-    def drawn(self, trial: int) -> dict[str, Any]:
-        """What is drawn for a trial, by key path: numbers, or words for choices that are none."""
+    def sampled(self, trial: int) -> dict[str, Any]:
+        """Sampled values of a trial, by key path: numbers, or the labels of choices."""
         row = self.rows.sel(trial=trial)
         found = {}
         for key in self.campaign.vary:
@@ -79,18 +79,18 @@ class Results(NamedTuple):
 
 
 def load(folder: Path) -> Results:
-    """The results in the folder of a campaign.
+    """Read the results in the folder of a campaign.
 
     Raises:
-        FileNotFoundError: there are none.
-        BadInput: its metadata are not those that it was written with.
-        OSError: they are damaged.
+        FileNotFoundError: the folder has no results.
+        BadInput: the metadata of the store have changed since it was written.
+        OSError: the store is damaged.
     """
     path = folder / STORE
     try:
         group = to_be_read(path)
         if "campaign" not in group.attrs:
-            raise FileNotFoundError(path)  # of a process that was killed before anything stood there
+            raise FileNotFoundError(path)  # from a process killed before its first write
         campaign, _ = read_text(str(group.attrs["campaign"]), Path())
         stored = layout(campaign)._replace(chunk=tuple(group.attrs["chunk"]))
         labels = trial_labels(campaign, str(group.attrs.get(INPUT_UNIT, "")))
@@ -100,22 +100,22 @@ def load(folder: Path) -> Results:
         return Results(campaign, _rows(group, campaign, stored).isel(trial=_done(group, campaign, stored, path)))
     except (FileNotFoundError, BadInput):
         raise
-    except Exception as error:  # zarr's words for what is not as it was written
-        raise OSError(f"{path} is damaged ({error}); `undertow campaign --resume` mends what can be mended") from error
+    except Exception as error:  # zarr raises many kinds of errors for damaged files
+        raise OSError(f"{path} is damaged ({error}); `undertow campaign --resume` repairs it where possible") from error
 
 
 def _rows(group: Any, campaign: Campaign, stored: Layout) -> xr.Dataset:
-    """All of the store by trial, without series. While room for further draws is made, arrays may be longer."""
-    axes, region = (*campaign.cross, DRAWS), tuple(slice(0, size) for size in stored.shape)
+    """All rows of the store by trial, without series. Arrays may be longer while a process makes room for more samples."""
+    axes, region = (*campaign.cross, SAMPLES), tuple(slice(0, size) for size in stored.shape)
     arrays = {name: group[name] for name in trial_labels(campaign) if name in group and name != "trial"}
     rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})
     if arrays:
-        rows = rows.stack({"trial": (DRAWS, *campaign.cross)}, create_index=False)  # as they are numbered
+        rows = rows.stack({"trial": (SAMPLES, *campaign.cross)}, create_index=False)  # as they are numbered
     return rows.assign_coords(trial=np.arange(campaign.number)).assign_attrs(group.attrs)
 
 
 def _done(group: Any, campaign: Campaign, stored: Layout, path: Path) -> np.ndarray:
-    """Which trials are of tasks that are done."""
+    """Which trials belong to finished tasks."""
     done, names = np.zeros(campaign.number, dtype=bool), trial_labels(campaign)
     for task in np.flatnonzero(flags(group[DONE], stored.tasks)) if DONE in group else ():
         block = stored.block(task)

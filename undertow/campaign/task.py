@@ -1,4 +1,4 @@
-"""A task: some trials, built and flown. It needs a text and two numbers, so that any process anywhere can do it."""
+"""A task of a campaign: build and run some trials. It is given as text and numbers, so that any process can run it."""
 
 import contextlib
 import functools
@@ -18,17 +18,17 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text
 
-# Status of a trial whose scenario cannot be built, beside those of `undertow.core.status`.
-REFUSED = -1
+# Status of a trial whose scenario cannot be built, in addition to those of `undertow.core.status`.
+INVALID = -1
 
 
 class Site(NamedTuple):
-    """What a process keeps between tasks of one campaign."""
+    """Objects that a process keeps between the tasks of one campaign."""
 
     trials: Trials
     part_cache: PartCache
     programs: ProgramCache
-    probes: Callable[[], dict[int, Built]]  # of the first trials of every combination those that can be built
+    probes: Callable[[], dict[int, Built]]  # the valid ones among the first trials of every combination
 
 
 @functools.lru_cache(maxsize=2)
@@ -47,15 +47,15 @@ def site(text: str, folder: str) -> Site:
 
 def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
     """Columns of the trials of a task."""
-    return fly(text, folder, layout.trials(task).tolist())
+    return run_trials(text, folder, layout.trials(task).tolist())
 
 
-def fly(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndarray]:
-    """Columns of some trials: what is drawn for them, how they ended, and their metrics.
+def run_trials(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndarray]:
+    """Run trials and return their columns: sampled values, status and metrics.
 
     Args:
-        text: of the campaign file.
-        folder: where relative paths in it start.
+        text: text of the campaign file.
+        folder: folder of relative paths in it.
         rows: numbers of the trials.
     """
     with runtime.on_processor():
@@ -68,20 +68,20 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
     where: list[int] = []
 
-    def flying() -> Iterator[Built]:
+    def trials_of_task() -> Iterator[Built]:
         for place, built in _built(here.trials, here.part_cache, rows):
             where.append(place)
             yield built
 
-    flown = here.programs.run(flying(), here.trials.campaign.series)
-    spread = functools.partial(_spread, len(rows), where)
-    columns["status"] = spread(flown.status, REFUSED)
-    columns["ended"] = spread(flown.ended, np.nan)
-    columns["backend"] = spread(flown.backend, REFUSED)
-    found = flown.metrics | {f"series:{name}": values for name, values in flown.series.items()}
+    result = here.programs.run(trials_of_task(), here.trials.campaign.series)
+    scatter = functools.partial(_scatter, len(rows), where)
+    columns["status"] = scatter(result.status, INVALID)
+    columns["ended"] = scatter(result.ended, np.nan)
+    columns["backend"] = scatter(result.backend, INVALID)
+    found = result.metrics | {f"series:{name}": values for name, values in result.series.items()}
     if "precision" in (*here.trials.campaign.vary, *here.trials.campaign.cross):  # one array holds both
         found = {name: values.astype(np.float64) for name, values in found.items()}
-    return columns | {name: spread(values, np.nan) for name, values in found.items()}
+    return columns | {name: scatter(values, np.nan) for name, values in found.items()}
 
 
 def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
@@ -98,32 +98,32 @@ def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
 
 
 def build_data(several: Trials, part_cache: PartCache, data: dict[str, Any]) -> Built:
-    """A scenario that stands where that of the trials does.
+    """Build a scenario with the location of the campaign's scenario.
 
     Raises:
-        BadInput: it cannot be built.
+        BadInput: the scenario cannot be built.
     """
     scenario = several.scenario
     return build(Text(data, scenario.name, scenario.folder, scenario.lines), part_cache)
 
 
 def _built(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
-    """Place among the rows, and trial, of those that can be built; a task of many does not hold them all."""
+    """Index and trial of each valid row, one at a time: a large task does not keep them all in memory."""
     for place, row in enumerate(rows):
         with contextlib.suppress(BadInput):
             yield place, build_trial(several, part_cache, row)
 
 
 def _columns(several: Trials, rows: Sequence[int]) -> Iterable[tuple[str, np.ndarray]]:
-    """Values of what is drawn; the number of the choice where they are not numbers."""
+    """Sampled values; the index of the choice where they are not numbers."""
     values = [several.values(row) for row in rows]
     for key, entries in several.columns():
         pick: Any = float if entries is None else list(entries.values()).index
         yield key, np.array([pick(one[key]) for one in values], dtype=float)
 
 
-def _spread(count: int, where: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
-    """Values at their rows, `empty` elsewhere."""
+def _scatter(count: int, where: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
+    """An array with values at their rows and `empty` elsewhere."""
     whole = np.full((count, *values.shape[1:]), empty, dtype=values.dtype)
     whole[where] = values
     return whole

@@ -1,4 +1,4 @@
-"""Trials of a campaign by their numbers: each is a scenario that `undertow simulate` could run."""
+"""Trials of a campaign by number: each is a scenario that `undertow simulate` could run."""
 
 import copy
 import itertools
@@ -7,53 +7,53 @@ from typing import Any, NamedTuple
 
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.labels import is_number, words
-from undertow.campaign.sampling import Draws, value
+from undertow.campaign.sampling import Samples, value
 from undertow.core.errors import BadInput, nearest
 from undertow.scenario.reading import Text, key_path, read
 
-# Of each combination so many trials tell whether it can be flown, and which numbers differ.
+# Trials of each combination that are built first, to find errors and the numbers that differ.
 _PROBES = 4
 
 
 class Trials(NamedTuple):
-    """All trials, by number: every combination of `cross` with the first draw, then with the next one, and so on.
+    """All trials by number: every combination of `cross` with the first sample, then with the next one, and so on.
 
     Attributes:
-        campaign: what was asked for.
-        text: of the campaign file.
-        scenario: what it varies, and where relative paths in it start.
-        draws: points of the unit cube, for `vary`, and seeds.
+        campaign: the campaign.
+        text: text of the campaign file.
+        scenario: the scenario that it varies, and the folder of relative paths in it.
+        samples: points of the unit cube, for `vary`, and seeds.
         combinations: values of `cross`, one tuple per combination.
     """
 
     campaign: Campaign
     text: Text
     scenario: Text
-    draws: Draws
+    samples: Samples
     combinations: tuple[tuple[Any, ...], ...]
 
     @property
     def number(self) -> int:
-        """How many trials there are."""
+        """Number of trials."""
         return self.campaign.number
 
     def values(self, trial: int) -> dict[str, Any]:
-        """What this trial puts into the scenario, by key path."""
-        draw, combination = divmod(trial, len(self.combinations))
-        crossed = dict(zip(self.campaign.cross, self.combinations[combination], strict=True))
-        drawn = zip(self.campaign.vary.items(), self.draws.point(draw), strict=True)
-        return crossed | {key: value(spread, float(share)) for (key, spread), share in drawn}
+        """Values that this trial sets in the scenario, by key path."""
+        sample, combination = divmod(trial, len(self.combinations))
+        swept = dict(zip(self.campaign.cross, self.combinations[combination], strict=True))
+        sampled = zip(self.campaign.vary.items(), self.samples.point(sample), strict=True)
+        return swept | {key: value(spread, float(share)) for (key, spread), share in sampled}
 
     def seed(self, trial: int) -> int:
-        """Of everything random in this trial."""
-        return self.draws.seed(trial // len(self.combinations))
+        """Seed of all random numbers of this trial."""
+        return self.samples.seed(trial // len(self.combinations))
 
     def first(self, combination: int) -> list[int]:
-        """The trials of a combination that are looked at before any is flown."""
-        return [draw * len(self.combinations) + combination for draw in range(min(_PROBES, self.campaign.trials))]
+        """The trials of a combination that are built before the first run."""
+        return [sample * len(self.combinations) + combination for sample in range(min(_PROBES, self.campaign.trials))]
 
     def probes(self) -> list[int]:
-        """Those of all combinations."""
+        """The first trials of all combinations."""
         return [trial for combination in range(len(self.combinations)) for trial in self.first(combination)]
 
     def data(self, trial: int) -> dict[str, Any]:
@@ -64,7 +64,7 @@ class Trials(NamedTuple):
         return data | {"seed": self.seed(trial)}
 
     def alternatives(self) -> Iterator[dict[str, Any]]:
-        """The scenario of the first trial, with each entry of what is chosen among others than numbers."""
+        """The scenario of the first trial with each entry of every choice that is not numeric."""
         for key, entries in self.columns():
             for entry in (entries or {}).values():
                 data = self.data(0)
@@ -72,7 +72,7 @@ class Trials(NamedTuple):
                 yield data
 
     def place(self, name: str) -> str:
-        """Line of the campaign that decides about a key of the scenario; nothing where the scenario does."""
+        """Line of the campaign file that sets a key of the scenario; empty where the scenario sets it."""
         for section, keys in (("vary", self.campaign.vary), ("cross", self.campaign.cross)):
             for key in keys:
                 if name == key or name.startswith((f"{key}.", f"{key}[")):
@@ -80,12 +80,12 @@ class Trials(NamedTuple):
         return ""
 
     def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
-        """See `drawn`."""
-        return drawn(self.campaign)
+        """See `varied_keys`."""
+        return varied_keys(self.campaign)
 
 
-def drawn(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None]]:
-    """Key paths that are drawn, with the values by name where those are not numbers."""
+def varied_keys(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None]]:
+    """Key paths of `vary`, with the values by name where they are not numbers."""
     for key, spread in campaign.vary.items():
         named = spread.choice is not None and not all(map(is_number, spread.choice))
         yield key, {words(entry): entry for entry in spread.choice or []} if named else None
@@ -95,17 +95,17 @@ def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
     """The trials of a campaign.
 
     Args:
-        campaign: what is asked for.
-        text: that says so.
-        allow_code: whether the code that an earlier run.nc names may run, if that is its scenario.
+        campaign: the campaign.
+        text: text of its file.
+        allow_code: whether the code that an earlier run.nc names may run, if the scenario is one.
 
     Raises:
-        BadInput: no such scenario, or too many trials.
+        BadInput: the scenario cannot be read, or there are too many trials.
     """
     if campaign.number >= 2**31:
         raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", campaign.number)
     combinations = tuple(itertools.product(*(entries.values() for entries in campaign.cross.values())))
-    return Trials(campaign, text, _scenario(campaign, text, allow_code), Draws(campaign), combinations)
+    return Trials(campaign, text, _scenario(campaign, text, allow_code), Samples(campaign), combinations)
 
 
 def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
@@ -142,7 +142,7 @@ def _put(data: dict[str, Any], key: str, put: Any) -> None:
 
 
 def _no_list(node: Any, step: str | int, key: str) -> BadInput:
-    """That a key path names an entry of what the scenario does not have."""
+    """The error for a key path that names an entry of a list the scenario does not have."""
     hint = nearest(str(step), node) or f"Give `{step}` in the scenario, with all its entries"
     return BadInput(key, "name an entry of a list of the scenario", f"of `{step}`, which it does not have", hint=hint)
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from undertow.campaign.campaign_schema import Spread
+from undertow.campaign.campaign_schema import Distribution
 from undertow.campaign.columns import ENDINGS
 from undertow.campaign.labels import words
 from undertow.campaign.store_results import Results
@@ -16,15 +16,15 @@ _BY_CHOICE = ("tracking_rms", "input_rms")
 
 
 def named(combination: Mapping[str, Any]) -> str:
-    """A combination of `cross` in words; numbers with what they are."""
-    said = (
+    """A combination of `cross` as text; numbers with the name of their key."""
+    parts = (
         f"{key.split('.')[-1]} {value}" if _numeric(value) else value for key, value in combination["values"].items()
     )
-    return ", ".join(said) or "all trials"
+    return ", ".join(parts) or "all trials"
 
 
 def endings(found: Mapping[str, Any]) -> Html:
-    """How many trials ended how, side by side for the combinations."""
+    """Number of trials by status, one column per combination."""
     several = found["combinations"]
     rows = [(word, *(str(one["status"].get(word, 0)) for one in several)) for word in found["status"]]
     head = ("trials", *map(named, several))
@@ -32,23 +32,24 @@ def endings(found: Mapping[str, Any]) -> Html:
 
 
 def by_xla(found: Mapping[str, Any]) -> str:
-    """That XLA flew some of the trials; nothing where it flew none."""
+    """A sentence about trials that used the XLA backend; empty where none did."""
     if not found["by_xla"]:
         return ""
-    said = "slower than in lanes, and alone one is repeated to rounding, not to the bit"
-    return f"{found['by_xla']} trials were flown by XLA: {said}. `undertow simulate` of one says why."
+    consequence = "which is slower, and a single run repeats such a trial only up to rounding"
+    return f"{found['by_xla']} trials used the XLA backend, {consequence}. `undertow simulate` of one states the reason."
 
 
 def requirements(found: Mapping[str, Any]) -> Html:
-    """What was required, and whether it holds; nothing where nothing was."""
+    """The requirements and their verdicts; empty where there are none."""
     rows = []
     for one in found["combinations"]:
-        for wanted in one["requirements"]:
-            low, high = wanted["interval"]
-            words = f"{_metric(wanted['metric'])} < {wanted['below']:g} in {100 * wanted['share']:g} % of the trials"
-            share = f"{100 * wanted['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
-            rows.append((words, named(one), chip(wanted["verdict"]), share))
-    head = ("required", "of", "verdict", "share that does")
+        for required in one["requirements"]:
+            low, high = required["interval"]
+            bound = f"{_metric(required['metric'])} < {required['below']:g}"
+            share = f"{100 * required['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
+            words = f"{bound} in {100 * required['share']:g} % of the trials"
+            rows.append((words, named(one), chip(required["verdict"]), share))
+    head = ("requirement", "combination", "verdict", "share of the trials [95 % interval]")
     return table(head, rows) if rows else Html("")
 
 
@@ -65,7 +66,7 @@ def distributions(results: Results, found: Mapping[str, Any]) -> Html:
 
 
 def by_choice(found: Mapping[str, Any]) -> list[Html]:
-    """What is drawn from words or parts: a table of median and 5 to 95 % for each."""
+    """For each choice, a table of the median and the 5 % to 95 % range."""
     tables = []
     for key, entries in found["choices"].items():
         rows = []
@@ -78,32 +79,32 @@ def by_choice(found: Mapping[str, Any]) -> list[Html]:
 
 
 def worst(results: Results, found: Mapping[str, Any]) -> Html:
-    """The worst trials with what was drawn for them."""
+    """The worst trials with their sampled values."""
     rows = []
     for trial in found["worst"]:
-        row, crossed = results.rows.sel(trial=trial), results.crossed(trial)
-        drawn = [number(one, _DIGITS) if isinstance(one, float) else one for one in results.drawn(trial).values()]
+        row, swept = results.rows.sel(trial=trial), results.swept(trial)
+        sampled = [number(one, _DIGITS) if isinstance(one, float) else one for one in results.sampled(trial).values()]
         lasted = int(row["status"]) == int(Status.OK)
         how = ending({"status": ENDINGS[int(row["status"])], "diverged_at": None if lasted else float(row["ended"])})
         error = number(float(row["tracking_rms"]) if lasted else None, _DIGITS)
-        rows.append((str(trial), how, error, *crossed, *drawn))
+        rows.append((str(trial), how, error, *swept, *sampled))
     keys = [prose(f"`{key}`") for key in (*results.campaign.cross, *results.campaign.vary)]
     return table(("trial", "ended", "tracking rms", *keys), rows, numeric=(2,), wide=len(keys) > 1)
 
 
 def asked(results: Results) -> list[Html]:
-    """What was flown: how it was drawn, by which versions, and the campaign file."""
+    """The configuration: sampling, versions and the campaign file."""
     campaign, attributes = results.campaign, results.rows.attrs
     rows = [(prose(f"`{key}`"), prose(_words(spread))) for key, spread in campaign.vary.items()]
     rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.cross.items()]
-    drawn = f"{campaign.trials} draws ({campaign.design}), seed {campaign.seed}"
-    drawn += ", each for every combination below." if campaign.cross else "."
+    sampling = f"{campaign.trials} samples ({campaign.design}), seed {campaign.seed}"
+    sampling += ", each for every combination below." if campaign.cross else "."
     versions = ", ".join(
         f"{key.removeprefix('version_')} {value}" for key, value in attributes.items() if key.startswith("version_")
     )
-    file = tag("details", tag("summary", "The whole campaign, as a file"), tag("pre", attributes["campaign"]))
+    file = tag("details", tag("summary", "The complete campaign file"), tag("pre", attributes["campaign"]))
     return [
-        tag("p", drawn),
+        tag("p", sampling),
         *([table(("key", "values"), rows)] if rows else []),
         tag("p", f"{versions}; {attributes['machine']}", class_="small"),
         file,
@@ -122,8 +123,8 @@ def _metric(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _words(spread: Spread) -> str:
-    """A distribution in words."""
+def _words(spread: Distribution) -> str:
+    """A distribution as text."""
     if spread.choice is not None:
         return "one of " + ", ".join(map(words, spread.choice))
     if spread.normal is not None:

@@ -1,4 +1,4 @@
-"""Weights that drift are damping: gain, chattering and error of Table 1 behind a lag, against time."""
+"""Figure: drifting weights add damping; gain, chattering and error of Table 1 behind a lag, against time."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,7 +15,7 @@ def drifting_figure(shown: Mapping[str, Any]) -> Figure:
     """Three panels.
 
     Args:
-        shown: `lag` (s), `needed` (the gain c that the linearised loop asks for, 1/s), and `runs`: by name
+        shown: `lag` (s), `needed` (the gain c that the linearised loop requires, 1/s), and `runs`: by name
             (free, bounded) `time`, `gain` by axis, `input_variation` and `tracking`.
     """
     figure = style.blank(9.6, 2.5)

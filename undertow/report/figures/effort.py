@@ -1,4 +1,4 @@
-"""Inputs: what every thruster is given, start-up and the rest of the run on scales of their own."""
+"""Figure: inputs of every thruster, with separate scales for start-up and the rest of the run."""
 
 from matplotlib.figure import Figure
 
@@ -11,8 +11,8 @@ from undertow.report.figures.uncertainty import settled
 def effort(title: str, runs: Controllers) -> Figure:
     """Figs. 9 and 13."""
     first = next(iter(runs.values()))
-    drawn = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    curves = [signals.curve(run, name, "voltage", look) for run, name, look in drawn]
+    looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
+    curves = [signals.curve(run, name, "voltage", look) for run, name, look in looks]
     start, end = settled(first), float(first["time"].values[-1])
     labels = signals.per_input(first, "voltage")
     return small_multiples(

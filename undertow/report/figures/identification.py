@@ -1,4 +1,4 @@
-"""State and series-parallel state on every axis, and their difference below."""
+"""Figure: state and series-parallel state on every axis, and their difference."""
 
 import xarray as xr
 from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""The map of lags: error, chattering, weights and life of Table 1 behind a lag, and behind a winding."""
+"""Figure: error, chattering, weights and duration of Table 1 behind a first-order lag and behind a winding."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -46,12 +46,12 @@ def lags_figure(rows: Rows, windows: Sequence[Sequence[float]]) -> Figure:
             style.label(panel, words, "", title, style.TINY)
         panel = style.place(figure, 0.56 + 2.38 * 3, top, 1.75, 1.3)
         _life(panel, _of(rows, kind=kind), max(row["ended"] for row in rows))
-        style.label(panel, words, "", "ended after, s (hollow: lasted)", style.TINY)
+        style.label(panel, words, "", "ended after, s (hollow: completed)", style.TINY)
     return figure
 
 
-def _of(rows: Rows, **wanted: str) -> list[Mapping[str, Any]]:
-    return [row for row in rows if all(row[key] == value for key, value in wanted.items())]
+def _of(rows: Rows, **where: str) -> list[Mapping[str, Any]]:
+    return [row for row in rows if all(row[key] == value for key, value in where.items())]
 
 
 def _logarithmic(panel: Axes) -> None:

@@ -21,8 +21,8 @@ def paper_figures(
 
     Args:
         example1: runs of Example 1 by controller, `rcafc` and `rafc`.
-        example2: runs of Example 2; as in the paper, only `rcafc` is drawn.
-        response: the thruster's answer to a slow and a fast voltage.
+        example2: runs of Example 2; as in the paper, only `rcafc` is plotted.
+        response: the response of the thruster to a slow and a fast voltage.
     """
     both = {key: example1[key] for key in ("rcafc", "rafc")}
     alone = {"rcafc": example2["rcafc"]}

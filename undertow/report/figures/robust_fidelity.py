@@ -1,4 +1,4 @@
-"""The ladder again: errors against time where it matters, and the steady error of every law at every place."""
+"""Figure: the robust variant and the paper's controllers on every fidelity level, and under limits and disturbances."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,47 +11,47 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from undertow.report.figures import style
 
-# Looks and marks of a law; the same colour for what plays the same part at sea.
+# Names, looks and marks of the controllers.
 _LOOKS = {
     "rcafc": ("RCAFC, Table 1", style.SOLID, "o"),
     "table1": ("RCAFC, Table 1", style.SOLID, "o"),
     "rafc": ("RAFC, Table 1", style.DASHED, "s"),
-    "hand_tuned": ("paper's law, by hand", style.Look("#7a5195", (0, (6, 1.5, 1, 1.5)), 1.1, 2), "D"),
+    "hand_tuned": ("paper's controller, tuned by hand", style.Look("#7a5195", (0, (6, 1.5, 1, 1.5)), 1.1, 2), "D"),
     "pid": ("PID", style.Look("#8a6d00", (0, (3, 1)), 1.1, 2), "v"),
     "robust": ("robust", style.Look("#00785a", "-", 1.3, 4), "^"),
     "measured": ("speeds measured", style.Look("#b0476f", (0, (1, 1)), 1.1, 5), "."),
 }
 _SHOWN = ("electromechanical", "24V_03", "overload", "sea")
 _TITLES = {
-    "electromechanical": "whole motor, no limit",
+    "electromechanical": "full motor model, no limit",
     "24V_03": "24 V, U1 x 0.3",
-    "overload": "24 V, too much for 1.5 s",
-    "sea": "BlueROV2 Heavy at sea",
+    "overload": "24 V, overload for 1.5 s",
+    "sea": "BlueROV2 Heavy, current and waves",
 }
 
 Rows = Sequence[Mapping[str, Any]]
 
 
-def sound_ladder_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dataset]) -> Figure:
-    """Errors against time at up to four places, and below them the steady tracking error at all of them.
+def robust_fidelity_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dataset]) -> Figure:
+    """Errors against time in up to four cases, and below them the steady tracking error in all cases.
 
     Args:
         rows: `place`, `words`, `law`, `status`, `diverged_at` and `steady` of each run.
-        datasets: runs by place and law; those that are missing are not drawn.
+        datasets: runs by place and law; missing ones are not plotted.
     """
     places = list(dict.fromkeys(row["place"] for row in rows))
     shown = [place for place in _SHOWN if any(place == where for where, _ in datasets)]
     tall = 1.75 if shown else 0.0
     figure = style.blank(9.6, 0.85 + tall + 0.27 * len(places) + 0.35)
     laws = dict(_LOOKS[row["law"]][:2] for row in rows)
-    style.head(figure, "The ladder again", laws)
+    style.head(figure, "The robust variant on every fidelity level", laws)
     for number, place in enumerate(shown):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.6, 1.75, 1.2)
         _errors(panel, {law: run for (where, law), run in datasets.items() if where == place})
         style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", _TITLES[place])
     panel = style.place(figure, 3.3, 0.62 + tall, 6.0, 0.27 * len(places))
     _dots(panel, places, rows)
-    style.label(panel, "tracking error rms, second half, m and rad; x: ended early")
+    style.label(panel, "tracking error rms over the second half, m and rad; cross: ended early")
     return figure
 
 
@@ -93,7 +93,7 @@ def _dots(panel: Axes, places: Sequence[str], rows: Rows) -> None:
 
 
 def _wrapped(words: str) -> str:
-    """On two lines where it is long."""
+    """Long text on two lines."""
     if len(words) < 50:
         return words
     middle = words.rfind(" ", 0, 48)

@@ -1,4 +1,4 @@
-"""Robust term on every axis, and the second half of the run enlarged below it."""
+"""Figure: robust term on every axis, with the second half of the run enlarged."""
 
 from matplotlib.figure import Figure
 
@@ -10,8 +10,8 @@ from undertow.report.figures.tracking import Controllers
 def robust_term(title: str, runs: Controllers) -> Figure:
     """Fig. 8."""
     first = next(iter(runs.values()))
-    drawn = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    curves = [signals.curve(run, name, "robust", look) for run, name, look in drawn]
+    looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
+    curves = [signals.curve(run, name, "robust", look) for run, name, look in looks]
     end = float(first["time"].values[-1])
     return small_multiples(
         title,

@@ -1,4 +1,4 @@
-"""Signals of a run's dataset as curves, with their names and units as a reader sees them."""
+"""Signals of a dataset as curves, with names and units."""
 
 import numpy as np
 import xarray as xr
@@ -18,7 +18,7 @@ def places(run: xr.Dataset) -> list[str]:
 
 
 def per_axis(run: xr.Dataset, quantity: str, rate: str = "") -> list[str]:
-    """Label of a quantity on each axis with its unit; `rate` is what the unit is divided by: "", "/s" or "/s^2"."""
+    """Label of a quantity on each axis with its unit, divided by `rate`: "", "/s" or "/s^2"."""
     units = run["axis"].attrs["unit_of_each"].split(", ")
     return [f"{quantity}, {power(unit + rate)}" for unit in units]
 
@@ -29,7 +29,7 @@ def per_input(run: xr.Dataset, quantity: str, signal: str = "voltage") -> list[s
 
 
 def curve(run: xr.Dataset, name: str, signal: str, look: Look) -> Curve:
-    """A signal of a dataset, as far as the run lasted."""
+    """A signal of a dataset, up to the end of the run."""
     lived = run["time"].values <= run.attrs.get("ended", np.inf)
     return Curve(name, run["time"].values[lived], run[signal].values[lived], look)
 

@@ -1,4 +1,4 @@
-"""Fig. 2: the motor's answer to a slow and a fast voltage, against the static laws."""
+"""Fig. 2: response of the motor to a slow and a fast voltage, compared with the static models."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +13,7 @@ LAWS_SECOND = style.Look("#555555", (0, (5, 1.2, 1, 1.2)), 1.0, 4)
 
 
 def thruster_laws(response: ThrusterResponse) -> Figure:
-    """Thrust against current, thrust against voltage, and how far each law is off."""
+    """Thrust against current, thrust against voltage, and the error of each static model."""
     figure = style.blank(9.6, 3.5)
     periods = {"long": response.long, "short": response.short}
     names = {key: f"V = 10 sin {_times(period.frequency)}" for key, period in periods.items()}
@@ -58,7 +58,7 @@ def _errors(panel: Axes, laws: tuple[Law, ...]) -> None:
     panel.set_yticks(places, [_typeset(law.text) for law in laws])
     panel.invert_yaxis()
     panel.set_xlim(0, 1.3 * max(max(law.error_long, law.error_short) for law in laws))
-    style.label(panel, "rms error, % of rms", "", "(c) Error of each law")
+    style.label(panel, "rms error, % of rms", "", "(c) Error of each model")
 
 
 def _times(frequency: float) -> str:

@@ -1,4 +1,4 @@
-"""Tracking: wanted and actual position on every axis, and the size of the error below it."""
+"""Figure: desired and actual position on every axis, and the size of the error."""
 
 from collections.abc import Mapping
 
@@ -14,15 +14,15 @@ Controllers = Mapping[str, xr.Dataset]  # rcafc, rafc or both
 def tracking(title: str, runs: Controllers) -> Figure:
     """Figs. 6 and 10."""
     first = next(iter(runs.values()))
-    drawn = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    wanted = signals.curve(first, "wanted $x_d$", "target", style.TRUTH)
-    actual = [signals.curve(run, name, "position", look) for run, name, look in drawn]
-    errors = [signals.magnitude(signals.curve(run, name, "error", look)) for run, name, look in drawn]
+    looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
+    desired = signals.curve(first, "desired $x_d$", "target", style.TRUTH)
+    actual = [signals.curve(run, name, "position", look) for run, name, look in looks]
+    errors = [signals.magnitude(signals.curve(run, name, "error", look)) for run, name, look in looks]
     return small_multiples(
         title,
         signals.axis_names(first),
         [
-            Block([wanted, *actual], signals.places(first), height=1.1, titled=True),
+            Block([desired, *actual], signals.places(first), height=1.1, titled=True),
             Block(errors, signals.per_axis(first, "|error|"), height=1.0, scale="log"),
         ],
     )

@@ -1,4 +1,4 @@
-"""Lumped uncertainty and its estimate on every axis, and the error of the estimate below it."""
+"""Figure: lumped uncertainty and its estimate on every axis, and the estimation error."""
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -11,10 +11,10 @@ from undertow.report.figures.tracking import Controllers
 def uncertainty(title: str, runs: Controllers) -> Figure:
     """Figs. 7 and 12."""
     first = next(iter(runs.values()))
-    drawn = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
+    looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
     true = signals.curve(first, "true $d$", "uncertainty", style.TRUTH)
-    estimates = [signals.curve(run, name, "estimate", look) for run, name, look in drawn]
-    errors = [signals.difference(run, name, "estimate", "uncertainty", look) for run, name, look in drawn]
+    estimates = [signals.curve(run, name, "estimate", look) for run, name, look in looks]
+    errors = [signals.difference(run, name, "estimate", "uncertainty", look) for run, name, look in looks]
     start = settled(first)
     rate = "/s^2"
     return small_multiples(
@@ -34,5 +34,5 @@ def uncertainty(title: str, runs: Controllers) -> Figure:
 
 
 def settled(run: xr.Dataset) -> float:
-    """Time, s, from which a y axis is made: the first twentieth of a run is start-up."""
+    """Time, s, after which the y axes fit the values: the first twentieth of a run is start-up."""
     return float(run["time"].values[-1]) / 20

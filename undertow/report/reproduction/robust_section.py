@@ -7,12 +7,12 @@ from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, tag
 from undertow.report.reproduction import robust_tables as tables
 
-FIGURES = ("sound_ladder", "ablations")
+FIGURES = ("robust_fidelity", "ablations")
 
 TITLE = "The sound version"
 
 CAPTIONS = {
-    "sound_ladder": (
+    "robust_fidelity": (
         "Above, the size of the tracking error against time. Below, its rms over the second half of each run. All runs "
         "are sampled, at 1 kHz on ODIN and at 100 Hz on BlueROV2 Heavy; a cross marks a run that ended early."
     ),
@@ -30,7 +30,7 @@ _LISTS = {
 }
 
 
-def sound_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
+def robust_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
     """Conclusions first, then the ladder, then the ablations; nothing if the chapter was not run.
 
     Args:
@@ -47,7 +47,7 @@ def sound_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list
         "the paper's laws, all of them sampled. The commands are to be typed in the folder of this page: `undertow "
         "simulate` and the file named below each law."
     )
-    ladder = [tag("h3", "The ladder again"), tag("p", prose(told)), *_figure(drawn, "sound_ladder")]
+    ladder = [tag("h3", "The ladder again"), tag("p", prose(told)), *_figure(drawn, "robust_fidelity")]
     return [*lists, *ladder, tables.ladder(results["ladder"]), *_ablations(results, drawn)]
 
 

@@ -11,7 +11,7 @@ from undertow.analysis.metrics import Metrics, results
 from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.campaign_schema import validate
 from undertow.campaign.reading import whole
-from undertow.campaign.task import REFUSED, fly, site
+from undertow.campaign.task import INVALID, run_trials, site
 from undertow.campaign.trials import Trials, trials
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
@@ -29,7 +29,7 @@ def text_of(data) -> str:
 
 
 def columns(data, rows):
-    return fly(text_of(data), "", rows)
+    return run_trials(text_of(data), "", rows)
 
 
 def test_rows_are_runs(campaign, backend):
@@ -108,13 +108,13 @@ def test_a_run_that_fails_costs_no_other(campaign, backend):
 
 def test_a_trial_that_cannot_be_built_is_a_row(campaign):
     found = columns(campaign(cross={"controller.frequency": [2.0, -1.0]}, trials=2), range(4))
-    assert found["status"].tolist() == [0, REFUSED, 0, REFUSED]
+    assert found["status"].tolist() == [0, INVALID, 0, INVALID]
     assert np.isnan(found["tracking_rms"]).tolist() == [False, True, False, True]
 
 
 def test_a_task_in_which_no_trial_can_be_built(campaign):
     found = columns(campaign(cross={"controller.frequency": [2.0, -1.0]}, trials=2), [1, 3])
-    assert found["status"].tolist() == [REFUSED, REFUSED]
+    assert found["status"].tolist() == [INVALID, INVALID]
     assert np.isnan(found["tracking_rms"]).all() and np.isnan(found["ended"]).all()
 
 
@@ -130,7 +130,7 @@ def test_single_precision(campaign):
     """Without noise, which is drawn differently."""
     scenario = campaign()["scenario"] | {"navigation": "perfect"}
     single = text_of(campaign(scenario=scenario | {"precision": "float32"}))
-    found = fly(single, "", range(9))
+    found = run_trials(single, "", range(9))
     wanted = columns(campaign(scenario=scenario), range(9))
     assert found["tracking_rms"].dtype == np.float32 and wanted["tracking_rms"].dtype == np.float64
     np.testing.assert_allclose(found["tracking_rms"], wanted["tracking_rms"], rtol=1e-4)
