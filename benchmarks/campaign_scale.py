@@ -127,7 +127,10 @@ def _resident() -> float:
 
 
 def dask(trials: int) -> dict:
-    """One worker and two, in turn; the shortest of five times each. All run_trials some first: compiling is not counted."""
+    """One worker and two, in turn; the shortest of five times each.
+
+    All run_trials some first: compiling is not counted.
+    """
     times: dict[int, list[float]] = {1: [], 2: []}
     stores = []
     with contextlib.ExitStack() as stack:

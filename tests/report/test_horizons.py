@@ -45,7 +45,7 @@ CURVES = {
     "tracking": np.exp(-TIME),
 }
 DRIFTING = {"lag": 0.05, "needed": 453.0, "runs": {"free": CURVES, "bounded": CURVES}}
-RESULTS = {"ladder": {}, "horizons": {"duration": 200.0, "windows": WINDOWS, "rows": LADDER}, "lags": MAP}
+RESULTS = {"fidelity": {}, "horizons": {"duration": 200.0, "windows": WINDOWS, "rows": LADDER}, "lags": MAP}
 
 
 def test_growth_is_drawn_up_to_the_end_of_each_run():
@@ -84,4 +84,4 @@ def test_page_says_how_long_everything_lasted(results, tmp_path):
         assert said in words
     assert "from 453 on" in words and "876 to 4382" in words and "never" in words
     assert "Simulated: level ideal, 10 s." in words
-    assert "lasts 20 s" in words, "the ladder of 20 s says so, too"
+    assert "lasts 20 s" in words, "the runs of 20 s say so, too"

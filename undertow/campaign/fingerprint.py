@@ -74,8 +74,8 @@ def samples(asked: str) -> int:
 def _decisive(asked: str) -> dict[str, Any]:
     """The part of a campaign file that determines the rows, without requirements; 2 and 2.0 are equal.
 
-    The number of samples is part of it only for a Latin hypercube, where every point depends on it. The order of keys is
-    part of it because it determines the numbers of the trials.
+    The number of samples is part of it only for a Latin hypercube, where every point depends on it. The order of keys
+    is part of it because it determines the numbers of the trials.
     """
     data: dict[str, Any] = {**_plain(asked), "requirements": {}}
     orders = {"vary": data["vary"], "cross": data["cross"]}

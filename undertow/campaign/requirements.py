@@ -42,7 +42,8 @@ def enough(share: float) -> int:
 def too_few(campaign: Campaign) -> tuple[str, ...]:
     """A sentence for each requirement that the number of trials cannot demonstrate."""
     return tuple(
-        f"`requirements.{name}.share` is {required.share:g}, which takes at least {enough(required.share)} trials without a "
+        f"`requirements.{name}.share` is {required.share:g}, which takes at least {enough(required.share)} trials "
+        "without a "
         f"failure to demonstrate; `trials` is {campaign.trials}"
         for name, required in campaign.requirements.items()
         if campaign.trials < enough(required.share)

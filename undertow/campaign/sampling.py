@@ -25,7 +25,8 @@ _EDGE = 2.0**-53
 class Samples:
     """Points of the unit cube and seeds, equal on every machine and with every executor.
 
-    Blocks are computed on demand, so that a billion samples take no memory. Only a Latin hypercube is computed as a whole.
+    Blocks are computed on demand, so that a billion samples take no memory. Only a Latin hypercube is computed as a
+    whole.
 
     Args:
         campaign: number of samples, design and seed.

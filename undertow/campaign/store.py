@@ -70,7 +70,10 @@ class Store:
             if "input_rms" in self._labels:
                 asked[INPUT_UNIT] = self._labels["input_rms"].attributes["units"]
             self._group.update_attributes({**identity.attributes, **asked})
-        for name, one in coordinates.items():  # always: an earlier process may have been killed before it wrote the values
+        for (
+            name,
+            one,
+        ) in coordinates.items():  # always: an earlier process may have been killed before it wrote the values
             label = Label((name,), one.attrs, one.dtype.str)
             new_array(self._group, name, one.shape, one.shape, label)[:] = one.values
         if DONE not in self._arrays:
@@ -119,7 +122,10 @@ class Store:
         self._held.close()
 
     def _settle(self, *names: str) -> None:
-        """Flush the metadata of arrays to disk: without them all chunks are lost; a damaged chunk can be computed again."""
+        """Flush the metadata of arrays to disk: without them all chunks are lost.
+
+        A damaged chunk can be computed again.
+        """
         for folder in (*(self._path / name for name in names), self._path):
             sync(folder / "zarr.json")
             sync(folder)

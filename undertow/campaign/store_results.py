@@ -105,7 +105,10 @@ def load(folder: Path) -> Results:
 
 
 def _rows(group: Any, campaign: Campaign, stored: Layout) -> xr.Dataset:
-    """All rows of the store by trial, without series. Arrays may be longer while a process makes room for more samples."""
+    """All rows of the store by trial, without series.
+
+    Arrays may be longer while a process makes room for more samples.
+    """
     axes, region = (*campaign.cross, SAMPLES), tuple(slice(0, size) for size in stored.shape)
     arrays = {name: group[name] for name in trial_labels(campaign) if name in group and name != "trial"}
     rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})

@@ -181,7 +181,9 @@ def campaign(
             help="Resume the campaign in DIR: run unfinished trials, and new ones if `trials` was increased.",
         ),
     ] = False,
-    workers: Annotated[int | None, typer.Option(metavar="N", help="Number of threads or workers. Default: all cores.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", help="Number of threads or workers. Default: all cores.")
+    ] = None,
     cluster: Annotated[
         str | None,
         typer.Option(metavar="WHERE", help="Dask cluster: local, slurm, ssh, or the address of a scheduler."),
@@ -246,7 +248,9 @@ def check(
     ],
     option: Annotated[
         list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Option of the part, for example parameters=wu2018. Repeatable."),
+        typer.Option(
+            "--option", metavar="KEY=VALUE", help="Option of the part, for example parameters=wu2018. Repeatable."
+        ),
     ] = None,
     allow_code: AllowCode = False,
 ) -> int:

@@ -131,7 +131,8 @@ def _sentences(found: Tuned) -> list[str]:
         ending += ", and only the initial design (the given gains and points spread over their ranges) was evaluated"
     return [
         f"Tuned: {options}",
-        f"The held-out cost is {given.held_out_cost / tuned.held_out_cost:.3g} times smaller than with the given gains. "
+        f"The held-out cost is {given.held_out_cost / tuned.held_out_cost:.3g} times smaller than with the given "
+        "gains. "
         f"{found.evaluations} evaluations, {found.rejected} rejected without a certificate, {found.elapsed:.0f} s; "
         f"{ending}.",
     ]

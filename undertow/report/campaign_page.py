@@ -9,7 +9,7 @@ import numpy as np
 from undertow.campaign.store_results import Results
 from undertow.report.campaign_tables import asked, by_choice, by_xla, distributions, endings, named, requirements, worst
 from undertow.report.figures.campaign import distributions_figure, sensitivity_figure
-from undertow.report.figures.writing import Plots, Saved, save_all
+from undertow.report.figures.writing import Saved, save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, tag
 
@@ -22,7 +22,8 @@ _CAPTIONS = {
 }
 _INTERVALS = (
     "Share of the trials that keep each requirement, with its 95 % Clopper-Pearson interval. The interval is exact for "
-    "random samples and conservative for Latin hypercube and Sobol samples, which are more even. A failed trial does not "
+    "random samples and conservative for Latin hypercube and Sobol samples, which are more even. A failed trial does "
+    "not "
     "keep the requirement; an invalid trial is not counted. The verdict `open` means that more trials are needed: "
     "increase `trials` and use `--resume`. The interval assumes that the number of trials was fixed beforehand."
 )

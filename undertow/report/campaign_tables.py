@@ -36,7 +36,9 @@ def by_xla(found: Mapping[str, Any]) -> str:
     if not found["by_xla"]:
         return ""
     consequence = "which is slower, and a single run repeats such a trial only up to rounding"
-    return f"{found['by_xla']} trials used the XLA backend, {consequence}. `undertow simulate` of one states the reason."
+    return (
+        f"{found['by_xla']} trials used the XLA backend, {consequence}. `undertow simulate` of one states the reason."
+    )
 
 
 def requirements(found: Mapping[str, Any]) -> Html:

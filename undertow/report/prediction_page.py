@@ -11,7 +11,7 @@ from undertow.report.page import bullets, document, figure, section, table, tag
 from undertow.report.prediction_tables import Rows, tables
 
 _CAPTIONS = {
-    "poles": "Controllable closed-loop poles of the sampled loop, converted to continuous time, with motors and coupling. "
+    "poles": "Controllable closed-loop poles of the sampled loop as continuous-time poles, with motors and coupling. "
     "Both axes are linear near zero and logarithmic beyond.",
     "frequency": "Gain from a disturbance on one axis to the error on the same axis, under the mean load.",
     "actuators": "Forces that each actuator must give under the loads along the reference, without limits.",
@@ -19,7 +19,7 @@ _CAPTIONS = {
 
 
 def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path) -> list[str]:
-    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`; return a sentence for each failed figure.
+    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`; return sentences on failures.
 
     Raises:
         OSError: the folder cannot be written.
@@ -45,7 +45,8 @@ def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path
 
 
 LEFT_OUT = (
-    "The loop is linearised at its equilibrium. Saturation, dead zones, pulses of speed controllers and large motions are "
+    "The loop is linearised at its equilibrium. Saturation, dead zones, pulses of speed controllers and large "
+    "motions are "
     "left out, and a moving reference is treated as one at rest under the loads that the motion causes. `undertow "
     "simulate` reports metrics that depart by more than 10 %."
 )

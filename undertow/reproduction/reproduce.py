@@ -65,7 +65,7 @@ def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True)
         "example1": examples.example(runs, 1),
         "example2": examples.example(runs, 2),
         "table2": examples.table2(runs),
-        "ladder": examples.ladder(runs),
+        "fidelity": examples.ladder(runs),
         "horizons": {
             "duration": horizons.duration(quick),
             "windows": horizons.windows(quick),
@@ -77,6 +77,6 @@ def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True)
     }
     if sound:
         last = chapter(folder, quick, lambda message, share: progress(message, _LONG + (_RUNNING - _LONG) * share))
-        results["sound"], runs = last.results, runs | last.runs
+        results["robust_variant"], runs = last.results, runs | last.runs
     (folder / "results.json").write_text(to_json(results, indent=1) + "\n", encoding="utf-8")
     return Reproduction(results, runs, thruster_response())

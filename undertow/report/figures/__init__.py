@@ -2,8 +2,8 @@
 
 from undertow.report.figures.fidelity import fidelity_figure as fidelity_figure
 from undertow.report.figures.paper import paper_figures as paper_figures
-from undertow.report.figures.run import run_plots as run_plots
 from undertow.report.figures.run import run_figures as run_figures
+from undertow.report.figures.run import run_plots as run_plots
 from undertow.report.figures.sweep import sweep_figure as sweep_figure
 from undertow.report.figures.writing import png as png
 from undertow.report.figures.writing import save as save

@@ -72,7 +72,10 @@ def _frequency(prediction: Prediction) -> Figure:
     error.legend(fontsize=style.SMALL, frameon=False, ncols=2, loc="lower center")
     style.label(error, "frequency of d, rad/s", "|e| / |d|, s$^2$", "tracking error")
     style.label(
-        missed, "frequency of d, rad/s", r"$|\hat{d} - d| \,/\, |d|$", "estimation error; above 1 the estimate adds error"
+        missed,
+        "frequency of d, rad/s",
+        r"$|\hat{d} - d| \,/\, |d|$",
+        "estimation error; above 1 the estimate adds error",
     )
     return figure
 

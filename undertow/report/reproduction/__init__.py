@@ -1,1 +1,1 @@
-"""The report of `undertow reproduce`: its page, chapter by chapter."""
+"""The report of `undertow reproduce`."""

@@ -1,4 +1,4 @@
-"""From what `undertow reproduce` found out to its figures and its page."""
+"""Figures and page of the report, from the results of `undertow reproduce`."""
 
 from pathlib import Path
 from typing import Any
@@ -21,15 +21,15 @@ def write(found: Reproduction, folder: Path) -> Path:
     Raises:
         OSError: the folder cannot be written.
     """
-    return write_report(found.results, draw(found), folder)
+    return write_report(found.results, make_figures(found), folder)
 
 
-def draw(found: Reproduction) -> dict[str, Figure]:
+def make_figures(found: Reproduction) -> dict[str, Figure]:
     """Every figure of the report, by name."""
     numbers = {claim["id"]: claim["numbers"] for claim in found.results["claims"]}
-    ladder = found.results["ladder"]
+    levels = found.results["fidelity"]
     figures = paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
-        "ladder": fidelity_figure(ladder, {fidelity: found.datasets(fidelity) for fidelity in ladder}),
+        "fidelity": fidelity_figure(levels, {fidelity: found.datasets(fidelity) for fidelity in levels}),
         "sweep": sweep_figure(numbers["C6"]["sweep"]),
         "horizons": horizons_figure(found.results["horizons"]["rows"], found.results["horizons"]["duration"]),
         "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),

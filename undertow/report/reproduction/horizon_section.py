@@ -1,4 +1,4 @@
-"""For how long the paper's laws last, behind which motor, and why: parts of the ladder's section of the report."""
+"""Long runs of the paper's controllers behind several motor models: a part of the section on fidelity levels."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,51 +9,57 @@ from undertow.report.page import Html, join, table, tag
 FIGURES = ("horizons", "lags", "drifting")
 
 CAPTIONS = {
-    "horizons": (
-        "Above, the largest weight against time; a cross marks a run that ended early. Thin grey lines are the same "
-        "laws with their weights projected into a box of 20. Below, how long RCAFC lasts on the whole motor for each "
-        "composite gain: weights that are free (blue) drift until the loop is lost; bounded ones (grey) last."
+    "horizons": prose(
+        "The upper panels show the largest weight against time; a cross marks a run that ended early. Thin grey "
+        "lines are "
+        "the same controllers with weights bounded by 20. The lower panel shows the time of divergence of RCAFC on the "
+        "full motor model for each composite gain: free weights (blue) drift until the loop diverges; with bounded "
+        "weights (grey) it lasts."
     ),
-    "lags": (
-        "Above, thrust follows the voltage with a first-order lag; below, the motor of Table 3 with another "
-        "inductance. Five sets bear every lag that was tried, 1 to 300 ms, at the price of chattering and "
-        "growing weights; one rule at the "
-        "same loop gain stays, at once, in a limit cycle. Where a line stops, runs had ended."
+    "lags": prose(
+        "The upper panels show thrust that follows the voltage with a first-order lag, the lower panels the motor of "
+        "Table 3 with other inductances. Five sets tolerate every lag from 1 to 300 ms, with chattering and growing "
+        "weights. One rule at the same loop gain enters a limit cycle at once. A line stops where runs ended early."
     ),
-    "drifting": (
-        "With one sinusoid per axis. Weights that differ from set to set make d_hat = z \u2212 c \u03b5, and c grows "
-        "with the square of the oscillation: \u010b = \u03b3 \u03b3_\u03b5 |\u03be'|\u00b2 \u03b5\u00b2. It stops "
-        "growing where the linearised loop with that c is stable (dotted): the chattering dies, the error is that of "
-        "Example 1. In a box of 20 c cannot get there, and the limit cycle stays."
+    "drifting": prose(
+        "One sinusoid acts per axis. Weights that differ between sets give $\\hat d = z - c \\varepsilon$, and $c$ "
+        "grows "
+        "with the square of the oscillation: $\\dot c = \\gamma \\gamma_\\varepsilon |\\xi'|^2 \\varepsilon^2$. It "
+        "stops "
+        "growing where the linearised loop with this $c$ is stable (dotted); the chattering decays, and the error is "
+        "that "
+        "of Example 1. With weights bounded by 20, $c$ cannot reach this value, and the limit cycle persists."
     ),
 }
 
 
-def horizon_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
-    """The long ladder, the map of lags and the mechanism; nothing if they were not run.
+def horizon_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
+    """The long runs, the map of lags and the mechanism; empty if they were not run.
 
     Args:
         results: of results.json; `horizons`, `lags` and `drifting` are used.
-        drawn: figures by name.
+        figures: figures by name.
     """
     content = []
     if results.get("horizons"):
-        content += [*_horizons(results["horizons"]), *_figure(drawn, "horizons"), _table(results["horizons"])]
+        content += [*_horizons(results["horizons"]), *_figure(figures, "horizons"), _table(results["horizons"])]
     if results.get("lags"):
-        content += [tag("h3", "What a lag does, and what a winding"), *_figure(drawn, "lags")]
+        content += [tag("h3", "Effect of a lag and of the winding inductance"), *_figure(figures, "lags")]
         content.append(_lags(results["lags"], results["horizons"]["windows"]))
     if results.get("drifting"):
-        content += [tag("h3", "Why a lag is borne: weights that drift are damping"), *_figure(drawn, "drifting")]
+        content += [tag("h3", "Mechanism: drifting weights add damping"), *_figure(figures, "drifting")]
     return content
 
 
 def _horizons(found: Mapping[str, Any]) -> list[Html]:
-    told = (
-        f"The same levels for {found['duration']:,.0f} s of suite U2, which is U1 again every 20 s (U1 itself must "
-        "not be run on: its chirp sweeps up for ever), sampled at 1 kHz. Each law runs as it is and with its weights "
-        "projected into a box of 20 m/s^2, rad/s^2. Metrics are taken over three windows, chattering from every sample."
+    text = (
+        f"The same fidelity levels for {found['duration']:,.0f} s of suite U2, which repeats U1 every 20 s (U1 itself "
+        "cannot be continued, because its chirp keeps rising), sampled at 1 kHz. Each controller runs with free "
+        "weights "
+        "and with weights bounded by 20 m/s^2 or rad/s^2. Metrics are computed over three windows, chattering from "
+        "every sample."
     )
-    return [tag("h3", f"For how long: {found['duration']:,.0f} s"), tag("p", prose(told))]
+    return [tag("h3", f"Long runs: {found['duration']:,.0f} s"), tag("p", prose(text))]
 
 
 def _table(found: Mapping[str, Any]) -> Html:
@@ -64,11 +70,11 @@ def _table(found: Mapping[str, Any]) -> Html:
         last = row["level"]
         name = join(prose(row["words"]), tag("div", tag("code", row["scenario"]), class_="small"))
         rows.append((level, name, _ended(row), *_by_window(row, windows)))
-    return _wide(("level", "law", f"of {found['duration']:g} s"), windows, rows)
+    return _wide(("level", "controller", f"status after {found['duration']:g} s"), windows, rows)
 
 
 def _lags(rows: Sequence[Mapping[str, Any]], windows: Sequence[Sequence[float]]) -> Html:
-    """One row per run of the map; what theory says of drifted weights stands beside five sets."""
+    """One row per run of the map, with the prediction for drifted weights beside five sets."""
     shown = []
     for row in rows:
         unit = "ms" if row["kind"] == "lag" else "mH"
@@ -76,18 +82,18 @@ def _lags(rows: Sequence[Mapping[str, Any]], windows: Sequence[Sequence[float]])
         between = row["damping"]
         theory = "" if row["law"] != "five" else "never" if between is None else _between(between)
         shown.append((behind, row["words"], theory, _ended(row), *_by_window(row, windows)))
-    return _wide(("behind", "law", "stable for c, 1/s", "how it ended"), windows, shown)
+    return _wide(("behind", "controller", "stable for c, 1/s", "status"), windows, shown)
 
 
 def _between(gains: Sequence[float]) -> str:
     low, high = gains
-    return f"from {low:.0f} on" if high >= 6000 else f"{low:.0f} to {high:.0f}"
+    return f"above {low:.0f}" if high >= 6000 else f"{low:.0f} to {high:.0f}"
 
 
 def _ended(row: Mapping[str, Any]) -> Html:
     word = str(row["status"]).replace("_", " ")
-    said = f"lasts {row['ended']:g} s" if row["lasted"] else f"{word} at {round_time(row['ended'])} s"
-    return tag("span", said, class_=f"chip {'holds' if row['lasted'] else 'fails'}")
+    text = f"lasts {row['ended']:g} s" if row["lasted"] else f"{word} at {round_time(row['ended'])} s"
+    return tag("span", text, class_=f"chip {'holds' if row['lasted'] else 'fails'}")
 
 
 def _by_window(row: Mapping[str, Any], windows: Sequence[Sequence[float]]) -> list[Html]:
@@ -101,5 +107,5 @@ def _wide(head: Sequence[str], windows: Sequence[Sequence[float]], rows: Sequenc
     return table((*head, *titles), rows, numeric=range(len(head), len(head) + len(titles)), wide=True)
 
 
-def _figure(drawn: Mapping[str, Html], name: str) -> list[Html]:
-    return [drawn[name]] if name in drawn else []
+def _figure(figures: Mapping[str, Html], name: str) -> list[Html]:
+    return [figures[name]] if name in figures else []

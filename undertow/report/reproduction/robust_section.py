@@ -1,4 +1,4 @@
-"""The last chapter of the report: the sound version beside the paper's law."""
+"""The last chapter of the report: the robust variant beside the paper's law."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,73 +9,79 @@ from undertow.report.reproduction import robust_tables as tables
 
 FIGURES = ("robust_fidelity", "ablations")
 
-TITLE = "The sound version"
+TITLE = "The robust variant"
 
 CAPTIONS = {
     "robust_fidelity": (
-        "Above, the size of the tracking error against time. Below, its rms over the second half of each run. All runs "
-        "are sampled, at 1 kHz on ODIN and at 100 Hz on BlueROV2 Heavy; a cross marks a run that ended early."
+        "The upper panels show the size of the tracking error against time, the lower panel its rms over the second "
+        "half "
+        "of each run. All runs are sampled, at 1 kHz on ODIN and at 100 Hz on BlueROV2 Heavy. A cross marks a run that "
+        "ended early."
     ),
     "ablations": (
-        "Dots are medians, thick lines the 95 % interval of the median, thin lines 5 to 95 % of the seeds. A cross "
-        "marks runs that ended early, at the right edge without a dot where most did."
+        "Dots are medians, thick lines the 95 % interval of the median, thin lines the 5 % to 95 % range of the "
+        "seeds. A "
+        "cross marks runs that ended early; where most runs ended early, there is no dot."
     ),
 }
 
 _LISTS = {
-    "wins": "Where the paper's idea wins",
-    "same": "Where a plain linear observer is as good: axes without a motor, 20 s at most",
-    "loses": "Where it loses",
-    "neither": "Where the sound version is no better, or costs something",
+    "wins": "Advantages of the paper's approach",
+    "same": "Cases in which a linear observer performs as well: axes without a motor, 20 s at most",
+    "loses": "Disadvantages of the paper's approach",
+    "neither": "Cases in which the robust variant is no better, or has a cost",
 }
 
 
-def robust_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
-    """Conclusions first, then the ladder, then the ablations; nothing if the chapter was not run.
+def robust_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
+    """Conclusions first, then every fidelity, then the ablations; nothing if the chapter was not run.
 
     Args:
-        results: `sound` of results.json.
-        drawn: figures by name.
+        results: `robust_variant` of results.json.
+        figures: figures by name.
     """
     if not results:
         return []
-    said = results["conclusions"]
-    lists = [part for key, title in _LISTS.items() if said[key] for part in (tag("h3", title), _sentences(said[key]))]
-    told = (
-        "Preset `robust` has the paper's structure, but works in body axes, knows the motors, is fed with what was "
-        "applied within limits, keeps its weights in a box and takes its gains from the sampling time. Here it meets "
-        "the paper's laws, all of them sampled. The commands are to be typed in the folder of this page: `undertow "
-        "simulate` and the file named below each law."
+    found = results["conclusions"]
+    lists = [part for key, title in _LISTS.items() if found[key] for part in (tag("h3", title), _sentences(found[key]))]
+    text = (
+        "Preset `robust` has the paper's structure, but it works in body axes, includes the motors in its nominal "
+        "model, "
+        "uses the applied instead of the commanded input, bounds its weights, and derives its gains from the "
+        "sampling time. "
+        "This section compares it with the paper's controllers, all of them sampled. Run the commands in the folder of "
+        "this page: `undertow simulate` with the file named below each controller."
     )
-    ladder = [tag("h3", "The ladder again"), tag("p", prose(told)), *_figure(drawn, "robust_fidelity")]
-    return [*lists, *ladder, tables.ladder(results["ladder"]), *_ablations(results, drawn)]
+    levels = [tag("h3", "Fidelity levels"), tag("p", prose(text)), *_figure(figures, "robust_fidelity")]
+    return [*lists, *levels, tables.fidelity(results["fidelity"]), *_ablations(results, figures)]
 
 
-def _ablations(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
-    told = (
-        f"One thing is changed at a time. Loads, noise and failures are drawn anew for each of {results['seeds']} "
-        "seeds, the same for every variant, and gains that were searched for were found on other seeds. Statistics "
-        "are those of the second half of each run; a run that ended early counts as infinitely bad."
+def _ablations(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
+    text = (
+        f"One element is changed at a time. Disturbances, noise and failures are random, with {results['seeds']} seeds "
+        "that are the same for every variant; gains were tuned on other seeds. Statistics are those of the second "
+        "half of "
+        "each run. A run that ended early counts as infinite."
     )
     if results["left_out"]:
-        told += f" This quick look has fewer seeds and leaves out {', '.join(results['left_out'])}."
+        text += f" This quick report uses fewer seeds and leaves out {', '.join(results['left_out'])}."
     return [
         tag("h3", "Ablations"),
-        tag("p", prose(told)),
+        tag("p", prose(text)),
         tables.answers(results["ablations"]),
-        *_figure(drawn, "ablations"),
+        *_figure(figures, "ablations"),
         tag("details", tag("summary", "Every variant in numbers"), tables.numbers(results["ablations"])),
     ]
 
 
-def _sentences(said: list[str]) -> Html:
-    """What it is about, up to the first full stop, in bold."""
+def _sentences(conclusions: list[str]) -> Html:
+    """A list with the topic of each conclusion, up to the first full stop, in bold."""
     items = []
-    for sentence in said:
+    for sentence in conclusions:
         about, rest = sentence.split(". ", 1)
         items.append(Html(f"<b>{prose(about)}.</b> {prose(rest)}"))
     return bullets(items)
 
 
-def _figure(drawn: Mapping[str, Html], name: str) -> list[Html]:
-    return [drawn[name]] if name in drawn else []
+def _figure(figures: Mapping[str, Html], name: str) -> list[Html]:
+    return [figures[name]] if name in figures else []

@@ -1,4 +1,4 @@
-"""The tables of the report, made from results.json."""
+"""Tables of the report, made from results.json."""
 
 from typing import Any
 
@@ -15,13 +15,13 @@ REFERENCE = {
 NAMES = {"rcafc": "RCAFC", "rafc": "RAFC"}
 
 _COLUMNS = {
-    "rcafc_error": Html("RCAFC, input &epsilon;"),
-    "rcafc_state": Html("RCAFC, input X"),
-    "rafc_error": Html("RAFC, input &epsilon;"),
-    "rafc_state": Html("RAFC, input X"),
+    "rcafc_error": prose("RCAFC, input $\\varepsilon$"),
+    "rcafc_state": prose("RCAFC, input $X$"),
+    "rafc_error": prose("RAFC, input $\\varepsilon$"),
+    "rafc_state": prose("RAFC, input $X$"),
 }
 
-# Metric -> the row of the paper's Table 2 it puts into numbers, and the paper's words for the four columns.
+# Metric -> the row of the paper's Table 2 that it quantifies, and the paper's words for the four columns.
 _TABLE2 = {
     "tracking_rms": ("steady state error e", ("very small", "exist/favorable", "exist/favorable", "exist")),
     "tracking_max": ("largest error", None),
@@ -36,16 +36,16 @@ _TABLE2 = {
 }
 _ROBUSTNESS = ("very good", "fair", "fair", "poor/fair")
 
-_RUNGS = {
+_LEVELS = {
     "ideal": "thrust proportional to voltage (Example 1)",
-    "static": "motor in its steady state at every instant (Example 2)",
-    "shaft": "rotor inertia counts, winding inductance does not",
-    "electromechanical": "all of Eqs. (8) to (11)",
+    "static": "quasi-static motor (Example 2)",
+    "shaft": "rotor inertia, without winding inductance",
+    "electromechanical": "full motor model, Eqs. (8) to (11)",
 }
 
 
 def reference_table(example: dict[str, Any]) -> Html:
-    """Ours beside the independent solution."""
+    """This run compared with the independent solution."""
     rows = []
     for key, expected in REFERENCE.items():
         found = (example.get(key) or {}).get("steady") or {}
@@ -54,11 +54,11 @@ def reference_table(example: dict[str, Any]) -> Html:
             apart = None if ours is None else 100 * (ours / theirs - 1)
             cells = (NAMES[key], _named(metric), number(ours, 4), number(theirs, 4), percent(apart))
             rows.append(cells)
-    return table(("controller", "metric", "this run", "independent", "apart"), rows, numeric=(2, 3, 4))
+    return table(("controller", "metric", "this run", "independent", "difference"), rows, numeric=(2, 3, 4))
 
 
 def table2(results: dict[str, Any]) -> Html:
-    """Table 2 in numbers, the paper's adjectives below them."""
+    """Table 2 in numbers, with the paper's words below them."""
     keys = [key for key in _COLUMNS if key in results]
     places = [list(_COLUMNS).index(key) for key in keys]
     rows = []
@@ -71,24 +71,24 @@ def table2(results: dict[str, Any]) -> Html:
     return table(("", *(_COLUMNS[key] for key in keys)), rows, numeric=range(1, 5), wide=True)
 
 
-def ladder(results: dict[str, Any]) -> Html:
-    """What happens to both controllers on every fidelity, and why."""
+def fidelity_levels(results: dict[str, Any]) -> Html:
+    """Both controllers on every fidelity level, with the reason of a failure."""
     rows = []
     for fidelity, entries in results.items():
         for key, entry in entries.items():
             steady = entry.get("steady") or {}
             figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "input_variation")]
             lasted = entry["status"] == "ok"
-            said = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
-            ended = tag("span", said, class_=f"chip {'holds' if lasted else 'fails'}")
-            place = join(tag("b", fidelity), tag("span", _RUNGS.get(fidelity, ""), class_="said"))
+            words = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
+            ended = tag("span", words, class_=f"chip {'holds' if lasted else 'fails'}")
+            place = join(tag("b", fidelity), tag("span", _LEVELS.get(fidelity, ""), class_="said"))
             rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
-    head = ("fidelity", "controller", "how it ended", "tracking rms", "estimation rms", "voltage variation, V/s", "why")
+    head = ("fidelity", "controller", "status", "tracking rms", "estimation rms", "voltage variation, V/s", "reason")
     return table(head, rows, numeric=(3, 4, 5), wide=True)
 
 
 def audit(claims: list[dict[str, Any]]) -> Html:
-    """Claims with verdict, the numbers behind it and the command that shows it."""
+    """Claims with their verdicts, the evidence and the command that reproduces it."""
     rows = []
     for claim in claims:
         verdict = join(chip(claim["verdict"]), _condition(claim["verdict"]))
@@ -97,11 +97,11 @@ def audit(claims: list[dict[str, Any]]) -> Html:
         identity = tag("b", claim["id"], id=claim["id"])
         simulated = tag("div", prose(f"Simulated: {claim['simulated']}."), class_="small")
         rows.append((identity, prose(claim["claim"]), verdict, join(prose(claim["evidence"]), simulated, command)))
-    return table(("", "claim", "verdict", "evidence, and the run that shows it"), rows, wide=True)
+    return table(("", "claim", "verdict", "evidence, and the run behind it"), rows, wide=True)
 
 
 def glance(claims: list[dict[str, Any]]) -> Html:
-    """Verdicts in one look."""
+    """Summary of the verdicts."""
     items = []
     for claim in claims:
         link = tag("a", claim["id"], href=f"#{claim['id']}")

@@ -51,7 +51,7 @@ def chapter(folder: Path, quick: bool, progress: Progress) -> Chapter:
         "quick": quick,
         "seeds": study.QUICK_SEEDS if quick else study.SEEDS,
         "left_out": [study.identity(module) for module in study.modules() if module not in wanted],
-        "ladder": rows,
+        "fidelity": rows,
         "ablations": found,
         "conclusions": conclusions(rows, found),
     }
