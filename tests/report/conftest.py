@@ -10,8 +10,8 @@ def run_of(controller="rcafc", axes=6, inputs=8, status="ok", ended=20.0, sample
     """A run in the shape of undertow's datasets, with signals that can be told apart."""
     time = np.linspace(0.0, 20.0, samples)
     size = {"rcafc": 1e-4, "rafc": 1e-2}[controller]
-    wanted = np.ones((samples, axes)) * np.arange(1, axes + 1)
-    error = wanted * np.exp(-time)[:, None] + size * np.sin(3 * time)[:, None]
+    desired = np.ones((samples, axes)) * np.arange(1, axes + 1)
+    error = desired * np.exp(-time)[:, None] + size * np.sin(3 * time)[:, None]
     d = 3 * np.sin(time)[:, None] * np.arange(1, axes + 1)
     miss = (100 * size * np.cos(time) + 40 * np.exp(-30 * time))[:, None] * np.ones(axes)
     volts = 10 * np.sin(time)[:, None] * np.arange(1, inputs + 1)
@@ -19,16 +19,16 @@ def run_of(controller="rcafc", axes=6, inputs=8, status="ok", ended=20.0, sample
         volts = volts * np.exp(np.minimum(time, ended) * 4)[:, None]
         d = d * np.exp(np.minimum(time, ended) * 4)[:, None]
     per_axis = {
-        "position": wanted - error,
+        "position": desired - error,
         "velocity": error.copy(),
-        "measured_position": wanted - error,
+        "measured_position": desired - error,
         "measured_velocity": error,
-        "target": wanted,
+        "target": desired,
         "error": error,
         "uncertainty": d,
         "estimate": d + miss,
         "robust": miss / 2,
-        "predicted_position": wanted - error + 2e-3,
+        "predicted_position": desired - error + 2e-3,
     }
     per_input = {"voltage": volts, "command": 2 * volts}
     names = ["north", "east", "down", "roll", "pitch", "yaw", "extra"][:axes]

@@ -59,7 +59,7 @@ def test_lines_are_the_data(figures, runs):
         upper, lower = titled(figures["fig06"], axis)
         pick = lambda run, name, column=column: run[name].values[:, column]
         np.testing.assert_array_equal(line(upper, "RAFC").get_ydata(), pick(runs["rafc"], "position"))
-        np.testing.assert_array_equal(line(upper, "wanted $x_d$").get_ydata(), pick(runs["rcafc"], "target"))
+        np.testing.assert_array_equal(line(upper, "desired $x_d$").get_ydata(), pick(runs["rcafc"], "target"))
         np.testing.assert_array_equal(line(lower, "RCAFC").get_ydata(), abs(pick(runs["rcafc"], "error")))
         assert lower.get_yscale() == "log"
         upper, lower = titled(figures["fig07"], axis)
@@ -75,7 +75,7 @@ def test_line_style_carries_the_meaning(figures):
     assert line(panel, "RCAFC").get_linestyle() == "-"
     assert line(panel, "RAFC").get_linestyle() == "--"
     assert line(panel, "true $d$")._unscaled_dash_pattern[1][0] < 1.5
-    assert [one.get_label() for one in titled(figures["fig10"], "north")[0].lines] == ["wanted $x_d$", "RCAFC"]
+    assert [one.get_label() for one in titled(figures["fig10"], "north")[0].lines] == ["desired $x_d$", "RCAFC"]
 
 
 def test_what_leaves_a_panel_is_written_above_it(figures):
@@ -162,7 +162,7 @@ def test_run_figures_for_any_size(make_run, axes, inputs):
     assert [len(figure.axes) for figure in figures.values()] == [axes, axes, axes, inputs]
     last = figures["effort"].axes[-1]
     np.testing.assert_array_equal(line(last, "applied").get_ydata(), run["voltage"].values[:, -1])
-    np.testing.assert_array_equal(line(last, "asked for").get_ydata(), run["command"].values[:, -1])
+    np.testing.assert_array_equal(line(last, "commanded").get_ydata(), run["command"].values[:, -1])
     assert last.get_ylabel() == "input, V"
 
 

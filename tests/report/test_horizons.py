@@ -54,7 +54,7 @@ def test_growth_is_drawn_up_to_the_end_of_each_run():
     crosses = sorted(line.get_xdata()[0] for line in motor.lines if line.get_marker() == "X")
     assert crosses == [1.5, 139.4], "a run that is bounded lasts"
     said = [text.get_text() for text in survival.texts]
-    assert sorted(said) == ["1.5 s", "139 s", "lasts"]
+    assert sorted(said) == ["1.5 s", "139 s", "completed"]
     tops = sorted(line.get_ydata()[1] for line in survival.lines)
     assert tops == [1.5, 139.4, 200.0]
 
@@ -80,8 +80,8 @@ def test_damping_and_what_is_asked_of_it_share_a_panel():
 def test_page_says_how_long_everything_lasted(results, tmp_path):
     page = write_report(results | {key: RESULTS[key] for key in ("horizons", "lags")}, {}, tmp_path).read_text("utf-8")
     words = re.sub(r"<[^>]+>", " ", page)
-    for said in ("diverged at 139 s", "diverged at 1.5 s", "lasts 200 s", "For how long: 200 s", "10 to 20 s"):
+    for said in ("diverged at 139 s", "diverged at 1.5 s", "lasts 200 s", "Long runs: 200 s", "10 to 20 s"):
         assert said in words
-    assert "from 453 on" in words and "876 to 4382" in words and "never" in words
+    assert "above 453" in words and "876 to 4382" in words and "never" in words
     assert "Simulated: level ideal, 10 s." in words
     assert "lasts 20 s" in words, "the runs of 20 s say so, too"

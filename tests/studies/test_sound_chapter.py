@@ -120,9 +120,17 @@ def test_the_chapter_on_the_page(tmp_path):
         "ablations": ABLATIONS,
         "conclusions": conclusions(ROWS, ABLATIONS),
     }
-    page = write_report({"robust_variant": sound}, {"ablations": ablations_figure(ABLATIONS)}, tmp_path).read_text("utf-8")
+    page = write_report({"robust_variant": sound}, {"ablations": ablations_figure(ABLATIONS)}, tmp_path).read_text(
+        "utf-8"
+    )
     words = re.sub(r"<[^>]+>", "", page)
-    for said in ("The robust variant", "Disadvantages of the paper's approach", "are random, with 8 seeds", "leaves out A2", "30 of 30"):
+    for said in (
+        "The robust variant",
+        "Disadvantages of the paper",
+        "are random, with 8 seeds",
+        "leaves out A2",
+        "30 of 30",
+    ):
         assert said in words
     assert "diverged at 1.5 s" in words and "most ended early" in words
     assert words.count("scenarios/sound_") == len(ROWS)

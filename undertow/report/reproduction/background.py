@@ -11,7 +11,7 @@ INTRODUCTION = join(
         "underwater vehicles by composite adaptive fuzzy estimation of uncertainties</i>, Nonlinear Dynamics, 2017, "
         "DOI "
     ),
-    tag("a", DOI, href=f"https://doi.org/{DOI}"),
+    DOI,
     Html(
         ". It recomputes every figure and table of its results and checks each of its claims. <b>RCAFC</b> is the "
         "robust "
