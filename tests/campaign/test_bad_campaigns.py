@@ -141,7 +141,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
         ),
         (
             ["simulate", "campaign.yaml"],
-            r"`scenario` must be a key of campaigns only .*`undertow campaign` flies campaigns",
+            r"`scenario` must be a key of campaigns only .*Run a campaign with `undertow campaign`",
         ),
         (["campaign", "campaign.yaml", "out"], r"`DIR` must follow the word `status`, but is out. .*`--out out`"),
         (["campaign", "status", "out", "--resume"], r"`--resume` must be left out with `status`"),

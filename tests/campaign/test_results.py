@@ -194,7 +194,7 @@ def test_what_flew_is_told(campaign, campaign_file, tmp_path, capsys, backend, n
     scenario, out = campaign()["scenario"], tmp_path / "out"
     scenario["loop"]["backend"] = backend
     assert run(["campaign", str(campaign_file(scenario=scenario, trials=4, requirements={})), "--out", str(out)]) == 0
-    sentence = f"{number} trials were ran by XLA: slower than in lanes"
+    sentence = f"{number} trials used the XLA backend, which is slower"
     assert (sentence in capsys.readouterr().out) == (sentence in (out / "campaign.html").read_text()) == bool(number)
     column = xr.open_zarr(out / STORE, consolidated=False)["backend"]
     assert column.attrs["flag_meanings"].split()[int(column[0])] == backend

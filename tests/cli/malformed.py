@@ -15,7 +15,7 @@ QUICK = [path for path in SCENARIOS if path.stem in ("inverted_pendulum", "magne
 _NUMBERS = (0, 1, -1, 2, 0.5, -0.5, 1e-300, 5e-324, 1e-30, 1e-9, 1e12, 1e30, -1e30, 1e154, 1e200, -1e200, 1.7e308)
 _ODD = (float("nan"), float("inf"), -float("inf"), 10**18, 10**30, -(10**30), 2**63, True, False, None)
 _WORDS = ("", "x", "nan", "inf", "1e3", "odin", "rcaf", "none", "kind", "./no.py:f", "no.yaml", "no.csv", "2001-01-01")
-_WORDS += ("\u00e9\u4e16", "a\nb", " ", "../..", "\u202e", "{}", "lanes", "xla", "euler", "adaptive", "robust")
+_WORDS += ("\u00e9\u4e16", "a\nb", " ", "../..", "\u202e", "{}", "simd", "xla", "euler", "adaptive", "robust")
 _KEYS = (
     "kind",
     "position",

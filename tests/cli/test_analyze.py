@@ -38,7 +38,7 @@ def test_predictions_are_written_and_shown(undertow, tmp_path):
     assert poles == pytest.approx([-30.0, -15.0], rel=1e-6)
     page = (tmp_path / "out" / "prediction.html").read_text()
     assert page.count("<img") == 3 and "undefined" not in page and "nan" not in page.lower().replace("nano", "")
-    for title in ("Poles over the operating range", "Error per unit of disturbance", "Actuators"):
+    for title in ("Controllable closed-loop poles over the operating range", "Error per unit of disturbance", "Actuator authority"):
         assert title in said.out and title in page
     assert {path.name for path in (tmp_path / "out" / "figures").iterdir()} >= {"poles.png", "frequency.svg"}
 
@@ -57,7 +57,7 @@ def test_what_is_doubtful_is_advised(undertow, tmp_path):
 def test_a_run_is_put_beside_its_prediction(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST)
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
-    assert said.code == 0 and "As predicted: no metric departs by more than 10 %." in said.out, said.out
+    assert said.code == 0 and "The run agrees with the prediction: no metric departs by more than 10 %." in said.out, said.out
     found = json.loads((tmp_path / "out" / "metrics.json").read_text())
     for name in ("tracking_rms", "estimation_rms", "input_rms"):
         assert found["predicted"][name] == pytest.approx(found["steady"][name], rel=0.1)
@@ -66,7 +66,7 @@ def test_a_run_is_put_beside_its_prediction(undertow, tmp_path):
 def test_what_no_linear_prediction_knows_is_named(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST.replace("limit: 8", "limit: 1.5"))
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
-    assert "Departs from the linear prediction by more than 10 %: tracking_rms by" in said.out
+    assert "The run departs from the linear prediction by more than 10 %: tracking_rms by" in said.out
     assert "Inputs were at a limit for" in said.out
 
 

@@ -60,7 +60,7 @@ def test_what_was_not_is_taken(written, dataset):
 def test_another_metric_is_a_difference_though_all_numbers_are_equal(written, dataset):
     """By somebody who has mended the checksum."""
     found = compare(written(better, mended=True), dataset)
-    said = "with the same versions. What differs: metrics.steady.tracking_rms, metrics.whole.tracking_rms"
+    said = "with the same versions. Differences: metrics.steady.tracking_rms, metrics.whole.tracking_rms"
     assert not found.equal and not found.explained and found.sentence.endswith(said)
 
 

@@ -62,7 +62,7 @@ def test_internal_error_is_3(undertow, tmp_path, monkeypatch):
     said = undertow("simulate", "s.yaml", "--out", "out")
     line = (
         "Error: internal error, RuntimeError: broken in two lines. "
-        "To see where, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
+        "To see the traceback, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
     )
     assert said.code == 3
     assert said.err.splitlines()[-1] == line

@@ -48,7 +48,7 @@ def his(folder):
 @pytest.mark.parametrize("command", ["simulate", "analyze", "tune", "check", "campaign"])
 def test_no_command_runs_it_unasked(his, refused, command):
     said = refused(command, str(his / ("campaign.yaml" if command == "campaign" else "run.nc")))
-    assert "must be without Python code of its own" in said and "--allow-code" in said
+    assert "must not name Python code" in said and "--allow-code" in said
     user = getpass.getuser()
     assert f"run.nc, a file of {user}" in said
     assert f"`plant.vehicle.kind` names {his / 'my_rov.py'}:my_rov, a file of {user}. " in said
@@ -76,12 +76,12 @@ def test_code_that_has_changed_since_is_named(his, refused):
     said = f"`plant.vehicle.kind` names {code}:my_rov, a file of {getpass.getuser()}, changed since that run. "
     assert said in refused("simulate", str(result))
     same = compare(result, simulate_scenario(result, allow_code=True).dataset)
-    assert same.equal and same.sentence.endswith(f"{hash_of(his)}, though {code} has other contents now")
+    assert same.equal and same.sentence.endswith(f"{hash_of(his)}, although {code} has changed")
     code.write_text(CODE.replace("return ut.vehicles.odin()", HEAVIER))
     other = compare(result, simulate_scenario(result, allow_code=True).dataset)
     assert not other.equal and other.explained
     assert other.sentence.startswith(
-        f"run.nc was not repeated bit for bit; other versions: {code} has other contents now. What differs: "
+        f"run.nc was not repeated bit for bit; other versions: {code} has changed. Differences: "
     )
 
 

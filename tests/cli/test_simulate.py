@@ -74,7 +74,7 @@ def test_other_numbers_with_equal_versions_are_a_failure(ran, undertow, tmp_path
     changed(tmp_path, other_numbers)
     said = undertow("simulate", "changed.nc", "--out", "again")
     assert said.code == 1
-    line = "Error: changed.nc was not repeated bit for bit, with the same versions. What differs: position"
+    line = "Error: changed.nc was not repeated bit for bit, with the same versions. Differences: position"
     assert said.err.splitlines()[-1] == line
 
 
@@ -114,5 +114,5 @@ def test_continuous_loop_and_late_window(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(text)
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0
-    assert "Advice: the steady window starts at 10 s, the run ends at 0.1 s: no steady metrics" in said.err
+    assert "Advice: there are no steady metrics: the steady window starts at 10 s, and the run ends at 0.1 s" in said.err
     assert json.loads((tmp_path / "out/metrics.json").read_text())["steady"] is None

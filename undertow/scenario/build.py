@@ -1,4 +1,4 @@
-"""From a scenario to a closed loop ready to run."""
+"""Build the closed loop of a scenario."""
 
 import functools
 from collections.abc import Callable, Mapping
@@ -24,11 +24,11 @@ Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
-_TOLD_APART = 2**24  # whole numbers that float32 holds
+_EXACT_INTEGERS = 2**24  # consecutive whole numbers that float32 represents
 
 
 def in_its_precision(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """A function of a scenario (its first argument, read or built) that computes in the precision it names."""
+    """Decorator: compute a function of a scenario (its first argument, read or built) in the scenario's precision."""
 
     @functools.wraps(function)
     def computed(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
@@ -49,15 +49,16 @@ class Built(NamedTuple):
 
     @in_its_precision
     def advice(self) -> tuple[str, ...]:
-        """What is odd about it, though it can be run."""
+        """Warnings about a scenario that can be run."""
         (start, _), end = self.window(), self.scenario.loop.duration
-        late = f"the steady window starts at {start:g} s, the run ends at {end:g} s: no steady metrics"
+        late = f"there are no steady metrics: the steady window starts at {start:g} s, and the run ends at {end:g} s"
         plant = self.closed_loop.plant
         fast = step_advice(plant.thruster, self.scenario.loop) if isinstance(plant, HybridVehicle) else ()
         loop, steps = self.scenario.loop, self.scenario.loop.duration / self.scenario.loop.dt
         times = rounded_times(loop)
-        if self.scenario.precision == "float32" and loop.method != "adaptive" and steps > _TOLD_APART:
-            times += (f"float32 tells no instants apart beyond {_TOLD_APART} steps, {_TOLD_APART * loop.dt:.6g} s",)
+        if self.scenario.precision == "float32" and loop.method != "adaptive" and steps > _EXACT_INTEGERS:
+            limit = f"{_EXACT_INTEGERS} steps, {_EXACT_INTEGERS * loop.dt:.6g} s"
+            times += (f"float32 cannot distinguish instants beyond {limit}",)
         return plant.advice() + fast + times + ((late,) if start >= end else ())
 
     def window(self) -> tuple[float, float]:
@@ -66,14 +67,14 @@ class Built(NamedTuple):
 
 
 def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None) -> Built:
-    """Objects described by a scenario, made on the processor: the same bits whether or not there is a GPU.
+    """Build the objects of a scenario on the CPU, so that the result does not depend on a GPU.
 
     Args:
         source: a scenario as read from a file, or as Python data.
-        part_cache: where many similar scenarios are built, so that what they share is made once.
+        part_cache: cache of parts that several similar scenarios share.
 
     Raises:
-        BadInput: anything wrong with it, with key path and place.
+        BadInput: the scenario is invalid; the error names key path and location.
     """
     text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
@@ -94,9 +95,9 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         return part
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
-        told = {"part": part.model_dump(), "context": context}
-        new = lambda: factory.make(KIND_OF[key], told["part"], text.folder, given, context)
-        return placed(text, where, lambda: part_cache.part(where, told, given, new))
+        described = {"part": part.model_dump(), "context": context}
+        new = lambda: factory.make(KIND_OF[key], described["part"], text.folder, given, context)
+        return placed(text, where, lambda: part_cache.part(where, described, given, new))
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):

@@ -1,4 +1,4 @@
-"""Whether times and parts fit together: shapes only, nothing is computed."""
+"""Consistency of times and parts: only shapes are evaluated."""
 
 import math
 from collections.abc import Callable
@@ -15,29 +15,29 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.reading import Text, key_path
 from undertow.scenario.schema import Initial, Loop, Window
 
-# A record takes about a kilobyte, a sampling time some microseconds.
+# A record takes about a kilobyte, a control step some microseconds.
 MOST_RECORDS = 1_000_000
 MOST_STEPS = 2_000_000_000
 
-# Of a time: multiples of decimal steps are met to this share.
+# Relative tolerance for multiples of decimal steps.
 _ROUNDING = 1e-9
 
 
 def placed(text: Text, key: str, make: Callable[[], Any]) -> Any:
-    """Result of `make`; its complaints with the key path and place in the scenario file."""
+    """Result of `make`; its errors get the key path and location in the scenario file."""
     try:
         return make()
     except BadInput as error:
         complaint = error.at(key)
-        where = complaint.where or text.where(key_path(complaint.name))  # a file of its own knows better
+        where = complaint.where or text.where(key_path(complaint.name))  # a named file has its own locations
         raise complaint.at(where=where) from error.__cause__
 
 
 def check_times(text: Text, loop: Loop, window: Window) -> None:
-    """Duration, records and sampling times that go together.
+    """Check that duration, records and sampling time are consistent.
 
     Raises:
-        BadInput: they do not.
+        BadInput: they are not.
     """
     start, stop = window.of_run(loop.duration)
     if not start < stop:
@@ -63,32 +63,32 @@ def check_times(text: Text, loop: Loop, window: Window) -> None:
 
 
 def rounded_times(loop: Loop) -> tuple[str, ...]:
-    """A sentence where a run ends at another time than it is told to, and where its last record is not at its end."""
-    stepped, said = loop.method != "adaptive", []
+    """Sentences where a run does not end at its duration, or its last record is not at its end."""
+    stepped, sentences = loop.method != "adaptive", []
     dt = loop.dt if loop.kind == "sampled" else loop.record / round(loop.record / loop.dt) if stepped else 0.0
     end = round(loop.duration / dt) * dt if stepped else loop.duration
     if abs(end - loop.duration) > _ROUNDING * loop.duration:
-        said.append(f"the run lasts {end:.9g} s, a whole number of steps of {dt:g} s, not {loop.duration:.9g} s")
+        sentences.append(f"the run lasts {end:.9g} s, a whole number of steps of {dt:g} s, not {loop.duration:.9g} s")
     last = math.floor(end / loop.record * (1 + _ROUNDING)) * loop.record
     if end - last > _ROUNDING * end:
-        said.append(
-            f"the last record is at {last:.9g} s, {end - last:.3g} s before the end: `loop.duration` is no multiple of "
-            f"`loop.record` ({loop.record:g} s)"
+        sentences.append(
+            f"the last record is at {last:.9g} s, {end - last:.3g} s before the end: `loop.duration` is not a multiple "
+            f"of `loop.record` ({loop.record:g} s)"
         )
-    return tuple(said)
+    return tuple(sentences)
 
 
 def whole_steps(interval: float, step: float) -> bool:
-    """Whether an interval is a whole number of steps, one at least."""
+    """Whether an interval is a whole number of steps, at least one."""
     ratio = interval / step
     return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6 * ratio
 
 
 def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
-    """Parts that agree on the number of outputs and can take a step together.
+    """Check that the parts agree on the number of outputs and can take a step together.
 
     Raises:
-        BadInput: they do not.
+        BadInput: they do not fit together.
     """
     axes, zero, what = len(loop.plant.outputs), jnp.zeros(()), "one per output of the plant"
     for key, value in start:
@@ -118,7 +118,7 @@ def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
 
 
 def _traced(text: Text, key: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Shapes of a result; whatever is raised on the way is a part that does not fit the others."""
+    """Shapes of a result; any exception means that the part does not fit the others."""
 
     def trace() -> Any:
         try:

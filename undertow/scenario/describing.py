@@ -1,4 +1,4 @@
-"""What can be said about a part without running it: for `undertow list`, `undertow describe` and the docs."""
+"""Descriptions of parts without running them, for `undertow list`, `undertow describe` and the docs."""
 
 import inspect
 import re
@@ -16,7 +16,7 @@ from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 
 
 class Option(NamedTuple):
-    """One argument of a part, as it stands in a scenario."""
+    """One option of a part, as written in a scenario."""
 
     name: str
     default: Any  # "required" when there is none
@@ -35,7 +35,7 @@ class Description(NamedTuple):
 
 
 def describe(name: str) -> tuple[Description, ...]:
-    """Every part of that name; kinds are separate, so there may be more than one.
+    """All parts of a name; several kinds can have a part of the same name.
 
     Args:
         name: of a part, `kind/name` for one kind only, `./file.py:function`, or a vehicle file.
@@ -51,8 +51,8 @@ def describe(name: str) -> tuple[Description, ...]:
             return (_describe("", name, catalogue.find("", name)),)
         except BadInput as error:
             raise BadInput("NAME", error.must, error.got, hint=error.hint) from error.__cause__
-    wanted, _, short = name.rpartition("/")
-    kinds = [kind for kind in catalogue.KINDS if wanted in ("", kind)]
+    given, _, short = name.rpartition("/")
+    kinds = [kind for kind in catalogue.KINDS if given in ("", kind)]
     known = {kind: catalogue.names(kind) for kind in kinds}
     named = [(kind, known[kind][short]) for kind in kinds if short in known[kind]]
     found = tuple(one for kind, part in named for one in _presets(kind, short, part))
@@ -96,7 +96,7 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
 
 
 def _instance(kind: str, name: Any, part: Any) -> Any:
-    """The part with all its defaults; None when it cannot be made of them."""
+    """The part with all its defaults; None where it has required options."""
     try:
         return factory.make(kind, name, Path())[0] if kind else part()
     except Exception:
@@ -121,7 +121,7 @@ def _options(kind: str, part: Any) -> tuple[Option, ...]:
 
 
 def _meanings(text: str) -> dict[str, str]:
-    """Argument -> its line(s) in the `Args:` section of a docstring; `a, b: ...` speaks of both."""
+    """Argument -> its text in the `Args:` section of a docstring; `a, b: ...` describes both."""
     section = re.search(r"^Args:\n((?:[ \t]+.*\n?|\n)*)", text, re.MULTILINE)
     found: dict[str, str] = {}
     names: list[str] = []

@@ -1,4 +1,4 @@
-"""Running a scenario: outcome, metrics and a dataset that can repeat itself."""
+"""Run a scenario: outcome, metrics and a dataset from which the run can be repeated."""
 
 import os
 import tempfile
@@ -32,19 +32,19 @@ class Executed(NamedTuple):
     built: Built
     outcome: Outcome
     status: Status
-    steady: dict[str, Any] | None  # metrics over the steady window; None when the run did not last
+    steady: dict[str, Any] | None  # metrics over the steady window; None when the run ended early
     whole: dict[str, Any]
     dataset: xr.Dataset
 
 
 def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
-    """Run a scenario, on the processor: one run has nothing that a GPU could do beside it.
+    """Run a scenario on the CPU: a single run has no work for a GPU.
 
     Args:
         source: a scenario, read, as data or built.
 
     Raises:
-        BadInput: anything wrong with it.
+        BadInput: the scenario is invalid.
     """
     with runtime.on_processor():
         return _execute(source if isinstance(source, Built) else build(source))
@@ -78,10 +78,10 @@ def run_loop(
     seed: int,
     accumulators: tuple[sampled.AbstractAccumulator, ...] = (),
 ) -> tuple[Outcome, dict[str, str]]:
-    """Run a closed loop as `loop:` and `initial:` of a scenario say; `accumulators` for a sampled one.
+    """Run a closed loop with the keys `loop` and `initial` of a scenario; `accumulators` are for a sampled loop.
 
     Returns:
-        The outcome; and attribute `left_to_xla` of its dataset, the reason, where lanes were asked for in vain.
+        The outcome; and attribute `left_to_xla` of its dataset, the reason why the SIMD backend could not be used.
     """
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
     common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}

@@ -1,4 +1,4 @@
-"""Building parts from their descriptions: a part's own signature says what may be given."""
+"""Build parts from their descriptions; the signature of a part defines its options."""
 
 import functools
 import inspect
@@ -21,7 +21,7 @@ from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 
-# Arguments that are parts themselves: their kind, and which one when no `kind` is said; a tuple for a list of parts.
+# Arguments that are parts themselves: their kind, and the default part; a tuple for a list of parts.
 INNER = {
     "vehicle": ("vehicles", "odin"),
     "thruster": ("thrusters", "paper_table3"),
@@ -30,7 +30,7 @@ INNER = {
     "sensors": ("sensors", ("imu", "dvl", "depth", "compass", "position_fix")),
 }
 
-# Kinds that are data: every declared parameter of theirs may be changed by name.
+# Kinds that are data: a scenario may change every declared parameter by name.
 _ADJUSTABLE = ("vehicles", "thrusters")
 
 _CONTRACTS = {
@@ -60,12 +60,12 @@ def make(
     Args:
         kind: folder of the catalogue.
         description: name, or mapping of `kind` (the name) and options; a vehicle's name may be that of a YAML file.
-        folder: where relative file names start.
-        given: leading arguments that are not the user's.
-        context: options that follow from the rest of a scenario where the user says nothing about them.
+        folder: folder of relative file names.
+        given: leading arguments that do not come from the user.
+        context: defaults of options that follow from the rest of a scenario.
 
     Raises:
-        BadInput: anything wrong with the description; key names start at the part.
+        BadInput: the description is invalid; key names start at the part.
     """
     options: dict[str, Any] = {"kind": description} if isinstance(description, str) else dict(description)
     name = options.pop("kind", None)
@@ -95,7 +95,7 @@ def make(
 
 
 def presets_of(function: Callable[..., Any]) -> Mapping[str, Callable[..., Any]]:
-    """Ready-made settings that a part has, each with options of its own; none for most."""
+    """Presets of a part, each with its own options; most parts have none."""
     return getattr(function, "presets", {})
 
 
@@ -105,7 +105,7 @@ def call(
     """Result of a function called with checked options, and all options with their defaults.
 
     Raises:
-        BadInput: unknown, missing or mistyped option, or the function's own complaint.
+        BadInput: unknown, missing or mistyped option, or an error of the function.
     """
     declared = _declared_once if inspect.isfunction(function) else _declared
     signature, hints = declared(function)
@@ -129,15 +129,15 @@ def call(
 
 
 def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -> Any:
-    """Same part with some declared parameters replaced; those of parts inside it as nested mappings.
+    """The same part with some declared parameters replaced; parameters of inner parts as nested mappings.
 
     Args:
-        part: to be changed.
+        part: the part.
         changes: new values by name.
-        options: other names that could have been meant.
+        options: other valid names, for suggestions.
 
     Raises:
-        BadInput: unknown parameter, wrong type or shape, or the part's own complaint.
+        BadInput: unknown parameter, wrong type or shape, or an error of the part.
     """
     fields = type(part).__dataclass_fields__
     values = {name: getattr(part, name) for name in fields}
@@ -165,12 +165,12 @@ def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -
 
 
 def is_part(thing: Any) -> bool:
-    """Whether it keeps the contract of some kind of part."""
+    """Whether an object keeps the contract of some kind of part."""
     return isinstance(thing, tuple(_CONTRACTS.values()))
 
 
 def _preset(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Callable[..., Any], dict[str, str]]:
-    """The function of the preset that the options name, the first where they name none; and that name."""
+    """The function of the preset in the options, by default the first; and its name."""
     presets = presets_of(function)
     if not presets:
         return function, {}
@@ -193,11 +193,11 @@ def _declared(function: Callable[..., Any]) -> tuple[list[tuple[str, inspect.Par
     return list(inspect.signature(function).parameters.items()), typing.get_type_hints(function)
 
 
-_declared_once = functools.cache(_declared)  # of thousands of trials; methods are of parts that come and go
+_declared_once = functools.cache(_declared)  # for thousands of trials; methods belong to short-lived parts
 
 
 def _made(make: Callable[[], Any]) -> Any:
-    """What `make` makes; whatever it raises is about the options, which are all it was given."""
+    """Result of `make`; any exception is about the options, which are its only input."""
     try:
         return make()
     except BadInput:
@@ -207,7 +207,7 @@ def _made(make: Callable[[], Any]) -> Any:
 
 
 def inner_default(name: str, parameter: inspect.Parameter) -> Any:
-    """Which part an argument of INNER is when nothing is said about it; None for none."""
+    """Default part of an argument of INNER; None for no part."""
     return INNER[name][1] if parameter.default is inspect.Parameter.empty else parameter.default
 
 
@@ -224,7 +224,7 @@ def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[
 def _at(
     name: str, kind: str, default: Mapping[str, str], description: Any, folder: Path | None
 ) -> tuple[Any, dict[str, Any]]:
-    """The part that stands at a key."""
+    """The part at a key."""
     if isinstance(description, Mapping):
         description = {**default, **description}
     elif not isinstance(description, str):
@@ -239,7 +239,8 @@ def _samples(options: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Turn `file` (a CSV file) or `csv` (its text, as results keep it) into `samples`; returns what results keep."""
     given = [key for key in ("file", "csv", "samples") if key in options]
     if len(given) > 1:
-        raise BadInput(given[1], "be left out when there is another source of samples", f"beside `{given[0]}`")
+        must = "be left out when there is another source of samples"
+        raise BadInput(given[1], must, f"given together with `{given[0]}`")
     for key in ("file", "csv"):
         if key in options and not isinstance(options[key], str):
             raise BadInput(key, "be text", repr(options[key]))

@@ -1,4 +1,4 @@
-"""Parts that were made before: what thousands of similar scenarios need to be built quickly."""
+"""Cache of parts, so that thousands of similar scenarios are built quickly."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -11,35 +11,35 @@ _MOST = 512  # parts that are remembered
 
 
 class PartCache:
-    """Makes a part once for each description, and lets loops of the same shape be checked once."""
+    """Makes a part once per description, and checks loops of the same structure once."""
 
     def __init__(self) -> None:
         self._made: dict[Any, tuple[Any, tuple[Any, ...]]] = {}
         self._checked: set[Any] = set()
 
     def part(self, where: str, description: Mapping[str, Any], given: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """Result of `make`, or what it was for the same description and the same other parts, in the same precision.
+        """Result of `make`, cached by description, other parts and precision.
 
         Args:
             where: key of the part.
             description: everything that `make` reads; plain data.
-            given: parts that it is made from.
-            make: what makes it.
+            given: other parts that it is made from.
+            make: makes the part.
         """
         try:
-            told = json.dumps(description, sort_keys=True)
+            text = json.dumps(description, sort_keys=True)
         except (TypeError, ValueError):  # arrays in Python data
             return make()
         double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
-        key = (where, told, double, tuple(id(part) for part in given))
+        key = (where, text, double, tuple(id(part) for part in given))
         if key not in self._made:
             if len(self._made) >= _MOST:
                 self._made.clear()
-            self._made[key] = (make(), given)  # with `given` alive, its identity stays its own
+            self._made[key] = (make(), given)  # keeps `given` alive, so that its id stays unique
         return self._made[key][0]
 
     def check_once(self, tree: Any, check: Callable[[], None]) -> None:
-        """Call `check`, unless it has passed for a tree of parts of this shape before."""
+        """Call `check`, unless it has passed before for parts of this structure."""
         shape = structure(tree)
         if shape not in self._checked:
             check()
@@ -47,6 +47,6 @@ class PartCache:
 
 
 def structure(tree: Any) -> Any:
-    """Everything about a tree of parts but its numbers: equal where one compiled program serves both."""
+    """Everything about a tree of parts except its numbers; equal structures share a compiled program."""
     leaves, form = jax.tree.flatten(tree)
     return form, tuple((leaf.shape, leaf.dtype) if eqx.is_array(leaf) else leaf for leaf in leaves)

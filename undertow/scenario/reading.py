@@ -1,4 +1,4 @@
-"""Reading scenario files: YAML 1.2 with line numbers, or the scenario inside a result file."""
+"""Read scenario files: YAML 1.2 with line numbers, or the scenario inside a result file."""
 
 import io
 import re
@@ -17,7 +17,7 @@ from undertow.scenario.yaml_text import Path_, load
 
 
 class Text(NamedTuple):
-    """A scenario as read: plain data, and where each key stands."""
+    """A scenario as read: plain data, and the line of each key."""
 
     data: dict[str, Any]
     name: str  # file name for messages; "" when not from a file
@@ -25,7 +25,7 @@ class Text(NamedTuple):
     lines: dict[Path_, int]  # key path -> line, from 1
 
     def where(self, path: Path_) -> str:
-        """Place of a key, or of the nearest enclosing one, for messages."""
+        """Location of a key, or of the nearest enclosing one, for messages."""
         while path and path not in self.lines:
             path = path[:-1]
         if not self.name:

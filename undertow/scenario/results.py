@@ -1,4 +1,4 @@
-"""What is known about a finished run: status, metrics, and a dataset that says how it came about."""
+"""Results of a finished run: status, metrics, and a self-describing dataset."""
 
 import json
 import math
@@ -20,7 +20,7 @@ class Labelled(NamedTuple):
     """One finished run."""
 
     status: Status
-    steady: dict[str, Any] | None  # metrics over the steady window; None when the run did not last
+    steady: dict[str, Any] | None  # metrics over the steady window; None when the run ended early
     whole: dict[str, Any]
     dataset: xr.Dataset
 
@@ -28,21 +28,21 @@ class Labelled(NamedTuple):
 def label(
     loop: ClosedLoop, outcome: Outcome, window: tuple[float, float], dt: float, attributes: dict[str, Any]
 ) -> Labelled:
-    """Measure a run and write down what it was.
+    """Compute the metrics of a run and make its dataset.
 
     Args:
-        loop: what was run.
-        outcome: how it went; the steady metrics are those it has accumulated, if any.
+        loop: the closed loop.
+        outcome: its outcome; accumulated metrics, if any, are the steady metrics.
         window: start and stop of the steady metrics, s.
         dt: sampling time, s.
-        attributes: of the dataset, beside status, metrics, versions and hashes.
+        attributes: further attributes of the dataset.
     """
     status, ended = Status(int(outcome.status)), float(outcome.ended)
     counted = {} if rules(loop) is None else {"rules": rules(loop)}
     covered = status is Status.OK and window[0] < ended
     dataset = to_dataset(outcome, loop.plant, loop.controller)
     over = lambda start, stop: measure(outcome, start, stop) | closure(dataset, start, stop) | counted
-    # A run that was ended by a command has none at that instant.
+    # A run ended by an invalid command has no input at that instant.
     last = ended - dt / 2 if status is Status.COMMAND_NOT_FINITE else ended
     steady, whole = over(*window) if covered else None, over(0.0, last)
     if steady is not None and outcome.accumulated:
@@ -59,13 +59,13 @@ def label(
 
 
 def rules(loop: ClosedLoop) -> int | None:
-    """Rules of the law's fuzzy system per axis; None for a law without one."""
+    """Number of fuzzy rules per axis; None for a controller without a fuzzy system."""
     fuzzy = getattr(loop.controller, "fuzzy", None)
     return None if fuzzy is None else fuzzy.rules
 
 
 def metrics_text(dataset: xr.Dataset, further: dict[str, Any] | None = None) -> str:
-    """Contents of metrics.json for a run, and whatever else is known about it."""
+    """Contents of metrics.json for a run, with further entries."""
     ending = {"status": dataset.attrs["status"], "ended": dataset.attrs["ended"]}
     metrics = json.loads(dataset.attrs["metrics"]) | (further or {})
     found = ending | metrics | {"certificate": certificate_of(dataset)}
@@ -73,12 +73,12 @@ def metrics_text(dataset: xr.Dataset, further: dict[str, Any] | None = None) -> 
 
 
 def certificate_of(dataset: xr.Dataset) -> dict[str, Any] | None:
-    """Certificate of a run as it stands in its attributes; None for a law without one, and in older files."""
+    """Certificate of a run from its attributes; None for a controller without one, and in older files."""
     return json.loads(dataset.attrs["certificate"]) if "certificate" in dataset.attrs else None
 
 
 def to_json(value: Any, indent: int | None = None) -> str:
-    """JSON that every reader takes: numbers that are not finite become null."""
+    """Standard JSON: numbers that are not finite become null."""
     return json.dumps(_finite(value), indent=indent, allow_nan=False)
 
 

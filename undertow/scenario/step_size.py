@@ -1,4 +1,4 @@
-"""Whether steps of fixed length are short enough: for the thrusters beforehand, for all else once a run has failed."""
+"""Stability of fixed integration steps: for the thrusters before a run, for the whole loop after a failed run."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,12 +18,12 @@ from undertow.thrusters.thruster import AbstractThruster
 # Largest step times decay rate at which a method is stable.
 _LIMITS = {"rk4": 2.785, "euler": 2.0}
 
-# Records of a failed run that are looked at.
+# Number of records of a failed run that are examined.
 _LOOKS = 9
 
 
 def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[str, ...]:
-    """A sentence when steps are too long for thrusters at rest, where only their linear part counts."""
+    """A sentence when steps are too long for the linearised thrusters at rest."""
     if loop.method not in _LIMITS:
         return ()
     rate, step = fastest_decay(thruster), loop.dt / loop.substeps
@@ -31,14 +31,15 @@ def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[str, ...]:
     if step <= longest:
         return ()
     return (
-        f"the thrusters settle in {1e3 / rate:.3g} ms, but steps of {1e3 * step:g} ms are unstable beyond "
-        f"{1e3 * longest:.3g} ms: the run will diverge by its steps alone. Take {_remedy(loop, longest)}, or another "
-        "fidelity",
+        f"the thrusters have a time constant of {1e3 / rate:.3g} ms, for which integration steps above "
+        f"{1e3 * longest:.3g} ms are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically. "
+        "Use "
+        f"{_remedy(loop, longest)}, or another fidelity level",
     )
 
 
 def _remedy(loop: Loop, longest: float) -> str:
-    """A setting with steps of at most so many seconds."""
+    """A setting with steps of at most `longest` seconds."""
     if loop.kind == "continuous":
         return f"a loop.dt of at most {longest:.2g} s"
     return f"loop.substeps: {int(np.ceil(loop.dt / longest))} or more"
@@ -54,10 +55,10 @@ def fastest_decay(thruster: AbstractThruster) -> float:
 
 
 def step_failure(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> str:
-    """Why a run failed if its steps were too long for what was integrated; nothing if that is not the cause.
+    """The reason of a failed run if its integration steps were too long; empty if that is not the cause.
 
-    A sampled run integrates the plant, one ODE the law with it. Looked at is where the run began, and further records
-    up to where it moved faster than it should: drag that is quadratic makes any plant fast once it has run away.
+    A sampled run integrates the plant, a continuous run the controller with it. The loop is linearised at the start and
+    at further records before the plant moved unusually fast: quadratic drag makes any diverging plant fast.
     """
     failed = Status(int(outcome.status)) in (Status.DIVERGED, Status.NOT_FINITE)
     if not failed or loop.method not in _LIMITS:
@@ -68,16 +69,18 @@ def step_failure(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> str:
         step = loop.dt
     if step <= longest:
         return ""
-    what = "plant and law together settle" if loop.kind == "continuous" else "the plant settles"
+    what = "plant and controller have" if loop.kind == "continuous" else "the plant has"
     return (
-        f"A state left every sensible envelope, but not because the loop is unstable: {what} in {1e3 / rate:.3g} ms, "
-        f"and steps of {1e3 * step:g} ms ({loop.method}) are unstable by themselves beyond {1e3 * longest:.3g} ms. "
-        f"Take {_remedy(loop, longest)}."
+        f"The run diverged numerically, not because the loop is unstable: {what} a time constant of {1e3 / rate:.3g} "
+        "ms, "
+        f"for which steps of {loop.method} above {1e3 * longest:.3g} ms are unstable, but the step is {1e3 * step:g} "
+        "ms. "
+        f"Use {_remedy(loop, longest)}."
     )
 
 
 def _decays(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> list[float]:
-    """Fastest decays of what is integrated at some records, 1/s; none where it grows by itself."""
+    """Fastest decay rates at some records, 1/s, without those where the fastest mode grows."""
     plant, samples = closed_loop.plant, outcome.signals
     ordinary = np.abs(np.asarray(samples.velocity)).max(axis=1) <= _ordinary(closed_loop, outcome)
     rows = np.flatnonzero(ordinary & (np.asarray(outcome.time) <= float(outcome.ended)))
@@ -96,14 +99,14 @@ def _decays(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> list[float
 
 
 def _ordinary(closed_loop: ClosedLoop, outcome: Outcome) -> float:
-    """A speed that is nothing unusual, m/s or rad/s: a few times that of the reference or of the start."""
+    """Largest usual speed, m/s or rad/s: a few times that of the reference or of the start."""
     times = np.linspace(0.0, float(outcome.ended), _LOOKS)
-    wanted = np.abs([np.asarray(closed_loop.reference.at(jnp.asarray(t)).velocity) for t in times]).max()
-    return max(1.0, 3 * float(wanted), 1.5 * float(np.abs(np.asarray(outcome.signals.velocity[0])).max()))
+    desired = np.abs([np.asarray(closed_loop.reference.at(jnp.asarray(t)).velocity) for t in times]).max()
+    return max(1.0, 3 * float(desired), 1.5 * float(np.abs(np.asarray(outcome.signals.velocity[0])).max()))
 
 
 def _fastest(rates: Callable[..., Any], points: list[tuple[Any, ...]]) -> list[float]:
-    """Fastest decay at each point; those where something grows faster than it decays are left out."""
+    """Fastest decay rate at each point, without points where the fastest mode grows."""
     slopes, found = jax.jit(jax.jacfwd(rates)), []
     for point in points:
         matrix = np.asarray(slopes(*map(jnp.asarray, point)))

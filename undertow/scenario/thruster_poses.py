@@ -1,4 +1,4 @@
-"""Where thrusters are and which way they push: a list of poses as people write them."""
+"""Poses of thrusters in a vehicle file."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +16,7 @@ _AXES = "forward, starboard, down"
 
 
 def poses(entries: Any) -> tuple[NDArray, NDArray]:
-    """Positions (m) and directions of positive thrust, each N x 3, directions with the length they were given.
+    """Positions (m) and directions of positive thrust, each of shape (N, 3), directions with their given length.
 
     Args:
         entries: one mapping per thruster: `position`, and `direction` or the angles `azimuth` (degrees, from forward

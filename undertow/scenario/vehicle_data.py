@@ -1,4 +1,4 @@
-"""A vehicle file, well formed. Whether its numbers make sense is the linter's question."""
+"""Contents of a vehicle file, checked for form. The linter checks whether the numbers are plausible."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -52,7 +52,7 @@ class VehicleData(NamedTuple):
         return assemble(self.name, self.hull, self.layout._replace(directions=directions / lengths[:, None]))
 
     def facts(self) -> Facts:
-        """What the linter looks at."""
+        """The facts that the linter checks."""
         hull, inertia = self.hull, np.asarray(self.hull.inertia)
         if hull.inertia_about_origin:
             inertia = inertia_about_origin(inertia, -hull.mass, hull.r_g)  # back to the centre of gravity

@@ -1,4 +1,4 @@
-"""A vehicle of the user's own from a YAML file alone. See docs/your-own-vehicle.md."""
+"""A vehicle from a YAML file. See docs/your-own-vehicle.md."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
