@@ -89,8 +89,8 @@ def main():
         letters = judge(from_data(scenario(vehicle, by_hand)), {"table 1": TABLE_1})
         names = {"given": "robust, as it comes", "start": "beginning", "tuned": "robust, tuned"}
         rows = [("by hand", letters[0]), ("Table 1", letters[1])]
-        rows += [(names[one.name], one) for one in found.judged]
-        best = found.judged[-1]
+        rows += [(names[one.name], one) for one in found.evaluated]
+        best = found.evaluated[-1]
         for name, one in rows:
             print(
                 f"  {name:<20} held-out cost {one.held_out_cost:8.4g} = {one.held_out_cost / best.held_out_cost:7.3g} "

@@ -93,7 +93,7 @@ def test_wrong_options(refused, tmp_path):
 
 
 def test_a_budget_that_ends_while_compiling_gives_what_was_begun(undertow, tmp_path):
-    """No time for anything: the given gains are tried all the same, with some beside them, certified and judged."""
+    """No time for anything: the given gains are tried all the same, with some beside them, certified and evaluated."""
     (tmp_path / "s.yaml").write_text(SCENARIO)
     said = undertow("tune", "s.yaml", "--out", "out", "--budget", "1e-3")
     assert said.code == 0, said

@@ -10,7 +10,7 @@ from undertow.tuning.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.evolution import search
 from undertow.tuning.gradient_descent import descend
 from undertow.tuning.objective import Objective
-from undertow.tuning.stability import Certificate, refusal
+from undertow.tuning.stability import Certificate, no_certificate
 
 RNG = np.random.default_rng(4)
 ROOT = RNG.normal(size=(3, 3))
@@ -84,7 +84,7 @@ def test_nothing_is_accepted_without_certificate(tmp_path, method):
     fenced = lambda point: Certificate((0.9 if point[0] >= 0.5 else 1.01,), ("",))
     asked = objective(tmp_path, Bowl(), fenced)
     best = tune(asked, method)
-    assert asked.refused > 0
+    assert asked.rejected > 0
     assert all(step.point[0] >= 0.5 and step.radius < 1 for step in asked.steps)
     assert best.cost < asked.steps[0].cost
 
@@ -128,7 +128,7 @@ def test_journal_of_something_else(tmp_path):
 
 
 def test_where_nothing_is_certified_the_worst_truth_is_named():
-    said = str(refusal(Certificate((0.9, 1.25, 0.8), ("wu2018", "px4", "px4")), 12))
+    said = str(no_certificate(Certificate((0.9, 1.25, 0.8), ("wu2018", "px4", "px4")), 12))
     assert "none of 12 points is certified" in said
     assert "spectral radius of 1.25 with the parameter set px4 as the truth" in said
-    assert "truth" not in str(refusal(Certificate((1.1,), ("",)), 12))
+    assert "truth" not in str(no_certificate(Certificate((1.1,), ("",)), 12))

@@ -39,9 +39,9 @@ def operating_point(built: Built) -> OperatingPoint:
     loop, settings = built.closed_loop, built.scenario.loop
     start, stop = built.window()
     position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)
-    calm = equilibrium(loop, settings.dt, position, np.zeros(len(position)))
+    unloaded = equilibrium(loop, settings.dt, position, np.zeros(len(position)))
     steps = min(round(settings.duration / settings.dt) + 1, _MAX_STEPS)
-    around = disturbance_profile(loop, calm, jax.random.PRNGKey(built.scenario.seed), steps, settings.dt)
+    around = disturbance_profile(loop, unloaded, jax.random.PRNGKey(built.scenario.seed), steps, settings.dt)
     inside = (around.time >= start) & (around.time <= stop)
     load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
     mean = equilibrium(loop, settings.dt, position, load)

@@ -85,7 +85,7 @@ def _how(found: Mapping[str, Any]) -> Html:
     return tag("p", prose(f"{order} {again} {by_xla(found)}".rstrip()))
 
 
-def _drawings(results: Results, found: Mapping[str, Any]) -> Drawings:
+def _plots(results: Results, found: Mapping[str, Any]) -> Plots:
     """What makes each figure; nothing where there is nothing to sample."""
     values, units = _values(results, found), {metric: results.unit(metric) for metric in results.metrics}
     figures = {

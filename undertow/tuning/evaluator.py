@@ -128,7 +128,7 @@ class Evaluation:
         each = np.asarray(self._compiled("slope", self._slopes, *arguments)(*arguments))
         return np.where(np.isfinite(each), each, 0.0).mean(axis=1)
 
-    def foresee_slope(self, point: Float[np.ndarray, " k"]) -> None:
+    def precompile_slope(self, point: Float[np.ndarray, " k"]) -> None:
         """Begin to compile what `slope` needs, beside whatever else is done."""
         self._compiling("slope", self._slopes, *self._of_slope(point))
 

@@ -50,10 +50,10 @@ class Objective:
     def __init__(
         self, computes: Computes, certify: Callable[[np.ndarray], Certificate], checkpoint: Checkpoint, watch: Watch
     ):
-        self._computes, self._certify, self._journal, self._watch = computes, certify, checkpoint, watch
+        self._computes, self._certify, self._checkpoint, self._watch = computes, certify, checkpoint, watch
         self.evaluations = 0
         self.steps: list[Step] = []
-        self.refused = 0
+        self.rejected = 0
 
     @property
     def best(self) -> Step | None:
@@ -70,17 +70,17 @@ class Objective:
         Raises:
             OutOfTime: it is.
         """
-        found = np.asarray(self._journal.ask("costs", points, lambda: _finite(self._computes.costs(points)), must))
+        found = np.asarray(self._checkpoint.ask("costs", points, lambda: _finite(self._computes.costs(points)), must))
         self.evaluations += len(points)
         for i in np.argsort(found, kind="stable"):
             if self.best is not None and not found[i] < self.best.cost:
                 break
             radius = self.radius(points[i])
             if radius < 1:
-                step = Step(self.evaluations, self._journal.elapsed, float(found[i]), points[i].tolist(), radius)
+                step = Step(self.evaluations, self._checkpoint.elapsed, float(found[i]), points[i].tolist(), radius)
                 self.steps.append(step)
                 break
-            self.refused += 1
+            self.rejected += 1
             found[i] = np.inf
         if self.best is not None:
             self._watch(self.best, self.evaluations)
@@ -88,11 +88,11 @@ class Objective:
 
     def slope(self, point: np.ndarray) -> np.ndarray:
         """Gradient of the cost."""
-        return np.asarray(self._journal.ask("slope", point, lambda: self._computes.slope(point).tolist()))
+        return np.asarray(self._checkpoint.ask("slope", point, lambda: self._computes.slope(point).tolist()))
 
     def radius(self, point: np.ndarray) -> float:
         """Largest spectral radius of the loop there."""
-        return float(self._journal.ask("radius", point, lambda: min(self._certify(point).worst, 1e300), must=True))
+        return float(self._checkpoint.ask("radius", point, lambda: min(self._certify(point).worst, 1e300), must=True))
 
 
 def _finite(costs: np.ndarray) -> list[float]:

@@ -81,7 +81,7 @@ def _plant(trials: Trials, number: int) -> Any:
     return jax.tree.map(lambda leaf: leaf[number] if eqx.is_array(leaf) else leaf, trials.plants)
 
 
-def refusal(given: Certificate, tried: int) -> BadInput:
+def no_certificate(given: Certificate, tried: int) -> BadInput:
     """What to say where no gains are certified.
 
     Args:

@@ -56,34 +56,34 @@ def training_and_held_out(text: Text, built: Built) -> tuple[Trials, Trials]:
     return train, trials(text, built, tune.held_out, own, "held_out", built.scenario.seed + _HELD_OUT_SEEDS)
 
 
-def trials(text: Text, built: Built, wanted: TrainingRuns, default: Sequence[str], key: str, first_seed: int) -> Trials:
+def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str], key: str, first_seed: int) -> Trials:
     """Every set with every seed; sizes of the disturbance take turns with the seeds.
 
     Args:
         text: the scenario as read.
         built: the same, built.
-        wanted: how many seeds, which sizes and sets.
+        runs: how many seeds, which sizes and sets.
         default: sets where none are named.
         key: under `tune`, for messages.
         first_seed: the others follow.
     """
-    names, known = tuple(wanted.sets if wanted.sets is not None else default), parameter_sets(built)
+    names, known = tuple(runs.sets if runs.sets is not None else default), parameter_sets(built)
     for i, name in enumerate(names):
         if not known:
             raise BadInput(f"tune.{key}.sets", "be left out: there is but one parameter set", list(names))
         checks.choice(f"tune.{key}.sets[{i}]", name, known)
-    for i, size in enumerate(wanted.sizes):
+    for i, size in enumerate(runs.sizes):
         checks.not_negative(f"tune.{key}.sizes[{i}]", size)
-    if not wanted.sizes:
+    if not runs.sizes:
         raise BadInput(f"tune.{key}.sizes", "have an entry")
     if names == ():
         names = known[:1] if known else ("",)
     plants = {name: _plant(text, built, name) for name in names}
-    each = [(name, seed) for seed in range(wanted.seeds) for name in names]
+    each = [(name, seed) for seed in range(runs.seeds) for name in names]
     return Trials(
         plants=stacked([plants[name] for name, _ in each]),
         keys=jnp.stack([jax.random.PRNGKey((first_seed + seed) % 2**32) for _, seed in each]),
-        sizes=jnp.asarray([wanted.sizes[seed % len(wanted.sizes)] for _, seed in each], dtype=float),
+        sizes=jnp.asarray([runs.sizes[seed % len(runs.sizes)] for _, seed in each], dtype=float),
         variants=tuple(name for name, _ in each),
     )
 

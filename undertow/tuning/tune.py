@@ -19,7 +19,7 @@ from undertow.tuning.evolution import search, spread_points
 from undertow.tuning.gradient_descent import descend
 from undertow.tuning.objective import Objective, Step, Watch
 from undertow.tuning.problem import Problem, problem
-from undertow.tuning.stability import Certificate, Certifier, refusal
+from undertow.tuning.stability import Certificate, Certifier, no_certificate
 
 METHODS = ("gradient", "search")
 
@@ -29,7 +29,7 @@ _FOR_THE_SEARCH = 0.85
 _BEGINNINGS = 2 * AT_ONCE  # points that are tried before the first step, the given gains among them
 
 
-class Judged(NamedTuple):
+class Evaluated(NamedTuple):
     """One choice of gains on both sets of trials."""
 
     name: str
@@ -46,10 +46,10 @@ class Tuned(NamedTuple):
 
     problem: Problem
     method: str
-    judged: tuple[Judged, ...]  # given, ..., start, tuned
+    evaluated: tuple[Evaluated, ...]  # given, ..., start, tuned
     steps: list[Step]
     evaluations: int
-    refused: int  # points that would have been better, but were not certified
+    rejected: int  # points that would have been better, but were not certified
     elapsed: float  # s
     finished: bool  # by itself, not by the budget
     searched: int  # points that were tried after the first ones
@@ -57,7 +57,7 @@ class Tuned(NamedTuple):
     @property
     def scenario(self) -> dict[str, Any]:
         """The scenario with the tuned gains."""
-        return self.problem.scenario(self.judged[-1].options or {})
+        return self.problem.scenario(self.evaluated[-1].options or {})
 
 
 @in_its_precision
@@ -80,7 +80,7 @@ def tune(
         method: gradient, downhill by forward differentiation, or search, differential evolution.
         budget: s, all told; what is begun is finished, and the first points are tried whatever it takes.
         resume: whether to go on from the checkpoint.
-        beside: other choices of options, by name, to be judged like the given and the tuned ones.
+        beside: other choices of options, by name, to be evaluated like the given and the tuned ones.
         say: told the stage.
         watch: told the best so far after every batch.
 
@@ -89,29 +89,29 @@ def tune(
     """
     begun = time.perf_counter()
     say("building")
-    wanted = problem(text)
+    task = problem(text)
     about = text_hash(
-        dump({"method": method, "tune": wanted.built.scenario.tune.model_dump(), **wanted.built.resolved})
+        dump({"method": method, "tune": task.built.scenario.tune.model_dump(), **task.built.resolved})
     )
     notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
-    make = lambda point: wanted.law(wanted.options(point))
-    first = make(wanted.start)
-    evaluation = Evaluation(wanted.bench, make, first, wanted.train)
+    make = lambda point: task.law(task.options(point))
+    first = make(task.start)
+    evaluation = Evaluation(task.bench, make, first, task.train)
     if method == "gradient" and not notes.is_over:
-        evaluation.foresee_slope(wanted.start)
-    certifier = Certifier(wanted.bench, wanted.train, first)
+        evaluation.precompile_slope(task.start)
+    certifier = Certifier(task.bench, task.train, first)
     objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
     say("compiling, and looking for a beginning")
-    seed = wanted.built.scenario.seed
-    others = spread_points(_BEGINNINGS - 1, len(wanted.parameters), seed)
-    objective.costs(np.vstack([wanted.start, others]), must=True)  # however long compiling takes: or nothing is found
+    seed = task.built.scenario.seed
+    others = spread_points(_BEGINNINGS - 1, len(task.parameters), seed)
+    objective.costs(np.vstack([task.start, others]), must=True)  # however long compiling takes: or nothing is found
     start = objective.best
     if start is None:
-        raise refusal(certifier(first), _BEGINNINGS)
+        raise no_certificate(certifier(first), _BEGINNINGS)
     say("tuning")
     finished = True
     try:
-        iterations = wanted.built.scenario.tune.iterations
+        iterations = task.built.scenario.tune.iterations
         if method == "gradient":
             descend(objective, np.array(start.point), start.cost, iterations)
         else:
@@ -121,17 +121,17 @@ def tune(
     say("judging")
     best = objective.best or start
     chosen: list[tuple[str, Mapping[str, Any] | None]] = [("given", None), *(beside or {}).items()]
-    chosen += [(name, wanted.rounded(np.array(step.point))) for name, step in (("start", start), ("tuned", best))]
-    judged = _judged(wanted, evaluation, certifier, chosen)
-    if not judged[-1].certificate.holds:
-        raise BadInput("tune", "find gains whose certificate holds after rounding", judged[-1].certificate.worst)
+    chosen += [(name, task.rounded(np.array(step.point))) for name, step in (("start", start), ("tuned", best))]
+    evaluated = _evaluate(task, evaluation, certifier, chosen)
+    if not evaluated[-1].certificate.holds:
+        raise BadInput("tune", "find gains whose certificate holds after rounding", evaluated[-1].certificate.worst)
     return Tuned(
-        problem=wanted,
+        problem=task,
         method=method,
-        judged=judged,
+        evaluated=evaluated,
         steps=objective.steps,
         evaluations=objective.evaluations,
-        refused=objective.refused,
+        rejected=objective.rejected,
         elapsed=notes.elapsed,
         finished=finished,
         searched=objective.evaluations - _BEGINNINGS,
@@ -139,7 +139,7 @@ def tune(
 
 
 @in_its_precision
-def judge(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Judged, ...]:
+def judge(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Evaluated, ...]:
     """How the gains of a scenario, and other choices of its options by name, do in the runs that `tune` would take.
 
     Scenarios that differ in their controller only meet the same runs.
@@ -147,26 +147,26 @@ def judge(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Judged,
     Raises:
         BadInput: anything wrong with the scenario.
     """
-    wanted = problem(text)
-    make = lambda point: wanted.law(wanted.options(point))
-    first = make(wanted.start)
-    evaluation = Evaluation(wanted.bench, make, first, wanted.train)
-    return _judged(
-        wanted, evaluation, Certifier(wanted.bench, wanted.train, first), [("given", None), *choices.items()]
+    task = problem(text)
+    make = lambda point: task.law(task.options(point))
+    first = make(task.start)
+    evaluation = Evaluation(task.bench, make, first, task.train)
+    return _evaluate(
+        task, evaluation, Certifier(task.bench, task.train, first), [("given", None), *choices.items()]
     )
 
 
-def _judged(
-    wanted: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, Mapping[str, Any] | None]]
-) -> tuple[Judged, ...]:
+def _evaluate(
+    task: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, Mapping[str, Any] | None]]
+) -> tuple[Evaluated, ...]:
     """All choices on both sets of trials; the given gains exactly as they were given."""
-    own = wanted.built.closed_loop.controller
-    laws: list[AbstractController] = [own if options is None else wanted.law(options) for _, options in chosen]
-    train, held_out = (evaluation.shares(laws, trials) for trials in (wanted.train, wanted.held_out))
+    own = task.built.closed_loop.controller
+    laws: list[AbstractController] = [own if options is None else task.law(options) for _, options in chosen]
+    train, held_out = (evaluation.shares(laws, trials) for trials in (task.train, task.held_out))
     costs = [evaluation.total(parts).mean(axis=1) for parts in (train, held_out)]
     row = lambda parts, i: Shares(*(np.asarray(part)[i] for part in parts))
     return tuple(
-        Judged(
+        Evaluated(
             name, options, row(train, i), row(held_out, i), float(costs[0][i]), float(costs[1][i]), certifier(laws[i])
         )
         for i, (name, options) in enumerate(chosen)

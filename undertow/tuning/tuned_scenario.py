@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 
 from undertow.scenario.reading import dump
-from undertow.tuning.tune import Judged, Tuned
+from undertow.tuning.tune import Evaluated, Tuned
 
 
 def as_scenario(found: Tuned) -> str:
     """YAML that `undertow simulate` takes, with the certificate above it."""
-    tuned = found.judged[-1]
+    tuned = found.evaluated[-1]
     sets = list(dict.fromkeys(name for name in found.problem.train.variants if name))
     points = f"{len(tuned.certificate.radii)} operating points" + (f" of {', '.join(sets)}" if sets else "")
     head = (
@@ -30,7 +30,7 @@ def as_data(found: Tuned) -> dict[str, Any]:
         "elapsed": found.elapsed,
         "finished": found.finished,
         "evaluations": found.evaluations,
-        "refused": found.refused,
+        "rejected": found.rejected,
         "parameters": [
             {"name": parameter.name, "low": parameter.low, "high": parameter.high}
             for parameter in found.problem.parameters
@@ -39,12 +39,12 @@ def as_data(found: Tuned) -> dict[str, Any]:
             name: {"variants": list(trials.variants), "sizes": np.asarray(trials.sizes).tolist()}
             for name, trials in sets.items()
         },
-        "gains": {one.name: _judged(one) for one in found.judged},
+        "gains": {one.name: _evaluate(one) for one in found.evaluated},
         "history": [step._asdict() for step in found.steps],
     }
 
 
-def _judged(one: Judged) -> dict[str, Any]:
+def _evaluate(one: Evaluated) -> dict[str, Any]:
     return {
         "options": one.options,
         "train_cost": one.train_cost,
