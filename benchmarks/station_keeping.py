@@ -135,7 +135,7 @@ def tuned(name, scenario, budget):
     """The scenario with tuned gains."""
     with tempfile.TemporaryDirectory() as folder:
         found = tune(from_data(scenario), Path(folder) / "checkpoint", budget=budget)
-    best = found.judged[-1]
+    best = found.evaluated[-1]
     print(
         f"{name}: tuned in {found.elapsed:.0f} s, {found.evaluations} gains, training cost {best.train_cost:.4g}, "
         f"held out {best.held_out_cost:.4g}, spectral radius {best.certificate.worst:.5f}\n  {best.options}",

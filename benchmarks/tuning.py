@@ -10,7 +10,7 @@ from pathlib import Path
 
 import undertow  # noqa: F401  (double precision)
 from undertow.scenario.reading import from_data
-from undertow.tuning.tune import judge, tune
+from undertow.tuning.tune import compare_gains, tune
 
 # The paper's law by hand: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors that lag by 0.1 s.
 BY_HAND = {
@@ -86,7 +86,7 @@ def main():
         wall, processor = time.perf_counter() - begun, time.process_time() - busy
         print(f"\n{vehicle}: {found.evaluations} gains in {wall:.0f} s, {processor:.0f} s of processor time")
         by_hand = {"preset": "paper", **BY_HAND, **BY_HAND_TOO.get(vehicle, {})}
-        letters = judge(from_data(scenario(vehicle, by_hand)), {"table 1": TABLE_1})
+        letters = compare_gains(from_data(scenario(vehicle, by_hand)), {"table 1": TABLE_1})
         names = {"given": "robust, as it comes", "start": "beginning", "tuned": "robust, tuned"}
         rows = [("by hand", letters[0]), ("Table 1", letters[1])]
         rows += [(names[one.name], one) for one in found.evaluated]

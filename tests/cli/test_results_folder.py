@@ -165,7 +165,9 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0
-    line = "Warning: figure `tracking` could not be made (ZeroDivisionError: division by zero); the results are complete"
+    line = (
+        "Warning: figure `tracking` could not be made (ZeroDivisionError: division by zero); the results are complete"
+    )
     assert said.err.splitlines()[-1] == line
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "figures",

@@ -114,5 +114,7 @@ def test_continuous_loop_and_late_window(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(text)
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0
-    assert "Advice: there are no steady metrics: the steady window starts at 10 s, and the run ends at 0.1 s" in said.err
+    assert (
+        "Advice: there are no steady metrics: the steady window starts at 10 s, and the run ends at 0.1 s" in said.err
+    )
     assert json.loads((tmp_path / "out/metrics.json").read_text())["steady"] is None

@@ -69,7 +69,11 @@ def test_a_plant_too_stiff_for_its_steps_is_not_called_an_unstable_loop(method):
     said = failed.dataset.attrs["status_sentence"]
     assert failed.status is not Status.OK and "the loop is unstable" not in said.replace("because the loop is", "")
     enough = math.ceil(0.01 * 1000 / {"rk4": 2.785, "euler": 2.0}[method])
-    assert f"steps of {method} above" in said and "but the step is 10 ms" in said and f"loop.substeps: {enough} or more" in said
+    assert (
+        f"steps of {method} above" in said
+        and "but the step is 10 ms" in said
+        and f"loop.substeps: {enough} or more" in said
+    )
     for substeps, status in ((enough - 1, False), (enough, True)):
         loop = BASE["loop"] | {"method": method, "substeps": substeps}
         assert (execute(BASE | {"loop": loop}).status is Status.OK) == status

@@ -62,7 +62,7 @@ def interrupted(*arguments):
         (
             "seeds: 1",
             "sets: [wu2018]",
-            "`tune.train.sets` must be left out: there is but one parameter set, but is ['wu2018'] (s.yaml, line 6)",
+            "`tune.train.sets` must be left out: there is only one parameter set, but is ['wu2018'] (s.yaml, line 6)",
         ),
         (
             "iterations: 3",

@@ -68,7 +68,7 @@ def test_operations_are_counted():
     )
     assert program(lambda known, carry, k: carry * 2.5 + known).operations == 6
     assert program(lambda known, carry, k: carry + jnp.sin(known)).operations == 3, "sin(known) is done before"
-    assert workload.batch(short(W1, 1), lanes=1).operations > 2_000
+    assert workload.batch(short(W1, 1), width=1).operations > 2_000
 
 
 def test_what_a_gpu_would_do(monkeypatch):

@@ -201,7 +201,7 @@ def test_runs_do_what_was_foretold(name):
             assert one.departure < 0.10, one
 
 
-@pytest.mark.parametrize(("sets", "said"), [(5, "weights that move apart may change that"), (1, "")])
+@pytest.mark.parametrize(("sets", "said"), [(5, "adapting weights may change that"), (1, "")])
 def test_what_is_said_of_moving_weights(sets, said):
     """Table 1 on `shaft`: five sets last 2,000 s where one does not, and both have these poles at fixed weights."""
     _, why_not = predicted(operating_point(build(_odin("shaft", {"sets": sets}))))

@@ -127,8 +127,8 @@ def test_journal_of_something_else(tmp_path):
         Checkpoint(tmp_path / "j", "two", 1.0, resume=True)
 
 
-def test_where_nothing_is_certified_the_worst_truth_is_named():
+def test_where_nothing_is_certified_the_worst_variant_is_named():
     said = str(no_certificate(Certificate((0.9, 1.25, 0.8), ("wu2018", "px4", "px4")), 12))
     assert "none of 12 points is certified" in said
-    assert "spectral radius of 1.25 with the parameter set px4 as the truth" in said
-    assert "truth" not in str(no_certificate(Certificate((1.1,), ("",)), 12))
+    assert "spectral radius of 1.25 on the plant variant px4" in said
+    assert "variant" not in str(no_certificate(Certificate((1.1,), ("",)), 12))

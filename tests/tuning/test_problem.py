@@ -44,7 +44,7 @@ def axis():
     """The problem, and its programs."""
     found = problem(from_data(AXIS))
     make = lambda point: found.law(found.options(point))
-    return found, Evaluation(found.bench, make, make(found.start), found.train)
+    return found, Evaluation(found.training_loop, make, make(found.start), found.train)
 
 
 def test_slope_equals_finite_differences(axis):
@@ -57,7 +57,7 @@ def test_slope_equals_finite_differences(axis):
 
 def test_both_methods_come_to_the_same_gains(axis, tmp_path):
     found, evaluation = axis
-    certifier = Certifier(found.bench, found.train, evaluation.law(found.start))
+    certifier = Certifier(found.training_loop, found.train, evaluation.law(found.start))
     best = []
     for method in ("gradient", "search"):
         checkpoint = Checkpoint(tmp_path / method, method, 1e9, False)
@@ -107,7 +107,7 @@ def test_parameter_sets_take_turns():
     masses = np.asarray(found.train.plants.body.mass_matrix)[:3, 0, 0]
     np.testing.assert_allclose(masses, [13.5 + 6.36, 11.5 + 10.77, 13.4 + 1.272])
     assert [parameter.axes for parameter in found.parameters[:2]] == [(0, 1, 2), (3, 4, 5)]
-    np.testing.assert_allclose(found.bench.sums.input_scale, 16.0)
+    np.testing.assert_allclose(found.training_loop.sums.input_scale, 16.0)
 
 
 def test_slopes_are_taken_without_steps():

@@ -1,7 +1,7 @@
-"""Parameter drift: section 3.8 of the theory page.
+"""Parameter drift: gain added by drifting weights, and time to divergence. Section 3.8 of the theory page.
 
-Weights that differ from set to set make d_hat = z - c eps with c = -xi'(0)^T theta. By the adaptive law c grows with
-the square of eps and never comes back: a gain that adds damping at first, and breaks the sampled loop in the end.
+Weights that differ between sets give d_hat = z - c eps with c = -xi'(0)^T theta. Under the adaptive law c grows with
+the square of eps and never decreases: it adds damping at first, and destabilises the sampled loop in the end.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ def basis_slope(fuzzy: FuzzySystem) -> np.ndarray:
         BadInput: more than one input.
     """
     if fuzzy.inputs != 1:
-        raise BadInput("fuzzy_input", "be error, as only this basis moves with eps", f"of {fuzzy.inputs} inputs")
+        raise BadInput("fuzzy_input", "be error, because only this basis depends on eps", f"of {fuzzy.inputs} inputs")
     centres, widths = np.asarray(fuzzy.centres[0]), np.asarray(fuzzy.widths[0])
     exponent = -((centres / widths) ** 2)
     basis = np.exp(exponent - exponent.max())

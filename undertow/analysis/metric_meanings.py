@@ -1,4 +1,4 @@
-"""What each metric means, for tables, reports and `undertow describe metrics`."""
+"""Meaning and unit of each metric, for tables, reports and `undertow describe metrics`."""
 
 from typing import NamedTuple
 
@@ -25,15 +25,15 @@ MEANINGS = {
     "model_rms": Meaning("rms of the modelling error eps = x_hat_dot - x_dot", "m/s, rad/s"),
     "input_rms": Meaning("rms of the applied input over all inputs", "[input]"),
     "input_peak": Meaning("largest applied input", "[input]"),
-    "input_variation": Meaning("total variation of the input per second, mean over inputs: chattering", "[input]/s"),
-    "weights_peak": Meaning("largest |theta|: drift shows here first", "m/s^2, rad/s^2"),
-    "energy": Meaning("electrical energy drawn", "J"),
-    # Infinite if it never does; not defined for a target that moves to the end.
-    "settling_time": Meaning("time from which the target rests and the error stays within 2 % of the way to it", "s"),
-    "saturated_fraction": Meaning("share of input-seconds at a limit", ""),
-    "bad_readings": Meaning("readings so far that were no numbers, left out or replaced by what the law expected", ""),
-    "energy_balance_residual": Meaning("what the energy ledger leaves over, share of the energy drawn: rounding", ""),
-    "energy_integration_residual": Meaning("the same against the state itself: error of the integrator", ""),
+    "input_variation": Meaning("total variation of the input per second, mean over inputs (chattering)", "[input]/s"),
+    "weights_peak": Meaning("largest |theta|; it shows parameter drift", "m/s^2, rad/s^2"),
+    "energy": Meaning("electrical energy supplied", "J"),
+    # Infinite if it never settles; not defined for a reference that moves until the end.
+    "settling_time": Meaning("time after which the reference rests and the error stays within 2 % of the step", "s"),
+    "saturated_fraction": Meaning("share of the time, mean over inputs, at which an input is saturated", ""),
+    "bad_readings": Meaning("number of readings that were not finite, left out or replaced by expected values", ""),
+    "energy_balance_residual": Meaning("residual of the energy balance, share of the energy supplied: rounding", ""),
+    "energy_integration_residual": Meaning("the same computed from the state: error of the integrator", ""),
     "rules": Meaning("fuzzy rules per axis", ""),
 }
 

@@ -1,4 +1,4 @@
-"""The benchmark's metrics, defined once: gathered step by step inside the loop, or from a recorded series."""
+"""Metrics of a run, computed step by step inside the loop or from a recorded series."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""The law in small signal with an actuator that takes time: section 3.9 of the theory page.
+"""Small-signal model of the controller with actuator dynamics: section 3.9 of the theory page.
 
 Per axis, on x_ddot = a with a the acceleration that the actuators give when the law asks for a_c. The
 identification model is told a_c (the voltage that was applied): nobody measures propeller speeds. Masses cancel,

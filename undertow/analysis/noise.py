@@ -1,4 +1,4 @@
-"""What white noise on the measurement does to a sampled law: stationary covariances, section 3.7 of the theory page.
+"""Effect of white measurement noise on a sampled controller: stationary covariances, section 3.7 of the theory page.
 
 Per axis, on x_ddot = u + d with an exact model and actuators that obey at once, y = (e, e_dot, eps, z) of the truth
 obeys y+ = A y + B n. d_hat = z - c eps, where c is the gain that drift adds (section 3.8), zero at first. Errors n of

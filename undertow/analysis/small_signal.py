@@ -1,4 +1,4 @@
-"""The law in small signal: what theory predicts before anything is simulated.
+"""Small-signal model of the controller: poles, frequency responses and limits in closed form.
 
 The basis functions sum to one and eps stays small, so the fuzzy estimate behaves as one integrator with the gain
 rho = |xi(0)|^2. Per axis, on x_ddot = u + d with an exact model and actuator, this leaves four linear states

@@ -1,1 +1,1 @@
-"""How fast undertow is, beside what anyone would write in NumPy."""
+"""Speed of undertow, compared with plain NumPy."""

@@ -1,4 +1,4 @@
-"""What a new process does until it has its first result: python -m undertow.bench.first"""
+"""A new process up to its first result: python -m undertow.bench.first"""
 
 from undertow.process import prepare
 

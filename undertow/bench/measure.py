@@ -1,4 +1,4 @@
-"""Times of workloads W1 and W2, taken one after another on one machine, so that their ratios mean something."""
+"""Times of workloads W1 and W2, measured one after another on one machine, so that their ratios are meaningful."""
 
 import os
 import subprocess
@@ -21,12 +21,12 @@ from undertow.core import runtime
 from undertow.loop import sampled
 from undertow.loop.vmap_batch import BatchRunner as VmapBatchRunner
 
-# Runs of a batch, and how often everything is done; the shortest time counts.
+# Runs of a batch, and number of repetitions; the shortest time counts.
 _BATCH, _BATCH_W2 = 64, 16
 _REPETITIONS, _REPETITIONS_W2 = 7, 3
 _ON_GPU = 65_536
-# Ticks of the yardstick, which is slow.
-_NUMPY_TICKS = 2_000
+# Control steps of the NumPy comparison, which is slow.
+_NUMPY_STEPS = 2_000
 
 Watch = Callable[[str, float], None]
 
@@ -35,32 +35,32 @@ def measure(watch: Watch) -> dict[str, Any]:
     """Nanoseconds per step, and per run where several execute at once; seconds of compiling; operations of one step.
 
     Args:
-        watch: told what is being done, and the share done.
+        watch: called with the current stage and the share done.
 
     Returns:
         Figures of W1 by their names, those of W2 under names that begin with `w2_`.
     """
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    found: dict[str, Any] = {"threads": threads, "lanes": lanes_of(64)}
+    found: dict[str, Any] = {"threads": threads, "simd_width": lanes_of(64)}
     watch("first results", 0.0)
     found["first_cold_s"], found["first_kept_s"] = _first_results()
     with runtime.on_processor():
         watch("W1, one run", 0.1)
         one = workload.workload(W1)
-        found |= {"steps": one.steps} | _in_a_lane(one)
-        watch("W1, one run, by XLA", 0.2)
+        found |= {"steps": one.steps} | _single(one)
+        watch("W1, one run, XLA backend", 0.2)
         found |= _by_xla(one)
         watch("W2, one run", 0.3)
         other = workload.workload(W2)
-        second = {"steps": other.steps} | _in_a_lane(other, _REPETITIONS_W2)
+        second = {"steps": other.steps} | _single(other, _REPETITIONS_W2)
         second |= _prefixed("batch_float64_", _batch(other, threads, _BATCH_W2, _REPETITIONS_W2))
         found |= _prefixed("w2_", second)
     for i, kind in enumerate(("float64", "float32")):
-        watch(f"W1, many runs, {kind}", 0.5 + 0.2 * i)
+        watch(f"W1, batch, {kind}", 0.5 + 0.2 * i)
         with runtime.in_precision(kind):
             found |= _many(kind, threads)
     watch("W1 in plain NumPy", 0.9)
-    found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_TICKS), 1) / _NUMPY_TICKS
+    found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_STEPS), 1) / _NUMPY_STEPS
     found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
     found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
     watch("", 1.0)
@@ -68,7 +68,7 @@ def measure(watch: Watch) -> dict[str, Any]:
 
 
 def _first_results() -> tuple[float, float]:
-    """Seconds from the start of a process to its first result: without compiled code from before, and with it."""
+    """Seconds from the start of a process to its first result, without and with cached compiled code."""
     with tempfile.TemporaryDirectory() as folder:
         settings = {**os.environ, "UNDERTOW_CACHE": folder}
         settings.pop("JAX_COMPILATION_CACHE_DIR", None)
@@ -77,8 +77,8 @@ def _first_results() -> tuple[float, float]:
         return _timed(work)[1], _timed(work)[1]
 
 
-def _in_a_lane(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:
-    single, compiling = _timed(lambda: workload.batch(one, lanes=1))
+def _single(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:
+    single, compiling = _timed(lambda: workload.batch(one, width=1))
     numbers = workload.alone(one.run)
     tracking = float(workload.tracking(single.run(numbers).accumulated)[0])
     each = _shortest(lambda: single.run(numbers), repetitions) / one.steps
@@ -108,7 +108,7 @@ def _by_xla(one: Workload) -> dict[str, float]:
 
 
 def _many(kind: str, threads: int) -> dict[str, Any]:
-    """Many runs, on this machine's processor and on its GPU if it has one."""
+    """A batch, on the CPU and, if there is one, on the GPU."""
     with runtime.on_processor():
         one = workload.workload(W1 | {"precision": kind})
         found = _prefixed(f"batch_{kind}_", _batch(one, threads, _BATCH))
@@ -135,7 +135,7 @@ def _batch(one: Workload, threads: int, runs: int, repetitions: int = _REPETITIO
 
 
 def on_gpu(one: Workload, driver: Driver, runs: int) -> dict[str, float]:
-    """Many runs on a GPU, a thread each; copying to and fro is counted."""
+    """A batch on a GPU with one thread per run, including the copies to and from it."""
     program, compiling = _timed(lambda: workload.batch(one, driver=driver))
     numbers = workload.several(one.run, runs)
     each = _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)

@@ -1,6 +1,6 @@
 """The closed loop as a user would write it in plain NumPy: no classes, Euler angles, matrices, RK4 at 1 ms.
 
-A yardstick for speed (workload W1) and an independent solution for the tests: it shares no code with undertow.
+It is the reference for speed (workload W1) and an independent solution for the tests: it shares no code with undertow.
 Vehicle ODIN (Antonelli 2006), motor of the paper's Table 3, gains of Table 1, suite U1.
 """
 
@@ -79,8 +79,8 @@ def law(eta, eta_dot, v_hat, theta, composite):
     d_hat = (theta * xi).sum(1)
     j = jacobian(eta)
     f = -j @ M_INV @ body_forces(eta, np.linalg.solve(j, eta_dot))
-    wanted = -f - d_hat + e - 2 * eta_dot + u_r
-    voltage = B_PINV @ M @ np.linalg.solve(j, wanted) / ALPHA
+    acceleration = -f - d_hat + e - 2 * eta_dot + u_r
+    voltage = B_PINV @ M @ np.linalg.solve(j, acceleration) / ALPHA
     known = f + j @ M_INV @ B @ (ALPHA * voltage)
     v_hat_dot = -150 * eps + known + d_hat - 0.1 * np.tanh(eps / 0.5)
     return voltage, v_hat_dot, -100 * (s + composite * eps)[:, None] * xi, (e, d_hat, u_r, known)
@@ -122,7 +122,7 @@ def paper_example(fidelity, composite, duration=20.0, h=1e-3, every=10):
 
 
 def workload_w1(steps=20_000, h=1e-3, composite=20.0, bound=20.0):
-    """Benchmark workload W1: whole motor, 1 kHz hold; mean square of e over the steady half."""
+    """Benchmark workload W1: full motor model, input held at 1 kHz; mean square of e over the second half."""
 
     def rate(t, y, voltage):
         eta, nu, speed, current = y

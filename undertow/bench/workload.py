@@ -1,4 +1,4 @@
-"""The speed workloads: W1, ODIN with the paper's whole motors at 1 kHz, and W2, BlueROV2 Heavy at sea at 100 Hz."""
+"""Speed workloads: W1, ODIN with full motor models at 1 kHz, and W2, BlueROV2 Heavy in current and waves at 100 Hz."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from undertow.reproduction.robust_variant.fidelity import at_sea
 from undertow.reproduction.setup import scenario
 from undertow.scenario.build import build
 
-# Table 1 but for gamma_eps and the bound: without it the weights drift until the loop is lost after 139 s.
+# Table 1 except for gamma_eps and the weight bound: without it the weights drift until the loop diverges after 139 s.
 W1 = scenario(
     "W1",
     fidelity="electromechanical",
@@ -25,12 +25,12 @@ W1 = scenario(
     loop={"kind": "sampled", "duration": 20.0},
 )
 
-# What users run: examples/bluerov2_heavy.yaml.
+# A typical scenario: examples/bluerov2_heavy.yaml.
 W2 = at_sea("W2", {"kind": "rcaf", "preset": "robust"})
 
 
 class Workload(NamedTuple):
-    """One of them, metrics only."""
+    """One workload; only metrics are recorded."""
 
     run: Run
     plan: Plan
@@ -48,22 +48,22 @@ def workload(data: Mapping[str, Any]) -> Workload:
 
 
 def constant(run: Run) -> list[bool]:
-    """Which of its numbers are the same in `several`: all but where they start."""
+    """Which numbers are equal in `several`: all except the initial position."""
     same = jax.tree.map(lambda leaf: True, eqx.filter(run, eqx.is_array))
     return jax.tree.leaves(same._replace(start=(False, True)))
 
 
 def several(run: Run, count: int) -> Any:
-    """Numbers of so many runs, from different places."""
+    """Numbers of `count` runs with different initial positions."""
     numbers = eqx.filter(run, eqx.is_array)
     stacked = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (count, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.1, size=(count, *run.start[0].shape))
     return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
 
 
-def batch(one: Workload, lanes: int = 0, driver: Driver | None = None) -> BatchRunner:
-    """Its program; arguments as of `BatchRunner`."""
-    return BatchRunner(one.run, one.plan, constant(one.run), lanes, driver)
+def batch(one: Workload, width: int = 0, driver: Driver | None = None) -> BatchRunner:
+    """Program of a workload; arguments as of `BatchRunner`."""
+    return BatchRunner(one.run, one.plan, constant(one.run), width, driver)
 
 
 def tracking(accumulated: Any) -> np.ndarray:

@@ -56,7 +56,7 @@ def bench(as_json: bool) -> int:
 
 def _table(words: str, found: dict[str, Any], prefix: str) -> Table:
     """One workload, with ratios to plain NumPy where that was measured."""
-    steps = f"{found[f'{prefix}steps']} steps, {found['lanes']} lanes, {found['threads']} threads"
+    steps = f"{found[f'{prefix}steps']} steps, SIMD width {found['simd_width']}, {found['threads']} threads"
     table = Table(title=f"{words}: nanoseconds per step and run ({steps})", title_justify="left", title_style="bold")
     table.add_column("execution")
     table.add_column("ns", justify="right")

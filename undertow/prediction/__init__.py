@@ -1,1 +1,1 @@
-"""What will happen, before anything is run."""
+"""Prediction of a scenario from its linearised closed loop."""

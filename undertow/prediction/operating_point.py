@@ -1,4 +1,4 @@
-"""Where a scenario's loop rests under its mean load, and the metrics of its run predicted from there."""
+"""Operating point of a scenario under its mean load, and the metrics predicted from there."""
 
 from typing import Any, NamedTuple
 
@@ -17,11 +17,11 @@ from undertow.core.contracts import AbstractController
 from undertow.scenario.build import Built
 
 _HELD = "at fixed weights"
-_MAX_STEPS = 200_000  # that are predicted one by one
+_MAX_STEPS = 200_000  # largest number of predicted steps
 
 
 class OperatingPoint(NamedTuple):
-    """A scenario's loop where it rests under its mean load, and what acts on it."""
+    """Equilibrium of a scenario's loop under its mean load, with the disturbances along the reference."""
 
     built: Built
     around: DisturbanceProfile
@@ -31,10 +31,10 @@ class OperatingPoint(NamedTuple):
 
 
 def operating_point(built: Built) -> OperatingPoint:
-    """Where the loop of a scenario rests under the mean load of its steady window, and its linearisation there.
+    """Equilibrium of a scenario's loop under the mean load of its steady window, with its linearisation.
 
     Raises:
-        BadInput: its slopes are not finite there.
+        BadInput: the Jacobians are not finite there.
     """
     loop, settings = built.closed_loop, built.scenario.loop
     start, stop = built.window()
@@ -50,12 +50,13 @@ def operating_point(built: Built) -> OperatingPoint:
 
 
 def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
-    """Metrics of the steady window by the linearised loop; or None, and why."""
+    """Metrics of the steady window from the linearised loop; or None, and the reason."""
     if not known.mean.found:
-        return None, f"no input holds the mean load: something still moves at {known.mean.moving:.2g} per second"
+        rate = f"{known.mean.moving:.2g} per second"
+        return None, f"the loop has no equilibrium under the mean load: a state still changes by {rate}"
     if known.radius >= 1:
         pole = margins.poles(known.linear)[0]
-        moving = "; weights that move apart may change that, which only a run tells" if has_weights(known.built) else ""
+        moving = "; adapting weights may change that, which only a run shows" if has_weights(known.built) else ""
         return (
             None,
             f"the loop linearised {_HELD} is unstable: rightmost pole {pole.real:+.3g} {_turning(pole)}1/s{moving}",
@@ -70,13 +71,13 @@ def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
 
 
 def has_weights(built: Built) -> bool:
-    """Whether the law has several fuzzy weights per axis, of which a linearisation sees the present ones only."""
+    """Whether the controller has several fuzzy weights per axis, which a linearisation holds constant."""
     law = built.closed_loop.controller
     return isinstance(law, RCAF) and law.fuzzy.rules > 1
 
 
 def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
-    """What of the predicted signals the law itself would not allow, in a sentence; empty where all is allowed."""
+    """A sentence where predicted signals exceed a bound of the controller; otherwise empty."""
     bounds: dict[str, tuple[str, Any]] = {}
     if isinstance(law, RCAF | RobustRCAF):
         weights = law.weights_bound if isinstance(law, RCAF) else law.estimator.bound
@@ -86,13 +87,13 @@ def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
         if share.max() > 1 and np.abs(signals[name]).max() > 0:
             row, axis = np.unravel_index(share.argmax(), share.shape)
             limit = np.broadcast_to(np.asarray(bound, dtype=float), share.shape[1:])[axis]
-            asked = f"the linear model asks for a {meaning} of {abs(signals[name][row, axis]):.3g}"
-            return f"{asked}, which the law bounds to {limit:.3g}: the loop does not stay where it is linear"
+            required = f"the linear model requires a {meaning} of {abs(signals[name][row, axis]):.3g}"
+            return f"{required}, which the controller limits to {limit:.3g}: the loop leaves its linear range"
     return ""
 
 
 def _start(known: OperatingPoint) -> list[np.ndarray]:
-    """States of plant and law at t = 0 as vectors."""
+    """States of plant and controller at t = 0 as vectors."""
     loop, initial = known.built.closed_loop, known.built.scenario.initial
     outputs = loop.outputs_at_start(initial.position, initial.velocity)
     realization = loop.realize(jax.random.PRNGKey(known.built.scenario.seed))

@@ -1,4 +1,4 @@
-"""What will happen, before anything is run: a scenario's loop linearised about where it rests, and driven."""
+"""Predict a scenario without running it: operating points, margins, noise, frequency responses and metrics."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -20,13 +20,13 @@ from undertow.plants.reachability import open_loop_advice
 from undertow.prediction.operating_point import OperatingPoint, operating_point, predicted
 from undertow.scenario.build import Built, in_its_precision
 
-# Loads at which the loop is looked at: larger than these shares of all that act along the reference.
+# Quantiles of the loads along the reference at which the loop is linearised.
 SHARES = (0.1, 0.5, 0.9)
 
-_SLOWEST, _LONGEST = 1e-2, 10.0  # rad/s and s: how far frequencies and margins are searched
-_HIGHEST = 1.0  # frequency times sampling time: a third of what sampling can tell apart
+_SLOWEST, _LONGEST = 1e-2, 10.0  # rad/s and s: ranges of frequencies and margins
+_HIGHEST = 1.0  # frequency times sampling time: a third of the Nyquist frequency
 _NOISE = 0.01  # m/s and rad/s, for gains per unit of noise
-_DEVIATIONS = 3.0  # of noise that must fit between the input at rest and its limit
+_DEVIATIONS = 3.0  # standard deviations of noise between the input at rest and its limit
 
 Progress = Callable[[str, float], None]
 
@@ -34,11 +34,11 @@ Progress = Callable[[str, float], None]
 class Point(NamedTuple):
     """One operating point."""
 
-    share: float  # of all loads that are smaller
+    share: float  # quantile of the load
     at: Equilibrium
     used: float  # largest |u| as a share of its limit; 0 without a limit
     poles: np.ndarray  # 1/s
-    radius: float  # spectral radius from step to step; below 1 it is stable
+    radius: float  # spectral radius over one control step; stable below 1
 
     @property
     def load(self) -> np.ndarray:
@@ -47,54 +47,56 @@ class Point(NamedTuple):
 
     @property
     def u(self) -> np.ndarray:
-        """Input that holds it."""
+        """Input at the operating point."""
         return self.at.at["u"]
 
     @property
     def found(self) -> bool:
-        """Whether there is such an input."""
+        """Whether the equilibrium exists."""
         return self.at.found
 
 
 class Noise(NamedTuple):
-    """White noise on the measured velocities, new at every step."""
+    """White noise on the measured velocities, independent at every control step."""
 
     of_input: np.ndarray  # standard deviation per m/s or rad/s of noise
     of_estimate: np.ndarray  # 1/s
-    largest: float  # noise, m/s and rad/s, whose threefold effect still fits into the limits of the input
+    largest: float  # noise, m/s and rad/s, at which three standard deviations of the input reach its limit
 
 
 class Prediction(NamedTuple):
-    """All that `undertow analyze` says."""
+    """Result of `undertow analyze`."""
 
     operating_point: OperatingPoint
     points: tuple[Point, ...]
-    margins: dict[str, float]  # of the point that is nearest to instability
+    margins: dict[str, float]  # at the point closest to instability
     noise: Noise
     frequency: np.ndarray  # rad/s
     error: np.ndarray  # |e / d| of each axis, (frequencies, axes); s^2
     estimation: np.ndarray  # |d_hat - d| / |d|, likewise
     forms: list[ClosedForm]
     estimators: list[tuple[str, float, float, float | None]]  # axis, w_o rad/s, zeta, |d_til| per |d_dot| s
-    drift: tuple[float, float] | None  # largest gain that weights in their box add, and the one that breaks, 1/s
+    drift: (
+        tuple[float, float] | None
+    )  # largest gain that bounded weights can add, and the gain that destabilises the loop, 1/s
     authority: ActuatorAuthority
     lost: tuple[str, ...]
     metrics: dict[str, float] | None  # of the steady window
-    why_not: str  # a sentence where there are none
+    why_not: str  # reason where there are none
 
 
 @in_its_precision
 def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
-    """Everything that can be said of a scenario before it is run.
+    """Predict a scenario from its linearised closed loop.
 
     Args:
         built: the scenario.
-        progress: told a message and the share done.
+        progress: called with a message and the share done.
     """
-    progress("where the loop rests", 0.0)
+    progress("equilibrium", 0.0)
     known = operating_point(built)
     loop, settings = built.closed_loop, built.scenario.loop
-    progress("poles at its operating points", 0.5)
+    progress("poles at the operating points", 0.5)
     points = tuple(_point(known, *each) for each in zip(SHARES, known.around.operating_loads(SHARES), strict=True))
     worst = max(points, key=lambda point: point.radius).at
     progress("margins", 0.6)
@@ -165,9 +167,9 @@ def _limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """|e / d| of each output, and |d_hat - d| / |d| of each axis of the law, under a load on the same axis."""
+    """|e / d| of each output, and |d_hat - d| / |d| of each axis of the controller, under a load on the same axis."""
     answer = {name: margins.response(linear, name, frequency) for name in ("error", "estimate", "uncertainty")}
-    into_axes = linear.direct["uncertainty"]["load"]  # a load on the outputs as the law sees it
+    into_axes = linear.direct["uncertainty"]["load"]  # a load on the outputs in the controller's axes
     missed = (answer["estimate"] - answer["uncertainty"]) @ np.linalg.inv(into_axes)
     own = lambda matrices: np.abs(np.diagonal(matrices, axis1=1, axis2=2))
     return own(answer["error"]), own(missed)

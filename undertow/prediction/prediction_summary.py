@@ -1,4 +1,4 @@
-"""A prediction as plain data, as it stands in prediction.json."""
+"""A prediction as plain data, for prediction.json."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from undertow.prediction.predict import Prediction
 
 
 def summary(prediction: Prediction) -> dict[str, Any]:
-    """What stands in prediction.json."""
+    """Contents of prediction.json."""
     known = prediction.operating_point
     return {
         "position": known.mean.parts.target.position.tolist(),
@@ -41,7 +41,7 @@ def summary(prediction: Prediction) -> dict[str, Any]:
             for row in prediction.forms
         ],
         "drift": prediction.drift,
-        "reach": {
+        "actuator_authority": {
             "low": prediction.authority.low.tolist(),
             "high": prediction.authority.high.tolist(),
             "demand": prediction.authority.demand.tolist(),

@@ -9,7 +9,7 @@ import numpy as np
 from undertow.campaign.store_results import Results
 from undertow.report.campaign_tables import asked, by_choice, by_xla, distributions, endings, named, requirements, worst
 from undertow.report.figures.campaign import distributions_figure, sensitivity_figure
-from undertow.report.figures.writing import Saved, save_all
+from undertow.report.figures.writing import Plots, Saved, save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, tag
 

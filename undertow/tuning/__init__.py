@@ -1,1 +1,1 @@
-"""Gains found by running the loop: what is tuned, on what it is tried, what it costs, and how the best is found."""
+"""Tuning of controllers: tunable parameters, training runs, cost, search and certificate."""

@@ -1,4 +1,4 @@
-"""What a run costs: smooth, without unit, finite however badly it goes."""
+"""Cost of a run: smooth, dimensionless and finite."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ Scalar = Float[Array, ""]
 
 _HAIR = 1e-9  # s; times are k dt in floating point
 _SMOOTH = 1e-6  # |x| is rounded below this
-_MOST = 100.0  # nothing counts for more than about this: a run that fails must not outweigh all others
+_MOST = 100.0  # upper bound of each part, so that a failed run does not outweigh all others
 
 
 class Sums(NamedTuple):
@@ -29,12 +29,12 @@ class Sums(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """Parts of the cost, without unit."""
+    """Dimensionless parts of the cost."""
 
-    tracking: Scalar  # rms of the error, each axis by its scale
-    effort: Scalar  # rms of the input, as a share of its limit
-    variation: Scalar  # total variation of the same per second: chattering, and noise that gets through
-    lost: Scalar  # share of the time that a failed run did not last
+    tracking: Scalar  # rms tracking error, each axis relative to its scale
+    effort: Scalar  # rms input, as a share of its limit
+    variation: Scalar  # total variation of the input per second, as a share of its limit: chattering and noise
+    lost: Scalar  # share of the duration that a failed run lacks
 
     def cost(self, weights: Weights) -> Scalar:
         """The weighted sum."""
@@ -47,11 +47,11 @@ class Shares(NamedTuple):
 
 
 class CostSums(AbstractAccumulator):
-    """What `Shares` needs, gathered step by step from `start` on."""
+    """Accumulates what `Shares` needs, step by step from `start` on."""
 
-    start: Scalar = param("s", "first time that counts")
-    error_scale: Float[Array, " n"] = param("m, rad", "errors that cost one")
-    input_scale: Scalar = param("unit of the input", "input that costs one")
+    start: Scalar = param("s", "start of the evaluated window")
+    error_scale: Float[Array, " n"] = param("m, rad", "errors with a cost of one")
+    input_scale: Scalar = param("unit of the input", "input with a cost of one")
 
     def init(self, sample: Signals) -> Sums:
         zero = jnp.zeros(())
@@ -76,8 +76,8 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
     """Parts of the cost of a run.
 
     Args:
-        sums: of its window.
-        ended: when it failed, else its duration, s.
+        sums: sums over the window.
+        ended: time of failure, or the duration, s.
         duration: s.
     """
     rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.samples, 1.0) + _SMOOTH**2)
@@ -87,5 +87,5 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
 
 
 def _bounded(x, most: float):
-    """x while it is small, `most` at most."""
+    """Approximately x while it is small, and below `most`."""
     return x / (1 + x / most)

@@ -1,4 +1,4 @@
-"""What is tuned when nothing is said: the numbers that matter of each law, and where to begin."""
+"""Default tunable parameters of each controller, with their ranges."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -11,14 +11,14 @@ Range = tuple[float, float]
 
 
 class Law(NamedTuple):
-    """How one law is tuned."""
+    """Tunable parameters of one controller."""
 
-    ranges: Callable[[float], Mapping[str, Range]]  # of the sampling time, s
-    now: Mapping[str, Callable[[Any], Any]]  # value of an option in a law that has been made
-    instead: Mapping[str, tuple[str, ...]]  # option -> others that say the same and must be left out
+    ranges: Callable[[float], Mapping[str, Range]]  # for a sampling time, s
+    now: Mapping[str, Callable[[Any], Any]]  # value of an option in an existing controller
+    instead: Mapping[str, tuple[str, ...]]  # option -> equivalent options that must be left out
 
 
-# One number for all axes.
+# Options with one number for all axes.
 SHARED = ("actuator_rate", "direction")
 
 
@@ -82,10 +82,10 @@ _LAWS = {
 
 
 def law_of(kind: str, preset: str | None) -> Law:
-    """How a controller is tuned; nothing is known of one that is not ours."""
+    """Tunable parameters of a controller; empty for a user's controller."""
     return _LAWS.get((kind, preset), Law(lambda dt: {}, {}, {}))
 
 
 def now(known: Law, law: AbstractController, option: str, given: Any) -> Any:
-    """What an option is in a law: as the law has it, else as it was given; None where neither says."""
+    """Value of an option: from the controller, else the given one; None where neither is known."""
     return known.now[option](law) if option in known.now else given

@@ -1,4 +1,4 @@
-"""The runs themselves: many gains on many trials at once, and the slope of their cost by forward differentiation."""
+"""Evaluation of gains: many gains on many trials at once, and the gradient of their cost by forward differentiation."""
 
 import concurrent.futures
 import threading
@@ -21,24 +21,24 @@ from undertow.tuning.cost import CostSums, Shares, shares
 from undertow.tuning.scaled import scaled
 from undertow.tuning.training_runs import Trials
 
-# Compiling is most of the time of a short tuning, and a lower level of optimisation halves it at the same speed.
+# Compiling dominates a short tuning; a lower optimisation level halves its time at the same speed.
 _COMPILER = {"xla_backend_optimization_level": "1"}
 
 AT_ONCE = 6  # gains per batch
-_STEPS = ("resolution", "dead_zone")  # parameters that make steps of what is smooth
+_STEPS = ("resolution", "dead_zone")  # parameters that make a smooth function piecewise constant
 _WORKERS = 2
 
 
-class Bench(NamedTuple):
-    """All that does not change while gains do.
+class TrainingLoop(NamedTuple):
+    """Everything that stays the same while the gains change.
 
     Attributes:
-        loop: reference, disturbance and sensor; plant and controller are put in.
-        settings: of the loop.
-        duration: of every run, s.
+        loop: reference, disturbance and navigation; plant and controller are replaced.
+        settings: settings of the loop.
+        duration: duration of every run, s.
         start: outputs at t = 0, and their rates.
-        sums: what is gathered.
-        weights: of the cost.
+        sums: accumulator of the cost.
+        weights: weights of the cost.
     """
 
     loop: ClosedLoop
@@ -49,16 +49,16 @@ class Bench(NamedTuple):
     weights: Weights
 
     def with_parts(self, plant: AbstractPlant, law: AbstractController, size: Any = 1.0) -> ClosedLoop:
-        """The loop of a plant and a law, with a disturbance of some size."""
+        """The loop with a plant, a controller, and a scaled disturbance."""
         loop = self.loop
         return ClosedLoop(plant, law, loop.reference, scaled(loop.disturbance, size), loop.navigation)
 
     def run(
         self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""], smooth: bool = False
     ) -> Shares:
-        """One closed loop; smooth for a slope that means something."""
+        """One run; `smooth` leaves out steps, for a meaningful gradient."""
         loop = self.with_parts(plant, law, size)
-        # Differentiated as they are, rounding sensors would look as if they were cut off.
+        # The derivative of a quantised sensor is zero, as if it were disconnected.
         loop = without(loop, _STEPS) if smooth else loop
         outcome = sampled.simulate(
             loop,
@@ -76,19 +76,23 @@ class Bench(NamedTuple):
 
 
 class Evaluation:
-    """Compiled programs for one bench and one number of trials per batch.
+    """Compiled programs for one training loop and one number of trials per batch.
 
     Args:
-        bench: what stays.
-        make: point -> law; may be traced.
-        like: a law of that kind, at any point.
-        trials: of the training; held-out ones run in batches of as many, so that nothing is compiled twice.
+        training_loop: what stays the same.
+        make: point -> controller; may be traced.
+        like: a controller of that kind, at any point.
+        trials: training runs; held-out runs use batches of the same size, so that nothing is compiled twice.
     """
 
     def __init__(
-        self, bench: Bench, make: Callable[[Any], AbstractController], like: AbstractController, trials: Trials
+        self,
+        training_loop: TrainingLoop,
+        make: Callable[[Any], AbstractController],
+        like: AbstractController,
+        trials: Trials,
     ):
-        self._bench, self._training = bench, trials
+        self._training_loop, self._training = training_loop, trials
         self._pool, self._lock = runtime.workers(_WORKERS), threading.Lock()
         self._compilers = runtime.workers(_WORKERS)
         self._programs: dict[str, concurrent.futures.Future[Any]] = {}
@@ -98,11 +102,11 @@ class Evaluation:
         self._make = jax.jit(self._numbers_at)
 
     def law(self, point: np.ndarray) -> AbstractController:
-        """The law of a point, unchecked."""
+        """The controller of a point, unchecked."""
         return eqx.combine(self._make(jnp.asarray(point)), self._law_rest)
 
     def costs(self, points: Float[np.ndarray, "p k"]) -> Float[np.ndarray, " p"]:
-        """Mean cost of each point over the training."""
+        """Mean cost of each point over the training runs."""
         return self.total(self.shares([self.law(point) for point in points], self._training)).mean(axis=1)
 
     def shares(self, laws: Sequence[AbstractController], trials: Trials) -> Shares:
@@ -120,16 +124,16 @@ class Evaluation:
 
     def total(self, parts: Shares) -> np.ndarray:
         """Cost of every run."""
-        return np.asarray(parts.cost(self._bench.weights))
+        return np.asarray(parts.cost(self._training_loop.weights))
 
     def slope(self, point: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Gradient of the mean cost over the training, forward through every run; runs without one count as flat."""
+        """Gradient of the mean training cost, by forward differentiation; runs without a finite one count as zero."""
         arguments = self._of_slope(point)
         each = np.asarray(self._compiled("slope", self._slopes, *arguments)(*arguments))
         return np.where(np.isfinite(each), each, 0.0).mean(axis=1)
 
     def precompile_slope(self, point: Float[np.ndarray, " k"]) -> None:
-        """Begin to compile what `slope` needs, beside whatever else is done."""
+        """Start to compile the gradient in the background."""
         self._compiling("slope", self._slopes, *self._of_slope(point))
 
     def _of_slope(self, point: Float[np.ndarray, " k"]) -> tuple[Any, ...]:
@@ -138,13 +142,17 @@ class Evaluation:
 
     def _slopes(self, point, plants, keys, sizes):
         """Shape (k, trials)."""
-        costs = lambda at: self._over_trials(self._numbers_at(at), plants, keys, sizes, True).cost(self._bench.weights)
+        costs = lambda at: self._over_trials(self._numbers_at(at), plants, keys, sizes, True).cost(
+            self._training_loop.weights
+        )
         along = lambda direction: jax.jvp(costs, (point,), (direction,))[1]
         return jax.vmap(along)(jnp.eye(point.shape[0]))
 
     def _over_trials(self, law, plants, keys, sizes, smooth: bool = False) -> Shares:
         whole = eqx.combine(law, self._law_rest)
-        one = lambda plant, key, size: self._bench.run(whole, eqx.combine(plant, self._plant_rest), key, size, smooth)
+        one = lambda plant, key, size: self._training_loop.run(
+            whole, eqx.combine(plant, self._plant_rest), key, size, smooth
+        )
         return jax.vmap(one)(plants, keys, sizes)
 
     def _many(self, laws, plants, keys, sizes) -> Shares:
@@ -155,7 +163,7 @@ class Evaluation:
         return jax.tree.map(np.asarray, self._compiled("costs", self._many, *arguments)(*arguments))
 
     def _numbers(self, law: AbstractController) -> Any:
-        """Numbers of a law in the shapes of those that are tuned: one gain for all axes stands for one per axis."""
+        """Numbers of a controller in the shapes of the tuned ones: one gain for all axes becomes one per axis."""
         spread = lambda number, like: jnp.broadcast_to(number, like.shape)
         return jax.tree.map(spread, eqx.filter(law, eqx.is_array), self._law_numbers)
 

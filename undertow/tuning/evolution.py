@@ -1,4 +1,4 @@
-"""Without slopes, for what is not smooth: differential evolution (scipy), a whole generation in one batch."""
+"""Search without gradients, for costs that are not smooth: differential evolution (SciPy), one generation per batch."""
 
 import numpy as np
 from scipy.optimize import differential_evolution
@@ -7,8 +7,8 @@ from scipy.stats import qmc
 from undertow.tuning.evaluator import AT_ONCE
 from undertow.tuning.objective import Objective
 
-_HOPELESS = 1e6  # cost of what is not certified
-_SPREAD = 1e-3  # of the population's costs, relative: it has come together
+_HOPELESS = 1e6  # cost of a point without a certificate
+_SPREAD = 1e-3  # relative spread of the costs at which the population has converged
 
 
 def spread_points(count: int, parameters: int, seed: int) -> np.ndarray:
@@ -22,10 +22,10 @@ def search(objective: Objective, start: np.ndarray, iterations: int, seed: int) 
     """Best of a population that mixes its differences, Storn and Price (1997); the objective keeps the best.
 
     Args:
-        objective: what is asked.
+        objective: gives the costs.
         start: a certified point; the others fill the box.
-        iterations: generations, at most.
-        seed: of everything random.
+        iterations: largest number of generations.
+        seed: seed of all random numbers.
     """
     parameters = len(start)
     population = AT_ONCE * max(2, int(np.ceil(2 * parameters / AT_ONCE)))

@@ -1,30 +1,30 @@
-"""Downhill in a box: quasi-Newton steps (BFGS) on the free variables, several step lengths tried in one batch."""
+"""Gradient descent in a box: quasi-Newton steps (BFGS) on the free variables, with several step lengths per batch."""
 
 import numpy as np
 
 from undertow.tuning.objective import Objective
 
 _LENGTHS = np.array([2.0, 1.0, 0.4, 0.15, 0.04, 0.005])  # of the quasi-Newton step
-_FIRST = 0.2  # largest change of a variable in a step that knows no curvature; the box is 1 wide
-_LARGEST = 0.5  # and in any other
-_FLAT = 1e-9  # slope
-_LITTLE = 1e-4  # relative gain of a step that is not worth another one
+_FIRST = 0.2  # largest change of a variable in a step without curvature; the box is 1 wide
+_LARGEST = 0.5  # and in any other step
+_FLAT = 1e-9  # gradient that counts as zero
+_LITTLE = 1e-4  # smallest relative improvement of a useful step
 _PATIENCE = 3
-_NARROWER, _NEAREST = 0.5, 0.01  # how far it looks around: half as far after every failure, down to the nearest
+_NARROWER, _NEAREST = 0.5, 0.01  # radius of the random search: halved after every failure, down to the smallest
 
 
 def descend(objective: Objective, start: np.ndarray, cost: float, iterations: int) -> None:
     """From a certified point to a local minimum of the cost in [0, 1]^k; the objective keeps the best.
 
-    Nocedal and Wright (2006), ch. 6, with variables at a bound held there while the slope pushes outward. Instead of
-    a line search one by one, all lengths are run at once and the best certified one is taken. Where none is better,
-    points all around are tried, nearer and nearer.
+    Nocedal and Wright (2006), ch. 6. Variables at a bound stay there while the gradient points outward. Instead of a
+    sequential line search, all step lengths are evaluated at once and the best certified one is taken. Where none is
+    better, random points around the current one are evaluated, with a decreasing radius.
 
     Args:
-        objective: what is asked.
+        objective: gives costs and gradients.
         start: shape (k,).
-        cost: there.
-        iterations: at most.
+        cost: cost at the start.
+        iterations: largest number of iterations.
     """
     x, inverse, slope, idle, stuck, reach = start, None, objective.slope(start), 0, False, _FIRST
     chance = np.random.default_rng(0)
@@ -43,8 +43,8 @@ def descend(objective: Objective, start: np.ndarray, cost: float, iterations: in
             reach *= _NARROWER if stuck else 1.0
             if reach < _NEAREST:
                 return
-            # First what was learnt of the curvature is forgotten; where the slope itself misleads, as limits and the
-            # certificate make it, points all around are tried.
+            # First the curvature is discarded. Where the gradient itself misleads, because of limits or the
+            # certificate, random points around the current one are evaluated.
             inverse, stuck = None, inverse is None
             continue
         stuck = False
@@ -57,7 +57,7 @@ def descend(objective: Objective, start: np.ndarray, cost: float, iterations: in
 
 
 def _direction(slope: np.ndarray, free: np.ndarray, inverse: np.ndarray | None) -> np.ndarray:
-    """Quasi-Newton step of the free variables; along the slope where there is no curvature or it leads uphill."""
+    """Quasi-Newton step of the free variables; a gradient step without curvature, or where it would ascend."""
     down = np.where(free, -slope, 0.0)
     if inverse is not None:
         newton = np.where(free, inverse @ down, 0.0)

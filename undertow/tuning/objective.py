@@ -1,4 +1,4 @@
-"""What a method may ask: costs of points, their slope, whether a point is certified; and the best that was found."""
+"""Objective of the search: costs, gradients and certificates of points, and the best point so far."""
 
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -13,7 +13,7 @@ Points = Float[np.ndarray, "p k"]
 
 
 class Computes(Protocol):
-    """Costs and slopes, as `Evaluation` computes them."""
+    """Costs and gradients, as computed by `Evaluation`."""
 
     def costs(self, points: Points) -> np.ndarray:
         """Cost of each point."""
@@ -25,7 +25,7 @@ class Computes(Protocol):
 
 
 class Step(NamedTuple):
-    """Something better than before."""
+    """An improvement."""
 
     evaluations: int
     elapsed: float  # s
@@ -38,13 +38,13 @@ Watch = Callable[[Step, int], None]  # the best so far, evaluations so far
 
 
 class Objective:
-    """Costs by way of a checkpoint. Nothing is accepted without a certificate.
+    """Costs with a checkpoint. No point is accepted without a certificate.
 
     Args:
-        computes: costs and slopes.
+        computes: computes costs and gradients.
         certify: point -> certificate.
-        checkpoint: what is known already.
-        watch: told after every batch.
+        checkpoint: the checkpoint.
+        watch: called after every batch.
     """
 
     def __init__(
@@ -61,14 +61,14 @@ class Objective:
         return self.steps[-1] if self.steps else None
 
     def costs(self, points: Points, must: bool = False) -> np.ndarray:
-        """Cost of each point; one that would be the best, but is not certified, costs infinitely much.
+        """Cost of each point; infinite for one that would be the best but has no certificate.
 
         Args:
             points: shape (points, parameters).
-            must: whether they are computed even if time is up.
+            must: whether to compute them even if the budget is used up.
 
         Raises:
-            OutOfTime: it is.
+            OutOfTime: the budget is used up.
         """
         found = np.asarray(self._checkpoint.ask("costs", points, lambda: _finite(self._computes.costs(points)), must))
         self.evaluations += len(points)
@@ -91,10 +91,10 @@ class Objective:
         return np.asarray(self._checkpoint.ask("slope", point, lambda: self._computes.slope(point).tolist()))
 
     def radius(self, point: np.ndarray) -> float:
-        """Largest spectral radius of the loop there."""
+        """Largest spectral radius of the loop at a point."""
         return float(self._checkpoint.ask("radius", point, lambda: min(self._certify(point).worst, 1e300), must=True))
 
 
 def _finite(costs: np.ndarray) -> list[float]:
-    """As JSON holds them."""
+    """Finite numbers, as JSON requires."""
     return np.nan_to_num(np.asarray(costs, dtype=float), nan=1e300, posinf=1e300).tolist()

@@ -1,4 +1,4 @@
-"""From a scenario to a tuning problem: parameters, laws, trials and what is counted."""
+"""The tuning problem of a scenario: tunable parameters, controllers, training runs and cost."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -17,23 +17,23 @@ from undertow.scenario.reading import Text, key_path
 from undertow.tuning import tunable_parameters as tunable_parameters
 from undertow.tuning.cost import CostSums
 from undertow.tuning.defaults import SHARED, Law, law_of, now
-from undertow.tuning.evaluator import Bench
+from undertow.tuning.evaluator import TrainingLoop
 from undertow.tuning.training_runs import Trials, training_and_held_out
 from undertow.tuning.tunable_parameters import TunableParameter
 
-_LONGEST = 20.0  # s, of a run, where nothing is said
+_LONGEST = 20.0  # s, default limit of the duration of a run
 _DIGITS = 5  # of a tuned gain
 _FAR = 1e9  # an input beyond every limit
 
 
 class Problem(NamedTuple):
-    """What is tuned, and on what."""
+    """A tuning problem."""
 
     built: Built
     parameters: list[TunableParameter]
-    law: Callable[[Mapping[str, Any]], AbstractController]  # of tuned options
-    start: np.ndarray  # the given gains as a point; those beyond the bounds at the nearer one
-    bench: Bench
+    law: Callable[[Mapping[str, Any]], AbstractController]  # from tuned options
+    start: np.ndarray  # the given gains as a point, moved to the nearest bound where they are outside
+    training_loop: TrainingLoop
     train: Trials
     held_out: Trials
 
@@ -42,7 +42,7 @@ class Problem(NamedTuple):
         return tunable_parameters.options(self.parameters, point, len(self.built.closed_loop.controller.model.angles))
 
     def rounded(self, point: np.ndarray) -> dict[str, Any]:
-        """Options at a point as a scenario has them."""
+        """Options at a point, rounded, as written in a scenario."""
         listed = {name: np.asarray(value) for name, value in self.options(point).items()}
         return {name: _rounded(value).tolist() for name, value in listed.items()}
 
@@ -81,11 +81,11 @@ def problem(text: Text) -> Problem:
     scales = np.where(angles, tune.angle_scale, tune.position_scale)
     sums = CostSums(start, scales, _input_scale(loop.plant, loop.controller))
     places = tuple(None if place is None else np.asarray(place, dtype=float) for _, place in scenario.initial)
-    bench = Bench(loop, scenario.loop, duration, places, sums, tune.weights)
+    training_loop = TrainingLoop(loop, scenario.loop, duration, places, sums, tune.weights)
     model = loop.controller.model
     law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))
     begin = [parameter.share(_mean(known, loop.controller, given, parameter)) for parameter in chosen]
-    found = Problem(built, chosen, law, np.array(begin), bench, train, held_out)
+    found = Problem(built, chosen, law, np.array(begin), training_loop, train, held_out)
     placed(text, "controller", lambda: found.law(found.options(found.start)))
     return found
 
@@ -96,7 +96,7 @@ def _law_of(built: Built) -> Law:
 
 
 def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractController], dict[str, Any]]:
-    """The function that makes the controller, and the options that it was made with."""
+    """The function that makes the controller, and its options."""
     options = dict(built.resolved["controller"])
     function = catalogue.find("controllers", options.pop("kind"), text.folder)
     preset = options.pop("preset", None)
@@ -120,7 +120,7 @@ def _parameters(
 
 
 def _groups(per: str, angles: tuple[bool, ...]) -> list[tuple[int, ...]]:
-    """Translation and rotation of a plant that has both; otherwise, or on demand, each axis or all together."""
+    """Groups of axes: translation and rotation of a plant with both; otherwise each axis, or all together."""
     axes = range(len(angles))
     if per == "all":
         return [tuple(axes)]
@@ -130,12 +130,12 @@ def _groups(per: str, angles: tuple[bool, ...]) -> list[tuple[int, ...]]:
 
 
 def _left_out(known: Law, options: Mapping[str, Any]) -> dict[str, None]:
-    """Options that would say the same as tuned ones."""
+    """Options that are equivalent to tuned ones, set to None."""
     return {other: None for option in options for other in known.instead.get(option, ())}
 
 
 def _mean(known: Law, law: AbstractController, given: Mapping[str, Any], parameter: TunableParameter) -> float:
-    """What a parameter stands at in a law: the geometric mean over its axes; half-way where nothing is known."""
+    """Value of a parameter in a controller: geometric mean over its axes, or of its bounds where unknown."""
     name = parameter.option if parameter.entry is None else f"{parameter.option}[{parameter.entry}]"
     value = now(known, law, name, given.get(parameter.option))
     if value is None:
@@ -148,7 +148,7 @@ def _mean(known: Law, law: AbstractController, given: Mapping[str, Any], paramet
 
 
 def _input_scale(plant: AbstractPlant, law: AbstractController) -> float:
-    """Largest input; where there is none, the one that accelerates every axis by 1 m/s^2 or rad/s^2."""
+    """Largest input; without limits, the input that accelerates every axis by 1 m/s^2 or rad/s^2."""
     x = plant.initial_state()
     most = np.abs(np.asarray(plant.admissible(x, jnp.full(plant.inputs(), _FAR)))).max()
     if most < _FAR:

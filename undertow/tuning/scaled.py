@@ -1,4 +1,4 @@
-"""A disturbance made larger or smaller as a whole."""
+"""A scaled disturbance."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float

@@ -1,4 +1,4 @@
-"""What gains are tried on: seeds, sizes of the disturbance, and vehicles that are not what the controller was told."""
+"""Training and held-out runs: seeds, sizes of the disturbance, and plant variants beside the nominal model."""
 
 import inspect
 import sys
@@ -18,34 +18,34 @@ from undertow.scenario.build import Built
 from undertow.scenario.reading import Text
 from undertow.scenario.schema import TrainingRuns
 
-_HELD_OUT_SEEDS = 1_000_000  # far from those of the training
+_HELD_OUT_SEEDS = 1_000_000  # far from the training seeds
 
 
 class Trials(NamedTuple):
-    """Runs that differ in what the controller does not know; the leaves of `plants` have one entry per trial."""
+    """Runs that differ in what the nominal model does not include; leaves of `plants` have one entry per trial."""
 
     plants: AbstractPlant
     keys: Array
     sizes: Float[Array, " trials"]
-    variants: tuple[str, ...]  # name of the true parameter set of each; "" where there is but one
+    variants: tuple[str, ...]  # plant variant of each; "" where there is only one
 
     @property
     def number(self) -> int:
-        """How many."""
+        """Number of trials."""
         return len(self.variants)
 
     def part(self, chosen: Any) -> "Trials":
-        """Some of them, by their numbers; numbers may repeat."""
+        """The trials with the given numbers, which may repeat."""
         pick = lambda tree: jax.tree.map(lambda leaf: leaf[chosen], eqx.filter(tree, eqx.is_array))
         plants = eqx.combine(pick(self.plants), eqx.filter(self.plants, eqx.is_array, inverse=True))
         return Trials(plants, self.keys[chosen], self.sizes[chosen], tuple(self.variants[i] for i in chosen))
 
 
 def training_and_held_out(text: Text, built: Built) -> tuple[Trials, Trials]:
-    """Both sets of trials of a scenario: other seeds in each, and other parameter sets where there are several.
+    """Both sets of trials of a scenario, with different seeds and, where there are several, different parameter sets.
 
-    The controller keeps what it was told. Published sets, the told one first, go in turn to the training and to the
-    held-out set, which has the told one, too.
+    The nominal model stays the same. Published sets, starting with the nominal one, alternate between the training and
+    the held-out set, which also contains the nominal one.
 
     Raises:
         BadInput: a parameter set that the vehicle does not have.
@@ -62,15 +62,15 @@ def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str],
     Args:
         text: the scenario as read.
         built: the same, built.
-        runs: how many seeds, which sizes and sets.
-        default: sets where none are named.
-        key: under `tune`, for messages.
-        first_seed: the others follow.
+        runs: number of seeds, sizes and sets.
+        default: sets where none are given.
+        key: key of `tune`, for messages.
+        first_seed: first seed; the others follow.
     """
     names, known = tuple(runs.sets if runs.sets is not None else default), parameter_sets(built)
     for i, name in enumerate(names):
         if not known:
-            raise BadInput(f"tune.{key}.sets", "be left out: there is but one parameter set", list(names))
+            raise BadInput(f"tune.{key}.sets", "be left out: there is only one parameter set", list(names))
         checks.choice(f"tune.{key}.sets[{i}]", name, known)
     for i, size in enumerate(runs.sizes):
         checks.not_negative(f"tune.{key}.sizes[{i}]", size)
@@ -89,7 +89,7 @@ def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str],
 
 
 def parameter_sets(built: Built) -> tuple[str, ...]:
-    """Published parameter sets of the scenario's vehicle, the one it has first; none where it has but one."""
+    """Published parameter sets of the scenario's vehicle, its own first; empty where there is only one."""
     vehicle = built.resolved["plant"].get("vehicle")
     if not isinstance(vehicle, dict) or "parameters" not in vehicle:
         return ()
@@ -102,7 +102,7 @@ def parameter_sets(built: Built) -> tuple[str, ...]:
 
 
 def stacked(plants: Sequence[AbstractPlant]) -> AbstractPlant:
-    """Plants of one kind as one whose arrays have an entry for each; names and sources are those of the first."""
+    """Plants of one kind as one plant with stacked arrays; names and sources are those of the first."""
     numbers = [jax.tree.leaves(eqx.filter(plant, eqx.is_array)) for plant in plants]
     tree = jax.tree.structure(eqx.filter(plants[0], eqx.is_array))
     together = jax.tree.unflatten(tree, [jnp.stack(leaves) for leaves in zip(*numbers, strict=True)])

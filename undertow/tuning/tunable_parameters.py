@@ -1,4 +1,4 @@
-"""What is tuned: options of a controller, each between two bounds, on a logarithmic scale."""
+"""Tunable parameters: options of a controller, each between two bounds on a logarithmic scale."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -10,33 +10,33 @@ from jaxtyping import Array, Float
 
 from undertow.core.errors import BadInput
 
-Point = Float[Array, " k"]  # of the tuning: 0 at the lower bound of a parameter, 1 at the upper
+Point = Float[Array, " k"]  # 0 at the lower bound of a parameter, 1 at the upper
 
 _NAME = re.compile(r"(\w+)(?:\[(\d+)\])?")
-_WIDTHS = {"feedback": 2, "gains": 3}  # options of which an axis has several, and how many
+_WIDTHS = {"feedback": 2, "gains": 3}  # options with several numbers per axis, and their count
 
 
 class TunableParameter(NamedTuple):
-    """One number to be found, shared by a group of axes."""
+    """One tunable number, shared by a group of axes."""
 
     option: str
-    entry: int | None  # of an option that has several numbers per axis, such as `feedback[0]`
-    axes: tuple[int, ...]  # () for an option that all axes share
+    entry: int | None  # index, for an option with several numbers per axis, such as `feedback[0]`
+    axes: tuple[int, ...]  # () for an option with one number for all axes
     low: float
     high: float
 
     @property
     def name(self) -> str:
-        """As in a scenario, with the axes that it is for."""
+        """Name as in a scenario, with its axes."""
         entry = "" if self.entry is None else f"[{self.entry}]"
         return f"{self.option}{entry}" + (f" of axes {', '.join(str(a + 1) for a in self.axes)}" if self.axes else "")
 
     def value(self, share: Any) -> Any:
-        """low at 0, high at 1, equal ratios for equal steps."""
+        """Value on a logarithmic scale: low at 0, high at 1."""
         return self.low * (self.high / self.low) ** share
 
     def share(self, value: float) -> float:
-        """Where a value stands between the bounds; beyond them it is taken to the nearer one."""
+        """Share of a value between the bounds; a value outside is moved to the nearest bound."""
         inside = min(max(value, self.low), self.high)
         return float(np.log(inside / self.low) / np.log(self.high / self.low))
 
@@ -48,8 +48,8 @@ def parameters(
 
     Args:
         ranges: low and high by option; `feedback[0]` for the first of several numbers per axis.
-        groups: axes that have their gains in common.
-        shared: options that are one number for all axes, whatever the groups.
+        groups: groups of axes that share their gains.
+        shared: options with one number for all axes.
 
     Raises:
         BadInput: not two bounds, not positive, or the wrong way round.
@@ -85,16 +85,16 @@ def options(chosen: Sequence[TunableParameter], point: Point, axes: int) -> dict
 
 
 def whole(chosen: Sequence[TunableParameter], key: str = "tune.parameters") -> None:
-    """Whether every option is covered: all of several numbers per axis, or none.
+    """Check that options with several numbers per axis are given completely.
 
     Raises:
-        BadInput: some of them are missing.
+        BadInput: some numbers are missing.
     """
     for option, width in _WIDTHS.items():
         entries = {parameter.entry for parameter in chosen if parameter.option == option}
         missing = [f"{option}[{i}]" for i in range(width) if i not in entries] if entries else []
         if missing:
-            raise BadInput(key, f"name {', '.join(missing)}, too", f"without, beside {option}[{min(entries)}]")
+            raise BadInput(key, f"include {', '.join(missing)}", f"given with {option}[{min(entries)}] only")
 
 
 def _parsed(name: str) -> tuple[str, int | None]:

@@ -1,4 +1,4 @@
-"""`undertow tune` without its command line: from a scenario to gains that are certified, and how good they are."""
+"""Tune the controller of a scenario: certified gains, and their evaluation on held-out runs."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -23,10 +23,10 @@ from undertow.tuning.stability import Certificate, Certifier, no_certificate
 
 METHODS = ("gradient", "search")
 
-# A share of the budget is kept for judging what was found.
+# Share of the budget for the search; the rest is for the final evaluation.
 _FOR_THE_SEARCH = 0.85
 
-_BEGINNINGS = 2 * AT_ONCE  # points that are tried before the first step, the given gains among them
+_INITIAL_DESIGN = 2 * AT_ONCE  # points that are evaluated before the search, including the given gains
 
 
 class Evaluated(NamedTuple):
@@ -42,17 +42,17 @@ class Evaluated(NamedTuple):
 
 
 class Tuned(NamedTuple):
-    """What a tuning found."""
+    """Result of a tuning."""
 
     problem: Problem
     method: str
     evaluated: tuple[Evaluated, ...]  # given, ..., start, tuned
     steps: list[Step]
     evaluations: int
-    rejected: int  # points that would have been better, but were not certified
+    rejected: int  # points that would have been better, but have no certificate
     elapsed: float  # s
-    finished: bool  # by itself, not by the budget
-    searched: int  # points that were tried after the first ones
+    finished: bool  # whether the search converged within the budget
+    searched: int  # points that were evaluated after the initial design
 
     @property
     def scenario(self) -> dict[str, Any]:
@@ -76,38 +76,36 @@ def tune(
 
     Args:
         text: the scenario.
-        checkpoint: file that an interrupted tuning goes on from.
-        method: gradient, downhill by forward differentiation, or search, differential evolution.
-        budget: s, all told; what is begun is finished, and the first points are tried whatever it takes.
-        resume: whether to go on from the checkpoint.
-        beside: other choices of options, by name, to be evaluated like the given and the tuned ones.
-        say: told the stage.
-        watch: told the best so far after every batch.
+        checkpoint: file from which an interrupted tuning is resumed.
+        method: `gradient`, gradient descent by forward differentiation, or `search`, differential evolution.
+        budget: s, in total; the initial design is always evaluated, and a batch that has begun is completed.
+        resume: whether to resume from the checkpoint.
+        beside: other choices of options, by name, to evaluate like the given and the tuned ones.
+        say: called with the current stage.
+        watch: called with the best so far after every batch.
 
     Raises:
-        BadInput: anything wrong with the scenario, or with what is to be resumed.
+        BadInput: the scenario, or the checkpoint to resume, is invalid.
     """
     begun = time.perf_counter()
     say("building")
     task = problem(text)
-    about = text_hash(
-        dump({"method": method, "tune": task.built.scenario.tune.model_dump(), **task.built.resolved})
-    )
+    about = text_hash(dump({"method": method, "tune": task.built.scenario.tune.model_dump(), **task.built.resolved}))
     notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
     make = lambda point: task.law(task.options(point))
     first = make(task.start)
-    evaluation = Evaluation(task.bench, make, first, task.train)
+    evaluation = Evaluation(task.training_loop, make, first, task.train)
     if method == "gradient" and not notes.is_over:
         evaluation.precompile_slope(task.start)
-    certifier = Certifier(task.bench, task.train, first)
+    certifier = Certifier(task.training_loop, task.train, first)
     objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
-    say("compiling, and looking for a beginning")
+    say("compiling and evaluating the initial design")
     seed = task.built.scenario.seed
-    others = spread_points(_BEGINNINGS - 1, len(task.parameters), seed)
-    objective.costs(np.vstack([task.start, others]), must=True)  # however long compiling takes: or nothing is found
+    others = spread_points(_INITIAL_DESIGN - 1, len(task.parameters), seed)
+    objective.costs(np.vstack([task.start, others]), must=True)  # otherwise slow compiling would leave no result
     start = objective.best
     if start is None:
-        raise no_certificate(certifier(first), _BEGINNINGS)
+        raise no_certificate(certifier(first), _INITIAL_DESIGN)
     say("tuning")
     finished = True
     try:
@@ -118,7 +116,7 @@ def tune(
             search(objective, np.array(start.point), iterations, seed)
     except OutOfTime:
         finished = False
-    say("judging")
+    say("evaluating on held-out runs")
     best = objective.best or start
     chosen: list[tuple[str, Mapping[str, Any] | None]] = [("given", None), *(beside or {}).items()]
     chosen += [(name, task.rounded(np.array(step.point))) for name, step in (("start", start), ("tuned", best))]
@@ -134,32 +132,32 @@ def tune(
         rejected=objective.rejected,
         elapsed=notes.elapsed,
         finished=finished,
-        searched=objective.evaluations - _BEGINNINGS,
+        searched=objective.evaluations - _INITIAL_DESIGN,
     )
 
 
 @in_its_precision
-def judge(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Evaluated, ...]:
-    """How the gains of a scenario, and other choices of its options by name, do in the runs that `tune` would take.
+def compare_gains(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Evaluated, ...]:
+    """Evaluate the gains of a scenario, and other choices of its options by name, on the runs that `tune` would use.
 
-    Scenarios that differ in their controller only meet the same runs.
+    Scenarios that differ only in their controller use the same runs.
 
     Raises:
-        BadInput: anything wrong with the scenario.
+        BadInput: the scenario is invalid.
     """
     task = problem(text)
     make = lambda point: task.law(task.options(point))
     first = make(task.start)
-    evaluation = Evaluation(task.bench, make, first, task.train)
+    evaluation = Evaluation(task.training_loop, make, first, task.train)
     return _evaluate(
-        task, evaluation, Certifier(task.bench, task.train, first), [("given", None), *choices.items()]
+        task, evaluation, Certifier(task.training_loop, task.train, first), [("given", None), *choices.items()]
     )
 
 
 def _evaluate(
     task: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, Mapping[str, Any] | None]]
 ) -> tuple[Evaluated, ...]:
-    """All choices on both sets of trials; the given gains exactly as they were given."""
+    """Evaluate all choices on both sets of trials; the given gains without rounding."""
     own = task.built.closed_loop.controller
     laws: list[AbstractController] = [own if options is None else task.law(options) for _, options in chosen]
     train, held_out = (evaluation.shares(laws, trials) for trials in (task.train, task.held_out))

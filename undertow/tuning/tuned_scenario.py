@@ -1,4 +1,4 @@
-"""What a tuning found, as a scenario to fly and as data to read."""
+"""Result of a tuning as a scenario and as data."""
 
 from typing import Any
 
@@ -15,15 +15,15 @@ def as_scenario(found: Tuned) -> str:
     points = f"{len(tuned.certificate.radii)} operating points" + (f" of {', '.join(sets)}" if sets else "")
     head = (
         f"# Gains found by `undertow tune`, method {found.method}.\n"
-        f"# Certificate: linearised exactly, the closed loop has a spectral radius of {tuned.certificate.worst:.6f},\n"
-        f"# below 1, from step to step: the largest at {points}.\n"
-        f"# Cost {tuned.train_cost:.6g} on the training, {tuned.held_out_cost:.6g} on held-out runs.\n"
+        f"# Certificate: the exactly linearised closed loop has a spectral radius of {tuned.certificate.worst:.6f},\n"
+        f"# below 1, over one control step; this is the largest at {points}.\n"
+        f"# Cost {tuned.train_cost:.6g} on training runs, {tuned.held_out_cost:.6g} on held-out runs.\n"
     )
     return head + dump(found.scenario)
 
 
 def as_data(found: Tuned) -> dict[str, Any]:
-    """Everything worth keeping; shares of the cost per run, in the order of `trials`."""
+    """Contents of tuning.json; parts of the cost per run, in the order of `trials`."""
     sets = {"train": found.problem.train, "held_out": found.problem.held_out}
     return {
         "method": found.method,

@@ -1,4 +1,4 @@
-"""Numbers that the theory gives for a run: the residual set of U9, and what |d_dot| allows the estimator to err."""
+"""Bounds of the theory for a run: the residual set of U9, and the estimation error that |d_dot| allows."""
 
 import numpy as np
 import xarray as xr

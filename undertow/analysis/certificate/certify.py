@@ -1,4 +1,4 @@
-"""The certificate of a run: signals for its dataset, and a summary that says for how long each hypothesis held."""
+"""The certificate of a run: signals for its dataset, and a summary of how long each hypothesis held."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""The Lyapunov function of the law that ran, from what was recorded: Eq. (46), and section X4 of the theory.
+"""The Lyapunov function of a controller from recorded signals: Eq. (46), and section X4 of the theory.
 
 theta* = d(t) 1: the basis sums to one, so these weights are exact at every instant (U6 of the theory). While d moves
 they move, and the function may rise.

@@ -1,4 +1,4 @@
-"""What the proof of the theorem asks for, held against a recorded run: Eqs. (33), (38), (41), (43), U6 and U7."""
+"""Hypotheses of the stability proof, checked along a recorded run: Eqs. (33), (38), (41), (43), U6 and U7."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -21,21 +21,21 @@ _SAME_BASIS = 0.01
 
 
 class Hypothesis(NamedTuple):
-    """One thing that the proof takes for granted; per record whether it held, None where no record tells."""
+    """One hypothesis of the proof; per record whether it held, None where the record does not show it."""
 
     name: str
     sentence: str
     held: np.ndarray | None  # (time,)
-    unknown: str = ""  # why no record tells
+    unknown: str = ""  # why the record does not show it
 
 
 def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterator[Hypothesis]:
-    """What both laws need; `bound` is theta_max of each axis, (n,)."""
+    """Hypotheses of both controllers; `bound` is theta_max of each axis, (n,)."""
     d = run["uncertainty"].values
     true = lambda name: (run[f"measured_{name}"].values == run[name].values).all(-1)
     yield Hypothesis("limits", "no input is at its limit", (run["saturated"].values == 0).all(-1))
     full = run["attained_share"].values >= 1 - ROUNDING
-    yield Hypothesis("demand", "the command gives the whole wanted acceleration (sigma = 0)", full)
+    yield Hypothesis("demand", "the command gives the whole required acceleration (sigma = 0)", full)
     unknown = "G depends on what actuators report"
     yield Hypothesis("rank", "G has full rank: every axis can be accelerated", _full_rank(law.model, run), unknown)
     yield Hypothesis("measurement", "the measurement is the truth", true("position") & true("velocity"))

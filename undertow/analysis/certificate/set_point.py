@@ -1,4 +1,4 @@
-"""The Lyapunov function of the paper per axis, on the way to a set-point: Eqs. (46)-(60).
+"""The Lyapunov function of the paper per axis, towards a set-point: Eqs. (46)-(60).
 
 Eqs. (38), (41) and (45) define the best weights theta* and what they leave over; the basis sums to one, so both
 are known in closed form.

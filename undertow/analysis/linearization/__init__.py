@@ -1,1 +1,1 @@
-"""A whole closed loop, linearised exactly: where it rests, how it is stable there, and what it will do."""
+"""Exact linearisation of a whole closed loop: equilibrium, stability margins and predicted response."""

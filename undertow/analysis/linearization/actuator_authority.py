@@ -1,4 +1,4 @@
-"""What the actuators can hold for ever, against what the surroundings and the model demand."""
+"""Steady forces that the actuators can hold, compared with the demand of loads and nominal model."""
 
 from typing import NamedTuple
 

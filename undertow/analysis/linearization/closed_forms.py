@@ -1,4 +1,4 @@
-"""What the theory's small models say of a law, to stand beside the exact linearisation of the whole loop."""
+"""Closed forms of the theory for a controller, to compare with the linearisation of the whole loop."""
 
 from typing import NamedTuple, TypeGuard
 

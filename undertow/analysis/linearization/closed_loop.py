@@ -1,4 +1,4 @@
-"""From the pieces of a loop at rest to one linear system in discrete time, with delay, lag and gain put in between."""
+"""The closed loop as one linear discrete-time system, with optional delay, lag and gain between law and plant."""
 
 from typing import NamedTuple
 
@@ -43,7 +43,7 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
     slopes, acting = at.local.slopes, at.acting
     own = slopes["plant"]["plant"][np.ix_(acting, acting)]
     push, load = gain * slopes["plant"]["u"][acting], slopes["plant"]["load"][acting]
-    seen = lambda name: slopes[name]["plant"][:, acting]
+    from_plant = lambda name: slopes[name]["plant"][:, acting]
     inputs, count = push.shape[1], len(own)
     if lag:
         own = np.block([[own, push], [np.zeros((inputs, count)), -np.eye(inputs) / lag]])
@@ -58,7 +58,7 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
 
     def of_state(name: str) -> np.ndarray:
         row = np.zeros((len(slopes[name]["law"]), states))
-        row[:, :count], row[:, z] = seen(name), slopes[name]["law"]
+        row[:, :count], row[:, z] = from_plant(name), slopes[name]["law"]
         return row
 
     u, u_noise = of_state("u"), slopes["u"]["noise"]
@@ -92,7 +92,7 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
 def close_continuous(at: Equilibrium, dt: float) -> LinearLoop:
     """The loop as one differential equation, followed exactly over dt (s); law and input change all the time."""
     slopes, acting = at.local.slopes, at.acting
-    seen = lambda name: slopes[name]["plant"][:, acting]
+    from_plant = lambda name: slopes[name]["plant"][:, acting]
     u, u_noise = np.hstack([seen("u"), slopes["u"]["law"]]), slopes["u"]["noise"]
     push = np.vstack([slopes["plant"]["u"][acting], slopes["flow"]["u"]])
     own = np.vstack(
@@ -108,7 +108,7 @@ def close_continuous(at: Equilibrium, dt: float) -> LinearLoop:
     signals, direct = {"u": u}, {"u": {"noise": u_noise}}
     for name in SIGNALS:
         applied = slopes[name]["u"]
-        signals[name] = np.hstack([seen(name), slopes[name]["law"]]) + applied @ u
+        signals[name] = np.hstack([from_plant(name), slopes[name]["law"]]) + applied @ u
         direct[name] = {"load": slopes[name]["load"], "noise": slopes[name]["noise"] + applied @ u_noise}
     return LinearLoop(step, dict(zip(ENTRIES, entered, strict=True)), signals, direct, dt)
 

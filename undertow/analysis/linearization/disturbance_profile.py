@@ -1,4 +1,4 @@
-"""What a run will be exposed to: load and errors of measurement along the reference, before anything is flown."""
+"""Loads and measurement errors along the reference, before a run."""
 
 from typing import NamedTuple
 

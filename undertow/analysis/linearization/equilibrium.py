@@ -1,4 +1,4 @@
-"""Where a closed loop rests under a constant load: found by Newton's method, whether the loop is stable or not."""
+"""Equilibrium of a closed loop under a constant load, by Newton's method; it need not be stable."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""A closed loop taken apart and differentiated exactly: plant, law and what is recorded, at one instant.
+"""Exact Jacobians of plant, controller and recorded signals of a closed loop at one instant.
 
 Limits, dead zones, pulses of speed controllers and the sensor are left out: what is linearised is the loop inside its
 limits, measured without error. The law hears the input `u` that it believes to be applied, and the plant gets the same.

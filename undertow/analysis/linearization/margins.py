@@ -1,4 +1,4 @@
-"""How much the linearised loop bears: sampling, delay, lag and gain; its poles and its answer to noise."""
+"""Robustness margins of the linearised loop: sampling, delay, lag and gain; its poles and its response to noise."""
 
 from collections.abc import Callable
 from typing import Any
@@ -35,14 +35,14 @@ def closed(at: Equilibrium, dt: float, kind: str = "sampled", **between: float) 
 
 
 def poles(loop: LinearLoop) -> np.ndarray:
-    """Poles that control can move, as rates in 1/s (logarithms over dt), the slowest first."""
+    """Controllable closed-loop poles in 1/s (logarithms over dt), the slowest first."""
     values = multipliers(loop, _REACHED_BY, _SHOWN_BY).astype(complex)
     rates = np.log(np.where(values == 0, 1e-300, values)) / loop.dt
     return rates[np.argsort(-rates.real, kind="stable")]
 
 
 def spectral_radius(loop: LinearLoop) -> float:
-    """Largest absolute value of the poles that control can move, from step to step; below 1 it is stable."""
+    """Spectral radius of the controllable closed-loop poles over one control step; stable below 1."""
     return float(np.abs(multipliers(loop, _REACHED_BY, _SHOWN_BY)).max(initial=0.0))
 
 

@@ -1,4 +1,4 @@
-"""The part of a linear loop that can be excited and seen: counters, norms and idle weights are not in it."""
+"""Minimal realization of a linear loop: without counters, norms and inactive weights."""
 
 from typing import cast
 

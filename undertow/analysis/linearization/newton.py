@@ -1,4 +1,4 @@
-"""What must stand still for a closed loop to rest, and Newton's method for it."""
+"""Equations of an equilibrium of a closed loop, and Newton's method for them."""
 
 from typing import NamedTuple
 

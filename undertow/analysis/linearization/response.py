@@ -1,4 +1,4 @@
-"""The metrics of a run, predicted: the linearised loop driven by what acts along the reference."""
+"""Metrics of a run, predicted by driving the linearised loop with the loads along the reference."""
 
 from typing import NamedTuple
 
