@@ -23,7 +23,7 @@ def prepare() -> None:
 
 
 def _keep_xla_code() -> None:
-    """Let XLA keep its code, unless JAX was told of a place already.
+    """Let XLA keep its code, unless a folder is already set.
 
     The code is for one kind of processor: machines that share a home folder have a folder each. It is run as the
     user, and XLA asks nobody whose it is: where others may write there, nothing is kept.

@@ -71,7 +71,7 @@ def test_noise_of_the_position_counts_too():
 
 def test_the_matrix_is_that_of_the_sampled_law(table1):
     for law in (table1(), table1(sets=1), table1(composite=0.0)):
-        matrix, _ = noise.tick_matrices(noise.steps(law, 2e-3))
+        matrix, _ = noise.step_matrices(noise.steps(law, 2e-3))
         np.testing.assert_allclose(matrix, small_signal.sampled_matrix(law, 2e-3), atol=1e-12)
 
 

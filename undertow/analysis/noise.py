@@ -61,7 +61,7 @@ def steps(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> Steps:
     )
 
 
-def tick_matrices(one: Steps, gain: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def step_matrices(one: Steps, gain: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """A (4 x 4) and B (4 x 2) of one step of y, with a gain c in 1/s; columns of B per m and per m/s of error."""
     unit, dt = np.eye(4), one.dt
     push = one.push + gain * unit[2]
@@ -94,7 +94,7 @@ def deviations(
         BadInput: the sampled law is unstable.
     """
     one = steps(law, dt, axis)
-    matrix, entry = tick_matrices(one, gain)
+    matrix, entry = step_matrices(one, gain)
     radius = float(np.abs(np.linalg.eigvals(matrix)).max())
     if not radius < 1:
         raise BadInput("law", f"be stable when sampled every {dt:g} s", f"of spectral radius {radius:.4g}")

@@ -157,7 +157,7 @@ def sampled_matrix(law: RCAF, dt: float, rule: str = "euler", axis: int = 0) -> 
     """
     if rule not in RULES:
         raise BadInput("rule", f"be one of {', '.join(RULES)}", rule)
-    return _tick(gains(law, axis), dt, rule)
+    return _step_matrix(gains(law, axis), dt, rule)
 
 
 def largest_sampling_time(law: RCAF, rule: str = "euler", axis: int = 0) -> float:
@@ -165,7 +165,7 @@ def largest_sampling_time(law: RCAF, rule: str = "euler", axis: int = 0) -> floa
     g = gains(law, axis)
 
     def unstable(dt: float) -> bool:
-        return bool(np.abs(np.linalg.eigvals(_tick(g, dt, rule))).max() > 1)
+        return bool(np.abs(np.linalg.eigvals(_step_matrix(g, dt, rule))).max() > 1)
 
     return first_crossing(unstable, np.geomspace(1e-6, 1e2, 2001))
 
@@ -190,7 +190,7 @@ def first_crossing(beyond: Callable[[float], bool], grid: np.ndarray, halvings: 
     return float(high)
 
 
-def _tick(g: Gains, dt: float, rule: str) -> np.ndarray:
+def _step_matrix(g: Gains, dt: float, rule: str) -> np.ndarray:
     unit = np.eye(4)
     push = np.array([g.stiffness, g.damping, 0.0, -1.0])  # u = push . state
     sliding = np.array([g.p12, g.p22, 0.0, 0.0])  # s = sliding . state

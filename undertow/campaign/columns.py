@@ -93,14 +93,14 @@ def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
         built: one of them.
     """
     cross = several.campaign.cross
-    found = {key: xr.Variable((key,), _crossed(entries), {"long_name": key}) for key, entries in cross.items()}
+    found = {key: xr.Variable((key,), _swept(entries), {"long_name": key}) for key, entries in cross.items()}
     if several.campaign.series is None:
         return found
     plan = planned(built, several.campaign.series)
     return found | record.coordinates(plan.times(), built.closed_loop.plant)
 
 
-def _crossed(entries: dict[str, Any]) -> np.ndarray:
+def _swept(entries: dict[str, Any]) -> np.ndarray:
     """The values where they are unnamed numbers or booleans; otherwise their names."""
     values, named = list(entries.values()), any(name != words(value) for name, value in entries.items())
     if not named and all(isinstance(value, bool) for value in values):

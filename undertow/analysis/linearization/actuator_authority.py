@@ -62,12 +62,12 @@ def _reach(loop: ClosedLoop, x, loads):
 
     low, high = at_limit(-1.0), at_limit(1.0)
 
-    def wanted(load):
+    def required(load):
         return model.force_for(
             y, -model.drift(y) - model.rates_derivative(y, load) + model.rates_derivative(y, jnp.zeros_like(load))
         )
 
-    forces = jax.vmap(wanted)(loads)
+    forces = jax.vmap(required)(loads)
     given = jax.vmap(lambda force: allocate(effect, force, low, high, jnp.asarray(_WHOLE)))(forces)
     share = jax.vmap(lambda force, given: attained(effect, force, given))(forces, given)
     return low, high, jnp.abs(forces).max(axis=0), share

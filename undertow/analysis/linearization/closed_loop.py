@@ -93,12 +93,12 @@ def close_continuous(at: Equilibrium, dt: float) -> LinearLoop:
     """The loop as one differential equation, followed exactly over dt (s); law and input change all the time."""
     slopes, acting = at.local.slopes, at.acting
     from_plant = lambda name: slopes[name]["plant"][:, acting]
-    u, u_noise = np.hstack([seen("u"), slopes["u"]["law"]]), slopes["u"]["noise"]
+    u, u_noise = np.hstack([from_plant("u"), slopes["u"]["law"]]), slopes["u"]["noise"]
     push = np.vstack([slopes["plant"]["u"][acting], slopes["flow"]["u"]])
     own = np.vstack(
         [
             np.hstack([slopes["plant"]["plant"][np.ix_(acting, acting)], slopes["plant"]["law"][acting]]),
-            np.hstack([seen("flow"), slopes["flow"]["law"]]),
+            np.hstack([from_plant("flow"), slopes["flow"]["law"]]),
         ]
     )
     load = np.vstack([slopes["plant"]["load"][acting], slopes["flow"]["load"]])

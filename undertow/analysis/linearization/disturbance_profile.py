@@ -41,7 +41,7 @@ def disturbance_profile(
 
     Args:
         loop: the five roles.
-        at: the loop at rest; what is unknown is told as seen from there.
+        at: the loop at rest; unknown quantities are relative to it.
         key: of everything random in the run.
         steps: how many, from t = 0.
         dt: s.

@@ -1,7 +1,8 @@
 """Exact Jacobians of plant, controller and recorded signals of a closed loop at one instant.
 
 Limits, dead zones, pulses of speed controllers and the sensor are left out: what is linearised is the loop inside its
-limits, measured without error. The law hears the input `u` that it believes to be applied, and the plant gets the same.
+limits, measured without error. The controller receives the input `u` that it believes to be applied, and the plant
+gets the same.
 """
 
 from typing import Any, NamedTuple
@@ -116,8 +117,8 @@ def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array
     """What follows from states, input, load and noise."""
     (plant, law), zero = (parts.loop.plant, parts.loop.controller), jnp.zeros(())
     x, z, r = parts.plant_state(flat_x), parts.law_state(flat_z), parts.target
-    calm = plant.no_load()
-    pushed = calm._replace(acceleration=calm.acceleration + load)
+    unloaded = plant.no_load()
+    pushed = unloaded._replace(acceleration=unloaded.acceleration + load)
     truth, axes = plant.output(zero, x), load.shape[0]
     y = truth._replace(position=truth.position + noise[:axes], velocity=truth.velocity + noise[axes:])
     command, telemetry = law.command(z, y, r)

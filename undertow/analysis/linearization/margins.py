@@ -13,7 +13,7 @@ from undertow.analysis.small_signal import first_crossing
 from undertow.core.errors import BadInput
 from undertow.loop.closed_loop import ClosedLoop
 
-# What control can reach, and what shows it: freedoms that no input moves are not the law's to stabilise.
+# Inputs and signals of the controllable poles: no controller can stabilise degrees of freedom that no input moves.
 _REACHED_BY, _SHOWN_BY = ("input", "noise"), ("error", "u")
 
 _POINTS, _HALVINGS = 25, 12  # of a search: to a ten-thousandth of the value

@@ -50,8 +50,8 @@ class Balance(NamedTuple):
 
         def look(at: dict):
             residual, jacobian = self.residual(self.parts.differentiate(at, self.dt), at, unknown, still)
-            sound = np.isfinite(residual).all() and np.isfinite(jacobian).all()
-            return residual, jacobian, float(np.abs(residual).max(initial=0.0)) if sound else np.inf
+            finite = np.isfinite(residual).all() and np.isfinite(jacobian).all()
+            return residual, jacobian, float(np.abs(residual).max(initial=0.0)) if finite else np.inf
 
         residual, jacobian, size = look(at)
         ends = np.cumsum([len(at[name]) for name in unknown])[:-1]

@@ -35,8 +35,8 @@ def make_figures(found: Reproduction) -> dict[str, Figure]:
         "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),
         "drifting": drifting_figure(found.results["drifting"]),
     }
-    sound = found.results.get("robust_variant")
-    return figures | _of_last_chapter(found, sound) if robust else figures
+    robust = found.results.get("robust_variant")
+    return figures | _of_last_chapter(found, robust) if robust else figures
 
 
 def _of_last_chapter(found: Reproduction, robust: dict[str, Any]) -> dict[str, Figure]:
