@@ -83,8 +83,8 @@ OPEN = (
 
 # Phrases in which a retired word is the field's word, or somebody else's name.
 PHRASES = re.compile(
-    r"lanes_of|your-own-instrument\.md|field != .books.|admin\.tick\.interval|docs/lanes\.md|\(lanes\.md\)|journal article|journal: Nonlinear Dynamics|Journal of|tick_params|ticklabel|charge drawn|speed of sound"
-    r"|Nonlinear Dynamics|sounding|fly[- ]?wheel",
+    r"lanes_of|\[?(?:docs/)?lanes\.md|your-own-instrument\.md|field != .books.|admin\.tick\.interval|tick_params"
+    r"|charge drawn|Nonlinear Dynamics|fly[- ]?wheel",
     re.I,
 )
 
