@@ -53,7 +53,7 @@ def test_what_is_doubtful_is_advised(undertow, tmp_path):
     assert said.code == 0
     assert "Advice: the loop is unstable at 3 of 3 operating points: rightmost pole +" in said.err
     assert "Advice: the weights are not bounded" in said.err
-    assert "No metrics predicted: the loop linearised at fixed weights is unstable" in said.out
+    assert "No metrics are predicted: the loop linearised at fixed weights is unstable" in said.out
     margins = json.loads((tmp_path / "out" / "prediction.json").read_text())["margins"]
     assert margins == {"sampling_time": 0.0, "delay": 0.0, "lag": 0.0, "gain_low": 1.0, "gain_high": 1.0}
 
@@ -73,7 +73,7 @@ def test_what_no_linear_prediction_knows_is_named(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST.replace("limit: 8", "limit: 1.5"))
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
     assert "The run departs from the linear prediction by more than 10 %: tracking_rms by" in said.out
-    assert "Inputs were at a limit for" in said.out
+    assert "Actuators were saturated" in said.out
 
 
 def test_mistakes_are_those_of_a_scenario(refused, tmp_path):

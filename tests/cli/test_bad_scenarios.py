@@ -238,7 +238,7 @@ MISTAKES = {
     "two sources of samples": (
         "kind: u1",
         "kind: table, file: d.csv, csv: t",
-        "`disturbance.csv` must be left out when there is another source of samples, but is beside `file` "
+        "`disturbance.csv` must be left out when there is another source of samples, but is given together with `file` "
         "(s.yaml, line 8)",
     ),
     "duplicate key": (
