@@ -25,7 +25,7 @@ def test_interrupted_and_resumed_its_result_can_be_flown(undertow, tmp_path):
     assert undertow("tune", "s.yaml", "--out", "out").code == 2
     said = undertow("tune", "s.yaml", "--out", "out", "--budget", "600", "--resume")
     assert said.code == 0, said
-    assert "Held-out cost" in said.out
+    assert "The held-out cost is" in said.out
     found = json.loads((tmp_path / "out" / "tuning.json").read_text())
     costs = [step["cost"] for step in found["history"]]
     assert costs == sorted(costs, reverse=True) and all(step["radius"] < 1 for step in found["history"])

@@ -123,7 +123,7 @@ def test_journal_of_something_else(tmp_path):
     Checkpoint(tmp_path / "j", "one", 1.0, resume=False)
     with pytest.raises(BadInput, match="resume"):
         Checkpoint(tmp_path / "j", "one", 1.0, resume=False)
-    with pytest.raises(BadInput, match="another one"):
+    with pytest.raises(BadInput, match="given with others"):
         Checkpoint(tmp_path / "j", "two", 1.0, resume=True)
 
 
