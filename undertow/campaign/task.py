@@ -2,7 +2,7 @@
 
 import contextlib
 import functools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,9 @@ from undertow.scenario.reading import Text
 
 # Status of a trial whose scenario cannot be built, beside those of `undertow.core.status`.
 REFUSED = -1
+
+# Success of a trial that was refused, or has no criterion.
+NOT_JUDGED = -1
 
 
 class Site(NamedTuple):
@@ -67,10 +70,13 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns["trial"] = np.array(rows, dtype=np.uint32)
     columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
     where: list[int] = []
+    criteria: list[dict[str, float]] = []
 
     def flying() -> Iterator[Built]:
         for place, built in _built(here.trials, here.part_cache, rows):
             where.append(place)
+            judged = built.window()[0] < built.scenario.loop.duration
+            criteria.append(built.resolved["success"] if judged else {})
             yield built
 
     flown = here.programs.run(flying(), here.trials.campaign.series)
@@ -78,10 +84,20 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns["status"] = spread(flown.status, REFUSED)
     columns["ended"] = spread(flown.ended, np.nan)
     columns["backend"] = spread(flown.backend, REFUSED)
+    columns["success"] = spread(_success(criteria, flown.metrics), NOT_JUDGED)
     found = flown.metrics | {f"series:{name}": values for name, values in flown.series.items()}
     if "precision" in (*here.trials.campaign.vary, *here.trials.campaign.cross):  # one array holds both
         found = {name: values.astype(np.float64) for name, values in found.items()}
     return columns | {name: spread(values, np.nan) for name, values in found.items()}
+
+
+def _success(criteria: Sequence[Mapping[str, float]], metrics: Mapping[str, np.ndarray]) -> np.ndarray:
+    """1 where all that a trial is judged by stays below its limit, 0 where not, `NOT_JUDGED` without a criterion."""
+    found = np.full(len(criteria), NOT_JUDGED, dtype=np.int8)
+    for i, criterion in enumerate(criteria):
+        if criterion:  # what is not defined, as in a run that failed, is NaN and below nothing
+            found[i] = all(name in metrics and metrics[name][i] < most for name, most in criterion.items())
+    return found
 
 
 def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:

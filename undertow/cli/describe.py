@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from undertow.analysis.metric_meanings import MEANINGS, PER_AXIS, unit_of
+from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.cli.tables import wide_console
 from undertow.scenario import describing
 from undertow.scenario.schema import keys
@@ -21,7 +21,7 @@ def describe(name: str) -> None:
         _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
     elif name == "metrics":
         rows = [
-            (key, unit_of(key, "unit of the input"), "yes" if key in PER_AXIS else "", one.meaning)
+            (key, one.unit.replace("[axis]", "[output]"), "yes" if key in PER_AXIS else "", one.meaning)
             for key, one in MEANINGS.items()
         ]
         _show_table(console, "Metrics", ("metric", "unit", "also <metric>_axes", "meaning"), rows)

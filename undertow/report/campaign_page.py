@@ -68,7 +68,7 @@ def _endings(found: Mapping[str, Any]) -> list[Html]:
 
 
 def _choices(found: Mapping[str, Any]) -> list[Html]:
-    tables = by_choice(found)
+    tables = by_choice(results, found)
     said = "By choice: median [5 %, 95 %] of the trials that lasted, all combinations together."
     return [tag("p", prose(said)), *tables] if tables else []
 
