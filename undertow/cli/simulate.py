@@ -40,9 +40,9 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
         typer.echo(f"Advice: left to XLA, which is slower, as lanes (docs/lanes.md) lack something: {why}.", err=True)
-    predicted = predicted.metrics if predicted else None
+    expected = predicted.metrics if predicted else None
     known = metrics_of(executed.dataset)
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, predicted))
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
     if predicted:
         console.print(f"{judgement(predicted, executed)}.", highlight=False, soft_wrap=True)
     certificate = certificate_of(executed.dataset)
