@@ -31,9 +31,9 @@ def minute(**choices):
     loop = ClosedLoop(plant, law, setpoint(np.zeros(SEEDS)), none(), white_noise(0.0, NOISE))
     outcome = sampled.simulate(loop, duration=60.0, dt=DT, record_every=10)
     assert int(outcome.status) == 0
-    rms = lambda name, k: float(jnp.sqrt((getattr(outcome.signals, name)[1000 * k : 1000 * (k + 1)] ** 2).mean()))
+    rms = lambda name, k: float(jnp.sqrt((outcome.signals[name][1000 * k : 1000 * (k + 1)] ** 2).mean()))
     windows = {name: (rms(name, 1), rms(name, 5)) for name in ("estimate", "error")}
-    return law, drift.gain_of(law, outcome.signals.weights), float(outcome.signals.weights_peak.max()), windows
+    return law, drift.gain_of(law, outcome.signals["weights"]), float(outcome.signals["weights_peak"].max()), windows
 
 
 def test_a_minute_with_a_box_and_without():

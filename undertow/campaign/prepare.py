@@ -1,11 +1,9 @@
 """A campaign from its file, with the first trials built: mistakes are told before anything is flown."""
 
-import contextlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from undertow.analysis.metrics import gathered_meanings
 from undertow.campaign import task as tasks
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.invalid_trials import refusals
@@ -49,25 +47,15 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
     here = tasks.site(text, str(folder))
     firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]
     _check_shapes(campaign, here.probes().values())
-    alternatives = list(_alternatives(several, here))
-    metrics = {}
-    for built in (*(built for _, built in firsts), *alternatives):
-        metrics = gathered_meanings(built.closed_loop, built.metrics) | metrics
+    metrics = here.metrics()
     advice: dict[str, str] = {}
     for row, built in firsts:
         _check(campaign, built, metrics)
         for sentence in (*built.advice(), *vehicle_warnings(built)):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
     told = (*too_few(campaign), *_refused(several, here), *advice.values())
-    named = (*(built.resolved for _, built in firsts), *(built.resolved for built in alternatives))
+    named = (*(built.resolved for _, built in firsts), *(built.resolved for built in here.alternatives()))
     return Prepared(several, text, folder, firsts[0][1], metrics, named, told)
-
-
-def _alternatives(several: Trials, here: tasks.Site) -> Iterator[Built]:
-    """The first trial with each entry of what is chosen, where it can be built: it may name another file."""
-    for data in several.alternatives():
-        with contextlib.suppress(BadInput):
-            yield tasks.build_data(several, here.part_cache, data)
 
 
 def _refused(several: Trials, here: tasks.Site) -> tuple[str, ...]:

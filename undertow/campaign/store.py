@@ -98,18 +98,14 @@ class Store:
 
         Args:
             task: its number.
-            columns: by name, one entry per trial; a metric that is not among them is defined for none.
+            columns: by name, one entry per trial.
 
         Raises:
             OSError: the disk is full, for example; the task then counts as not done.
         """
         region = self.layout.region(task)
         covered = [one.stop - one.start for one in region]
-        trials = len(columns["status"])
-        undefined = {name: np.full(trials, np.nan) for name in self._labels if name not in columns}
-        for name, values in {**columns, **undefined}.items():
-            if name not in self._labels:  # a metric that no part of the first trials has
-                continue
+        for name, values in columns.items():
             each = values.shape[1:]
             if name not in self._arrays:
                 shape, chunks = (*self.layout.shape, *each), (*self.layout.chunk, *each)

@@ -8,12 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from undertow.analysis.metrics import gathered_meanings
 from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.layout import Layout
 from undertow.campaign.reading import read_text
 from undertow.campaign.trials import Trials, trials
 from undertow.core import runtime
 from undertow.core.errors import BadInput
+from undertow.core.metric import Metric
 from undertow.scenario.build import Built, build
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text
@@ -32,6 +34,14 @@ class Site(NamedTuple):
     part_cache: PartCache
     programs: ProgramCache
     probes: Callable[[], dict[int, Built]]  # of the first trials of every combination those that can be built
+    alternatives: Callable[[], list[Built]]  # the first trial with each entry of what is chosen, where it can be built
+
+    def metrics(self) -> dict[str, Metric]:
+        """That any of the trials may have: each has a column, NaN where a law or plant has no such metric."""
+        found: dict[str, Metric] = {}
+        for built in (*self.probes().values(), *self.alternatives()):
+            found = gathered_meanings(built.closed_loop, built.metrics) | found
+        return found
 
 
 @functools.lru_cache(maxsize=2)
@@ -45,7 +55,8 @@ def site(text: str, folder: str) -> Site:
     several, part_cache = trials(*read_text(text, Path(folder))), PartCache()
     rows = several.probes()
     probes = functools.cache(lambda: {rows[place]: built for place, built in _built(several, part_cache, rows)})
-    return Site(several, part_cache, ProgramCache(lambda: list(probes().values())), probes)
+    others = functools.cache(lambda: list(_alternatives(several, part_cache)))
+    return Site(several, part_cache, ProgramCache(lambda: list(probes().values())), probes, others)
 
 
 def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
@@ -85,10 +96,19 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns["ended"] = spread(flown.ended, np.nan)
     columns["backend"] = spread(flown.backend, REFUSED)
     columns["success"] = spread(_success(criteria, flown.metrics), NOT_JUDGED)
-    found = flown.metrics | {f"series:{name}": values for name, values in flown.series.items()}
+    undefined = np.full(len(where), np.nan)
+    found = {name: flown.metrics.get(name, undefined) for name in here.metrics()}
+    found |= {f"series:{name}": values for name, values in flown.series.items()}
     if "precision" in (*here.trials.campaign.vary, *here.trials.campaign.cross):  # one array holds both
         found = {name: values.astype(np.float64) for name, values in found.items()}
     return columns | {name: spread(values, np.nan) for name, values in found.items()}
+
+
+def _alternatives(several: Trials, part_cache: PartCache) -> Iterator[Built]:
+    """They may name other files, and have metrics of their own."""
+    for data in several.alternatives():
+        with contextlib.suppress(BadInput):
+            yield build_data(several, part_cache, data)
 
 
 def _success(criteria: Sequence[Mapping[str, float]], metrics: Mapping[str, np.ndarray]) -> np.ndarray:
