@@ -83,7 +83,8 @@ def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.
     """How well the energy balance of a recorded run closes between two times, s; {} without a ledger.
 
     Returns:
-        Largest change of the residual and of the integration error since the start, as shares of the energy drawn until the stop.
+        Largest change of the residual and of the integration error since the start, as shares
+        of the energy drawn until the stop.
     """
     if "energy_source" not in recorded:
         return {}
