@@ -1,8 +1,8 @@
 """What is there, with units and sources."""
 
 import pytest
-from undertow.analysis.metric_meanings import MEANINGS
 
+from undertow.analysis.metrics import MEANINGS
 from undertow.core import catalogue
 from undertow.scenario import describing
 from undertow.scenario.schema import keys

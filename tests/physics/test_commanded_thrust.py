@@ -78,6 +78,9 @@ class Asking(AbstractController):
     def command(self, z, y, r):
         return self.asked, self.inner.command(z, y, r)[1]
 
+    def signals(self):
+        return self.inner.signals()
+
     def advance(self, z, y, r, u_applied, dt):
         return self.inner.advance(z, y, r, u_applied, dt)
 
@@ -89,7 +92,7 @@ def test_metrics_count_each_limit():
     law = Asking(plant.model(), asked, pid(plant.model(), sampling_time=0.02))
     loop = ClosedLoop(plant, law, setpoint([0.0] * 6), none(), perfect())
     run = sampled.simulate(loop, duration=1.0, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 1.0),))
-    found = results(run.accumulated[0])
+    found = results((Metrics(0.0, 1.0),), run.accumulated)
     assert found["saturated_fraction"] == pytest.approx(2 / 8)
     assert found["input_peak"] == pytest.approx(FORWARD)
     assert found["input_rms"] == pytest.approx(np.sqrt((30**2 + 12**2 + 15**2 + 11**2) / 8))

@@ -194,7 +194,7 @@ def test_batches_and_xla_agree_where_the_zone_subtracts(law):
         here, there = found.signals[name], np.asarray(wanted.signals[name])
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max(), err_msg=name)
     assert np.abs(wanted.signals["input"][np.abs(wanted.signals["input"]) > 0]).min() > 1.2, "the zone is added"
-    assert results(found.accumulated[0])["input_rms"] > 1.2
+    assert results(how["accumulators"], found.accumulated)["input_rms"] > 1.2
 
 
 def test_what_cannot_be():

@@ -34,6 +34,9 @@ class DeafToLimits(AbstractController):
     def command(self, z, y, r):
         return self.law.command(z, y, r)
 
+    def signals(self):
+        return self.law.signals()
+
     def advance(self, z, y, r, u_applied, dt):
         return self.law.advance(z, y, r, self.law.command(z, y, r)[0], dt)
 

@@ -101,8 +101,11 @@ class Stepped(AbstractController):
         return self.law.init(y, r), jnp.zeros_like(y.position)
 
     def command(self, z, y, r):
-        asked, telemetry = self.law.command(z[0], y, r)
-        return z[1] if self.delayed else asked, telemetry
+        asked, signals = self.law.command(z[0], y, r)
+        return z[1] if self.delayed else asked, signals
+
+    def signals(self):
+        return self.law.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         asked, _ = self.law.command(z[0], y, r)

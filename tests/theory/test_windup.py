@@ -38,6 +38,9 @@ class FedCommanded(AbstractController):
     def command(self, z, y, r):
         return self.law.command(z, y, r)
 
+    def signals(self):
+        return self.law.signals()
+
     def advance(self, z, y, r, u_applied, dt):
         commanded, _ = self.law.command(z, y, r)
         return self.law.advance(z, y, r, commanded, dt)

@@ -134,6 +134,6 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     if several:
         resolved["metrics"] = [description for _, description in several]
     built = Built(loop.starting_at(scenario.initial.position), scenario, resolved, tuple(part for part, _ in several))
-    criterion = placed(text, "success", built.criterion)
     placed(text, "controller.signals", loop.signals)
+    criterion = placed(text, "success", built.criterion)
     return built._replace(resolved=resolved | {"success": criterion})
