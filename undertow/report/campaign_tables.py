@@ -24,9 +24,11 @@ def named(combination: Mapping[str, Any]) -> str:
 
 
 def endings(found: Mapping[str, Any]) -> Html:
-    """How many trials ended how, side by side for the combinations."""
+    """How many trials ended how, and how many succeeded, side by side for the combinations."""
     several = found["combinations"]
     rows = [(word, *(str(one["status"].get(word, 0)) for one in several)) for word in found["status"]]
+    if any(one["success"]["within"] or one["success"]["not_within"] for one in several):
+        rows.append(("within the criterion of success", *(str(one["success"]["within"]) for one in several)))
     head = ("trials", *map(named, several))
     return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 3)
 
