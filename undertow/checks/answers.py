@@ -29,10 +29,17 @@ def is_a(name: str, value: Any, kind: type) -> Iterator[Finding]:
         yield error("contract", name, f"give {article} {kind.__name__}", form(value))
 
 
+def two_values(name: str, value: Any, what: str) -> Iterator[Finding]:
+    """A tuple of two, no more and no less."""
+    if type(value) is not tuple or len(value) != 2:
+        says = f"`{name}` must return two values, {what}, but returns {form(value)}"
+        yield Finding("error", "contract", name, says)
+
+
 def alike(name: str, value: Any, model: Any, must: str, types: bool = False) -> Iterator[Finding]:
     """The same tree as `model`, with arrays of the same shapes; and of the same types of number, where asked for."""
     if type(value) is not type(model):
-        yield error("contract", name, must, f"a {type(value).__name__}, not a {type(model).__name__}")
+        yield error("contract", name, must, f"{_kind(value)}, not {_kind(model)}")
         return
     (found, tree), (due, model_tree) = map(jax.tree_util.tree_flatten_with_path, (value, model))
     if tree != model_tree:
@@ -56,12 +63,16 @@ def agree(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
         yield error("contract", name, f"agree with {what}", got)
 
 
+def _kind(value: Any) -> str:
+    return "an array" if isinstance(value, jax.Array | jax.ShapeDtypeStruct) else f"a {type(value).__name__}"
+
+
 def form(value: Any) -> str:
     """What an answer is, in words."""
     if value is None:
         return "nothing (no `return`?)"
     if isinstance(value, jax.Array | jax.ShapeDtypeStruct):
         return f"an array of shape {value.shape}"
-    if isinstance(value, tuple):
+    if type(value) is tuple:
         return f"{len(value)} values" if len(value) != 1 else "one value"
-    return f"of type {type(value).__name__}"
+    return f"a {type(value).__name__}"

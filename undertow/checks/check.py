@@ -121,9 +121,9 @@ def _of_feedback(make: Callable[..., Any], axes: int) -> Report:
 
 def _place(part: Any, key: str) -> str:
     """Where in the user's own file a method is that a finding names."""
-    thing, _, inner = key.rpartition(".")
+    thing, _, method = key.rpartition(".")
     part = part.model() if thing == "model" and isinstance(part, AbstractPlant) else part
-    return place_of(part, inner)
+    return place_of(part, method) if method else ""
 
 
 def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
@@ -180,7 +180,7 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
 def _no_part(name: str, thing: Any) -> BadInput:
     """What to say of something that a function returns instead of a part."""
     contract, shared = factory.contract_like(thing)
-    place, kind = place_of(thing, ""), type(thing).__name__
+    place, kind = place_of(thing), type(thing).__name__
     if not place:
         hint = "Return a vehicle, thruster, plant, controller or another part"
         return BadInput("", "", f"`{name}` returns {thing!r}, which is not a part", hint=hint)

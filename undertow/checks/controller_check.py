@@ -8,7 +8,7 @@ import numpy as np
 
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
-from undertow.checks.answers import alike, form, shaped
+from undertow.checks.answers import alike, form, shaped, two_values
 from undertow.checks.finding import Finding, advice
 from undertow.core.contracts import AbstractController, Measurement, Target
 from undertow.disturbances.none import none
@@ -28,14 +28,14 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
     r, dt = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n)), jnp.asarray(1e-3)
     z = jax.eval_shape(controller.init, y, r)
     answer = jax.eval_shape(controller.command, z, y, r)
-    if not isinstance(answer, tuple) or len(answer) != 2:
-        yield _error("command", "return two values, the input and the signals", f"returns {form(answer)}")
+    if wrong := list(two_values("command", answer, "the input and the signals")):
+        yield from wrong
         return
     u, telemetry = answer
     inputs = controller.model.gain(y).shape[1]
     if getattr(u, "shape", None) != (inputs,):
-        due = f"return an input of shape {(inputs,)}, one entry per input of the plant"
-        yield _error("command", due, f"returns {form(u)}", _DEFAULT)
+        due = f"must return an input of shape {(inputs,)}, one entry per input of the plant"
+        yield Finding("error", "contract", "command", f"`command` {due}, but returns {form(u)}", _DEFAULT)
         return
     yield from shaped("command", telemetry.estimate, (n,))
     after = jax.eval_shape(controller.advance, z, y, r, u, dt)
@@ -59,11 +59,7 @@ def check_stability(controller: AbstractController, plant: DoubleIntegrator, dt:
     radius, reversed_radius = (margins.spectral_radius(margins.closed(at, dt, gain=gain)) for gain in (1.0, -1.0))
     if at.found and radius > 1 + _GROWTH * dt:
         got = f"unstable there: the linearised closed loop has a spectral radius of {radius:.6g} at steps of {dt:g} s"
-        hint = "Check its gains, and that its state does not grow by itself"
+        hint = "Check the gains, and the signs of input and state: the error is target minus position"
         if reversed_radius < radius and reversed_radius <= 1 + _GROWTH * dt:
             hint = "With the opposite sign of the input it is stable: the error is target minus position"
         yield advice("stability", "command", "bring a double integrator, x_ddot = u, back to the origin", got, hint)
-
-
-def _error(key: str, must: str, got: str, hint: str = "") -> Finding:
-    return Finding("error", "contract", key, f"`{key}` must {must}, but {got}", hint)

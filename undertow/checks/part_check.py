@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.checks.answers import agree, alike, is_a, shaped
+from undertow.checks.answers import agree, alike, is_a, shaped, two_values
 from undertow.checks.controller_check import check_controller
 from undertow.checks.finding import Finding, error
 from undertow.checks.plant_check import check_plant
@@ -102,8 +102,12 @@ def _disturbance(disturbance: AbstractDisturbance, around: DisturbanceProfile) -
 def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> Iterator[Finding]:
     realization = jax.eval_shape(navigation.realize, jax.random.PRNGKey(0))
     state = jax.eval_shape(navigation.init, realization, around.truth)
-    y, after = jax.eval_shape(navigation.measure, realization, state, jnp.zeros(()), around.truth)
-    yield from alike("measure", after, state, "give the state in the form of `init`")
+    answer = jax.eval_shape(navigation.measure, realization, state, jnp.zeros(()), around.truth)
+    if unpaired := list(two_values("measure", answer, "the measurement and the state after it")):
+        yield from unpaired
+        return
+    y, after = answer
+    yield from alike("measure", after, state, "return the state in the form that `init` gives it", types=True)
     wrong, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
     yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
 

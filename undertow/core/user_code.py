@@ -1,9 +1,7 @@
 """What a part that somebody else wrote did wrong: a sentence, with the method and the line of their file."""
 
-import ast
 import inspect
 import re
-import textwrap
 import traceback
 from dataclasses import FrozenInstanceError
 from pathlib import Path
@@ -64,25 +62,18 @@ def python_says(error: BaseException) -> str:
     return f"{says}. {hint}" if hint else says
 
 
-def place_of(part: Any, name: str, returning: bool = False) -> str:
-    """`mine.py, line 7`, where a class of the user's own, or that of an object, defines a method; "" where it does not.
+def place_of(part: Any, method: str = "") -> str:
+    """`mine.py, line 7`, where a class of the user's own begins, or a method of it; "" for other people's classes.
 
     Args:
-        part: an object, or a class.
-        name: of the method; "" for the class itself.
-        returning: the line of its last `return` instead.
+        part: an object, or the class.
+        method: its name; "" for the class itself.
     """
     kind = part if isinstance(part, type) else type(part)
-    thing: Any = inspect.unwrap(getattr(kind, name)) if name and callable(getattr(kind, name, None)) else kind
-    if not _is_own(thing.__module__) or (name and thing is kind):
+    thing: Any = inspect.unwrap(getattr(kind, method, None) or str) if method else kind
+    if not _is_own(getattr(thing, "__module__", None)):
         return ""
-    lines, first = inspect.getsourcelines(thing)
-    file = inspect.getsourcefile(thing) or ""
-    if returning:
-        tree = ast.parse(textwrap.dedent("".join(lines)))
-        returns = [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Return)]
-        first += max(returns, default=1) - 1
-    return f"{Path(file).name}, line {first}"
+    return f"{Path(inspect.getsourcefile(thing) or '').name}, line {inspect.getsourcelines(thing)[1]}"
 
 
 def _is_own(module: str | None) -> bool:
@@ -109,6 +100,6 @@ def _abstract(found: re.Match[str], frames: list[tuple[FrameType, int]]) -> Faul
     many, verb = ("s", "are") if len(names) > 1 else ("", "is")
     missing = "implemented" if what == "method" else "declared"
     kind = next((f.f_globals[name] for f, _ in reversed(frames) if isinstance(f.f_globals.get(name), type)), None)
-    place = place_of(kind, "") if kind is not None else ""
+    place = place_of(kind) if kind is not None else ""
     at = f" ({place})" if place else ""
     return Fault(f"cannot instantiate `{name}`: {what}{many} {listed} {verb} not {missing}{at}", "")
