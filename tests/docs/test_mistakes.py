@@ -21,22 +21,22 @@ MISTAKES = [
         "velocity=velocity), after",
         "velocity=velocity)",
         "Error: `measure` must return two values, the measurement and the state after it, but returns a Measurement "
-        "(my_navigation.py, line 40)",
+        "(my_navigation.py, line 41)",
     ),
     (
         "navigation",
         "my_navigation",
         "return truth._replace(position=position, velocity=velocity), after",
         "return position, after",
-        "Error: `measure` must give a Measurement, but is an array of shape (6,) (my_navigation.py, line 40)",
+        "Error: `measure` must give a Measurement, but is an array of shape (6,) (my_navigation.py, line 41)",
     ),
     (
         "navigation",
         "my_navigation",
         "state.count + 1)",
-        "state.count + 1.0)",
-        "Error: `measure` must return the state in the form that `init` gives it, but is of type float64 instead of int64 "
-        "in `count` (my_navigation.py, line 40)",
+        "(state.count + 1)[None])",
+        "Error: `measure` must return the state in the form that `init` gives it, but is of shape (1,) instead of () in "
+        "`count` (my_navigation.py, line 41)",
     ),
     (
         "controller",
