@@ -9,17 +9,33 @@ from pathlib import Path
 
 from simdjit.cache import private_folder
 
+# XLA compiles the body of a small `while` loop into one plain function instead of a list of kernels to be
+# dispatched one by one. Its own limit (1 kB of loop state) is below a vehicle with its thrusters; with the limit
+# raised, one step of the closed loop takes a quarter of the time.
+_ONE_FUNCTION_PER_LOOP = "xla_cpu_small_while_loop_byte_threshold=100000000"
+
 # Objects before the youngest are looked through. Tracing makes millions that live: Python's 700 cost half a second.
 _YOUNG, _MIDDLE, _OLD = 50_000, 20, 100
 
 
 def prepare() -> None:
-    """Keep compiled code from one process to the next, and look for garbage seldom; before JAX is imported."""
+    """Set the environment variables of JAX and XLA, and look for garbage seldom; before JAX is imported.
+
+    Whoever calls this decides about the whole process, so nothing calls it at import. A caller's own settings stay.
+    """
     # Or XLA says on the terminal that compiling is slow, and asks for a bug report.
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    os.environ.setdefault("JAX_ENABLE_X64", "1")
+    _compile_loops_whole()
     _keep_xla_code()
     gc.set_threshold(_YOUNG, _MIDDLE, _OLD)
     atexit.register(gc.freeze)  # or Python looks through everything once more before it goes: half a second
+
+
+def _compile_loops_whole() -> None:
+    flags = os.environ.get("XLA_FLAGS", "")
+    if "xla_backend_extra_options" not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_extra_options={_ONE_FUNCTION_PER_LOOP}".strip()
 
 
 def _keep_xla_code() -> None:
