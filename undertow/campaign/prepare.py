@@ -16,6 +16,7 @@ from undertow.checks.vehicle_findings import vehicle_warnings
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.loop.closed_loop import Signals
+from undertow.loop.simd_batch import unavailable
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.results import rules
@@ -54,7 +55,11 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
         _check(campaign, built.scenario.loop)
         for sentence in (*built.advice(), *vehicle_warnings(built)):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
-    told = (*too_few(campaign), *_refused(several, here), *advice.values())
+    by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
+    slower = (
+        (f"backend xla, which is slower, computes all trials: {unavailable()}",) if by_simd and unavailable() else ()
+    )
+    told = (*slower, *too_few(campaign), *_refused(several, here), *advice.values())
     named = (*(built.resolved for _, built in firsts), *_chosen(several, here))
     return Prepared(several, text, folder, firsts[0][1], named, told)
 

@@ -10,7 +10,6 @@ import jax
 import numpy as np
 import xarray as xr
 
-from simdjit.errors import Unsupported
 from undertow.analysis.metrics import Metrics
 from undertow.core import runtime
 from undertow.core.status import Status
@@ -101,7 +100,7 @@ def run_loop(
     if settings.backend == "simd":
         try:
             return simd_batch.simulate(loop, **common), {}
-        except Unsupported as error:
+        except simd_batch.Unsupported as error:
             lacking = {"left_to_xla": str(error)}
     return jax.device_get(sampled.simulate(loop, **common)), lacking
 

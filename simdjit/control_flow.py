@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 
 from simdjit import elementwise, indexing, regions
-from simdjit.errors import Unsupported
-from simdjit.graph import BOOL, I64, Node
-from simdjit.nodes import Nodes, filled, flat
+from simdjit.graph import BOOL, I64, Node, Nodes, Unsupported, filled, flat
 from simdjit.rules import Equation, rule
 
 # A loop of at most so many rounds is written out.
