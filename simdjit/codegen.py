@@ -1,4 +1,4 @@
-"""The frame of a program of lanes: start, then step after step, and now and then a record."""
+"""LLVM's assembly of a whole program: the first carry, then step after step, with records at intervals."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

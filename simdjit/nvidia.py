@@ -1,4 +1,4 @@
-"""A program of lanes for an NVIDIA GPU: every run has a thread of its own, and a warp is what a register is elsewhere.
+"""A program for an NVIDIA GPU: every run has a thread of its own, and a warp is what a vector register is elsewhere.
 
 The same operations as on a processor, rounded alike and never contracted: the same bits.
 """

@@ -74,7 +74,7 @@ def test_a_loop_for_a_batch(constant):
 
 
 def test_what_has_no_rule():
-    with pytest.raises(simdjit.Unsupported, match="no rule for `fft`|complex"):
+    with pytest.raises(simdjit.Unsupported, match=r"no rule for `fft`|complex"):
         simdjit.compile(lambda x: jnp.fft.fft(x).real, np.zeros(8))
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from undertow import process
+from undertow.bench import measure
+from undertow.cli.main import run
 from undertow.loop import simd_batch
 from undertow.scenario.execute import execute
 
@@ -61,7 +63,7 @@ def test_simulate(folder, hidden):
     assert done.stderr.count("computed by backend xla") == 1
     assert f"the batch compiler cannot be imported (No module named '{hidden}')" in " ".join(done.stderr.split())
     with xr.open_dataset(folder / "run" / "run.nc") as found:
-        assert "pip install" in found.attrs["left_to_xla"]
+        assert "`pip install .`" in found.attrs["left_to_xla"]
         wanted = execute_file(folder)
         np.testing.assert_allclose(found["position"], wanted["position"], rtol=1e-9, atol=1e-12)
 
@@ -84,6 +86,23 @@ def test_campaign(folder):
 def test_analyze(folder):
     done = without("simdjit", folder, "analyze", "scenario.yaml", "--out", "prediction")
     assert done.returncode == 0, done.stderr
+
+
+def test_bench_leaves_out_what_it_cannot_measure(monkeypatch, capsys):
+    """The other figures stand, and the reason."""
+    monkeypatch.setattr(simd_batch, "unavailable", lambda: "there is no compiler")
+    monkeypatch.setattr(measure, "_first_results", lambda: (2.0, 1.0))
+    monkeypatch.setattr(measure, "_by_xla", lambda one: {"single_xla_compile_s": 3.0, "single_xla_ns": 2000.0})
+    monkeypatch.setattr(measure, "_shortest", lambda work, repetitions=1: 2000.0 * 6e5)
+    assert run(["bench"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Figures of SIMD batches are left out: there is no compiler." in said
+    assert "one run, by XLA" in said and "one run in plain NumPy" in said and "many runs" not in said
+    assert run(["bench", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["simd_unavailable"] == "there is no compiler"
+    assert found["numpy_ns"] == 6e5 and found["single_xla_ns"] == 2000.0
+    assert not [key for key in found if key.startswith(("single_ns", "batch", "gpu", "w2"))]
 
 
 def test_check_and_list(folder):

@@ -56,9 +56,8 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
         for sentence in (*built.advice(), *vehicle_warnings(built)):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
     by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
-    slower = (
-        (f"backend xla, which is slower, computes all trials: {unavailable()}",) if by_simd and unavailable() else ()
-    )
+    why = unavailable() if by_simd else ""
+    slower = (f"trials are computed by backend xla, which is slower: {why}",) if why else ()
     told = (*slower, *too_few(campaign), *_refused(several, here), *advice.values())
     named = (*(built.resolved for _, built in firsts), *_chosen(several, here))
     return Prepared(several, text, folder, firsts[0][1], named, told)

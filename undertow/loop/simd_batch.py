@@ -29,7 +29,9 @@ else:
     try:
         from simdjit import Unsupported
     except ImportError as error:
-        _REASON = f"the batch compiler cannot be imported ({error}). Run: pip install simdjit llvmlite"
+        _REASON = (
+            f"the batch compiler cannot be imported ({error}). `pip install .` in the folder of undertow installs it"
+        )
 
         class Unsupported(Exception):
             """A program that the batch compiler cannot make; says why."""
