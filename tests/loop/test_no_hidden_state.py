@@ -88,17 +88,17 @@ def by_parts(precision):
         seed=3,
         precision=precision,
     )
-    return [np.asarray(run.outcome.signals.position), run.metrics["whole"]["input_variation"]]
+    return [run.dataset["position"].values, run.metrics["whole"]["input_variation"]]
 
 
 def by_scenario(precision):
     found = execute(SCENARIO | {"precision": precision, "seed": 3})
-    return [np.asarray(found.outcome.signals.position), found.whole["input_variation"]]
+    return [found.dataset["position"].values, found.whole["input_variation"]]
 
 
 def by_xla(precision):
     found = execute(SCENARIO | {"precision": precision, "seed": 3, "loop": SCENARIO["loop"] | {"backend": "xla"}})
-    return [np.asarray(found.outcome.signals.position), found.whole["input_variation"]]
+    return [found.dataset["position"].values, found.whole["input_variation"]]
 
 
 def by_campaign(precision):

@@ -22,6 +22,7 @@ from undertow.core.contracts import (
     Pose,
     Target,
 )
+from undertow.core.signals import check_declared
 from undertow.core.user_code import python_says
 from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.sensors.sensor import AbstractSensor
@@ -74,12 +75,17 @@ def _controller(controller: AbstractController, around: DisturbanceProfile) -> I
     @jax.jit
     def step():
         z = controller.init(y, r)
-        u, telemetry = controller.command(z, y, r)
-        return z, u, telemetry.estimate, controller.advance(z, y, r, u, jnp.asarray(1e-3))
+        u, signals = controller.command(z, y, r)
+        check_declared(controller, signals)
+        return z, u, signals, controller.advance(z, y, r, u, jnp.asarray(1e-3))
 
-    z, u, estimate, after = step()
+    z, u, signals, after = step()
     yield from shaped("command", u, (controller.model.gain(y).shape[1],))
-    yield from shaped("command", estimate, (n,))
+    sizes = {"axis": n, "actuator": u.shape[0]}
+    for name, signal in controller.signals().items():
+        found = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # of dimensions of the law's own
+        form = tuple(sizes.get(dimension, found.get(dimension, 1)) for dimension in signal.dimensions)
+        yield from shaped(f"command, signal {name}", signals[name], form)
     yield from alike("advance", after, z, "have the form of the state")
 
 

@@ -34,7 +34,7 @@ KINDS = (
 
 # Key of a scenario -> kind of its part.
 KIND_OF = {"plant": "plants", "controller": "controllers", "reference": "references"}
-KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation"}
+KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation", "metrics": "metrics"}
 
 Part = Callable[..., Any]
 
@@ -66,7 +66,7 @@ def publish(package_name: str) -> Callable[[str], Any]:
 
 def names(kind: str) -> dict[str, Part]:
     """All parts of a kind: shipped ones and those of installed entry points."""
-    parts = collect(importlib.import_module(f"undertow.{kind}"))
+    parts = collect(importlib.import_module(f"undertow.{kind}")) if kind in KINDS else {}
     return parts | {entry.name: entry.load() for entry in _entry_points(f"undertow.{kind}")}
 
 
@@ -86,7 +86,8 @@ def find(kind: str, name: str, folder: Path | None = None) -> Part:
         return _from_file(name, folder or Path())
     parts = names(kind)
     if name not in parts:
-        raise BadInput("name", f"be a part in {kind}", name, hint=did_you_mean(name, parts))
+        hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
+        raise BadInput("name", f"be a part in {kind}", name, hint=hint)
     return parts[name]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from undertow.core import catalogue, checks, contracts
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import python_says
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
@@ -43,6 +44,7 @@ _CONTRACTS = {
     "references": contracts.AbstractReference,
     "sensors": AbstractSensor,
     "navigation": contracts.AbstractNavigation,
+    "metrics": AbstractMetric,
 }
 
 _VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)

@@ -29,6 +29,9 @@ class Forgetting(AbstractController):
     def command(self, z: Any, y: Measurement, r: Target):
         return self.law.command(z, y, r)
 
+    def signals(self):
+        return self.law.signals()
+
     def advance(self, z: Any, y: Measurement, r: Target, u_applied, dt) -> Any:
         size = jnp.abs(self.law.identification.error(z.predicted_velocity, self.model.rates(y)))[:, None]
         after = self.law.advance(z, y, r, u_applied, dt)

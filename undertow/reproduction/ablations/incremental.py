@@ -5,7 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.controllers.signals import ESTIMATE, MODELLING_ERROR
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
 
@@ -36,15 +37,11 @@ class Incremental(AbstractController):
         model, missing = self.model, z.acceleration - z.known
         velocity, acceleration = model.desired_motion(y, r)
         demand = acceleration + self.feedback[0] * model.error(y, r) + self.feedback[1] * (velocity - model.rates(y))
-        telemetry = Telemetry(
-            estimate=missing,
-            robust=jnp.zeros_like(demand),
-            modelling_error=z.velocity - model.rates(y),
-            predicted_position=y.position,
-            predicted_velocity=z.velocity,
-            weights=missing[:, None],
-        )
-        return model.invert(y, demand - missing - model.drift(y)), telemetry
+        signals = {"estimate": missing, "modelling_error": z.velocity - model.rates(y)}
+        return model.invert(y, demand - missing - model.drift(y)), signals
+
+    def signals(self):
+        return ESTIMATE | MODELLING_ERROR
 
     def advance(self, z: FilterState, y: Measurement, r: Target, u_applied, dt) -> FilterState:
         known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.controllers.signals import ESTIMATE, MODELLING_ERROR
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
 
@@ -33,15 +34,11 @@ class LinearObserver(AbstractController):
         model = self.model
         velocity, acceleration = model.desired_motion(y, r)
         demand = acceleration + self.feedback[0] * model.error(y, r) + self.feedback[1] * (velocity - model.rates(y))
-        telemetry = Telemetry(
-            estimate=z.estimate,
-            robust=jnp.zeros_like(demand),
-            modelling_error=z.rates - model.rates(y),
-            predicted_position=y.position,
-            predicted_velocity=z.rates,
-            weights=z.estimate[:, None],
-        )
-        return model.invert(y, demand - z.estimate - model.drift(y)), telemetry
+        signals = {"estimate": z.estimate, "modelling_error": z.rates - model.rates(y)}
+        return model.invert(y, demand - z.estimate - model.drift(y)), signals
+
+    def signals(self):
+        return ESTIMATE | MODELLING_ERROR
 
     def advance(self, z: ObserverState, y: Measurement, r: Target, u_applied, dt) -> ObserverState:
         eps = z.rates - self.model.rates(y)
