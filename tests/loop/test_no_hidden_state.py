@@ -105,7 +105,7 @@ def by_campaign(precision):
     vary = {"disturbance.amplitude": {"uniform": [0.5, 2.0]}}
     campaign = {"scenario": SCENARIO | {"precision": precision}, "trials": 2, "seed": 7, "vary": vary}
     columns = fly(dump(campaign), "", range(2))
-    return [columns["input_variation"], columns["input_rms"] if "input_rms" in columns else columns["tracking_rms"]]
+    return [columns["input_variation"], columns["position_rms"]]
 
 
 WAYS = {"parts": by_parts, "scenario": by_scenario, "xla": by_xla, "campaign": by_campaign}
