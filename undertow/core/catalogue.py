@@ -91,18 +91,25 @@ def find(kind: str, name: str, folder: Path | None = None) -> Part:
     return parts[name]
 
 
+@functools.lru_cache
+def _module(path: Path, contents: bytes) -> ModuleType:
+    """A file as a module: once for the same contents, as two parts from it must be of the same class."""
+    spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ImportError("not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where annotations of the file are looked up
+    spec.loader.exec_module(module)
+    return module
+
+
 def _from_file(name: str, folder: Path) -> Part:
     path_text, attribute = name.rsplit(":", 1)
     path = (folder / path_text).resolve()
     if not path.is_file():
         raise BadInput("name", "name an existing file", path_text)
-    spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise BadInput("name", "name a Python file", path_text)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where annotations of the file are looked up
     try:
-        spec.loader.exec_module(module)
+        module = _module(path, path.read_bytes())
     except (Exception, SystemExit) as error:
         raise BadInput("name", "name a file that Python can run", f"{path_text}: {python_says(error)}") from error
     part = getattr(module, attribute, None)
