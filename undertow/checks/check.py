@@ -16,12 +16,9 @@ from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean
-<<<<<<< HEAD
 from undertow.core.runtime import double_outside_runs
-=======
 from undertow.core.user_code import place_of
 from undertow.plants.double_integrator import double_integrator
->>>>>>> house
 from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.reading import Text, key_path, read
