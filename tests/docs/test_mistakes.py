@@ -43,22 +43,22 @@ MISTAKES = [
         "my_controller",
         "(AbstractController):",
         "(__import__('equinox').Module):",
-        "Error: `my_controller` returns a `SlidingMode`, which is not a part (my_controller.py, line 10). ",
+        "Error: `my_controller` returns a `SlidingMode`, which is not a part (my_controller.py, line 11). ",
     ),
     (
         "controller",
         "my_controller",
         "def advance(",
         "def step(",
-        "Error: Cannot instantiate `SlidingMode`: method `advance` is not implemented (my_controller.py, line 10)",
+        "Error: Cannot instantiate `SlidingMode`: method `advance` is not implemented (my_controller.py, line 11)",
     ),
     (
         "controller",
         "my_controller",
-        "return u, Telemetry(*[jnp.zeros_like(s)] * 5, weights=jnp.zeros((len(s), 0)))",
+        'return u, {"surface": s}',
         "return u",
         "Error: `command` must return two values, the input and the signals, but returns an array of shape (8,) "
-        "(my_controller.py, line 25)",
+        "(my_controller.py, line 26)",
     ),
     (
         "controller",
@@ -66,7 +66,7 @@ MISTAKES = [
         "self.model.invert(y, acceleration - self.model.drift(y))",
         "acceleration - self.model.drift(y)",
         "Error: `command` must return an input of shape (8,), one entry per input of the plant, but returns an array of "
-        "shape (6,) (my_controller.py, line 25). ",
+        "shape (6,) (my_controller.py, line 26). ",
     ),
     (
         "controller",
@@ -74,7 +74,7 @@ MISTAKES = [
         "self.model.invert(y, acceleration - self.model.drift(y))",
         "self.model.invert(y, acceleration) if s[0] > 0 else jnp.zeros(8)",
         "Error: Cannot run `SlidingMode.command`: Python's `if`, `while`, `and`, `or`, `not`, `min` or `max` needs the "
-        "value of a traced array (my_controller.py, line 28). Use `jnp.where(condition, a, b)`, `jnp.minimum` or "
+        "value of a traced array (my_controller.py, line 29). Use `jnp.where(condition, a, b)`, `jnp.minimum` or "
         "`jnp.maximum`",
     ),
     (
@@ -82,7 +82,7 @@ MISTAKES = [
         "my_controller",
         "jnp.clip(s / self.layer, -1, 1)",
         "__import__('numpy').tanh(s / self.layer)",
-        "Error: Cannot run `SlidingMode.command`: NumPy needs the value of a traced array (my_controller.py, line 27). "
+        "Error: Cannot run `SlidingMode.command`: NumPy needs the value of a traced array (my_controller.py, line 28). "
         "Use `jax.numpy`",
     ),
     (
@@ -91,7 +91,7 @@ MISTAKES = [
         "        return z + dt",
         "        self.integral = z + dt",
         "Error: Cannot run `SlidingMode.advance`: it assigns `self.integral`, but a part holds parameters only "
-        "(my_controller.py, line 33). ",
+        "(my_controller.py, line 34). ",
     ),
     (
         "controller",
@@ -99,7 +99,7 @@ MISTAKES = [
         "return jnp.zeros_like(y.position)",
         "return 0.0",
         "Error: `advance` must return the state in the form that `init` gives it, but is of shape (6,) instead of () "
-        "(my_controller.py, line 31)",
+        "(my_controller.py, line 32)",
     ),
     (
         "controller",
