@@ -11,7 +11,7 @@ import pytest
 from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractController, AbstractModel, AbstractNavigation, Measurement, Telemetry
+from undertow.core.contracts import AbstractController, AbstractNavigation, Measurement, Model, Telemetry
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
@@ -139,7 +139,7 @@ def test_a_vehicle_in_its_own_axes(law, within):
 class Broken(AbstractContinuousController):
     """A spring, but for one input that is something else from a time on; the clock is the position of an axis."""
 
-    model: AbstractModel
+    model: Model
     value: jax.Array = eqx.field(converter=jnp.asarray)
     after: jax.Array = eqx.field(converter=jnp.asarray)
     method: str = eqx.field(static=True, default="euler")
@@ -194,7 +194,7 @@ def test_the_adaptive_integrator_says_so_too():
 class Mute(AbstractController):
     """No input but what is no number."""
 
-    model: AbstractModel
+    model: Model
 
     def init(self, y, r):
         return jnp.zeros(())

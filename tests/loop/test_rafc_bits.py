@@ -5,7 +5,7 @@ import numpy as np
 
 from undertow.controllers.rcaf import rcaf
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -19,7 +19,7 @@ class PlainRAFC(AbstractContinuousController):
     """theta_dot = -gamma s xi(eps), Eq. (61); everything else as in the composite law."""
 
     law: AbstractContinuousController
-    model: AbstractModel
+    model: Model
     method: str = "euler"
     substeps: int = 1
 

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
+from undertow.core.contracts import AbstractController, Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.disturbances import none
 from undertow.loop import sampled, simd_batch
@@ -68,7 +68,7 @@ def test_each_side_is_clipped_at_its_own_limit():
 class Asking(AbstractController):
     """A law that asks for the same whatever happens."""
 
-    model: AbstractModel
+    model: Model
     asked: jax.Array
     inner: AbstractController
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
-from undertow.core.contracts import AbstractController, AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.contracts import AbstractController, AbstractPlant, Effort, Load, Measurement, Model
 from undertow.core.status import Status
 from undertow.thrusters.thruster import AbstractThruster
 
@@ -19,7 +19,7 @@ class RailState(NamedTuple):
     thrusters: Any
 
 
-class RailModel(AbstractModel):
+class RailModel(Model):
     """F = 0, or what the speed sensors explain; G from the voltage gain."""
 
     thruster: AbstractThruster
@@ -83,7 +83,7 @@ class MotorRail(AbstractPlant):
         return RailModel(self.thruster, speed_sensor)
 
 
-class ThrustModel(AbstractModel):
+class ThrustModel(Model):
     """The same axis with thrusts for inputs."""
 
     angles: tuple[bool, ...] = eqx.field(static=True, default=(False,))
@@ -104,7 +104,7 @@ class InnerLoop(AbstractController):
     V = k_2 Om + k_3 Q + k_1 lambda (Om_wanted - Om); the law hears which thrusts there are. Section X9.
     """
 
-    model: AbstractModel
+    model: Model
     law: AbstractController
     thruster: Any
     rate: float

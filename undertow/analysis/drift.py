@@ -38,7 +38,7 @@ def gain_of(law: RCAF | RobustRCAF, weights: np.ndarray) -> np.ndarray:
 def gain_bound(law: RCAF | RobustRCAF, axis: int = 0) -> float:
     """Largest c, 1/s, while |theta| <= theta_max: theta_max sum |xi'(0)|; zero for one set, infinite without a box."""
     bound = law.estimator.bound if isinstance(law, RobustRCAF) else law.weights_bound
-    theta_max = np.broadcast_to(np.asarray(bound, dtype=float), len(law.model.angles))[axis]
+    theta_max = np.broadcast_to(np.asarray(bound, dtype=float), len(law.model.coordinates.angles))[axis]
     slope = np.abs(basis_slope(_fuzzy(law))).sum()
     return float(theta_max * slope) if slope > 0 else 0.0
 

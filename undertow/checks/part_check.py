@@ -22,6 +22,7 @@ from undertow.core.contracts import (
     Pose,
     Target,
 )
+from undertow.core.measurement import measurement_of_outputs
 from undertow.core.user_code import python_says
 from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.sensors.sensor import AbstractSensor
@@ -38,7 +39,7 @@ class DisturbanceProfile(NamedTuple):
 
 
 _BODY = DisturbanceProfile(
-    truth=Measurement(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
+    truth=measurement_of_outputs(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
     pose=Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
 )
 
@@ -67,8 +68,8 @@ def check_contract(part: Any, around: DisturbanceProfile = _BODY) -> tuple[Findi
 
 
 def _controller(controller: AbstractController, around: DisturbanceProfile) -> Iterator[Finding]:
-    n = len(controller.model.angles)
-    y = Measurement(0.1 * jnp.ones(n), jnp.zeros(n))
+    n = len(controller.model.coordinates.angles)
+    y = controller.model.coordinates.measurement(0.1 * jnp.ones(n), jnp.zeros(n))
     r = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n))
 
     @jax.jit
@@ -78,7 +79,7 @@ def _controller(controller: AbstractController, around: DisturbanceProfile) -> I
         return z, u, telemetry.estimate, controller.advance(z, y, r, u, jnp.asarray(1e-3))
 
     z, u, estimate, after = step()
-    yield from shaped("command", u, (controller.model.gain(y).shape[1],))
+    yield from shaped("command", u, (controller.model.dynamics.gain(y).shape[1],))
     yield from shaped("command", estimate, (n,))
     yield from alike("advance", after, z, "have the form of the state")
 
@@ -121,7 +122,7 @@ def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> I
 def _sensor(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
     """Tried on a body at rest, so that a delay makes no difference."""
     report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
-    truth = Measurement(around.truth.position, jnp.zeros(6), report)
+    truth = measurement_of_outputs(around.truth.position, jnp.zeros(6), report)
     motion, right = motion_of(truth, jnp.zeros(3), jnp.asarray(0.01)), estimate_of(truth)
     reading = sensor.reading(motion)
     if jnp.ndim(reading) != 1:

@@ -5,12 +5,12 @@ from typing import Any
 from undertow.controllers.presets.paper import paper
 from undertow.controllers.presets.robust import robust
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 
 PRESETS = {"paper": paper, "robust": robust}
 
 
-def rcaf(model: AbstractModel, *, preset: str = "paper", **options: Any) -> AbstractController:
+def rcaf(model: Model, *, preset: str = "paper", **options: Any) -> AbstractController:
     """Robust composite adaptive fuzzy controller.
 
     Args:

@@ -118,7 +118,7 @@ class Realization(NamedTuple):
         if navigation.smooth is True:  # traced in a part whose field is not static; guarded then
             return MeasurementState(state, None)
         y, _ = navigation.measure(self.navigation_realization, state, zero, truth)
-        return MeasurementState(state, at_start(self.loop.controller.model, truth, y))
+        return MeasurementState(state, at_start(self.loop.controller.model.coordinates, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
         """What the surroundings do to the plant at time t."""
@@ -140,7 +140,7 @@ class Realization(NamedTuple):
         y, state = measure(self.navigation_realization, measuring.navigation, t, truth)
         if measuring.expected is None:
             return y, MeasurementState(state, None)
-        y, expected = measuring.expected.repaired(self.loop.controller.model, y)
+        y, expected = measuring.expected.repaired(self.loop.controller.model.coordinates, y)
         return y, MeasurementState(state, expected)
 
     def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
@@ -156,8 +156,8 @@ class Realization(NamedTuple):
             measured_position=y.position,
             measured_velocity=y.velocity,
             target=r.position,
-            error=controller.model.difference(r.position, truth.position),
-            uncertainty=controller.model.rates_derivative(truth, acceleration)
+            error=controller.model.coordinates.difference(r.position, truth.position),
+            uncertainty=controller.model.coordinates.acceleration(truth, acceleration)
             - controller.known_acceleration(z, truth, applied),
             estimate=telemetry.estimate,
             robust=telemetry.robust,

@@ -7,6 +7,7 @@ from jaxtyping import Array, Float, Int
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractNavigation, Measurement
+from undertow.core.measurement import with_outputs
 from undertow.core.param import param
 from undertow.numerics.randomness import numbered
 
@@ -39,11 +40,8 @@ class WhiteNoise(AbstractNavigation):
 
     def measure(self, realization, state, t, truth: Measurement):
         errors = jax.random.normal(numbered(realization, state), (2, *truth.position.shape), dtype=truth.position.dtype)
-        noisy = truth._replace(
-            position=truth.position + self.position * errors[0],
-            velocity=truth.velocity + self.velocity * errors[1],
-        )
-        return noisy, state + 1
+        position, velocity = truth.position + self.position * errors[0], truth.velocity + self.velocity * errors[1]
+        return with_outputs(truth, position, velocity), state + 1
 
 
 def white_noise(position=0.0, velocity=0.01) -> WhiteNoise:

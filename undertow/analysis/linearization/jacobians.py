@@ -15,6 +15,7 @@ from jaxtyping import Array, PyTree
 
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.contracts import Target
+from undertow.core.measurement import with_outputs
 from undertow.loop.closed_loop import ClosedLoop
 
 # Arguments of `Parts.values`, in this order; and what it gives.
@@ -119,18 +120,18 @@ def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array
     calm = plant.no_load()
     pushed = calm._replace(acceleration=calm.acceleration + load)
     truth, axes = plant.output(zero, x), load.shape[0]
-    y = truth._replace(position=truth.position + noise[:axes], velocity=truth.velocity + noise[axes:])
+    y = with_outputs(truth, truth.position + noise[:axes], truth.velocity + noise[axes:])
     command, telemetry = law.command(z, y, r)
     values = {
         "plant": ravel_pytree(plant.dynamics(zero, x, u, pushed))[0],
         "law": ravel_pytree(law.advance(z, y, r, u, dt))[0],
         "u": command,
         "position": truth.position,
-        "error": law.model.difference(r.position, truth.position),
+        "error": law.model.coordinates.difference(r.position, truth.position),
         "estimate": telemetry.estimate,
         "robust": telemetry.robust,
         "modelling_error": telemetry.modelling_error,
-        "uncertainty": law.model.rates_derivative(truth, plant.acceleration(zero, x, u, pushed))
+        "uncertainty": law.model.coordinates.acceleration(truth, plant.acceleration(zero, x, u, pushed))
         - law.known_acceleration(z, truth, u),
     }
     if isinstance(law, AbstractContinuousController):

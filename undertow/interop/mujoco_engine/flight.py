@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, AbstractReference, Measurement
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
 from undertow.interop.mujoco_engine.propellers import Propellers
 from undertow.interop.mujoco_engine.submerged import Submerged
@@ -86,4 +87,4 @@ def fly(
 
 def _measured(body: Submerged, propellers: Propellers) -> Measurement:
     turning = PropellerReport(jnp.asarray(propellers.speed), None)
-    return Measurement(jnp.asarray(body.position()), jnp.asarray(body.velocity()), turning)
+    return measurement_of_outputs(jnp.asarray(body.position()), jnp.asarray(body.velocity()), turning)

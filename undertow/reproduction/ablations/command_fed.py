@@ -2,14 +2,14 @@
 
 from typing import Any
 
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
+from undertow.core.contracts import AbstractController, Measurement, Model, Target
 
 
 class CommandFed(AbstractController):
     """The same law, but it learns from what it commanded instead of from what was applied."""
 
     law: AbstractController
-    model: AbstractModel
+    model: Model
 
     def __init__(self, law: AbstractController):
         self.law, self.model = law, law.model
