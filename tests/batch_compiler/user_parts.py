@@ -68,7 +68,7 @@ class PredictiveControl(AbstractController):
         wanted = jax.lax.fori_loop(0, 40, step, jnp.zeros(size))[:1] - 4.0 * (y.velocity - r.velocity)
         none = jnp.zeros(1)
         telemetry = Telemetry(none, none, none, y.position, y.velocity, jnp.zeros((1, 0)))
-        return self.model.invert(y, wanted - self.model.drift(y)), telemetry
+        return self.model.dynamics.invert(y, wanted - self.model.dynamics.drift(y)), telemetry
 
     def advance(self, z, y, r, u_applied, dt):
         return z

@@ -11,7 +11,8 @@ import pytest
 from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractController, AbstractNavigation, Measurement, Model, Telemetry
+from undertow.core.contracts import AbstractController, AbstractNavigation, Model, Telemetry
+from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
@@ -200,7 +201,7 @@ class Mute(AbstractController):
         return jnp.zeros(())
 
     def command(self, z, y, r):
-        still, inputs = jnp.zeros_like(y.position), self.model.gain(y).shape[1]
+        still, inputs = jnp.zeros_like(y.position), self.model.dynamics.gain(y).shape[1]
         return jnp.full(inputs, NAN), Telemetry(still, still, still, y.position, y.velocity, jnp.zeros((6, 0)))
 
     def advance(self, z, y, r, u_applied, dt):
@@ -228,7 +229,7 @@ def test_navigation_leaves_out_readings_that_are_none():
     """As if they were lost: the estimate goes on, each is counted, and the depth is known again afterwards."""
     quiet = [imu(angle_noise=0, rate_noise=0, force_noise=0), dvl(noise=0, resolution=0, delay=0), compass(noise=0)]
     sensor = observer([*quiet, position_fix(noise=0, delay=0), Flooded(Sampling(0.05), 0.2)])
-    motion = lambda t: Measurement(jnp.zeros(6).at[2].set(jnp.sin(t)), jnp.zeros(6).at[2].set(jnp.cos(t)))
+    motion = lambda t: measurement_of_outputs(jnp.zeros(6).at[2].set(jnp.sin(t)), jnp.zeros(6).at[2].set(jnp.cos(t)))
     path = sensor.realize(jax.random.PRNGKey(0))
 
     def step(state, t):

@@ -9,8 +9,9 @@ from scipy.optimize import linprog
 
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
-from undertow.core.contracts import AbstractController, Measurement, Model, Target
+from undertow.core.contracts import AbstractController, Model, Target
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances import none
 from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
@@ -161,7 +162,7 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
 
     @eqx.filter_jit
     def decide(position):
-        y = Measurement(jnp.zeros(6), jnp.zeros(6))
+        y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
         r = Target(position, jnp.zeros(6), jnp.zeros(6))
         unfiltered = eqx.tree_at(lambda c: c.filter, controller, None)
         z = unfiltered.init(y, r)
@@ -170,7 +171,7 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
             u,
             telemetry.diagnostics["attained_share"],
             unfiltered._plan(z, y, r).forces,
-            own.acceleration_per_force(y),
+            own.dynamics.gain(y),
         )
 
     for _ in range(6):

@@ -29,7 +29,7 @@ def left_over(speed_sensor):
 
     def d(z):
         acceleration = whole.acceleration(zero, x, volts, Load(jnp.zeros(6), jnp.zeros(6)))
-        return law.model.rates_derivative(y, acceleration) - law.known_acceleration(z, y, volts)
+        return law.model.coordinates.acceleration(y, acceleration) - law.known_acceleration(z, y, volts)
 
     return np.asarray(jax.jit(d)(law.init(y, r)))
 

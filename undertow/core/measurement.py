@@ -47,11 +47,15 @@ def body_of(y: Measurement) -> BodyMotion:
     return y.body
 
 
-def with_outputs(y: Measurement, position: Array, velocity: Array) -> Measurement:
-    """The measurement with other outputs (m, rad) and rates, as noise on them makes it; of any plant.
+def completed(y: Measurement, truth: Measurement) -> Measurement:
+    """What a navigation filter made of the truth, with a pose that fits the outputs where it changed these alone."""
+    if truth.body is None or (y.position is truth.position and y.velocity is truth.velocity):
+        return y
+    return measurement_of_outputs(*y[:3]) if y.body is None or y.body is truth.body else y
 
-    What is changed with `_replace` instead does not reach a law in body axes.
-    """
+
+def with_outputs(y: Measurement, position: Array, velocity: Array) -> Measurement:
+    """The measurement with other outputs (m, rad) and rates, as noise on them makes it; of any plant."""
     if y.body is None:
         return Measurement(position, velocity, y.actuator)
     return measurement_of_outputs(position, velocity, y.actuator)

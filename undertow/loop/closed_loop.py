@@ -23,6 +23,7 @@ from undertow.core.contracts import (
     Telemetry,
     Time,
 )
+from undertow.core.measurement import completed
 from undertow.loop.readings import Expected, at_start
 
 
@@ -134,7 +135,11 @@ class Realization(NamedTuple):
 
     def _read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
         """What the law is given, and what is remembered afterwards."""
-        measure = self.loop.navigation.measure
+
+        def measure(realization, state, t, truth):
+            y, state = self.loop.navigation.measure(realization, state, t, truth)
+            return completed(y, truth), state
+
         if not isinstance(measuring, MeasurementState):
             return measure(self.navigation_realization, measuring, t, truth)
         y, state = measure(self.navigation_realization, measuring.navigation, t, truth)
