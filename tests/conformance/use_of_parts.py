@@ -79,7 +79,8 @@ def sensors(sensor, v):
     reading = sensor.reading(motion)
     state = sensor.sampling.init(reading, v[: reading.size])
     heard = sensor.sampling.deliver(state, 1 + jnp.abs(v[12]), reading, v[: reading.size + 1])
-    later = sensor.predict(estimate, heard[0].reading).predicted(0.01)
+    moved = sensor.predict(estimate, heard[0].reading) if hasattr(sensor, "predict") else estimate
+    later = moved.predicted(0.01)
     return heard, sensor.correct(later, heard[0].reading)
 
 

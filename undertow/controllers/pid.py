@@ -13,7 +13,7 @@ from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
-from undertow.core.contracts import AbstractController, Measurement, Model, Target, Telemetry
+from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target, Telemetry
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
@@ -39,7 +39,7 @@ class Plan(NamedTuple):
     forces: Float[Array, " m"]  # that would give what is wanted
 
 
-class PID(AbstractController):
+class PID(AbstractInformedController):
     """a = a_d + k_p e + k_d e_dot + integral of k_i e, in the model's own axes; forces within limits; no windup.
 
     Raises:

@@ -12,7 +12,6 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.actuator_model import AbstractActuatorModel, Forces
-from undertow.core.arrays import as_array
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 
@@ -271,13 +270,24 @@ class AbstractController(eqx.Module):
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
         """State one sampling time later."""
 
-    def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
-        """F + G u: what the law takes for granted of the acceleration; d is all the rest."""
-        return self.model.dynamics.drift(y) + matvec(self.model.dynamics.gain(y), u_applied)
-
     def columns(self) -> dict[str, tuple[str, str]]:
         """Meaning and unit of each entry of the telemetry's `diagnostics`."""
         return {}
+
+
+class AbstractInformedController(AbstractController):
+    """A law that knows more of the acceleration than F + G u, such as what its motors do."""
+
+    @abc.abstractmethod
+    def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+        """What the law takes for granted of the acceleration; d is all the rest."""
+
+
+def known_acceleration(law: AbstractController, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+    """What a law takes for granted of the acceleration: F + G u, unless it says otherwise."""
+    if isinstance(law, AbstractInformedController):
+        return law.known_acceleration(z, y, u_applied)
+    return law.model.dynamics.drift(y) + matvec(law.model.dynamics.gain(y), u_applied)
 
 
 class AbstractDisturbance(eqx.Module):
@@ -303,9 +313,18 @@ class AbstractReference(eqx.Module):
     def at(self, t: Time) -> Target:
         """Wanted position, velocity and acceleration at time t."""
 
-    def starting_at(self, position: Outputs) -> "AbstractReference":
-        """This reference for a plant that starts at a position; itself unless it leaves open where it begins."""
-        return self
+
+class AbstractOpenReference(AbstractReference):
+    """A reference that leaves open where it begins."""
+
+    @abc.abstractmethod
+    def starting_at(self, position: Outputs) -> AbstractReference:
+        """This reference for a plant that starts at a position."""
+
+
+def starting_at(reference: AbstractReference, position: Outputs) -> AbstractReference:
+    """A reference for a plant that starts at a position; itself unless it leaves open where it begins."""
+    return reference.starting_at(position) if isinstance(reference, AbstractOpenReference) else reference
 
 
 class AbstractNavigation(eqx.Module):
@@ -325,13 +344,17 @@ class AbstractNavigation(eqx.Module):
     def measure(self, realization: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
         """Measurement at time t, and the state after it."""
 
-    def ignored(self, state: PyTree) -> Int[Array, ""]:
-        """Readings so far that were no numbers, and that it has left out."""
-        return jnp.zeros((), dtype=int)
 
+class AbstractInformedNavigation(AbstractNavigation):
+    """A navigation filter that knows how noisy it is, and which readings it left out."""
+
+    @abc.abstractmethod
     def velocity_noise(self, dt: float) -> Array:
         """What a law is told of it: standard deviation of white noise, new at every step of dt (s), on velocities.
 
         One number or one per output, m/s and rad/s; zero where nothing is known.
         """
-        return as_array(0.0)
+
+    @abc.abstractmethod
+    def ignored(self, state: PyTree) -> Int[Array, ""]:
+        """Readings so far that were no numbers, and that it has left out."""

@@ -12,6 +12,7 @@ from undertow.core.arrays import as_array
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
+    AbstractInformedNavigation,
     AbstractNavigation,
     AbstractPlant,
     AbstractReference,
@@ -22,6 +23,8 @@ from undertow.core.contracts import (
     Target,
     Telemetry,
     Time,
+    known_acceleration,
+    starting_at,
 )
 from undertow.core.measurement import completed
 from undertow.loop.readings import Expected, at_start
@@ -88,7 +91,7 @@ class ClosedLoop(eqx.Module):
     def starting_at(self, position: Any) -> "ClosedLoop":
         """This loop with its reference beginning where the plant does; at zero where None."""
         start, _ = self.outputs_at_start(position, None)
-        reference = self.reference.starting_at(start)
+        reference = starting_at(self.reference, start)
         return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.navigation)
 
     def realize(self, key: PRNGKeyArray) -> "Realization":
@@ -163,7 +166,7 @@ class Realization(NamedTuple):
             target=r.position,
             error=controller.model.coordinates.difference(r.position, truth.position),
             uncertainty=controller.model.coordinates.acceleration(truth, acceleration)
-            - controller.known_acceleration(z, truth, applied),
+            - known_acceleration(controller, z, truth, applied),
             estimate=telemetry.estimate,
             robust=telemetry.robust,
             modelling_error=telemetry.modelling_error,
@@ -183,7 +186,10 @@ class Realization(NamedTuple):
         """Readings so far that were no numbers: left out by the sensor, or replaced for the law."""
         if not isinstance(measuring, MeasurementState) or measuring.expected is None:
             return jnp.zeros((), dtype=int)
-        return measuring.expected.replaced + self.loop.navigation.ignored(measuring.navigation)
+        navigation, replaced = self.loop.navigation, measuring.expected.replaced
+        if not isinstance(navigation, AbstractInformedNavigation):
+            return replaced
+        return replaced + navigation.ignored(measuring.navigation)
 
     def record(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Signals:
         """`sample` of the decision taken at time t."""

@@ -14,6 +14,7 @@ from undertow.core.contracts import (
     Outputs,
     Telemetry,
     Time,
+    known_acceleration,
 )
 from undertow.core.measurement import with_outputs
 
@@ -61,7 +62,7 @@ class Expected(NamedTuple):
         self, law: AbstractController, z: Any, y: Measurement, telemetry: Telemetry, applied: Inputs, dt: Time
     ) -> "Expected":
         """A sampling time later, with an input applied."""
-        acceleration = law.known_acceleration(z, y, applied) + telemetry.estimate
+        acceleration = known_acceleration(law, z, y, applied) + telemetry.estimate
         rates = law.model.coordinates.velocity(y) + dt * acceleration
         return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)
 

@@ -6,13 +6,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractNavigation, Measurement
+from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.measurement import with_outputs
 from undertow.core.param import param
 from undertow.numerics.randomness import numbered
 
 
-class WhiteNoise(AbstractNavigation):
+class WhiteNoise(AbstractInformedNavigation):
     """Independent Gaussian errors, new at every sample of the control loop; the number of the sample picks them.
 
     Raises:
@@ -33,6 +33,9 @@ class WhiteNoise(AbstractNavigation):
 
     def velocity_noise(self, dt):
         return self.velocity
+
+    def ignored(self, state):
+        return jnp.zeros((), dtype=int)
 
     def init(self, realization, truth) -> Int[Array, ""]:
         """Samples so far."""

@@ -14,7 +14,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PyTree
 
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import Target
+from undertow.core.contracts import Target, known_acceleration
 from undertow.core.measurement import with_outputs
 from undertow.loop.closed_loop import ClosedLoop
 
@@ -132,7 +132,7 @@ def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array
         "robust": telemetry.robust,
         "modelling_error": telemetry.modelling_error,
         "uncertainty": law.model.coordinates.acceleration(truth, plant.acceleration(zero, x, u, pushed))
-        - law.known_acceleration(z, truth, u),
+        - known_acceleration(law, z, truth, u),
     }
     if isinstance(law, AbstractContinuousController):
         values["flow"] = ravel_pytree(law.flow(z, y, r, u))[0]

@@ -13,7 +13,7 @@ from undertow.controllers.robust.estimator import Estimate, Estimator, Estimator
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter, Room
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, Measurement, Model, Target, Telemetry
+from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target, Telemetry
 from undertow.core.param import param
 from undertow.estimation.tsk import FuzzySystem
 from undertow.numerics.linear import matvec
@@ -47,7 +47,7 @@ class Plan(NamedTuple):
     forces: Float[Array, " m"]  # that would give what is wanted
 
 
-class RobustRCAF(AbstractController):
+class RobustRCAF(AbstractInformedController):
     """The paper's structure, in the model's own axes, fed with what was applied, within the actuators' limits.
 
     Gains are one number for all axes or one per axis. With `tracking_share` 0 the estimator is a pure observer: it

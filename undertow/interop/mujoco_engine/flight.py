@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractReference, Measurement
+from undertow.core.contracts import AbstractController, AbstractReference, Measurement, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
@@ -64,7 +64,7 @@ def fly(
     propellers = Propellers(thruster, body.model.nu)
     start = np.zeros(6) if position is None else np.asarray(position, dtype=float)
     body.place(start, np.zeros(6))
-    reference = reference.starting_at(jnp.asarray(start))
+    reference = starting_at(reference, jnp.asarray(start))
     command, advance, wanted = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
     z, rows, steps, status = None, [], round(duration / dt), Status.OK
     for step in range(steps + 1):

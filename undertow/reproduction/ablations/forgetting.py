@@ -6,11 +6,17 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.composite_law import RCAF
-from undertow.core.contracts import AbstractController, Measurement, Model, Target
+from undertow.core.contracts import (
+    AbstractInformedController,
+    Measurement,
+    Model,
+    Target,
+    known_acceleration,
+)
 from undertow.core.param import param
 
 
-class Forgetting(AbstractController):
+class Forgetting(AbstractInformedController):
     """theta_dot = Eq. (44) - gamma (leakage + e_mod |eps|) theta, and no adaptation while |eps| < zone."""
 
     law: RCAF
@@ -37,4 +43,4 @@ class Forgetting(AbstractController):
         return after._replace(weights=learnt - forgotten)
 
     def known_acceleration(self, z: Any, y: Measurement, u_applied):
-        return self.law.known_acceleration(z, y, u_applied)
+        return known_acceleration(self.law, z, y, u_applied)
