@@ -91,6 +91,11 @@ class RobustRCAF(AbstractInformedController):
         """That of the estimator."""
         return self.estimator.fuzzy
 
+    @property
+    def weights_bound(self) -> Float[Array, "..."]:
+        """theta_max of the estimator, m/s^2 and rad/s^2."""
+        return self.estimator.bound
+
     def init(self, y: Measurement, r: Target) -> RobustState:
         smoothing = None if self.filter is None else self.filter.init(y.position)
         _, coordinates, actuators = self.model
