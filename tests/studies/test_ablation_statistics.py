@@ -16,6 +16,7 @@ from undertow.reproduction.ablations.ablation import Schedule
 from undertow.reproduction.ablations.rough_sensor import RoughSensor
 from undertow.reproduction.ablations.summary import median_rank, spread, summary
 from undertow.reproduction.ablations.tuning import ERROR, VARIATION, cost, tuned
+from undertow.reproduction.all_outputs import with_all_outputs
 
 SHORT = Schedule(duration=0.4)
 
@@ -54,7 +55,7 @@ def test_seeds_together_are_the_runs_one_by_one():
         alone = sampled.simulate(
             loop, duration=0.4, key=key, record_every=0, accumulators=(Metrics(0.2, np.nextafter(0.4, 0.0)),)
         )
-        metrics = results(alone.accumulated[0])
+        metrics = with_all_outputs(results((Metrics(),), alone.accumulated))
         np.testing.assert_allclose([error, miss], [metrics["tracking_rms"], metrics["estimation_rms"]], rtol=1e-12)
     assert len(set(together["tracking_rms"])) == 3
 

@@ -8,8 +8,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from simdjit.cuda import Driver
-from undertow.analysis.metrics import overall
 from undertow.campaign.runs import planned, run_of
 from undertow.loop.simd_batch import BatchRunner, Plan, Run
 from undertow.reproduction.robust_variant.fidelity import at_sea
@@ -61,14 +59,15 @@ def several(run: Run, count: int) -> Any:
     return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
 
 
-def batch(one: Workload, lanes: int = 0, driver: Driver | None = None) -> BatchRunner:
+def batch(one: Workload, lanes: int = 0, driver: Any = None) -> BatchRunner:
     """Its program; arguments as of `BatchRunner`."""
     return BatchRunner(one.run, one.plan, constant(one.run), lanes, driver)
 
 
 def tracking(accumulated: Any) -> np.ndarray:
-    """rms of the error of runs, m and rad."""
-    return overall(accumulated[0])["tracking_rms"]
+    """The check value of runs: rms of the error over all six outputs, metres and radians together."""
+    squares, samples = accumulated[0].squares["error"], accumulated[0].samples
+    return np.sqrt(np.asarray(squares).mean(-1) / np.asarray(samples))
 
 
 def alone(run: Run) -> Any:

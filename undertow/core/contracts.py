@@ -12,6 +12,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.actuator_model import AbstractActuatorModel, Forces
+from undertow.core.runtime import double_outside_runs
+from undertow.core.signals import Signal
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 
@@ -99,18 +101,6 @@ class Effort(NamedTuple):
     saturated: Inputs  # 1 where an input is at its limit, else 0
 
 
-class Telemetry(NamedTuple):
-    """What a controller lets one look at. Nothing here is carried."""
-
-    estimate: Outputs  # d_hat, m/s^2, rad/s^2
-    robust: Outputs  # u_r
-    modelling_error: Outputs  # eps, m/s, rad/s
-    predicted_position: Outputs  # x_hat
-    predicted_velocity: Outputs
-    weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2; no columns when nothing is learnt
-    diagnostics: dict[str, Array] | None = None  # scalars that this law alone has to tell, by name
-
-
 class AbstractDynamics(eqx.Module):
     """What a controller may know of how a plant moves: F and G of x_ddot = F + G f + d. Eq. (17).
 
@@ -195,6 +185,11 @@ class AbstractPlant(eqx.Module):
     output_units: eqx.AbstractVar[tuple[str, ...]]
     input_unit: eqx.AbstractVar[str]
 
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        if "model" in vars(cls):  # its numbers are made where a plant's own are, before any run
+            cls.model = double_outside_runs(cls.model)
+
     @abc.abstractmethod
     def initial_state(self, position: Outputs | None = None, velocity: Outputs | None = None) -> PyTree:
         """State x with given outputs (zero where None), actuators at rest."""
@@ -241,11 +236,11 @@ class AbstractPlant(eqx.Module):
 
     @abc.abstractmethod
     def diagnostics(self, x: PyTree, u: Inputs) -> dict[str, Array]:
-        """Scalars that this plant alone has and that are worth recording, by name."""
+        """Values of the signals that this plant declares, by name."""
 
     @abc.abstractmethod
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of `diagnostics`."""
+    def signals(self) -> dict[str, Signal]:
+        """What is recorded of this plant alone, by name: each entry of `diagnostics`; {} for nothing."""
 
     def no_load(self) -> Load:
         """Load of load surroundings."""
@@ -263,16 +258,19 @@ class AbstractController(eqx.Module):
         """State z before the first measurement is used."""
 
     @abc.abstractmethod
-    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, Telemetry]:
-        """Input u, and what one may look at."""
+    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
+        """Input u, and the values of the declared signals by name. Nothing of them is carried.
+
+        A signal `estimate` is what the law believes of d; it is used where a reading is no number.
+        """
 
     @abc.abstractmethod
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
         """State one sampling time later."""
 
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of the telemetry's `diagnostics`."""
-        return {}
+    @abc.abstractmethod
+    def signals(self) -> dict[str, Signal]:
+        """What `command` lets one look at, by name; {} for nothing."""
 
 
 class AbstractInformedController(AbstractController):

@@ -12,7 +12,6 @@ from undertow.core.contracts import (
     Inputs,
     Measurement,
     Outputs,
-    Telemetry,
     Time,
     known_acceleration,
 )
@@ -59,10 +58,11 @@ class Expected(NamedTuple):
         return whole, self._replace(replaced=self.replaced + jnp.where(all_finite(y), 0, 1))
 
     def after(
-        self, law: AbstractController, z: Any, y: Measurement, telemetry: Telemetry, applied: Inputs, dt: Time
+        self, law: AbstractController, z: Any, y: Measurement, estimate: Outputs | None, applied: Inputs, dt: Time
     ) -> "Expected":
-        """A sampling time later, with an input applied."""
-        acceleration = known_acceleration(law, z, y, applied) + telemetry.estimate
+        """A sampling time later, with an input applied; `estimate` is d_hat of a law that has one."""
+        known = known_acceleration(law, z, y, applied)
+        acceleration = known if estimate is None else known + estimate
         rates = law.model.coordinates.velocity(y) + dt * acceleration
         return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)
 

@@ -12,6 +12,7 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Model, Pose
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_pose
+from undertow.core.runtime import double_outside_runs
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import Kinematics, quaternion_rate, rotation_from_quaternion
 from undertow.plants.hybrid_model import EulerCoordinates, HybridDynamics
@@ -51,6 +52,7 @@ class HybridVehicle(AbstractPlant):
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True)
 
+    @double_outside_runs
     def __init__(
         self,
         vehicle: Vehicle,
@@ -117,8 +119,8 @@ class HybridVehicle(AbstractPlant):
     def diagnostics(self, x: VehicleState, u):
         return self.power.diagnostics(self.thruster, x.thrusters, x.power, u)
 
-    def columns(self):
-        return self.power.columns()
+    def signals(self):
+        return self.power.signals()
 
     def inputs(self) -> int:
         return self.vehicle.thrusters

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
 from undertow.core.contracts import AbstractPlant, Effort, Inputs, Outputs
+from undertow.core.signals import Signal
 from undertow.plants.reachability import open_loop_advice
 
 
@@ -43,7 +44,7 @@ class AbstractMechanism(AbstractPlant):
     def diagnostics(self, x: PyTree, u: Inputs) -> dict[str, Array]:
         return {}
 
-    def columns(self) -> dict[str, tuple[str, str]]:
+    def signals(self) -> dict[str, Signal]:
         return {}
 
 

@@ -66,7 +66,8 @@ def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     begun = from_start(known.linear, known.mean, *_start(known))
     signals = signals_within(known.mean, begun, known.around, (start, stop), every)
     forbidden = _forbidden(known.built.closed_loop.controller, signals)
-    return (None, forbidden) if forbidden else (metrics_of(signals), "")
+    units = known.built.closed_loop.plant.output_units
+    return (None, forbidden) if forbidden else (metrics_of(signals, units), "")
 
 
 def has_weights(built: Built) -> bool:
@@ -79,7 +80,7 @@ def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
     """What of the predicted signals the law itself would not allow, in a sentence; empty where all is allowed."""
     bounds: dict[str, tuple[str, Any]] = {}
     if isinstance(law, RCAF | RobustRCAF):
-        bounds = {"robust": ("robust term", law.robust_gain), "estimate": ("estimate", law.weights_bound)}
+        bounds = {"robust_term": ("robust term", law.robust_gain), "estimate": ("estimate", law.weights_bound)}
     for name, (meaning, bound) in bounds.items():
         share = np.abs(signals[name]) / np.maximum(np.asarray(bound, dtype=float), 1e-300)
         if share.max() > 1 and np.abs(signals[name]).max() > 0:

@@ -8,12 +8,12 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from simdjit.machine import lanes_of
-from undertow.analysis.metrics import Metrics, results
+from undertow.analysis.metrics import Gathered, accumulators, results
 from undertow.campaign.campaign_schema import Series
 from undertow.campaign.runs import leaves, planned, run_of
 from undertow.core.status import Status
-from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run
+from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run, simd_width
+from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import Built, build
 from undertow.scenario.part_cache import PartCache, structure
 
@@ -65,10 +65,9 @@ def start(
     """
     part_cache = PartCache()
     built = {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
-    accumulators = tuple(Metrics(*window) for window in windows)
     groups: dict[Any, dict[str, tuple[Run, int]]] = {}
     for name, one in built.items():
-        run = run_of(one)._replace(accumulators=accumulators)
+        run = run_of(one)._replace(accumulators=_gathered(one, windows))
         plan = planned(one, Series(signals=list(signals), every=every))
         groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
     pieces = [pool.submit(_together, plan, runs) for (_, plan), runs in groups.items()]
@@ -80,6 +79,10 @@ def start(
     return flown
 
 
+def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
+    return tuple(one for window in windows for one in accumulators(built.closed_loop.plant, (), *window))
+
+
 def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ended]:
     """Runs of one program, by name with their numbers of steps; those of one length side by side."""
     first = next(iter(runs.values()))[0]
@@ -89,7 +92,7 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ende
     ]
     lengths = {steps: [name for name in runs if runs[name][1] == steps] for _, steps in runs.values()}
     # A program for one run is faster than one for eight that flies one.
-    width = min(lanes_of(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
+    width = min(simd_width(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
     batch = BatchRunner(first, plan, constant, width)
     tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}
     for steps, names in lengths.items():
@@ -102,9 +105,8 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ende
 
 def _ran(built: Built, ended: Ended, windows: Sequence[Window]) -> BatchResult:
     status, end = Status(int(ended.status)), float(ended.ended)
-    metrics = [
-        results(state) if end >= stop else None for state, (_, stop) in zip(ended.accumulated, windows, strict=True)
-    ]
+    each = zip(_gathered(built, windows), ended.accumulated, windows, strict=True)
+    metrics = [with_all_outputs(results((one,), (state,))) if end >= stop else None for one, state, (_, stop) in each]
     time = np.asarray(ended.time)
     kept = time <= end
     series = {name: np.asarray(values)[kept] for name, values in ended.series.items()}

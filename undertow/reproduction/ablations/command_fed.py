@@ -27,6 +27,9 @@ class CommandFed(AbstractInformedController):
     def command(self, z: Any, y: Measurement, r: Target):
         return self.law.command(z, y, r)
 
+    def signals(self):
+        return self.law.signals()
+
     def advance(self, z: Any, y: Measurement, r: Target, u_applied, dt) -> Any:
         commanded, _ = self.law.command(z, y, r)
         return self.law.advance(z, y, r, commanded, dt)

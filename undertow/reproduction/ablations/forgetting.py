@@ -35,6 +35,9 @@ class Forgetting(AbstractInformedController):
     def command(self, z: Any, y: Measurement, r: Target):
         return self.law.command(z, y, r)
 
+    def signals(self):
+        return self.law.signals()
+
     def advance(self, z: Any, y: Measurement, r: Target, u_applied, dt) -> Any:
         size = jnp.abs(self.law.identification.error(z.predicted_velocity, self.model.coordinates.velocity(y)))[:, None]
         after = self.law.advance(z, y, r, u_applied, dt)

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractController, Measurement, Model, Target, Telemetry
+from undertow.controllers.signals import ESTIMATE, MODELLING_ERROR
+from undertow.core.contracts import AbstractController, Measurement, Model, Target
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
 
@@ -36,15 +37,11 @@ class Incremental(AbstractController):
         model, missing = self.model, z.acceleration - z.known
         error, rate, acceleration = model.coordinates.tracking_error(y, r)
         demand = acceleration + self.feedback[0] * error + self.feedback[1] * rate
-        telemetry = Telemetry(
-            estimate=missing,
-            robust=jnp.zeros_like(demand),
-            modelling_error=z.velocity - model.coordinates.velocity(y),
-            predicted_position=y.position,
-            predicted_velocity=z.velocity,
-            weights=missing[:, None],
-        )
-        return model.dynamics.invert(y, demand - missing - model.dynamics.drift(y)), telemetry
+        signals = {"estimate": missing, "modelling_error": z.velocity - model.coordinates.velocity(y)}
+        return model.dynamics.invert(y, demand - missing - model.dynamics.drift(y)), signals
+
+    def signals(self):
+        return ESTIMATE | MODELLING_ERROR
 
     def advance(self, z: FilterState, y: Measurement, r: Target, u_applied, dt) -> FilterState:
         known = self.model.dynamics.drift(y) + matvec(self.model.dynamics.gain(y), u_applied)

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractController, Measurement, Model, Target, Telemetry
+from undertow.controllers.signals import ESTIMATE, MODELLING_ERROR
+from undertow.core.contracts import AbstractController, Measurement, Model, Target
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
 
@@ -33,15 +34,11 @@ class LinearObserver(AbstractController):
         model = self.model
         error, rate, acceleration = model.coordinates.tracking_error(y, r)
         demand = acceleration + self.feedback[0] * error + self.feedback[1] * rate
-        telemetry = Telemetry(
-            estimate=z.estimate,
-            robust=jnp.zeros_like(demand),
-            modelling_error=z.rates - model.coordinates.velocity(y),
-            predicted_position=y.position,
-            predicted_velocity=z.rates,
-            weights=z.estimate[:, None],
-        )
-        return model.dynamics.invert(y, demand - z.estimate - model.dynamics.drift(y)), telemetry
+        signals = {"estimate": z.estimate, "modelling_error": z.rates - model.coordinates.velocity(y)}
+        return model.dynamics.invert(y, demand - z.estimate - model.dynamics.drift(y)), signals
+
+    def signals(self):
+        return ESTIMATE | MODELLING_ERROR
 
     def advance(self, z: ObserverState, y: Measurement, r: Target, u_applied, dt) -> ObserverState:
         eps = z.rates - self.model.coordinates.velocity(y)

@@ -11,6 +11,7 @@ from undertow.core.status import Status
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.reproduction.ablations.ablation import Schedule
+from undertow.reproduction.all_outputs import with_all_outputs
 
 # Two families of seeds that have none in common: gains are sought on one and reported on the other.
 TRAINING, HELD_OUT = 1, 2
@@ -48,12 +49,13 @@ def run(loop: ClosedLoop, schedule: Schedule, seeds, family: int = HELD_OUT) -> 
         Name -> one value per seed, `share`, `lost_axes` and the `status` codes among them.
     """
     last = float(np.nextafter(schedule.duration, 0.0))
-    window = Metrics(schedule.duration / 2, last)
+    window = Metrics(schedule.duration / 2, last, loop.plant.output_units)
     states, status = jax.tree.map(np.asarray, _program(loop, window, keys(family, seeds), tuple(schedule)))
-    each = [results(jax.tree.map(lambda leaf, i=i: leaf[i], states)) for i in range(seeds)]
+    one_of = lambda i: results((window,), (jax.tree.map(lambda leaf: leaf[i], states),))
+    each = [with_all_outputs(one_of(i)) for i in range(seeds)]
     lasted = status == int(Status.OK)
-    kept = {name: np.where(lasted, [one[name] for one in each], np.inf) for name in METRICS}
-    axes = np.array([one["tracking_rms_axes"] for one in each])
+    kept = {name: np.where(lasted, [one.get(name, np.nan) for one in each], np.inf) for name in METRICS}
+    axes = np.array([one["error_rms_axes"] for one in each])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(lasted, kept["estimation_rms"] / kept["uncertainty_rms"], np.inf)
     return kept | {"share": share, "lost_axes": np.where(lasted, (axes > _HELD).sum(1), np.inf), "status": status}

@@ -7,7 +7,7 @@ _RECOVERED = 0.01  # m, rad
 
 def _motor(n: Numbers) -> str:
     paper, sound = n.fidelity("electromechanical", "rcafc"), n.fidelity("electromechanical", "robust")
-    if paper["status"] == "ok":
+    if paper["status"] == "completed":
         return ""
     kept = sound["steady"]["tracking_rms"]
     return (
@@ -58,7 +58,7 @@ def _frequency(n: Numbers) -> str:
 
 def _at_sea(n: Numbers) -> str:
     paper, hand, sound = (n.fidelity("sea", law) for law in ("table1", "hand_tuned", "robust"))
-    if paper["status"] == "ok":
+    if paper["status"] == "completed":
         return ""
     return (
         f"At sea. On BlueROV2 Heavy Table 1 ends after {paper['diverged_at']:.2g} s. The paper's law tuned by hand "
