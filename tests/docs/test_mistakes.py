@@ -63,16 +63,16 @@ MISTAKES = [
     (
         "controller",
         "my_controller",
-        "self.model.invert(y, acceleration - self.model.drift(y))",
-        "acceleration - self.model.drift(y)",
+        "self.model.dynamics.invert(y, acceleration - self.model.dynamics.drift(y))",
+        "acceleration - self.model.dynamics.drift(y)",
         "Error: `command` must return an input of shape (8,), one entry per input of the plant, but returns an array of "
         "shape (6,) (my_controller.py, line 26). ",
     ),
     (
         "controller",
         "my_controller",
-        "self.model.invert(y, acceleration - self.model.drift(y))",
-        "self.model.invert(y, acceleration) if s[0] > 0 else jnp.zeros(8)",
+        "self.model.dynamics.invert(y, acceleration - self.model.dynamics.drift(y))",
+        "self.model.dynamics.invert(y, acceleration) if s[0] > 0 else jnp.zeros(8)",
         "Error: Cannot run `SlidingMode.command`: Python's `if`, `while`, `and`, `or`, `not`, `min` or `max` needs the "
         "value of a traced array (my_controller.py, line 29). Use `jnp.where(condition, a, b)`, `jnp.minimum` or "
         "`jnp.maximum`",
@@ -104,8 +104,8 @@ MISTAKES = [
     (
         "controller",
         "my_controller",
-        "self.model.invert(y, acceleration - self.model.drift(y))",
-        "self.model.invert(y, self.model.drift(y) - acceleration)",
+        "self.model.dynamics.invert(y, acceleration - self.model.dynamics.drift(y))",
+        "self.model.dynamics.invert(y, self.model.dynamics.drift(y) - acceleration)",
         "Advice: `command` should bring a double integrator, x_ddot = u, back to the origin, but is unstable there: the "
         "linearised closed loop has a spectral radius of",
     ),
@@ -155,23 +155,23 @@ MISTAKES = [
     (
         "plant",
         "my_plant",
-        "return acceleration / self.inverse_inertia",
-        "return -acceleration / self.inverse_inertia",
-        "Error: `model.invert` must agree with `model.gain`: G G# a = a, but is -12.5 instead of 12.5 in entry 1",
+        "return acceleration * self.inertia()",
+        "return -acceleration * self.inertia()",
+        "Error: `invert` must agree with `gain`: G G# a = a, but is -12.5 instead of 12.5 in entry 1",
     ),
     (
         "plant",
         "my_plant",
-        "jnp.full((1, 1), self.inverse_inertia)",
-        "-jnp.full((1, 1), self.inverse_inertia)",
-        "Error: `model.gain` must push where the plant does, but is -12.5 where x_ddot changes by 12.5 per unit",
+        "jnp.full((1, 1), 1 / self.inertia())",
+        "-jnp.full((1, 1), 1 / self.inertia())",
+        "Error: `gain` must push where the plant does, but is -12.5 where x_ddot changes by 12.5 per unit",
     ),
     (
         "plant",
         "my_plant",
-        "def pose(self, x)",
-        "def at_sea(self, x)",
-        "Error: Cannot instantiate `Pendulum`: method `pose` is not implemented (my_plant.py, line 37)",
+        "def power(self, x, u)",
+        "def watts(self, x, u)",
+        "Error: Cannot instantiate `Pendulum`: method `power` is not implemented (my_plant.py, line 42)",
     ),
     (
         "disturbance",

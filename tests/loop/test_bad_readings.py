@@ -11,7 +11,8 @@ import pytest
 from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractController, AbstractModel, AbstractNavigation, Measurement
+from undertow.core.contracts import AbstractController, AbstractNavigation, Model
+from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
@@ -141,7 +142,7 @@ def test_a_vehicle_in_its_own_axes(law, within):
 class Broken(AbstractContinuousController):
     """A spring, but for one input that is something else from a time on; the clock is the position of an axis."""
 
-    model: AbstractModel
+    model: Model
     value: jax.Array = eqx.field(converter=jnp.asarray)
     after: jax.Array = eqx.field(converter=jnp.asarray)
     method: str = eqx.field(static=True, default="euler")
@@ -198,13 +199,13 @@ def test_the_adaptive_integrator_says_so_too():
 class Mute(AbstractController):
     """No input but what is no number."""
 
-    model: AbstractModel
+    model: Model
 
     def init(self, y, r):
         return jnp.zeros(())
 
     def command(self, z, y, r):
-        return jnp.full(self.model.gain(y).shape[1], NAN), {}
+        return jnp.full(self.model.dynamics.gain(y).shape[1], NAN), {}
 
     def signals(self):
         return {}
@@ -234,7 +235,7 @@ def test_navigation_leaves_out_readings_that_are_none():
     """As if they were lost: the estimate goes on, each is counted, and the depth is known again afterwards."""
     quiet = [imu(angle_noise=0, rate_noise=0, force_noise=0), dvl(noise=0, resolution=0, delay=0), compass(noise=0)]
     sensor = observer([*quiet, position_fix(noise=0, delay=0), Flooded(Sampling(0.05), 0.2)])
-    motion = lambda t: Measurement(jnp.zeros(6).at[2].set(jnp.sin(t)), jnp.zeros(6).at[2].set(jnp.cos(t)))
+    motion = lambda t: measurement_of_outputs(jnp.zeros(6).at[2].set(jnp.sin(t)), jnp.zeros(6).at[2].set(jnp.cos(t)))
     path = sensor.realize(jax.random.PRNGKey(0))
 
     def step(state, t):

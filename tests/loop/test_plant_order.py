@@ -7,7 +7,7 @@ import pytest
 from jaxtyping import Array, Float
 
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractDisturbance, AbstractPlant
+from undertow.core.contracts import AbstractDisturbance
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -15,6 +15,7 @@ from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.plants.inverted_pendulum import inverted_pendulum
+from undertow.plants.mechanism import AbstractMechanism
 from undertow.plants.two_link_arm import two_link_arm
 from undertow.references.setpoint import setpoint
 from undertow.thrusters.paper_table3 import paper_table3
@@ -47,10 +48,10 @@ def rail(disturbance, limit=float("inf"), **gains):
     return ClosedLoop(plant, rcaf(plant.model(), **gains), setpoint(np.zeros(1)), disturbance, perfect())
 
 
-class Pendulum(AbstractPlant):
+class Pendulum(AbstractMechanism):
     """x_ddot = -20 sin x + u + d, smooth; a double integrator in everything else."""
 
-    rail: AbstractPlant
+    rail: AbstractMechanism
     outputs: tuple[str, ...] = eqx.field(static=True, default=("angle",))
     output_units: tuple[str, ...] = eqx.field(static=True, default=("rad",))
     input_unit: str = eqx.field(static=True, default="rad/s^2")
@@ -67,23 +68,14 @@ class Pendulum(AbstractPlant):
     def output(self, t, x):
         return self.rail.output(t, x)
 
-    def pose(self, x):
-        return None
+    def limits(self):
+        return self.rail.limits()
 
-    def admissible(self, x, u):
-        return self.rail.admissible(x, u)
-
-    def effort(self, x, u):
-        return self.rail.effort(x, u)
-
-    def inputs(self):
-        return 1
+    def power(self, x, u):
+        return self.rail.power(x, u)
 
     def status(self, x):
         return self.rail.status(x)
-
-    def advice(self):
-        return ()
 
     def model(self):
         return self.rail.model()

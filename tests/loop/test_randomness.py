@@ -10,6 +10,7 @@ import pytest
 from undertow.controllers.pid import pid
 from undertow.core import catalogue, runtime
 from undertow.core.contracts import AbstractDisturbance, AbstractNavigation, Measurement
+from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
 from undertow.loop import sampled, simd_batch
@@ -93,7 +94,7 @@ def test_instruments_are_heard_and_noisy_at_any_time(precision):
         times = [(0.0, 10.0), (1e7, 10.0)] + [(0.0, 1e-7), (1e5, 1e-7)] * (precision == "float64")
         for start, period in times:
             sensor = observer([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
-            truth = Measurement(jnp.zeros(6), jnp.zeros(6))
+            truth = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
             path = sensor.realize(jax.random.PRNGKey(1))
 
             def step(state, k, sensor=sensor, path=path, truth=truth, start=start, period=period):

@@ -67,7 +67,7 @@ class PredictiveControl(AbstractController):
         pace = 1.0 / jnp.trace(hessian)
         step = lambda i, u: jnp.clip(u - pace * (hessian @ u + linear), -30.0, 30.0)
         wanted = jax.lax.fori_loop(0, 40, step, jnp.zeros(size))[:1] - 4.0 * (y.velocity - r.velocity)
-        return self.model.invert(y, wanted - self.model.drift(y)), {"wanted": wanted}
+        return self.model.dynamics.invert(y, wanted - self.model.dynamics.drift(y)), {"wanted": wanted}
 
     def signals(self):
         return {"wanted": Signal(("axis",), "[axis]/s^2", "acceleration that the program asks for")}

@@ -9,8 +9,9 @@ from scipy.optimize import linprog
 
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
+from undertow.core.contracts import AbstractController, Model, Target
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances import none
 from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
@@ -68,7 +69,7 @@ def test_each_side_is_clipped_at_its_own_limit():
 class Asking(AbstractController):
     """A law that asks for the same whatever happens."""
 
-    model: AbstractModel
+    model: Model
     asked: jax.Array
     inner: AbstractController
 
@@ -164,7 +165,7 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
 
     @eqx.filter_jit
     def decide(position):
-        y = Measurement(jnp.zeros(6), jnp.zeros(6))
+        y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
         r = Target(position, jnp.zeros(6), jnp.zeros(6))
         unfiltered = eqx.tree_at(lambda c: c.filter, controller, None)
         z = unfiltered.init(y, r)
@@ -173,7 +174,7 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
             u,
             signals["attained_share"],
             unfiltered._plan(z, y, r).forces,
-            own.acceleration_per_force(y),
+            own.dynamics.gain(y),
         )
 
     for _ in range(6):

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 import undertow as ut
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.disturbances.none import none
 from undertow.loop import continuous, sampled
@@ -33,7 +33,7 @@ BATTERY = battery(resistance=0.01)
 class Driven(AbstractContinuousController):
     """Voltages size * (bias + sin(7 t + phase)), whatever is measured; the state is the time."""
 
-    model: AbstractModel
+    model: Model
     size: Float[Array, ""]
     bias: Float[Array, ""]
     method: str = eqx.field(static=True, default="rk4")

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 
@@ -26,7 +26,7 @@ class DeafToLimits(AbstractController):
     """A law told what it asked for instead of what was applied."""
 
     law: AbstractController
-    model: AbstractModel
+    model: Model
 
     def init(self, y, r):
         return self.law.init(y, r)

@@ -83,10 +83,10 @@ def test_an_integral_faster_than_the_sampling_stays_bounded():
 
 def test_steady_curve_holds_a_force_and_limits_of_an_endless_supply_are_endless():
     plant = hybrid_vehicle(bluerov2_heavy(), t200(dead_zone=0.0))
-    drive = plant.model().in_body_axes().actuators().quasi_static()
+    drive = plant.model().in_body_axes().actuators.quasi_static()
     forces = jnp.linspace(-20.0, 20.0, 8)
     np.testing.assert_allclose(drive.force((), drive.command((), forces, 1.0)), forces, rtol=1e-12)
-    endless = hybrid_vehicle(bluerov2_heavy(), t200(supply=np.inf)).model().in_body_axes().actuators().quasi_static()
+    endless = hybrid_vehicle(bluerov2_heavy(), t200(supply=np.inf)).model().in_body_axes().actuators.quasi_static()
     low, high = endless.range((), 1.0)
     assert (np.asarray(low) == -np.inf).all() and (np.asarray(high) == np.inf).all()
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.none import none
 from undertow.estimation.tsk import gaussian_sets
 from undertow.loop import sampled
@@ -92,7 +92,7 @@ def test_without_delay_it_is_the_matrix_of_the_package(table1):
 class Stepped(AbstractController):
     """The law with its input one step late, its weights stepped before its identification model, or as it is."""
 
-    model: AbstractModel
+    model: Model
     law: AbstractController
     semi_implicit: bool
     delayed: bool

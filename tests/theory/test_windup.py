@@ -9,7 +9,7 @@ import pytest
 
 from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -29,7 +29,7 @@ SURVIVES = {
 class FedCommanded(AbstractController):
     """A law that never hears of limits."""
 
-    model: AbstractModel
+    model: Model
     law: AbstractController
 
     def init(self, y, r):

@@ -66,7 +66,7 @@ def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> R
     name, part, make = _named(thing, options)
     reports = [_of_part(name, part)]
     if isinstance(part, AbstractController) and not reports[0].errors:
-        reports.append(_of_feedback(make, len(part.model.angles)))
+        reports.append(_of_feedback(make, len(part.model.coordinates.angles)))
     return _joined(reports)
 
 

@@ -10,7 +10,7 @@ from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.checks.answers import alike, form, shaped, two_values
 from undertow.checks.finding import Finding, advice
-from undertow.core.contracts import AbstractController, Measurement, Target
+from undertow.core.contracts import AbstractController, Target
 from undertow.core.signals import check_declared
 from undertow.disturbances.none import none
 from undertow.loop.closed_loop import ClosedLoop
@@ -24,8 +24,8 @@ _DEFAULT = "Tried with the default vehicle; for another plant, check a scenario"
 
 def check_controller(controller: AbstractController) -> Iterator[Finding]:
     """Every method once, traced as a loop traces it, near the origin; then with numbers."""
-    n = len(controller.model.angles)
-    y = Measurement(0.1 * jnp.ones(n), jnp.zeros(n))
+    n = len(controller.model.coordinates.angles)
+    y = controller.model.coordinates.measurement(0.1 * jnp.ones(n), jnp.zeros(n))
     r, dt = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n)), jnp.asarray(1e-3)
     z = jax.eval_shape(controller.init, y, r)
     answer = jax.eval_shape(controller.command, z, y, r)
@@ -33,7 +33,7 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
         yield from wrong
         return
     u, signals = answer
-    inputs = controller.model.gain(y).shape[1]
+    inputs = controller.model.dynamics.gain(y).shape[1]
     if getattr(u, "shape", None) != (inputs,):
         due = f"must return an input of shape {(inputs,)}, one entry per input of the plant"
         yield Finding("error", "contract", "command", f"`command` {due}, but returns {form(u)}", _DEFAULT)

@@ -22,6 +22,7 @@ from undertow.core.contracts import (
     Measurement,
     Pose,
 )
+from undertow.core.measurement import measurement_of_outputs
 from undertow.core.user_code import fault_of
 from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.sensors.sensor import AbstractSensor
@@ -38,7 +39,7 @@ class DisturbanceProfile(NamedTuple):
 
 
 _BODY = DisturbanceProfile(
-    truth=Measurement(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
+    truth=measurement_of_outputs(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
     pose=Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
 )
 
@@ -115,7 +116,7 @@ def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> I
 def _sensor(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
     """Tried on a body at rest, so that a delay makes no difference."""
     report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
-    truth = Measurement(around.truth.position, jnp.zeros(6), report)
+    truth = measurement_of_outputs(around.truth.position, jnp.zeros(6), report)
     motion, right = motion_of(truth, jnp.zeros(3), jnp.asarray(0.01)), estimate_of(truth)
     reading = sensor.reading(motion)
     if jnp.ndim(reading) != 1:

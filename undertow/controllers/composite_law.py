@@ -13,7 +13,7 @@ from undertow.controllers.signals import ADAPTIVE_LAW, lyapunov_signals, share_g
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractModel, Measurement, Target
+from undertow.core.contracts import Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.signals import Signal
@@ -54,7 +54,7 @@ class RCAF(AbstractContinuousController):
             system whose number of inputs does not fit `fuzzy_input`.
     """
 
-    model: AbstractModel
+    model: Model
     fuzzy: FuzzySystem
     identification: SeriesParallel
     feedback: Float[Array, "*n 2"] = param(
@@ -90,41 +90,43 @@ class RCAF(AbstractContinuousController):
         checks.choice("fuzzy_input", self.fuzzy_input, FUZZY_INPUTS)
         if self.fuzzy.inputs != 1 + FUZZY_INPUTS.index(self.fuzzy_input):
             raise BadInput("fuzzy", f"have the inputs of `{self.fuzzy_input}`", f"of {self.fuzzy.inputs} input(s)")
-        axes = len(self.model.angles)
+        axes = len(self.model.coordinates.angles)
         for name in _PER_AXIS_IDENTIFICATION:
             checks.per_axis(name, getattr(self.identification, name), axes)
         check_gains(self.feedback, self.weight, {name: getattr(self, name) for name in _PER_AXIS}, axes)
 
     def init(self, y: Measurement, r: Target) -> RCAFState:
         axes = y.position.shape[0]
-        return RCAFState(y.position, self.model.rates(y), jnp.zeros((axes, self.fuzzy.rules)))
+        return RCAFState(y.position, self.model.coordinates.velocity(y), jnp.zeros((axes, self.fuzzy.rules)))
 
     def command(self, z: RCAFState, y: Measurement, r: Target):
         """V of Eq. (23), with d_hat of Eq. (42) and u_r of Eq. (43)."""
+        dynamics, coordinates, _ = self.model
         off = self._tracking(y, r)
-        eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
+        eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
         u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
-        wanted = -self.model.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
-        u = self.model.invert(y, wanted)
+        wanted = -dynamics.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
+        u = dynamics.invert(y, wanted)
         signals = {
             "estimate": d_hat,
             "robust_term": u_r,
             "modelling_error": eps,
             "predicted_position": z.predicted_position,
             "predicted_velocity": z.predicted_velocity,
-            "attained_share": share_given(wanted, matvec(self.model.gain(y), u)),
+            "attained_share": share_given(wanted, matvec(dynamics.gain(y), u)),
         }
         signals |= lyapunov_signals(off, self.lyapunov(), self.weight)
         return u, signals | weight_signals(z.weights, self.weights_bound)
 
     def flow(self, z: RCAFState, y: Measurement, r: Target, u_applied) -> RCAFState:
         """Identification model, Eq. (32), and composite adaptive law, Eq. (44)."""
+        dynamics, coordinates, _ = self.model
         s = self._tracking(y, r).filtered
-        eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
+        eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         xi = self._basis(eps, y)
         d_hat = self.fuzzy.output(z.weights, xi)
-        known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)
+        known = dynamics.drift(y) + matvec(dynamics.gain(y), u_applied)
         theta_rate = -(self.adaptation * (s + self.composite * eps))[:, None] * xi
         return RCAFState(
             predicted_position=z.predicted_velocity,
@@ -148,7 +150,7 @@ class RCAF(AbstractContinuousController):
         return self.weights_bound[..., None]
 
     def _tracking(self, y: Measurement, r: Target) -> Tracking:
-        return tracking(self.model, self.lyapunov(), y, r)
+        return tracking(self.model.coordinates, self.lyapunov(), y, r)
 
     def _basis(self, eps: PerAxis, y: Measurement) -> Float[Array, "n rules"]:
         """xi of the chosen input: eps (the paper's), or (x_i, x_i_dot) (what Table 2 compares it with)."""

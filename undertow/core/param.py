@@ -69,9 +69,10 @@ def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]
         elif isinstance(value, eqx.Module):
             yield from parameters(value, f"{name}.")
         elif isinstance(value, tuple):
+            fields = getattr(value, "_fields", None)
             for i, member in enumerate(value):
                 if isinstance(member, eqx.Module):
-                    yield from parameters(member, f"{name}[{i}].")
+                    yield from parameters(member, f"{name}.{fields[i]}." if fields else f"{name}[{i}].")
 
 
 def tuning_ranges(part: eqx.Module) -> dict[str, tuple[float, float]]:

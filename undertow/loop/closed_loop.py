@@ -11,6 +11,7 @@ from undertow.core.arrays import as_array
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
+    AbstractInformedNavigation,
     AbstractNavigation,
     AbstractPlant,
     AbstractReference,
@@ -20,8 +21,11 @@ from undertow.core.contracts import (
     Outputs,
     Target,
     Time,
+    known_acceleration,
+    starting_at,
 )
 from undertow.core.errors import BadInput
+from undertow.core.measurement import completed
 from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
 from undertow.numerics.randomness import keys_for
@@ -83,7 +87,7 @@ class ClosedLoop(eqx.Module):
     def starting_at(self, position: Any) -> "ClosedLoop":
         """This loop with its reference beginning where the plant does; at zero where None."""
         start, _ = self.outputs_at_start(position, None)
-        reference = self.reference.starting_at(start)
+        reference = starting_at(self.reference, start)
         return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.navigation)
 
     def signals(self) -> dict[str, Signal]:
@@ -129,7 +133,7 @@ class Realization(NamedTuple):
         if navigation.smooth is True:  # traced in a part whose field is not static; guarded then
             return MeasurementState(state, None)
         y, _ = navigation.measure(self.navigation_realization, state, zero, truth)
-        return MeasurementState(state, at_start(self.loop.controller.model, truth, y))
+        return MeasurementState(state, at_start(self.loop.controller.model.coordinates, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
         """What the surroundings do to the plant at time t."""
@@ -145,13 +149,17 @@ class Realization(NamedTuple):
 
     def _read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
         """What the law is given, and what is remembered afterwards."""
-        measure = self.loop.navigation.measure
+
+        def measure(realization, state, t, truth):
+            y, state = self.loop.navigation.measure(realization, state, t, truth)
+            return completed(y, truth), state
+
         if not isinstance(measuring, MeasurementState):
             return measure(self.navigation_realization, measuring, t, truth)
         y, state = measure(self.navigation_realization, measuring.navigation, t, truth)
         if measuring.expected is None:
             return y, MeasurementState(state, None)
-        y, expected = measuring.expected.repaired(self.loop.controller.model, y)
+        y, expected = measuring.expected.repaired(self.loop.controller.model.coordinates, y)
         return y, MeasurementState(state, expected)
 
     def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
@@ -170,9 +178,9 @@ class Realization(NamedTuple):
             "measured_position": y.position,
             "measured_velocity": y.velocity,
             "reference": r.position,
-            "error": controller.model.difference(r.position, truth.position),
-            "uncertainty": controller.model.rates_derivative(truth, acceleration)
-            - controller.known_acceleration(z, truth, applied),
+            "error": controller.model.coordinates.difference(r.position, truth.position),
+            "uncertainty": controller.model.coordinates.acceleration(truth, acceleration)
+            - known_acceleration(controller, z, truth, applied),
             "input": applied,
             "commanded_input": command,
             "power": effort.power,
@@ -185,7 +193,10 @@ class Realization(NamedTuple):
         """Readings so far that were no numbers: left out by the sensor, or replaced for the law."""
         if not isinstance(measuring, MeasurementState) or measuring.expected is None:
             return jnp.zeros((), dtype=int)
-        return measuring.expected.replaced + self.loop.navigation.ignored(measuring.navigation)
+        navigation, replaced = self.loop.navigation, measuring.expected.replaced
+        if not isinstance(navigation, AbstractInformedNavigation):
+            return replaced
+        return replaced + navigation.ignored(measuring.navigation)
 
     def record(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Signals:
         """Signals of the decision taken at time t."""

@@ -80,8 +80,7 @@ def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
     """What of the predicted signals the law itself would not allow, in a sentence; empty where all is allowed."""
     bounds: dict[str, tuple[str, Any]] = {}
     if isinstance(law, RCAF | RobustRCAF):
-        weights = law.weights_bound if isinstance(law, RCAF) else law.estimator.bound
-        bounds = {"robust_term": ("robust term", law.robust_gain), "estimate": ("estimate", weights)}
+        bounds = {"robust_term": ("robust term", law.robust_gain), "estimate": ("estimate", law.weights_bound)}
     for name, (meaning, bound) in bounds.items():
         share = np.abs(signals[name]) / np.maximum(np.asarray(bound, dtype=float), 1e-300)
         if share.max() > 1 and np.abs(signals[name]).max() > 0:

@@ -105,7 +105,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     law, names = loop.controller, loop.plant.outputs
     metrics, why_not = predicted(known)
     axes = range(len(names))
-    gains = np.asarray(law.model.gain(loop.plant.output(0.0, worst.parts.states(worst.at)[0])))
+    gains = np.asarray(law.model.dynamics.gain(loop.plant.output(0.0, worst.parts.states(worst.at)[0])))
     return Prediction(
         operating_point=known,
         points=points,

@@ -11,7 +11,7 @@ from undertow.analysis.success import criterion_of
 from undertow.core import runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.catalogue import KIND_OF
-from undertow.core.contracts import AbstractDisturbance
+from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
@@ -127,7 +127,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
     model, resolved["model"] = placed(text, "model", lambda: part_cache.part("model", scenario.model, (plant,), known))
     navigation = make("navigation")
-    context["velocity_noise"] = np.asarray(navigation.velocity_noise(scenario.loop.dt)).tolist()
+    noise = isinstance(navigation, AbstractInformedNavigation) and navigation.velocity_noise(scenario.loop.dt)
+    context["velocity_noise"] = np.asarray(noise, dtype=float).tolist()
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
     resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario

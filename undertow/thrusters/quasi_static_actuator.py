@@ -58,3 +58,6 @@ class QuasiStaticActuator(AbstractActuatorModel):
 
     def advance(self, state, u, dt) -> tuple[()]:
         return ()
+
+    def quasi_static(self) -> "QuasiStaticActuator":
+        return self

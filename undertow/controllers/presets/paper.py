@@ -4,7 +4,7 @@ import math
 
 from undertow.controllers.composite_law import FUZZY_INPUTS, RCAF
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.estimation.series_parallel import SeriesParallel
 from undertow.estimation.tsk import gaussian_sets
@@ -15,7 +15,7 @@ _REACH = {"error": (1.0,), "state": (4.0, 2.0)}
 
 
 def paper(
-    model: AbstractModel,
+    model: Model,
     *,
     feedback=(1.0, 2.0),
     weight=((10.0, 0.0), (0.0, 10.0)),

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractReference, Measurement
+from undertow.core.contracts import AbstractController, AbstractReference, Measurement, starting_at
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.interop.mujoco_engine.propellers import Propellers
@@ -65,7 +66,7 @@ def fly(
     propellers = Propellers(thruster, body.model.nu)
     start = np.zeros(6) if position is None else np.asarray(position, dtype=float)
     body.place(start, np.zeros(6))
-    reference = reference.starting_at(jnp.asarray(start))
+    reference = starting_at(reference, jnp.asarray(start))
     command, advance, wanted = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
     z, rows, steps, status = None, [], round(duration / dt), Status.OK
     for step in range(steps + 1):
@@ -88,4 +89,4 @@ def fly(
 
 def _measured(body: Submerged, propellers: Propellers) -> Measurement:
     turning = PropellerReport(jnp.asarray(propellers.speed), None)
-    return Measurement(jnp.asarray(body.position()), jnp.asarray(body.velocity()), turning)
+    return measurement_of_outputs(jnp.asarray(body.position()), jnp.asarray(body.velocity()), turning)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from undertow.controllers.presets.paper import paper
 from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.robust_law import RobustRCAF
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.reproduction.ablations import gains
 from undertow.reproduction.ablations.ablation import Answer, Variant, answer
 from undertow.reproduction.ablations.incremental import Incremental
@@ -52,11 +52,11 @@ def variants(quick: bool) -> tuple[Variant, ...]:
     return tuple(found)
 
 
-def _robust(model: AbstractModel, **options) -> RobustRCAF:
+def _robust(model: Model, **options) -> RobustRCAF:
     return robust(model, reference_frequency=0, **options)
 
 
-def _like_robust(kind, model: AbstractModel):
+def _like_robust(kind, model: Model):
     """A linear law of the poles and the feedback that preset `robust` chooses for a model, sampled at 1 kHz."""
     law, dt = _robust(model), 1e-3
     of_rates, of_estimate = law.estimator.gains(jnp.asarray(dt))

@@ -3,7 +3,7 @@
 from functools import partial
 
 from undertow.controllers.presets.paper import paper
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.disturbances.random_suite import random_suite
 from undertow.reproduction.ablations import gains
 from undertow.reproduction.ablations.ablation import Answer, Schedule, Variant, answer
@@ -38,12 +38,12 @@ def variants(quick: bool) -> tuple[Variant, ...]:
     return tuple(found)
 
 
-def _fuzzy(composite: float, gain: float, term: float, model: AbstractModel):
+def _fuzzy(composite: float, gain: float, term: float, model: Model):
     """The pole grows with the estimator, so that its damping ratio stays."""
     return paper(model, composite=composite, adaptation=100 * gain, pole=150 * gain**0.5, robust_gain=10 * term)
 
 
-def _linear(gain: float, term: float, model: AbstractModel):
+def _linear(gain: float, term: float, model: Model):
     """The same two factors on what Table 1 amounts to."""
     slope = tuple(own + term * (whole - own) for own, whole in zip((1.0, 2.0), gains.FEEDBACK, strict=True))
     return LinearObserver(model, gain**0.5 * gains.POLE, gain * gains.STIFFNESS, slope)

@@ -3,7 +3,7 @@
 from functools import partial
 
 from undertow.controllers.presets.paper import paper
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.disturbances.random_suite import random_suite
 from undertow.reproduction.ablations.ablation import Answer, Schedule, Variant, answer
 from undertow.reproduction.ablations.forgetting import Forgetting
@@ -41,7 +41,7 @@ def variants(quick: bool) -> tuple[Variant, ...]:
     return (*cured, Variant("one set", f"sets: 1, adaptation: {matched:.4g}", loop(one, still, noisy), long))
 
 
-def _law(options: dict, cure: dict, model: AbstractModel) -> Forgetting:
+def _law(options: dict, cure: dict, model: Model) -> Forgetting:
     return Forgetting(paper(model, **_SETS, **options), **cure)
 
 

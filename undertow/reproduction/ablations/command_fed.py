@@ -2,14 +2,21 @@
 
 from typing import Any
 
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractInformedController,
+    Measurement,
+    Model,
+    Target,
+    known_acceleration,
+)
 
 
-class CommandFed(AbstractController):
+class CommandFed(AbstractInformedController):
     """The same law, but it learns from what it commanded instead of from what was applied."""
 
     law: AbstractController
-    model: AbstractModel
+    model: Model
 
     def __init__(self, law: AbstractController):
         self.law, self.model = law, law.model
@@ -28,4 +35,4 @@ class CommandFed(AbstractController):
         return self.law.advance(z, y, r, commanded, dt)
 
     def known_acceleration(self, z: Any, y: Measurement, u_applied):
-        return self.law.known_acceleration(z, y, u_applied)
+        return known_acceleration(self.law, z, y, u_applied)

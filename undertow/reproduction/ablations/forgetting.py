@@ -6,15 +6,21 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.composite_law import RCAF
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
+from undertow.core.contracts import (
+    AbstractInformedController,
+    Measurement,
+    Model,
+    Target,
+    known_acceleration,
+)
 from undertow.core.param import param
 
 
-class Forgetting(AbstractController):
+class Forgetting(AbstractInformedController):
     """theta_dot = Eq. (44) - gamma (leakage + e_mod |eps|) theta, and no adaptation while |eps| < zone."""
 
     law: RCAF
-    model: AbstractModel
+    model: Model
     leakage: Float[Array, ""] = param("", "kappa of the sigma-modification, X2", default=0.0)
     e_mod: Float[Array, ""] = param("s/m, s/rad", "factor of |eps| in it", default=0.0)
     zone: Float[Array, ""] = param("m/s, rad/s", "largest modelling error that is taken for noise", default=0.0)
@@ -33,11 +39,11 @@ class Forgetting(AbstractController):
         return self.law.signals()
 
     def advance(self, z: Any, y: Measurement, r: Target, u_applied, dt) -> Any:
-        size = jnp.abs(self.law.identification.error(z.predicted_velocity, self.model.rates(y)))[:, None]
+        size = jnp.abs(self.law.identification.error(z.predicted_velocity, self.model.coordinates.velocity(y)))[:, None]
         after = self.law.advance(z, y, r, u_applied, dt)
         learnt = jnp.where(size < self.zone, z.weights, after.weights)
         forgotten = dt * self.law.adaptation * (self.leakage + self.e_mod * size) * z.weights
         return after._replace(weights=learnt - forgotten)
 
     def known_acceleration(self, z: Any, y: Measurement, u_applied):
-        return self.law.known_acceleration(z, y, u_applied)
+        return known_acceleration(self.law, z, y, u_applied)

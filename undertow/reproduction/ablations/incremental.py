@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.signals import ESTIMATE, MODELLING_ERROR
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
+from undertow.core.contracts import AbstractController, Measurement, Model, Target
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
 
@@ -23,29 +23,29 @@ class FilterState(NamedTuple):
 class Incremental(AbstractController):
     """G u = wanted - (H x_ddot - H (F + G u)): no observer, no estimate; x_ddot is the filtered velocity's slope."""
 
-    model: AbstractModel
+    model: Model
     pole: Float[Array, ""] = param("1/s", "a of the filter")
     stiffness: Float[Array, ""] = param("1/s^2", "b of the filter")
     feedback: Float[Array, "2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
 
     def init(self, y: Measurement, r: Target) -> FilterState:
-        rates = self.model.rates(y)
+        rates = self.model.coordinates.velocity(y)
         zero = jnp.zeros_like(rates)
         return FilterState(rates, zero, zero, zero)
 
     def command(self, z: FilterState, y: Measurement, r: Target):
         model, missing = self.model, z.acceleration - z.known
-        velocity, acceleration = model.desired_motion(y, r)
-        demand = acceleration + self.feedback[0] * model.error(y, r) + self.feedback[1] * (velocity - model.rates(y))
-        signals = {"estimate": missing, "modelling_error": z.velocity - model.rates(y)}
-        return model.invert(y, demand - missing - model.drift(y)), signals
+        error, rate, acceleration = model.coordinates.tracking_error(y, r)
+        demand = acceleration + self.feedback[0] * error + self.feedback[1] * rate
+        signals = {"estimate": missing, "modelling_error": z.velocity - model.coordinates.velocity(y)}
+        return model.dynamics.invert(y, demand - missing - model.dynamics.drift(y)), signals
 
     def signals(self):
         return ESTIMATE | MODELLING_ERROR
 
     def advance(self, z: FilterState, y: Measurement, r: Target, u_applied, dt) -> FilterState:
-        known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)
-        of_velocity = self.stiffness * (self.model.rates(y) - z.velocity) - self.pole * z.acceleration
+        known = self.model.dynamics.drift(y) + matvec(self.model.dynamics.gain(y), u_applied)
+        of_velocity = self.stiffness * (self.model.coordinates.velocity(y) - z.velocity) - self.pole * z.acceleration
         of_known = self.stiffness * (known - z.known) - self.pole * z.known_rate
         return FilterState(
             z.velocity + dt * z.acceleration,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.presets.paper import paper
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.random_suite import RandomSuite, random_suite
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
@@ -14,7 +14,7 @@ from undertow.reproduction.ablations.rough_sensor import RoughSensor
 
 AXES = 6
 
-Law = Callable[[AbstractModel], AbstractController]
+Law = Callable[[Model], AbstractController]
 
 
 def loop(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from undertow.controllers.presets.paper import paper
 from undertow.controllers.presets.robust import robust
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.disturbances.adding import Together
 from undertow.disturbances.gauss_markov_current import gauss_markov_current
 from undertow.disturbances.tether import tether
@@ -27,12 +27,12 @@ _NOISE = 2e-3  # m/s, rad/s
 _HARDLY = 1e-9
 
 
-def hand_tuned(model: AbstractModel):
+def hand_tuned(model: Model):
     """The paper's law with gains found by hand."""
     return paper(model, **HAND_TUNED)
 
 
-def sound(model: AbstractModel):
+def sound(model: Model):
     """Preset `robust`, no gain given."""
     return robust(model, sampling_time=SCHEDULE.dt)
 

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core.contracts import AbstractNavigation, Measurement
+from undertow.core.measurement import with_outputs
 from undertow.core.param import param
 
 
@@ -52,5 +53,5 @@ class RoughSensor(AbstractNavigation):
         past = jnp.concatenate([now[None], state.past[:-1]])
         fresh = state.step % self.every.astype(int) == 0
         held = jnp.where(fresh, past[self.delay.astype(int)], state.held)
-        told = truth._replace(position=held[0], velocity=held[1])
+        told = with_outputs(truth, held[0], held[1])
         return told, RoughState(state.step + 1, past, held)

@@ -3,7 +3,6 @@
 import jax
 import numpy as np
 
-from undertow.core.contracts import Measurement
 from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import law_of
@@ -41,9 +40,9 @@ def perfect_variation(run: Executed) -> float:
     @jax.jit
     @jax.vmap
     def cancelling(t, goal):
-        y = Measurement(goal, 0 * goal)
+        y = model.coordinates.measurement(goal, 0 * goal)
         load = loop.disturbance.at(path, t, loop.plant.pose(x), loop.plant.no_load())
-        return model.invert(y, -model.drift(y) - load.acceleration)
+        return model.dynamics.invert(y, -model.dynamics.drift(y) - load.acceleration)
 
     # Between the records: a jump of d at a record is followed by the law after it, and several at once are one.
     time = late["time"].values - run.built.scenario.loop.record / 2
