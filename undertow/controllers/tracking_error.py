@@ -32,6 +32,12 @@ def tracking(model: AbstractModel, lyapunov: Matrices, y: Measurement, r: Target
     return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
 
 
+def demanded_acceleration(model: AbstractModel, gains: Feedback, y: Measurement, r: Target) -> PerAxis:
+    """x_ddot_d + K^T E, m/s^2 and rad/s^2: what state feedback asks for."""
+    velocity, acceleration = model.desired_motion(y, r)
+    return acceleration + gains[..., 0] * model.error(y, r) + gains[..., 1] * (velocity - model.rates(y))
+
+
 def check_gains(feedback: Feedback, weight: Matrices, per_axis: dict[str, Any], axes: int) -> None:
     """Whether K, Q and other gains fit the axes, and K and Q what Eq. (21) asks of them.
 
