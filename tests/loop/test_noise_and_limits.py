@@ -55,7 +55,7 @@ def test_two_laws_meet_the_same_noise(key):
     def noise(**gains):
         law = rcaf(plant.model(), **gains)
         loop = ClosedLoop(plant, law, setpoint(np.ones(2)), sinusoid(), white_noise(0.0, 0.01))
-        samples = sampled.simulate(loop, duration=0.2, dt=DT, record_every=1, key=key).samples
+        samples = sampled.simulate(loop, duration=0.2, dt=DT, record_every=1, key=key).signals
         return np.asarray(samples.predicted_velocity - samples.modelling_error - samples.velocity)
 
     one, other = noise(), noise(composite=0.0, feedback=(4.0, 4.0))
@@ -68,7 +68,7 @@ def limited():
     plant = double_integrator(2, LIMIT)
     law = rcaf(plant.model(), sets=3)
     loop = ClosedLoop(plant, law, setpoint(np.array([2.0, -1.0])), sinusoid(1.0, 2.0), perfect())
-    samples = sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).samples
+    samples = sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).signals
     return law, jax.tree.map(np.asarray, samples)
 
 

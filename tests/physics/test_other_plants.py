@@ -321,7 +321,7 @@ def test_under_actuated_controlled_rows_follow_and_the_rest_is_the_open_loop():
     assert np.abs(together).max() < 0.02 and np.abs(error[late, 2]).max() < 0.02
 
     idle = ClosedLoop(linear_plant(UNDER, springs, brakes, limit=0.0), loop.controller, loop.reference, load, perfect())
-    free = np.asarray(sampled.simulate(idle, duration=12.0, dt=1e-3, record_every=10).samples.position)
+    free = np.asarray(sampled.simulate(idle, duration=12.0, dt=1e-3, record_every=10).signals.position)
     np.testing.assert_allclose(np.asarray(samples.position) @ apart, free @ apart, atol=1e-9)
     assert np.abs((np.asarray(samples.position) - free) @ np.array([1.0, 1.0, 0.0])).max() > 0.1, "negative control"
 

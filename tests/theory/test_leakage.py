@@ -44,7 +44,7 @@ def test_a_constant_load_is_estimated_without_bias():
     plant = double_integrator(1)
     law = robust(plant.model(), bandwidth=30.0, reach=(0.5,), leakage=0.5, reference_frequency=0.0)
     loop = ClosedLoop(plant, law, setpoint([0.0]), sinusoid(0.0, 1.0, offset=3.0), perfect())
-    last = jax.tree.map(lambda x: x[-1], sampled.simulate(loop, duration=60.0, dt=DT, record_every=1000).samples)
+    last = jax.tree.map(lambda x: x[-1], sampled.simulate(loop, duration=60.0, dt=DT, record_every=1000).signals)
     np.testing.assert_allclose(last.estimate, 3.0, rtol=1e-9)
 
 

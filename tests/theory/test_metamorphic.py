@@ -68,7 +68,7 @@ def test_axes_do_not_meet():
 def test_doubling_a_small_load_doubles_the_answer(rails, factor):
     loads = np.array([0.2, 0.2 * factor])
     loop = rails(2, disturbance=sinusoid(loads, 10.0, offset=loads))
-    samples = jax.tree.map(np.asarray, sampled.simulate(loop, duration=4.0, record_every=1).samples)
+    samples = jax.tree.map(np.asarray, sampled.simulate(loop, duration=4.0, record_every=1).signals)
     for series in (samples.estimate - samples.uncertainty, samples.error):
         gap = np.abs(series[:, 1] - factor * series[:, 0]).max()
         assert gap <= 0.01 * np.abs(series[:, 1]).max()
@@ -83,7 +83,7 @@ def test_time_shift_shifts_every_bit(rails):
 
     def run(start, steps):
         loop = rails(1, disturbance=Stairs(jnp.asarray(values), jnp.asarray(start)))
-        return sampled.simulate(loop, duration=steps * step, dt=step, record_every=1).samples
+        return sampled.simulate(loop, duration=steps * step, dt=step, record_every=1).signals
 
     early, late = run(0.0, 2048), run(shift * step, 2048)
     for series, shifted in zip(jax.tree.leaves(early), jax.tree.leaves(late), strict=True):

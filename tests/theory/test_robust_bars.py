@@ -54,7 +54,7 @@ def test_the_estimator_depends_on_neither_controller_nor_limits():
         plant = double_integrator(2, limit=limit)
         law = rcaf(plant.model(), preset="robust", bandwidth=40.0, tracking=tracking, sampling_time=1e-3)
         loop = ClosedLoop(plant, law, setpoint(position), sinusoid([1.0, 2.0], [3.0, 7.0]), perfect())
-        samples = sampled.simulate(loop, duration=3.0, dt=1e-3, record_every=1).samples
+        samples = sampled.simulate(loop, duration=3.0, dt=1e-3, record_every=1).signals
         return np.asarray(samples.modelling_error), np.asarray(samples.estimate - samples.uncertainty)
 
     first, second = run(2.0, [0.0, 0.0], math.inf), run(8.0, [3.0, -1.0], 4.0)
@@ -122,5 +122,5 @@ def test_a_ball_near_the_magnet(gap):
     plant = magnetic_levitation()
     law = rcaf(plant.model(), preset="robust")
     loop = ClosedLoop(plant, law, sine(1e-3, 1.0, gap), none(), perfect())
-    samples = sampled.simulate(loop, duration=10.0, dt=1e-3, record_every=10, position=[gap]).samples
+    samples = sampled.simulate(loop, duration=10.0, dt=1e-3, record_every=10, position=[gap]).signals
     assert float(jnp.abs(samples.error[500:]).max()) < 5e-6

@@ -122,7 +122,7 @@ def test_nonlinear_loop_agrees(rule, delayed, rafc, layout):
     loop = ClosedLoop(plant, stepped, setpoint([1e-9]), none(), perfect())
     for factor in (0.97, 1.03):
         dt = factor * limit(law, rule, delayed)
-        samples = sampled.simulate(loop, duration=1500 * dt, dt=dt, record_every=1).samples
+        samples = sampled.simulate(loop, duration=1500 * dt, dt=dt, record_every=1).signals
         eps = np.abs(np.asarray(samples.modelling_error))[:, 0]
         first, later = eps[:50].max(), eps[-200:].max()
         assert later < 1e-2 * first if factor < 1 else later > 100 * first, (factor, first, later)

@@ -185,7 +185,7 @@ def test_a_gain_three_times_too_large(dt, stable):
     plant = linear_plant(((3.0,),))
     law = rcaf(plant.model(gain=((1.0,),)), sets=3)
     loop = ClosedLoop(plant, law, setpoint([1e-6]), none(), perfect())
-    eps = np.abs(np.asarray(sampled.simulate(loop, duration=2.0, dt=dt, record_every=1).samples.modelling_error))
+    eps = np.abs(np.asarray(sampled.simulate(loop, duration=2.0, dt=dt, record_every=1).signals.modelling_error))
     assert (eps[-50:].max() < 1e-2 * eps[:20].max()) == stable
     g = small_signal.gains(law)
     assert (dt < g.pole / (3 * g.b2)) == stable

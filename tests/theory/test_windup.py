@@ -50,7 +50,7 @@ def step(name, limit, load=1.0):
     law = rcaf(plant.model(), **choices)
     fed = FedCommanded(law.model, law) if name == "commanded" else law
     loop = ClosedLoop(plant, fed, setpoint([2.0]), sinusoid(0.0, 1.0, offset=load), perfect())
-    samples = sampled.simulate(loop, duration=40.0, dt=1e-3, record_every=1).samples
+    samples = sampled.simulate(loop, duration=40.0, dt=1e-3, record_every=1).signals
     error, velocity = np.asarray(samples.error)[:, 0], np.asarray(samples.velocity)[:, 0]
     return error, np.asarray(samples.estimate)[:, 0], 5 * (error - velocity), law
 

@@ -133,7 +133,7 @@ class Metrics(AbstractAccumulator):
 def results(state: MetricsState) -> dict[str, Any]:
     """Metrics by their names in result files: overall values as numbers, per-axis values as `<name>_axes` lists."""
     host = jax.tree.map(np.asarray, state)
-    count = max(float(host.signals), 1.0)
+    count = max(float(host.samples), 1.0)
     found: dict[str, Any] = {name: float(value) for name, value in overall(host).items()}
     for name, squares in host.squares.items():
         found[f"{name}_rms_axes"] = np.sqrt(squares / count).tolist()
@@ -163,7 +163,7 @@ OVERALL = tuple(_OVERALL)
 def overall(state: MetricsState) -> dict[str, np.ndarray]:
     """Metrics over all axes by their names; of many runs at once where the leaves have leading axes."""
     host = jax.tree.map(np.asarray, state)
-    count = np.maximum(host.signals, 1.0)
+    count = np.maximum(host.samples, 1.0)
     return {name: value(host, count) for name, value in _OVERALL.items()}
 
 

@@ -86,7 +86,7 @@ class BatchRunner:
         self._plan = plan
         integrate, dt = METHODS[plan.method], plan.dt
 
-        def draw(numbers):
+        def realize(numbers):
             loop, accumulators, at, key = eqx.combine(numbers, rest)
             return loop.realize(key), accumulators, at
 
@@ -98,16 +98,16 @@ class BatchRunner:
             realization, accumulators, _ = known
             return sampled.control_step(realization, accumulators, jnp.asarray(dt), integrate, plan.substeps, carry, k)
 
-        def look(known, carry, k):
+        def record(known, carry, k):
             t = instant(k, jnp.asarray(dt))
-            sample = known[0].look(t, *carry[0])
+            sample = known[0].record(t, *carry[0])
             return t, {name: getattr(sample, name) for name in plan.signals}
 
-        self._program = Program(draw, start, control_step, look, numbers, constant, lanes, driver)
+        self._program = Program(realize, start, control_step, record, numbers, constant, lanes, driver)
 
     @property
     def operations(self) -> int:
-        """Arithmetic operations of one integrate of one run: law, plant and its integration, what is accumulated."""
+        """Arithmetic operations of one step of one run: law, plant and its integration, what is accumulated."""
         return self._program.operations
 
     def run(self, numbers: Any, steps: int | None = None) -> Ended:

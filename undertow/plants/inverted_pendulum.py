@@ -11,7 +11,7 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
 from undertow.core.param import param
 from undertow.core.status import Status
-from undertow.plants.nominal import nominal
+from undertow.plants.nominal_parameters import nominal
 
 _FLAT = 0.01  # rad short of 90 deg, where the force has all but lost its grip: G is 1 % of what it is upright
 

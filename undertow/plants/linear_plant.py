@@ -15,7 +15,7 @@ from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.inverses import pseudo_inverse
 from undertow.numerics.linear import matvec
-from undertow.plants.nominal import nominal
+from undertow.plants.nominal_parameters import nominal
 from undertow.plants.reachability import open_loop_advice
 
 _ENVELOPE = 1e6

@@ -11,7 +11,7 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
 from undertow.core.status import Status
 from undertow.plants.levitation_rig import RIGS, LevitationRig, PerCoil
-from undertow.plants.nominal import nominal
+from undertow.plants.nominal_parameters import nominal
 
 FIDELITIES = ("ideal", "coil")
 

@@ -13,7 +13,7 @@ from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 from undertow.plants.arm_links import Links
-from undertow.plants.nominal import nominal
+from undertow.plants.nominal_parameters import nominal
 
 _ENVELOPE = 1e3  # rad, rad/s
 

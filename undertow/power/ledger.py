@@ -62,8 +62,8 @@ COLUMNS = {
     "energy_conversion": "energy out of nothing: (k_t - k_e) I Om, and what fidelity `ideal` leaves out",
     "energy_stored": "energy gone into windings and rotors",
     "energy_battery": "heat in the battery",
-    "energy_books": "what these leave over: rounding, where the equations conserve energy",
-    "energy_defect": "what is left over against the state itself: error of the integrator",
+    "energy_residual": "what these leave over: rounding, where the equations conserve energy",
+    "energy_integration_error": "what is left over against the state itself: error of the integrator",
 }
 
 
@@ -76,7 +76,7 @@ def columns(ledger: Ledger, stored: Joule, cells: Joule | None) -> dict[str, Jou
     """Entries of COLUMNS at one instant, of all thrusters together."""
     total = ledger.total()
     kept = {f"energy_{name}": value for name, value in total._asdict().items()}
-    return kept | {"energy_books": total.books(), "energy_defect": total.defect(stored, cells)}
+    return kept | {"energy_residual": total.books(), "energy_integration_error": total.defect(stored, cells)}
 
 
 def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.inf) -> dict[str, float]:
@@ -96,4 +96,4 @@ def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.
 
     drawn = change("source")[-1:].sum()
     share = lambda name: float(change(name).max() / drawn) if drawn else 0.0
-    return {f"energy_{name}_share": share(name) for name in ("books", "defect")}
+    return {"energy_balance_residual": share("energy_residual"), "energy_integration_residual": share("energy_integration_error")}

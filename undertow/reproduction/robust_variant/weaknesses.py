@@ -108,8 +108,9 @@ def _slow_rate(n: Numbers) -> str:
     if not sound > paper:
         return ""
     return (
-        f"Slow sampling of plain axes. At 100 Hz, velocities exact and no motor, Table 1 tracks to {paper:.2g} m; "
-        f"`robust` keeps room for three sampling times of delay, and tracks to {sound:.2g} m (A8)."
+        f"Slow sampling of plain axes. At 100 Hz, velocities exact and no motor, Table 1 tracks to {paper:.2g} m for "
+        f"the 10 s of A8, on drifting weights; `robust` keeps room for three sampling times of delay, and tracks to "
+        f"{sound:.2g} m."
     )
 
 
