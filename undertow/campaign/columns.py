@@ -70,7 +70,7 @@ def labels(several: Trials, built: Built) -> dict[str, Label]:
         built: one of them.
     """
     of_input = built.closed_loop.plant.input_unit
-    found, along = trial_labels(several.campaign, of_input), (*several.campaign.cross, DRAWS)
+    found, along = trial_labels(several.campaign, of_input), (*several.campaign.axes, DRAWS)
     for name in several.campaign.series.signals if several.campaign.series else ():
         said = _said(*record.meaning(name, built.closed_loop.plant)) | {"comment": _AFTER}
         found[f"series:{name}"] = Label((*along, *record.dimensions(name)), said)
@@ -81,7 +81,7 @@ def trial_labels(campaign: Campaign, input_unit: str = "") -> dict[str, Label]:
     """Labels of the columns that hold a number for each trial, by name; for a plant whose input has a unit."""
     of_metrics = {name: _said(MEANINGS[name].meaning, unit_of(name, input_unit)) for name in OVERALL}
     of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in drawn(campaign)} | ALWAYS | of_metrics
-    along = (*campaign.cross, DRAWS)
+    along = (*campaign.axes, DRAWS)
     return {name: Label(along, said, _DTYPES.get(name, "float64")) for name, said in of_trials.items()}
 
 
@@ -92,8 +92,8 @@ def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
         several: the trials.
         built: one of them.
     """
-    cross = several.campaign.cross
-    found = {key: xr.Variable((key,), _crossed(entries), {"long_name": key}) for key, entries in cross.items()}
+    axes = several.campaign.axes
+    found = {key: xr.Variable((key,), _crossed(entries), {"long_name": key}) for key, entries in axes.items()}
     if several.campaign.series is None:
         return found
     plan = planned(built, several.campaign.series)

@@ -96,4 +96,7 @@ def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.
 
     drawn = change("source")[-1:].sum()
     share = lambda name: float(change(name).max() / drawn) if drawn else 0.0
-    return {"energy_balance_residual": share("energy_residual"), "energy_integration_residual": share("energy_integration_error")}
+    return {
+        "energy_balance_residual": share("energy_residual"),
+        "energy_integration_residual": share("energy_integration_error"),
+    }

@@ -38,14 +38,14 @@ class Reproduction(NamedTuple):
         return {name: self.runs[f"{fidelity}_{name}"].dataset for name in CONTROLLERS}
 
 
-def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True) -> Reproduction:
+def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: bool = True) -> Reproduction:
     """Run the paper and audit it; writes `runs/`, `scenarios/` and `results.json` into a folder.
 
     Args:
         folder: an existing, empty folder.
         quick: fewer points in the sweeps and a long horizon of 200 s, not 2,000 s; the same accuracy.
         progress: told a message and the share done.
-        sound: whether to run the last chapter, the sound version beside the paper's.
+        robust_variant: whether to run the last chapter, the robust variant beside the paper's.
     """
     wanted = examples.scenarios() | claims.scenarios(quick)
     batched = horizons.scenarios(quick) | lag_map.scenarios(quick) | claims.batched(quick)
@@ -75,8 +75,8 @@ def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True)
         "drifting": drifting.shown(folder),
         "claims": claims.audit(runs, long),
     }
-    if sound:
+    if robust_variant:
         last = chapter(folder, quick, lambda message, share: progress(message, _LONG + (_RUNNING - _LONG) * share))
-        results["sound"], runs = last.results, runs | last.runs
+        results["robust_variant"], runs = last.results, runs | last.runs
     (folder / "results.json").write_text(to_json(results, indent=1) + "\n", encoding="utf-8")
     return Reproduction(results, runs, thruster_response())

@@ -32,7 +32,7 @@ _TITLES = {
 Rows = Sequence[Mapping[str, Any]]
 
 
-def sound_ladder_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dataset]) -> Figure:
+def robust_fidelity_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dataset]) -> Figure:
     """Errors against time at up to four places, and below them the steady tracking error at all of them.
 
     Args:

@@ -10,7 +10,7 @@ from undertow.report.figures.ablations import ablations_figure
 from undertow.report.figures.drifting import drifting_figure
 from undertow.report.figures.horizons import horizons_figure
 from undertow.report.figures.lags import lags_figure
-from undertow.report.figures.robust_fidelity import sound_ladder_figure
+from undertow.report.figures.robust_fidelity import robust_fidelity_figure
 from undertow.report.reproduction.report import write_report
 from undertow.reproduction.reproduce import Reproduction
 
@@ -35,14 +35,14 @@ def draw(found: Reproduction) -> dict[str, Figure]:
         "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),
         "drifting": drifting_figure(found.results["drifting"]),
     }
-    sound = found.results.get("sound")
-    return figures | _of_last_chapter(found, sound) if sound else figures
+    robust = found.results.get("robust_variant")
+    return figures | _of_last_chapter(found, robust) if robust else figures
 
 
-def _of_last_chapter(found: Reproduction, sound: dict[str, Any]) -> dict[str, Figure]:
-    rows = sound["ladder"]
+def _of_last_chapter(found: Reproduction, robust: dict[str, Any]) -> dict[str, Figure]:
+    rows = robust["fidelity"]
     datasets = {(row["place"], row["law"]): found.runs[Path(row["scenario"]).stem].dataset for row in rows}
     return {
-        "sound_ladder": sound_ladder_figure(rows, datasets),
-        "ablations": ablations_figure(sound["ablations"]),
+        "robust_fidelity": robust_fidelity_figure(rows, datasets),
+        "ablations": ablations_figure(robust["ablations"]),
     }

@@ -12,7 +12,7 @@ from undertow.report.page import Html, bullets, document, figure, section, table
 from undertow.report.reproduction import horizon_section, tables
 from undertow.report.reproduction.background import ASSUMED, INTRODUCTION, LEFT_OPEN
 from undertow.report.reproduction.captions import captions
-from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, sound_section
+from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, robust_section
 
 _TITLE = "The paper, reproduced and audited"
 
@@ -52,7 +52,7 @@ def _content(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html
         "table2": ("Table 2 in numbers", _table2(results)),
         "ladder": ("The ladder: how much of the thruster is real", _ladder(results, drawn)),
         "audit": ("Audit of the claims", _audit(claims, drawn)),
-        "sound": (TITLE, sound_section(results.get("sound") or {}, drawn)),
+        "robust_variant": (TITLE, robust_section(results.get("robust_variant") or {}, drawn)),
         "open": ("What the paper leaves open, and misprints", _left_open()),
         "provenance": ("Provenance", _provenance(results)),
     }
