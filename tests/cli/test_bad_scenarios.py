@@ -233,7 +233,7 @@ MISTAKES = {
     "negative noise": (
         "seed: 3",
         "navigation: {kind: white_noise, velocity: -1}",
-        "`sensor.velocity` must be zero or positive, but is -1 (s.yaml, line 11)",
+        "`navigation.velocity` must be zero or positive, but is -1 (s.yaml, line 11)",
     ),
     "two sources of samples": (
         "kind: u1",
@@ -309,7 +309,7 @@ def test_numbers_and_words_of_yaml_1_2(tmp_path):
 
 
 def test_merged_keys_have_the_place_of_what_they_belong_to(refused, tmp_path):
-    text = SCENARIO.replace("disturbance: {kind: u1}", "disturbance: &x {kind: u1, scale: big}\nsensor:\n  <<: *x")
+    text = SCENARIO.replace("disturbance: {kind: u1}", "disturbance: &x {kind: u1, scale: big}\nnavigation:\n  <<: *x")
     (tmp_path / "s.yaml").write_text(text.replace("disturbance: &x", "model: &x"))
     said = "`model.kind` must be an option here, but is unknown (s.yaml, line 8). "
     assert refused("simulate", "s.yaml").startswith(said)

@@ -43,5 +43,5 @@ def test_missing_file(refused, tmp_path):
 def test_wrong_number_of_columns(refused, tmp_path):
     (tmp_path / "d.csv").write_text("t,d1\n0,1\n1,2\n")
     (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: u1", "kind: table, file: d.csv"))
-    said = "`disturbance.signals` must have columns t, d1..d6, but is a table of 2 columns (s.yaml, line 8)"
+    said = "`disturbance.samples` must have columns t, d1..d6, but is a table of 2 columns (s.yaml, line 8)"
     assert refused("simulate", "s.yaml") == said

@@ -17,7 +17,7 @@ from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import continuous, sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.observer import navigation
+from undertow.navigation.observer import observer
 from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
@@ -227,7 +227,7 @@ class Flooded(Depth):
 def test_navigation_leaves_out_readings_that_are_none():
     """As if they were lost: the estimate goes on, each is counted, and the depth is known again afterwards."""
     quiet = [imu(angle_noise=0, rate_noise=0, force_noise=0), dvl(noise=0, resolution=0, delay=0), compass(noise=0)]
-    sensor = navigation([*quiet, position_fix(noise=0, delay=0), Flooded(Sampling(0.05), 0.2)])
+    sensor = observer([*quiet, position_fix(noise=0, delay=0), Flooded(Sampling(0.05), 0.2)])
     motion = lambda t: Measurement(jnp.zeros(6).at[2].set(jnp.sin(t)), jnp.zeros(6).at[2].set(jnp.cos(t)))
     path = sensor.realize(jax.random.PRNGKey(0))
 

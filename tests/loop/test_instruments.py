@@ -16,59 +16,59 @@ from undertow.thrusters.thruster import PropellerReport
 QUIET_IMU = {"angle_noise": 0.0, "rate_noise": 0.0, "force_noise": 0.0}
 
 
-def initial_measuring(sampling, step, duration, truth=lambda t: jnp.stack([t]), key=0):
-    """Instants, readings and freshness of an sensor that is asked every `step` seconds."""
+def readings_of(sampling, step, duration, truth=lambda t: jnp.stack([t]), key=0):
+    """Instants, readings and freshness of a sensor that is asked every `step` seconds."""
     steps = round(duration / step)
     times = jnp.arange(steps, dtype=float) * step
 
-    def step(state, t):
+    def advance(state, t):
         chance = jax.random.normal(jax.random.fold_in(jax.random.PRNGKey(key), sampling.number(t)), (2,))
         arrival, state = sampling.deliver(state, t, truth(t), chance)
         return state, arrival
 
-    _, arrivals = jax.lax.scan(step, sampling.init(jnp.zeros(1), jnp.ones(1)), times)
+    _, arrivals = jax.lax.scan(advance, sampling.init(jnp.zeros(1), jnp.ones(1)), times)
     return np.asarray(times), np.asarray(arrivals.reading[:, 0]), np.asarray(arrivals.fresh)
 
 
 def test_readings_come_at_the_period_and_are_as_old_as_the_delay():
     """The truth is the time itself, so a reading tells when it was taken."""
-    times, readings, fresh = initial_measuring(Sampling(0.05, delay=0.12), 0.01, 2.0)
+    times, readings, fresh = readings_of(Sampling(0.05, delay=0.12), 0.01, 2.0)
     np.testing.assert_allclose(times[fresh], np.arange(38) * 0.05 + 0.12, atol=1e-12)
     np.testing.assert_allclose(readings[fresh], np.arange(38) * 0.05, atol=1e-12)
 
 
 def test_a_period_between_ticks_waits_for_the_next_tick():
-    times, readings, fresh = initial_measuring(Sampling(0.015), 0.01, 0.1)
+    times, readings, fresh = readings_of(Sampling(0.015), 0.01, 0.1)
     np.testing.assert_allclose(times[fresh], [0.0, 0.02, 0.03, 0.05, 0.06, 0.08, 0.09], atol=1e-12)
     np.testing.assert_array_equal(readings[fresh], times[fresh])
 
 
 def test_faster_than_the_loop_the_newest_is_heard():
-    times, readings, fresh = initial_measuring(Sampling(0.01, delay=0.03), 0.05, 1.0)
+    times, readings, fresh = readings_of(Sampling(0.01, delay=0.03), 0.05, 1.0)
     assert fresh[1:].all() and not fresh[0]
     # Sample (t - delay) falls between two steps and is answered with the truth at the step after it.
     np.testing.assert_allclose(readings[fresh], times[fresh], atol=1e-12)
 
 
 def test_resolution_rounds_to_the_nearest_step():
-    _, readings, _ = initial_measuring(Sampling(0.01, resolution=0.25), 0.01, 1.0)
+    _, readings, _ = readings_of(Sampling(0.01, resolution=0.25), 0.01, 1.0)
     np.testing.assert_array_equal(readings, np.round(np.arange(100) * 0.01 / 0.25) * 0.25)
 
 
 def test_bias_is_one_number_per_run():
-    _, readings, _ = initial_measuring(Sampling(0.01, bias=0.3), 0.01, 0.5, lambda t: jnp.zeros(1))
+    _, readings, _ = readings_of(Sampling(0.01, bias=0.3), 0.01, 0.5, lambda t: jnp.zeros(1))
     np.testing.assert_allclose(readings, 0.3, rtol=1e-15)
 
 
 def test_noise_belongs_to_the_sample_not_to_the_loop():
     sampling, still = Sampling(0.02, noise=0.5), lambda t: jnp.zeros(1)
-    _, slow, when_slow = initial_measuring(sampling, 0.02, 4.0, still)
-    _, fast, when_fast = initial_measuring(sampling, 0.005, 4.0, still)
+    _, slow, when_slow = readings_of(sampling, 0.02, 4.0, still)
+    _, fast, when_fast = readings_of(sampling, 0.005, 4.0, still)
     np.testing.assert_array_equal(slow[when_slow], fast[when_fast])
 
 
 def test_noise_and_dropout_have_the_stated_statistics():
-    _, readings, fresh = initial_measuring(Sampling(0.01, noise=0.5, dropout=0.3), 0.01, 200.0, lambda t: jnp.zeros(1))
+    _, readings, fresh = readings_of(Sampling(0.01, noise=0.5, dropout=0.3), 0.01, 200.0, lambda t: jnp.zeros(1))
     kept, n = readings[fresh], len(fresh)
     assert abs(fresh.mean() - 0.7) < 4 * np.sqrt(0.21 / n)
     assert abs(kept.mean()) < 4 * 0.5 / np.sqrt(len(kept))
@@ -111,17 +111,17 @@ def observe(sensor, motion, steps, step, key):
     """Estimated and true measurements at every step."""
     path = sensor.realize(key)
 
-    def step(state, k):
+    def advance(state, k):
         truth = motion(k * step)
         told, state = sensor.measure(path, state, k * step, truth)
         return state, (told, truth)
 
-    return jax.lax.scan(step, sensor.init(path, motion(0.0)), jnp.arange(steps, dtype=float))[1]
+    return jax.lax.scan(advance, sensor.init(path, motion(0.0)), jnp.arange(steps, dtype=float))[1]
 
 
 def errors(sensors, motion, step, duration, key=0):
     """Errors of position and velocity at every step, [t, 12]."""
-    told, truth = observe(navigation(sensors), motion, round(duration / step), step, jax.random.PRNGKey(key))
+    told, truth = observe(observer(sensors), motion, round(duration / step), step, jax.random.PRNGKey(key))
     apart = told.position - truth.position
     apart = apart.at[:, 3:].set(wrap_angle(apart[:, 3:]))
     return np.concatenate([apart, told.velocity - truth.velocity], axis=1)
@@ -198,9 +198,9 @@ def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
         dvl(period=period, noise=0, resolution=0, delay=0, blend=alpha),
         compass(noise=0),
     ]
-    sensor = navigation(parts)
+    sensor = observer(parts)
     level = lambda t: Measurement(jnp.zeros(6), jnp.zeros(6))
-    realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).spoken[0].offset[5:]
+    realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).states[0].offset[5:]
     velocity = errors(parts, level, 0.01, 40.0, key)[2000:, 6:9]
     before_correction = np.abs(velocity).max(0)
     expected = np.abs(np.asarray(realization)) * period / alpha * (1 - alpha)
@@ -217,7 +217,7 @@ def test_propeller_speed_and_its_rate(rate):
         return Measurement(jnp.zeros(6), jnp.zeros(6), PropellerReport(jnp.array([3.0, -2.0]) * t, rate))
 
     parts = [imu(**QUIET_IMU), propeller_speed(noise=0)]
-    told, truth = observe(navigation(parts), motion, 100, 0.01, jax.random.PRNGKey(0))
+    told, truth = observe(observer(parts), motion, 100, 0.01, jax.random.PRNGKey(0))
     np.testing.assert_allclose(told.actuator.speed, truth.actuator.speed, atol=1e-12)
     if rate is None:
         assert told.actuator.acceleration is None
@@ -234,10 +234,10 @@ def test_the_same_key_gives_the_same_bits():
 
 def test_an_imu_is_needed():
     with pytest.raises(BadInput, match="IMU among them"):
-        navigation([dvl(), depth()])
+        observer([dvl(), depth()])
 
 
 def test_only_vehicles_navigate():
     with pytest.raises(BadInput, match="a plant of 1 output"):
-        sensor = navigation([imu()])
+        sensor = observer([imu()])
         sensor.init(sensor.realize(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)))

@@ -12,7 +12,7 @@ from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
 from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.observer import navigation
+from undertow.navigation.observer import observer
 from undertow.navigation.white_noise import white_noise
 from undertow.numerics.randomness import numbered
 from undertow.plants.double_integrator import double_integrator
@@ -42,7 +42,7 @@ def test_no_two_parts_share_a_key(seed):
     disturbance = Together((*(Keyed() for _ in range(6)), Together((Keyed(), Keyed(), Keyed()))))
     sensors = [imu(), dvl(), depth(), position_fix(), compass(), propeller_speed()]
     plant = double_integrator()
-    loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, navigation(sensors))
+    loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, observer(sensors))
     realization = loop.realize(jax.random.PRNGKey(seed))
     keys = [*jax.tree.leaves(realization.disturbance_realization), *realization.navigation_realization]
     samples = [
@@ -90,7 +90,7 @@ def test_instruments_are_heard_and_noisy_at_any_time(precision):
     with runtime.in_precision(precision):
         times = [(0.0, 10.0), (1e7, 10.0)] + [(0.0, 1e-7), (1e5, 1e-7)] * (precision == "float64")
         for start, period in times:
-            sensor = navigation([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
+            sensor = observer([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
             truth = Measurement(jnp.zeros(6), jnp.zeros(6))
             path = sensor.realize(jax.random.PRNGKey(1))
 

@@ -168,7 +168,7 @@ def test_energy_is_accounted_for(kind):
     run = sampled.simulate(station(kind, law, offset=0.2), duration=2.0, dt=0.02, record_every=10, substeps=8)
     found = {name: np.asarray(values) for name, values in run.signals.diagnostics.items() if name.startswith("energy_")}
     assert found["energy_source"][-1] > 5.0
-    assert np.abs(found["energy_defect"]).max() < 1e-3 * found["energy_source"][-1]
+    assert np.abs(found["energy_integration_error"]).max() < 1e-3 * found["energy_source"][-1]
 
 
 @pytest.mark.parametrize("make", [t200, t500], ids=["t200", "t500"])

@@ -122,8 +122,8 @@ def test_defect_falls_with_the_step_at_the_order_of_the_integrator(fidelity, dt,
         return plant.diagnostics(jax.lax.fori_loop(0, steps, move, plant.initial_state()), volts)
 
     ends = [diagnostics(dt / n, np.asarray(round(0.2 / dt * n))) for n in (first, 2 * first, 4 * first)]
-    assert all(abs(end["energy_books"]) < 1e-12 * end["energy_source"] for end in ends)
-    defects = np.abs([end["energy_defect"] / end["energy_source"] for end in ends])
+    assert all(abs(end["energy_residual"]) < 1e-12 * end["energy_source"] for end in ends)
+    defects = np.abs([end["energy_integration_error"] / end["energy_source"] for end in ends])
     assert defects[-1] > 1e-12, "above rounding"
     slopes = np.log2(defects[:-1] / defects[1:])
     assert abs(slopes[-1] - order) < 0.2, (defects, slopes)
@@ -134,8 +134,8 @@ def test_closure_over_a_part_of_a_run():
     diagnostics = {
         "time": time,
         "energy_source": 100 * time,
-        "energy_books": np.array([0.0, 1.0, -2.0, 0.5, 0.5]),
-        "energy_defect": np.array([0.0, 0.0, 0.0, 0.0, 8.0]),
+        "energy_residual": np.array([0.0, 1.0, -2.0, 0.5, 0.5]),
+        "energy_integration_error": np.array([0.0, 0.0, 0.0, 0.0, 8.0]),
     }
     assert closure(diagnostics) == {"energy_balance_residual": 0.005, "energy_integration_residual": 0.02}
     assert closure(diagnostics, 2.0, 3.0) == {"energy_balance_residual": 0.025, "energy_integration_residual": 0.0}

@@ -49,18 +49,18 @@ def test_jacobian_is_that_of_the_code(rails, rule):
     zero = jnp.zeros(())
     flat, restore = ravel_pytree(drawn.start())
 
-    def step(flat, step):
+    def advance(flat, step):
         x, z = restore(flat)
         seen = drawn.decide(zero, x, z)
         moved = rk4(lambda t, x: loop.plant.dynamics(t, x, seen.applied, drawn.load(t, x)), zero, x, step)
         after = moved, loop.controller.advance(z, seen.y, seen.r, seen.applied, step)
         return ravel_pytree(after)[0]
 
-    step = jax.jit(step)
+    advance = jax.jit(advance)
     nudges = 1e-6 * np.eye(flat.size)
     for dt in (1e-3, 3e-3):
         step = jnp.asarray(dt)
-        columns = [(step(flat + nudge, step) - step(flat - nudge, step)) / 2e-6 for nudge in nudges]
+        columns = [(advance(flat + nudge, step) - advance(flat - nudge, step)) / 2e-6 for nudge in nudges]
         found = np.linalg.eigvals(np.stack(columns, 1))
         predicted = np.linalg.eigvals(small_signal.sampled_matrix(loop.controller, dt, rule))
         marginal = np.ones(len(found) - 4)  # x_hat, and weights that cancel in d_hat

@@ -112,7 +112,7 @@ def test_parameter_sets_take_turns():
 
 def test_slopes_are_taken_without_steps():
     """Rounded readings have no slope: nothing is rounded, nothing else changes."""
-    sensor = navigation([imu(), dvl(), depth()])
+    sensor = observer([imu(), dvl(), depth()])
     plant = hybrid_vehicle(bluerov2_heavy(), t200())
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0] * 6), sinusoid(), sensor)
     smooth = without(loop, ("resolution", "dead_zone"))

@@ -40,9 +40,9 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
         typer.echo(f"Advice: left to XLA, which is slower, as lanes (docs/lanes.md) lack something: {why}.", err=True)
-    predicted = predicted.metrics if predicted else None
+    expected = predicted.metrics if predicted else None
     unit = executed.built.closed_loop.plant.input_unit
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, predicted))
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, expected))
     if predicted:
         console.print(f"{judgement(predicted, executed)}.", highlight=False, soft_wrap=True)
     certificate = certificate_of(executed.dataset)

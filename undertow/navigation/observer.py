@@ -123,7 +123,7 @@ def _either(fresh, new: Estimate, old: Estimate) -> Estimate:
     return jax.tree.map(lambda a, b: jnp.where(fresh, a, b), new, old)
 
 
-def navigation(sensors) -> Navigation:
+def observer(sensors) -> Navigation:
     """A vehicle that knows where it is from its sensors only. For the sampled loop.
 
     Args:

@@ -80,10 +80,11 @@ def columns(ledger: Ledger, stored: Joule, cells: Joule | None) -> dict[str, Jou
 
 
 def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.inf) -> dict[str, float]:
-    """How far the books of a recorded run close between two times, s; {} without a ledger.
+    """How well the energy balance of a recorded run closes between two times, s; {} without a ledger.
 
     Returns:
-        Largest change of `books` and of `defect` since the start, as shares of the energy drawn until the stop.
+        Largest change of the residual and of the integration error since the start, as shares
+        of the energy drawn until the stop.
     """
     if "energy_source" not in recorded:
         return {}
@@ -96,7 +97,4 @@ def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.
 
     drawn = change("source")[-1:].sum()
     share = lambda name: float(change(name).max() / drawn) if drawn else 0.0
-    return {
-        "energy_balance_residual": share("energy_residual"),
-        "energy_integration_residual": share("energy_integration_error"),
-    }
+    return {"energy_balance_residual": share("residual"), "energy_integration_residual": share("integration_error")}

@@ -57,8 +57,8 @@ def fly(
     checks.positive("duration", duration, "s")
     checks.positive("dt", dt, "s")
     timestep = body.model.opt.timestep
-    steps = round(dt / timestep)
-    if steps < 1 or abs(steps * timestep - dt) > 1e-9 * dt:
+    per_step = round(dt / timestep)
+    if per_step < 1 or abs(per_step * timestep - dt) > 1e-9 * dt:
         raise BadInput("dt", f"be a whole number of the engine's steps ({timestep:g} s)", f"{dt:g} s")
     propellers = Propellers(thruster, body.model.nu)
     start = np.zeros(6) if position is None else np.asarray(position, dtype=float)
@@ -77,9 +77,9 @@ def fly(
             break
         rows.append((t, body.position(), body.velocity(), np.asarray(r.position), applied))
         if step < steps:
-            thrusts = propellers.turn(applied, dt, 2 * steps)
+            thrusts = propellers.turn(applied, dt, 2 * per_step)
             # Runge-Kutta asks at the ends and in the middle of each step.
-            body.advance(lambda now, t=t, thrusts=thrusts: thrusts[round(2 * (now - t) / timestep)], steps)
+            body.advance(lambda now, t=t, thrusts=thrusts: thrusts[round(2 * (now - t) / timestep)], per_step)
             z = advance(z, y, r, jnp.asarray(applied), jnp.asarray(dt))
     return Flight(*map(np.array, zip(*rows, strict=True)), status=status)
 
