@@ -20,8 +20,8 @@ from undertow.plants import double_integrator
 from undertow.reproduction.ablations import study
 from undertow.reproduction.ablations.study import Spread, Summary, spread
 from undertow.reproduction.ablations.verdicts import ABLATIONS
-from undertow.reproduction.matching import equal_gain_ratio
 from undertow.reproduction.robust_variant import conclusions, fidelity
+from undertow.reproduction.setup import equal_gain_ratio
 from undertow.scenario.reading import dump, from_data
 from undertow.scenario.schema import validate
 

@@ -1,4 +1,4 @@
-"""Thrusters that fail unannounced: given ones, or others for every seed."""
+"""Undetected thruster failures: given thrusters, or others for every seed."""
 
 import jax
 import jax.numpy as jnp
@@ -49,7 +49,7 @@ def thruster_loss(
     failing: tuple[int, ...] | None = None,
     thrusters: int = 8,
 ) -> ThrusterLoss:
-    """Loss of thrusters that nobody is told of.
+    """Undetected loss of thrusters.
 
     Args:
         remaining: share of the thrust that remains; 0 for off, -1 for reversed.

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from undertow.reproduction import claims, drifting, examples, horizons, lag_map
-from undertow.reproduction.batches import start
-from undertow.reproduction.experiments import run_all, write_all
 from undertow.reproduction.robust_variant.chapter import chapter
+from undertow.reproduction.running import run_all, start, write_all
 from undertow.reproduction.setup import CONTROLLERS
 from undertow.reproduction.thruster_response import ThrusterResponse, thruster_response
 from undertow.scenario.execute import Executed
@@ -34,7 +33,7 @@ class Reproduction(NamedTuple):
     response: ThrusterResponse
 
     def datasets(self, fidelity: str) -> dict[str, xr.Dataset]:
-        """Recorded series on a fidelity of the ladder, by controller. Examples 1 and 2 are `ideal` and `static`."""
+        """Recorded series on a fidelity, by controller. Examples 1 and 2 are `ideal` and `static`."""
         return {name: self.runs[f"{fidelity}_{name}"].dataset for name in CONTROLLERS}
 
 
@@ -52,10 +51,10 @@ def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: boo
     write_all(batched, folder)
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         try:
-            flying = start(batched, horizons.windows(quick), 1.0, ("weights_peak",), pool)
+            running_batches = start(batched, horizons.windows(quick), 1.0, ("weights_peak",), pool)
             runs = run_all(wanted, folder, lambda message, share: progress(message, _PAPER * share))
-            progress(f"{horizons.duration(quick):g} s of the ladder", _PAPER)
-            long = flying()
+            progress(f"{horizons.duration(quick):g} s on every fidelity", _PAPER)
+            long = running_batches()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -65,7 +64,7 @@ def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: boo
         "example1": examples.example(runs, 1),
         "example2": examples.example(runs, 2),
         "table2": examples.table2(runs),
-        "ladder": examples.ladder(runs),
+        "fidelity": examples.fidelity(runs),
         "horizons": {
             "duration": horizons.duration(quick),
             "windows": horizons.windows(quick),

@@ -5,7 +5,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from undertow.report.figures import ladder_figure, paper_figures, sweep_figure
+from undertow.report.figures import fidelity_figure, paper_figures, sweep_figure
 from undertow.report.figures.ablations import ablations_figure
 from undertow.report.figures.drifting import drifting_figure
 from undertow.report.figures.horizons import horizons_figure
@@ -27,9 +27,9 @@ def write(found: Reproduction, folder: Path) -> Path:
 def draw(found: Reproduction) -> dict[str, Figure]:
     """Every figure of the report, by name."""
     numbers = {claim["id"]: claim["numbers"] for claim in found.results["claims"]}
-    ladder = found.results["ladder"]
+    compared = found.results["fidelity"]
     figures = paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
-        "ladder": ladder_figure(ladder, {fidelity: found.datasets(fidelity) for fidelity in ladder}),
+        "fidelity": fidelity_figure(compared, {fidelity: found.datasets(fidelity) for fidelity in compared}),
         "sweep": sweep_figure(numbers["C6"]["sweep"]),
         "horizons": horizons_figure(found.results["horizons"]["rows"], found.results["horizons"]["duration"]),
         "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),

@@ -47,8 +47,8 @@ def robust_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> lis
         "the paper's laws, all of them sampled. The commands are to be typed in the folder of this page: `undertow "
         "simulate` and the file named below each law; each ablation is `undertow campaign` and a file of campaigns/."
     )
-    ladder = [tag("h3", "Every fidelity again"), tag("p", prose(told)), *_figure(drawn, "robust_fidelity")]
-    return [*lists, *ladder, tables.fidelity(results["fidelity"]), *_ablations(results, drawn)]
+    compared = [tag("h3", "Every fidelity again"), tag("p", prose(told)), *_figure(drawn, "robust_fidelity")]
+    return [*lists, *compared, tables.fidelity(results["fidelity"]), *_ablations(results, drawn)]
 
 
 def _ablations(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:

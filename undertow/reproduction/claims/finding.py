@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from undertow.reproduction.matching import equal_gain_ratio
+from undertow.reproduction.setup import equal_gain_ratio
 from undertow.scenario.execute import Executed
 
 Runs = Mapping[str, Executed]

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 from undertow.reproduction.ablations import study
 from undertow.reproduction.ablations.verdicts import ABLATIONS
-from undertow.reproduction.experiments import run_all
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
+from undertow.reproduction.running import run_all
 from undertow.scenario.execute import Executed
 
 Progress = Callable[[str, float], None]

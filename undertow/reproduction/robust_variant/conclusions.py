@@ -82,7 +82,7 @@ def _loss(n: Numbers) -> str:
     if failed or not one < 0.01:
         return ""
     return (
-        f"Loss of thrust that nobody is told of. With one of ODIN's eight thrusters off, drawn anew for each of "
+        f"Undetected loss of thrust. With one of ODIN's eight thrusters off, drawn anew for each of "
         f"{seeds} seeds, no run ends early; the error grows from {none:.2g} to {one:.2g} (A13; thrusters without lag)."
     )
 
@@ -137,15 +137,15 @@ def _robust_term(n: Numbers) -> str:
 def _tuned(n: Numbers) -> str:
     fuzzy, plain, rafc = (n.median("A6", f"{name}, tuned") for name in ("RCAFC", "linear observer", "RAFC"))
     return (
-        f"Tuning. With the same budget, told on other seeds: RCAFC {fuzzy:.2g}, linear observer {plain:.2g}, "
+        f"Tuning. With the same budget, evaluated on other seeds: RCAFC {fuzzy:.2g}, linear observer {plain:.2g}, "
         f"RAFC {rafc:.2g} m (A6)."
     )
 
 
 def _limited(n: Numbers) -> str:
     fuzzy, plain = (n.median("A6", f"{name}, limited") for name in ("RCAFC", "linear observer"))
-    told = "The linear observer, fed with the applied input too, is as safe"
-    return f"Limits. {told}: {plain:.3g} m, RCAFC {fuzzy:.3g} m (A6)."
+    safe = "The linear observer, fed with the applied input too, is as safe"
+    return f"Limits. {safe}: {plain:.3g} m, RCAFC {fuzzy:.3g} m (A6)."
 
 
 def _motor(n: Numbers) -> str:
@@ -155,7 +155,7 @@ def _motor(n: Numbers) -> str:
     kept = robust["steady"]["tracking_rms"]
     return (
         f"A motor. With all of Eqs. (8) to (11) Table 1 ends after {paper['diverged_at']:.2g} s; preset `robust`, "
-        f"which knows the motor, tracks to {kept:.2g} without propeller speeds (20 s; 2,000 s: see the ladder)."
+        f"which knows the motor, tracks to {kept:.2g} without propeller speeds (20 s; 2,000 s: see the long runs)."
     )
 
 
@@ -262,7 +262,7 @@ def _noisy_motor(n: Numbers) -> str:
     if not own > 2 * searched:
         return ""
     return (
-        f"Noise it is not told of. With 2 mm/s of velocity noise `robust` moves the voltage by {own:.2g} V/s; with a "
+        f"Unmodelled noise. With 2 mm/s of velocity noise `robust` moves the voltage by {own:.2g} V/s; with a "
         f"bandwidth and an actuator rate found by search by {searched:.2g} V/s (A20)."
     )
 

@@ -1,7 +1,8 @@
-"""Scenarios flown in batches, for horizons at which a series of every sample is too long to keep."""
+"""Running named scenarios: one by one, each saved so that it can be run again, or many of one program in batches."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -15,9 +16,37 @@ from undertow.campaign.runs import leaves, planned, run_of
 from undertow.core.status import Status
 from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run
 from undertow.scenario.build import Built, build
+from undertow.scenario.execute import Executed, execute, save
 from undertow.scenario.part_cache import PartCache, structure
+from undertow.scenario.reading import dump
 
+Scenarios = Mapping[str, dict[str, Any]]
 Window = tuple[float, float]  # s
+
+
+def run_all(scenarios: Scenarios, folder: Path, progress: Callable[[str, float], None]) -> dict[str, Executed]:
+    """Run named scenarios; writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
+
+    Args:
+        scenarios: name -> scenario.
+        folder: where the results go.
+        progress: told a message and the share done.
+    """
+    write_all(scenarios, folder)
+    (folder / "runs").mkdir(exist_ok=True)
+    found = {}
+    for name, scenario in scenarios.items():
+        progress(f"running {name}", len(found) / len(scenarios))
+        found[name] = execute(scenario)
+        save(found[name].dataset, folder / "runs" / f"{name}.nc")
+    return found
+
+
+def write_all(scenarios: Scenarios, folder: Path) -> None:
+    """Write `scenarios/<name>.yaml`, for those who want to run them again."""
+    (folder / "scenarios").mkdir(parents=True, exist_ok=True)
+    for name, scenario in scenarios.items():
+        (folder / "scenarios" / f"{name}.yaml").write_text(dump(scenario), encoding="utf-8")
 
 
 class BatchResult(NamedTuple):
@@ -36,7 +65,7 @@ class BatchResult(NamedTuple):
         return self.status is Status.OK
 
 
-def fly(
+def run_batches(
     scenarios: Mapping[str, dict[str, Any]], windows: Sequence[Window], every: float, signals: Sequence[str]
 ) -> dict[str, BatchResult]:
     """Run sampled scenarios, those whose programs are equal side by side; arguments and errors of `start`."""
@@ -73,11 +102,11 @@ def start(
         groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
     pieces = [pool.submit(_together, plan, runs) for (_, plan), runs in groups.items()]
 
-    def flown() -> dict[str, BatchResult]:
+    def finished() -> dict[str, BatchResult]:
         ended = {name: one for piece in pieces for name, one in piece.result().items()}
         return {name: _ran(one, ended[name], windows) for name, one in built.items()}
 
-    return flown
+    return finished
 
 
 def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ended]:
@@ -88,15 +117,15 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ende
         all(np.array_equal(column[0], other) for other in column[1:]) for column in zip(*numbers.values(), strict=True)
     ]
     lengths = {steps: [name for name in runs if runs[name][1] == steps] for _, steps in runs.values()}
-    # A program for one run is faster than one for eight that flies one.
+    # A program for one run is faster than one for eight that runs one.
     width = min(lanes_of(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
     batch = BatchRunner(first, plan, constant, width)
     tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}
     for steps, names in lengths.items():
         stacked = [np.stack(column) for column in zip(*(numbers[name] for name in names), strict=True)]
-        flown = batch.run(jax.tree.unflatten(tree, stacked), steps)
+        outcome = batch.run(jax.tree.unflatten(tree, stacked), steps)
         for i, name in enumerate(names):
-            found[name] = jax.tree.map(lambda leaf, i=i: leaf[i] if isinstance(leaf, np.ndarray) else leaf, flown)
+            found[name] = jax.tree.map(lambda leaf, i=i: leaf[i] if isinstance(leaf, np.ndarray) else leaf, outcome)
     return found
 
 
