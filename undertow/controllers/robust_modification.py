@@ -45,7 +45,7 @@ class RobustModification(eqx.Module):
         return learnt - (adaptation * (self.leakage + self.e_modification * size))[:, None] * weights
 
 
-def robust_modification(leakage, e_modification, dead_zone) -> RobustModification | None:
+def modification_of(leakage, e_modification, dead_zone) -> RobustModification | None:
     """One with these values; None, which costs nothing, where all of them are zero."""
     values = (leakage, e_modification, dead_zone)
     if not any(isinstance(value, Tracer) or np.any(np.asarray(value) != 0) for value in values):

@@ -44,7 +44,7 @@ class ThrusterLoss(AbstractDisturbance):
 
 def thruster_loss(
     remaining: float = 0.0,
-    start: float = 2.0,
+    start: float = 0.0,
     number: int = 1,
     failing: tuple[int, ...] | None = None,
     thrusters: int = 8,

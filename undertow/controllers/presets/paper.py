@@ -3,7 +3,7 @@
 import math
 
 from undertow.controllers.composite_law import FUZZY_INPUTS, RCAF
-from undertow.controllers.robust_modification import robust_modification
+from undertow.controllers.robust_modification import modification_of
 from undertow.core import checks
 from undertow.core.contracts import AbstractModel
 from undertow.core.errors import BadInput
@@ -92,7 +92,7 @@ def paper(
         robust_gain=robust_gain,
         layer=layer,
         weights_bound=weights_bound,
-        modification=robust_modification(leakage, e_modification, dead_zone),
+        modification=modification_of(leakage, e_modification, dead_zone),
         identification_input=identification_input,
         switching=switching,
         fuzzy_input=fuzzy_input,
