@@ -76,7 +76,7 @@ def test_what_a_gpu_would_do(monkeypatch):
     assert measure.vmapped_ns(short(W1, 5), runs=3) > 0
     monkeypatch.setattr(nvidia, "ptx", lambda assembly, generation: assembly)
     found = measure.on_gpu(short(W1, 5), Driver(EmulatedGpu()), runs=40)
-    assert found["ns"] > 0 and found["ticks_per_second"] == pytest.approx(1e9 / found["ns"])
+    assert found["ns"] > 0 and found["steps_per_second"] == pytest.approx(1e9 / found["ns"])
 
 
 @pytest.mark.slow
@@ -87,7 +87,7 @@ def test_bench(capsys):
     assert found["single_times_numpy"] == pytest.approx(found["numpy_ns"] / found["single_ns"], rel=1e-4)
     assert found["first_cold_s"] > found["first_kept_s"] > 0
     assert found["batch_float64_ns"] < found["single_ns"] < found["numpy_ns"]
-    assert found["w2_tracking_rms"] == pytest.approx(0.0082, rel=0.05) and found["w2_ticks"] == 12_000
+    assert found["w2_tracking_rms"] == pytest.approx(0.0082, rel=0.05) and found["w2_steps"] == 12_000
     assert found["w2_operations"] > found["operations"] > 2_000
     assert run(["bench"]) == 0
     said = capsys.readouterr().out
