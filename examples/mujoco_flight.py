@@ -28,7 +28,7 @@ def main(fast: bool = False, figure: str | None = None) -> dict[str, float]:
     gap = np.abs(flight.position - run.dataset.position.values).max(axis=0)
     found["position in flight, m"] = float(gap[:3].max())
     found["attitude in flight, rad"] = float(gap[3:].max())
-    found["voltage in flight, V"] = float(np.abs(flight.voltage - run.dataset.voltage.values).max())
+    found["voltage in flight, V"] = float(np.abs(flight.voltage - run.dataset["input"].values).max())
     for name, difference in found.items():
         print(f"{name:<26}{difference:8.0e}")
     print(f"flight of {flight.time[-1]:g} s: undertow {run.status.word}, MuJoCo {flight.status.word}")

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from undertow.analysis.metric_meanings import MEANINGS, unit_of
+from undertow.analysis.metrics import for_people, meanings
+from undertow.analysis.success import Success, criterion_of
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
@@ -28,7 +29,7 @@ from undertow.navigation.perfect import perfect
 from undertow.scenario import execute
 from undertow.scenario.consistency import check_fit, check_times, rounded_times
 from undertow.scenario.reading import from_data, read
-from undertow.scenario.results import certificate_of, label
+from undertow.scenario.results import Measuring, certificate_of, label, metrics_of
 from undertow.scenario.schema import Initial, Loop, Window, complaint
 from undertow.scenario.step_size import step_failure
 
@@ -46,12 +47,14 @@ class Run:
             per-axis values as lists named `<name>_axes`; see `undertow describe metrics`.
         status: how it ended.
         outcome: the same series as arrays, and the final states.
+        success: whether control succeeded, by the scenario's criterion or the default one; None without one.
     """
 
     dataset: xr.Dataset
     metrics: dict[str, dict[str, Any] | None]
     status: Status
     outcome: Outcome
+    success: Success | None
 
     @property
     def certificate(self) -> dict[str, Any] | None:
@@ -76,11 +79,12 @@ class Run:
         steady, whole = self.metrics["steady"], self.metrics["whole"] or {}
         lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.dataset.attrs['status_sentence']}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
-        of_input = self.dataset["voltage"].attrs["units"]
-        for name in MEANINGS:
-            if name in whole:
-                late = f"{steady[name]:.4g}" if steady and name in steady else "-"
-                lines.append(f"  {name:<20}{late:>12}{whole[name]:>12.4g}  {unit_of(name, of_input)}".rstrip())
+        for name, metric in metrics_of(self.dataset).items():
+            value, unit = for_people(whole[name], metric.unit)
+            late = f"{for_people(steady[name], metric.unit)[0]:.4g}" if steady and name in steady else "-"
+            lines.append(f"  {name:<20}{late:>12}{value:>12.4g}  {unit}".rstrip())
+        if self.success is not None:
+            lines.append(f"  {self.success.sentence(metrics_of(self.dataset))}")
         return "\n".join(lines)
 
 
@@ -151,8 +155,9 @@ def simulate(
     attributes: dict[str, Any] = left_to_xla | {"title": "a closed loop run by undertow", "seed": seed}
     if why := step_failure(closed_loop, settings, outcome):
         attributes["status_sentence"] = why
-    steady = window.of_run(settings.duration)
-    return _run(outcome, *label(closed_loop, outcome, steady, settings.dt, attributes))
+    criterion = criterion_of(None, meanings(closed_loop))
+    how = Measuring(window.of_run(settings.duration), settings.dt, criterion=criterion)
+    return _run(outcome, *label(closed_loop, outcome, how, attributes))
 
 
 def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool = False) -> Run:
@@ -166,12 +171,14 @@ def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool
         BadInput: anything wrong with it, with key path and line.
     """
     text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
-    _, outcome, status, steady, whole, dataset = execute.execute(text)
-    return _run(outcome, status, steady, whole, dataset)
+    _, outcome, *labelled = execute.execute(text)
+    return _run(outcome, *labelled)
 
 
-def _run(outcome: Outcome, status: Status, steady: Any, whole: Any, dataset: xr.Dataset) -> Run:
-    return Run(dataset, {"steady": steady, "whole": whole}, status, outcome)
+def _run(
+    outcome: Outcome, status: Status, steady: Any, whole: Any, success: Success | None, dataset: xr.Dataset
+) -> Run:
+    return Run(dataset, {"steady": steady, "whole": whole}, status, outcome, success)
 
 
 def _plain(value: Any) -> Any:

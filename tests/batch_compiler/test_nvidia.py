@@ -28,7 +28,7 @@ def several(name, steps, runs, every=0):
     """A run of an example, how it is run, which numbers are the same, and numbers of runs from different places."""
     loop, how = example(name)
     run = Run(loop, how["accumulators"], loop.outputs_at_start(None, None), how["key"])
-    plan = Plan(steps, how["dt"], every, ("position", "voltage"), how["method"], how["substeps"])
+    plan = Plan(steps, how["dt"], every, ("position", "input"), how["method"], how["substeps"])
     numbers = eqx.filter(run, eqx.is_array)
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (runs, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(runs, *run.start[0].shape))

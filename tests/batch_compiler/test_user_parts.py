@@ -47,7 +47,7 @@ def test_the_same_figures_and_the_reason_where_it_is_left_to_xla(name):
         found, wanted = (execute(scenario(name, backend)).dataset for backend in ("simd", "xla"))
     assert found.attrs.get("left_to_xla") == LEFT.get(name)
     assert "left_to_xla" not in wanted.attrs
-    for signal in ("position", "velocity", "voltage"):
+    for signal in ("position", "velocity", "input"):
         here, there = found[signal].values, wanted[signal].values
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max(), err_msg=signal)
-    assert np.ptp(found["voltage"].values) > 0
+    assert np.ptp(found["input"].values) > 0

@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.core.contracts import AbstractController, AbstractDisturbance, AbstractNavigation, Measurement, Telemetry
+from undertow.core.contracts import AbstractController, AbstractDisturbance, AbstractNavigation, Measurement
+from undertow.core.signals import Signal
 
 
 class KalmanFilter(AbstractNavigation):
@@ -66,9 +67,10 @@ class PredictiveControl(AbstractController):
         pace = 1.0 / jnp.trace(hessian)
         step = lambda i, u: jnp.clip(u - pace * (hessian @ u + linear), -30.0, 30.0)
         wanted = jax.lax.fori_loop(0, 40, step, jnp.zeros(size))[:1] - 4.0 * (y.velocity - r.velocity)
-        none = jnp.zeros(1)
-        telemetry = Telemetry(none, none, none, y.position, y.velocity, jnp.zeros((1, 0)))
-        return self.model.invert(y, wanted - self.model.drift(y)), telemetry
+        return self.model.invert(y, wanted - self.model.drift(y)), {"wanted": wanted}
+
+    def signals(self):
+        return {"wanted": Signal(("axis",), "[axis]/s^2", "acceleration that the program asks for")}
 
     def advance(self, z, y, r, u_applied, dt):
         return z

@@ -20,7 +20,7 @@ CAMPAIGN = {
     "trials": 40,
     "chunk": 16,
     "vary": {"disturbance.amplitude": {"uniform": [0.5, 2.0]}},
-    "requirements": {"tracking_rms": {"below": 0.2, "share": 0.5}},
+    "requirements": {"position_rms": {"below": 0.2, "share": 0.5}},
     "seed": 7,
 }
 

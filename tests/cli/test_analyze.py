@@ -59,14 +59,14 @@ def test_a_run_is_put_beside_its_prediction(undertow, tmp_path):
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
     assert said.code == 0 and "As predicted: no metric departs by more than 10 %." in said.out, said.out
     found = json.loads((tmp_path / "out" / "metrics.json").read_text())
-    for name in ("tracking_rms", "estimation_rms", "input_rms"):
+    for name in ("position_rms", "estimation_rms", "input_rms"):
         assert found["predicted"][name] == pytest.approx(found["steady"][name], rel=0.1)
 
 
 def test_what_no_linear_prediction_knows_is_named(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST.replace("limit: 8", "limit: 1.5"))
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
-    assert "Departs from the linear prediction by more than 10 %: tracking_rms by" in said.out
+    assert "Departs from the linear prediction by more than 10 %: position_rms by" in said.out
     assert "Inputs were at a limit for" in said.out
 
 

@@ -40,7 +40,7 @@ def test_part_from_a_file_runs(undertow, tmp_path):
         (
             "./my_rov.py:my_rov",
             "def my_rov():\n    return 1 / 0",
-            "`plant.vehicle` must be something that can be made, but is not: ZeroDivisionError: division by zero",
+            "`plant.vehicle`: cannot run `my_rov`: ZeroDivisionError: division by zero (my_rov.py, line 2)",
         ),
         (
             "./my_rov.py:my_rov",

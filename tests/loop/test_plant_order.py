@@ -138,14 +138,14 @@ def test_a_jump_at_a_tick_is_met_exactly():
     t = np.asarray(outcome.time)
     pushed = np.clip(t - 0.25, 0.0, 0.5)
     exact = 1.5 * pushed**2 + 1.5 * np.clip(t - 0.75, 0.0, None)
-    assert np.abs(np.asarray(outcome.signals.position)[:, 0] - exact).max() < 1e-8
+    assert np.abs(np.asarray(outcome.signals["position"])[:, 0] - exact).max() < 1e-8
     # Negative control: a jump inside a step is smeared.
     inside = sampled.simulate(
         rail(Step(jnp.asarray(3.0), 0.255, 0.75), limit=0.0), duration=1.0, dt=2.0**-6, record_every=1
     )
     late = np.clip(t - 0.255, 0.0, 0.495)
     smeared = 1.5 * late**2 + 3.0 * 0.495 * np.clip(t - 0.75, 0.0, None)
-    assert np.abs(np.asarray(inside.signals.position)[:, 0] - smeared).max() > 1e-4
+    assert np.abs(np.asarray(inside.signals["position"])[:, 0] - smeared).max() > 1e-4
 
 
 def test_declared_jumps_are_met_by_the_continuous_loop():
@@ -155,6 +155,6 @@ def test_declared_jumps_are_met_by_the_continuous_loop():
     for declared in (True, False):
         loop = rail(Step(jnp.asarray(1000.0), 5.0, 5.0001, declared), **slow)
         outcome = continuous.simulate(loop, duration=5.02, record_step=0.01, tolerances=(1e-8, 1e-9))
-        speeds[declared] = float(outcome.signals.velocity[-1, 0])
+        speeds[declared] = float(outcome.signals["velocity"][-1, 0])
     assert 0.09 < speeds[True] < 0.1
     assert abs(speeds[False]) < 1e-6, "negative control: undeclared, it is stepped over"

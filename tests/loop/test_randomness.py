@@ -67,7 +67,7 @@ def noise_of_a_run(duration, dt, simulate=sampled.simulate):
     law = pid(plant.model(), sampling_time=dt, frequency=0.05 / dt)
     loop = ClosedLoop(plant, law, setpoint([0.0]), none(), white_noise(DEVIATION, 0.0))
     samples = simulate(loop, duration=duration, dt=dt, record_every=1).signals
-    return np.asarray(samples.measured_position - samples.position)[:-1, 0]
+    return np.asarray(samples["measured_position"] - samples["position"])[:-1, 0]
 
 
 @pytest.mark.parametrize("simulate", [sampled.simulate, simd_batch.simulate], ids=["xla", "simd"])

@@ -315,15 +315,15 @@ def test_under_actuated_controlled_rows_follow_and_the_rest_is_the_open_loop():
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), load, perfect())
     outcome = sampled.simulate(loop, duration=12.0, dt=1e-3, record_every=10)
     samples = outcome.signals
-    error, apart = np.asarray(samples.error), np.array([1.0, -1.0, 0.0])
+    error, apart = np.asarray(samples["error"]), np.array([1.0, -1.0, 0.0])
     late = np.asarray(outcome.time) > 8
     together = (error[:, 0] + error[:, 1])[late]
     assert np.abs(together).max() < 0.02 and np.abs(error[late, 2]).max() < 0.02
 
     idle = ClosedLoop(linear_plant(UNDER, springs, brakes, limit=0.0), loop.controller, loop.reference, load, perfect())
-    free = np.asarray(sampled.simulate(idle, duration=12.0, dt=1e-3, record_every=10).signals.position)
-    np.testing.assert_allclose(np.asarray(samples.position) @ apart, free @ apart, atol=1e-9)
-    assert np.abs((np.asarray(samples.position) - free) @ np.array([1.0, 1.0, 0.0])).max() > 0.1, "negative control"
+    free = np.asarray(sampled.simulate(idle, duration=12.0, dt=1e-3, record_every=10).signals["position"])
+    np.testing.assert_allclose(np.asarray(samples["position"]) @ apart, free @ apart, atol=1e-9)
+    assert np.abs((np.asarray(samples["position"]) - free) @ np.array([1.0, 1.0, 0.0])).max() > 0.1, "negative control"
 
 
 def test_under_actuated_error_equation_holds_along_the_controlled_rows():
@@ -339,8 +339,8 @@ def test_under_actuated_error_equation_holds_along_the_controlled_rows():
         sample = drawn.sample(t, x, z, seen)
         acceleration = plant.acceleration(t, x, seen.applied, drawn.load(t, x))
         k1, k2 = loop.controller.feedback
-        left = seen.r.acceleration - acceleration + k1 * sample.error + k2 * (seen.r.velocity - sample.velocity)
-        residual = left - sample.estimate + drawn.load(t, x).acceleration + sample.robust
+        left = seen.r.acceleration - acceleration + k1 * sample["error"] + k2 * (seen.r.velocity - sample["velocity"])
+        residual = left - sample["estimate"] + drawn.load(t, x).acceleration + sample["robust_term"]
         np.testing.assert_allclose(basis.T @ residual, 0.0, atol=1e-9)
         assert np.abs(residual).max() > 1e-3, "negative control: not so across them"
 

@@ -18,7 +18,7 @@ def row(level, law, composite, bounded, ended, **more):
     by_window = lambda value: [value, 2 * value if lasted else None]
     return {
         "level": level, "law": law, "words": law, "composite": composite, "bounded": bounded,
-        "scenario": f"scenarios/long_{level}_{law}.yaml", "status": "ok" if lasted else "diverged", "ended": ended,
+        "scenario": f"scenarios/long_{level}_{law}.yaml", "status": "completed" if lasted else "diverged", "ended": ended,
         "lasted": lasted, "tracking_rms": by_window(1e-4), "estimation_rms": by_window(0.2),
         "input_variation": by_window(50.0), "weights_peak": by_window(14.0),
         "growth": {"time": [1.0, 10.0, min(ended, 150.0)], "weights_peak": [3.0, 30.0, 300.0]},

@@ -95,7 +95,7 @@ def test_conclusions_find_their_variants():
         for one in ABLATIONS
     ]
     rows = [
-        {"place": place, "law": law, "status": "ok", "steady": None}
+        {"place": place, "law": law, "status": "completed", "steady": None}
         for place, compared in fidelity.places(False).items()
         for law in compared.runs
     ]

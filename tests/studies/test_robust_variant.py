@@ -47,7 +47,7 @@ def row(place, law, tracking=None, ended=None):
         "law": law,
         "name": law,
         "scenario": f"scenarios/robust_variant_{place}_{law}.yaml",
-        "status": "ok" if ended is None else "diverged",
+        "status": "completed" if ended is None else "diverged",
         "diverged_at": ended,
         "steady": None if tracking is None else metrics | {"tracking_rms": tracking},
         "largest_after": 1.25,

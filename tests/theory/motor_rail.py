@@ -113,10 +113,13 @@ class InnerLoop(AbstractController):
         return self.law.init(y, r)
 
     def command(self, z, y, r):
-        thrust, telemetry = self.law.command(z, y, r)
+        thrust, signals = self.law.command(z, y, r)
         motor, speed = self.thruster.motor, y.actuator.speed
         wanted = motor.speed_at(thrust)
-        return motor.steady_voltage(speed) + motor.k1 * self.rate * (wanted - speed), telemetry
+        return motor.steady_voltage(speed) + motor.k1 * self.rate * (wanted - speed), signals
+
+    def signals(self):
+        return self.law.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         return self.law.advance(z, y, r, self.thruster.motor.thrust(y.actuator.speed), dt)

@@ -138,7 +138,7 @@ def row(fidelity="electromechanical", supply=np.inf, speed_sensor=False, inner=N
     duration = 15.0 + 2 * PERIOD
     run = sampled.simulate(loop, duration=duration, dt=dt, record_every=1, substeps=round(dt / 1e-3))
     late = np.asarray(run.time) > 15.0
-    error, volts = np.asarray(run.signals.error)[late, 0], np.asarray(run.signals.voltage)[late, 0]
+    error, volts = np.asarray(run.signals["error"])[late, 0], np.asarray(run.signals["input"])[late, 0]
     rms = lambda series: float(np.sqrt((series**2).mean()))
     found = {"e": rms(error), "V": rms(volts), "variation": float(np.abs(np.diff(volts)).sum() / (2 * PERIOD))}
     return int(run.status), float(run.ended), found, law

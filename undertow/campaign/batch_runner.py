@@ -11,7 +11,7 @@ import numpy as np
 
 from simdjit import nvidia
 from simdjit.errors import Unsupported
-from undertow.analysis.metrics import overall
+from undertow.analysis.metrics import results_of_batch
 from undertow.campaign.campaign_schema import Series
 from undertow.campaign.runs import leaves, planned, run_of, shared_numbers
 from undertow.core import runtime
@@ -29,7 +29,7 @@ SIMD, XLA = 0, 1
 class BatchResult(NamedTuple):
     """What is kept of trials, one entry each."""
 
-    metrics: dict[str, np.ndarray]  # over the steady window; NaN where a run did not last
+    metrics: dict[str, np.ndarray]  # over the steady window; NaN where a run did not last, or has none
     status: np.ndarray
     ended: np.ndarray  # s
     backend: np.ndarray  # SIMD or XLA
@@ -91,6 +91,8 @@ class ProgramCache:
         for kind, group in groups.items():
             with runtime.in_precision(kind.precision):
                 pieces.append(self._together(kind, group))
+        names = dict.fromkeys(name for piece in pieces for name in piece.metrics)
+        pieces = [piece._replace(metrics={name: _defined(piece, name) for name in names}) for piece in pieces]
         back = np.argsort([i for group in groups.values() for i in group.members])
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
@@ -105,7 +107,8 @@ class ProgramCache:
         tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
         flown = self._programs[kind].run(jax.tree.unflatten(tree, numbers))
         lasted = flown.status == int(Status.OK)
-        metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(flown.accumulated[0]).items()}
+        found = results_of_batch(group.first.accumulators, flown.accumulated)
+        metrics = {name: np.where(lasted, value, np.nan) for name, value in found.items()}
         backend = np.full(
             count, SIMD if isinstance(self._programs[kind], simd_batch.BatchRunner) else XLA, dtype=np.int8
         )
@@ -131,6 +134,11 @@ class ProgramCache:
             if self._shared is None:
                 self._shared = shared_numbers(self._probes())
             return self._shared
+
+
+def _defined(piece: BatchResult, name: str) -> np.ndarray:
+    """A metric of some trials; NaN where their law or plant has none of that name."""
+    return piece.metrics.get(name, np.full(len(piece.status), np.nan))
 
 
 def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:

@@ -6,17 +6,14 @@ import numpy as np
 import xarray as xr
 
 from undertow.campaign.batch_runner import XLA
-from undertow.campaign.columns import ENDINGS
+from undertow.campaign.columns import ENDINGS, JUDGEMENTS
 from undertow.campaign.invalid_trials import refusals
 from undertow.campaign.requirements import verdict
-from undertow.campaign.sensitivity import by_choice, correlations, quantiles
+from undertow.campaign.sensitivity import by_choice, correlations, defined_quantiles
 from undertow.campaign.store_results import Results
 from undertow.campaign.trials import Trials
 
 _WORST = 5
-
-# Trials are ranked by this; those that failed come first.
-_RANKED_BY = "tracking_rms"
 
 
 def summary(results: Results, several: Trials) -> dict[str, Any]:
@@ -56,7 +53,8 @@ def _combination(results: Results, number: int) -> dict[str, Any]:
         "status": endings(rows),
         "failed": int((flown & ~lasted).sum()),
         "refused": int((~flown).sum()),
-        "metrics": {name: quantiles(rows[name].values[lasted]) for name in results.metrics} if lasted.any() else {},
+        "metrics": defined_quantiles(rows, results.metrics, lasted),
+        "success": {word: int((rows["success"].values == code).sum()) for code, word in JUDGEMENTS.items()},
         "requirements": [
             verdict(rows.isel(trial=flown), name, wanted) for name, wanted in results.campaign.requirements.items()
         ],
@@ -66,6 +64,7 @@ def _combination(results: Results, number: int) -> dict[str, Any]:
 def _worst(results: Results) -> np.ndarray:
     """Trials that failed, the earliest first; then those with the largest error. What was refused was not flown."""
     rows, lasted = results.rows.isel(trial=results.flown), results.lasted[results.flown]
-    error = np.where(lasted, rows[_RANKED_BY].values, np.inf)
+    errors = rows[results.tracking[0]].values if results.tracking else np.inf
+    error = np.where(lasted, errors, np.inf)
     order = np.lexsort((rows["ended"].values, -error))
     return rows["trial"].values[order[:_WORST]]

@@ -12,6 +12,7 @@ from jaxtyping import Array, PyTree
 from undertow.checks.answers import agree, alike, is_a, shaped
 from undertow.checks.finding import Finding, error
 from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Measurement
+from undertow.core.signals import check_declared
 
 _GRIP = 1e-9  # of the largest entry: below it an input does not act at once
 
@@ -85,6 +86,13 @@ def _forms(plant: AbstractPlant) -> Iterator[Finding]:
         yield from shaped("output", y.velocity, (n,))
     if isinstance(effort, Effort):
         yield from (finding for value in effort for finding in shaped("effort", value, (m,)))
+    recorded = jax.eval_shape(plant.diagnostics, x, u)
+    check_declared(plant, recorded)
+    sizes = {"axis": n, "actuator": m}
+    for name, signal in plant.signals().items():
+        if set(signal.dimensions) <= set(sizes):
+            form = tuple(sizes[dimension] for dimension in signal.dimensions)
+            yield from shaped(f"diagnostics, signal {name}", recorded[name], form)
     yield from alike("dynamics", jax.eval_shape(plant.dynamics, t, x, u, calm), x, "have the form of the state")
     yield from shaped("acceleration", jax.eval_shape(plant.acceleration, t, x, u, calm), (n,))
     yield from shaped("status", jax.eval_shape(plant.status, x), ())

@@ -46,7 +46,8 @@ def bench(as_json: bool) -> int:
             compiling += f" (XLA {found[f'{prefix}single_xla_compile_s']:.2g} s)"
         compiling += f", {found[f'{prefix}batch_float64_compile_s']:.2g} s for many"
         figures = (
-            f"{found[f'{prefix}operations']} operations per step, tracking rms {found[f'{prefix}tracking_rms']:.6f}"
+            f"{found[f'{prefix}operations']} operations per step, "
+            f"rms of all six errors {found[f'{prefix}tracking_rms']:.6f}"
         )
         console.print(f"Made ready in {compiling}; {figures}.", highlight=False)
     first = f"{found['first_cold_s']:.2g} s, {found['first_kept_s']:.2g} s with compiled code from before"

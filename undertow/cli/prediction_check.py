@@ -16,7 +16,7 @@ Result = TypeVar("Result")
 _DEPARTS = 0.10
 
 # Metrics that tell more about the hardest moment than about the law: shown, not judged.
-_PEAKS = ("tracking_max", "input_peak")
+_PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
 
 # Of the wanted: numbers below this share of the largest of their kind are zero.
 _NOTHING = 1e-9

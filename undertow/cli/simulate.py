@@ -18,7 +18,7 @@ from undertow.scenario.build import build
 from undertow.scenario.execute import Executed, execute, save
 from undertow.scenario.reading import dump, read
 from undertow.scenario.reproducibility import Repetition, compare
-from undertow.scenario.results import certificate_of, metrics_text
+from undertow.scenario.results import certificate_of, metrics_of, metrics_text
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
@@ -41,14 +41,17 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
         why = executed.dataset.attrs["left_to_xla"]
         typer.echo(f"Advice: left to XLA, which is slower, as lanes (docs/lanes.md) lack something: {why}.", err=True)
     expected = predicted.metrics if predicted else None
-    unit = executed.built.closed_loop.plant.input_unit
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, expected))
+    known = metrics_of(executed.dataset)
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
     if predicted:
         console.print(f"{judgement(predicted, executed)}.", highlight=False, soft_wrap=True)
     certificate = certificate_of(executed.dataset)
     if certificate is not None:
         console.print(certificate_table(certificate, executed.built.window()))
-    console.print(f"Status: {executed.status.word}. Results: {folder}", highlight=False, soft_wrap=True)
+    judgement_of_it = f"; {executed.success.sentence(known)}" if executed.success else ""
+    console.print(
+        f"Status: {executed.status.word}{judgement_of_it}. Results: {folder}", highlight=False, soft_wrap=True
+    )
     codes = [_judge_ending(executed)] + ([_judge(repetition, console)] if repetition else [])
     return max(codes)
 

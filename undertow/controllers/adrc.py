@@ -5,9 +5,10 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.signals import ESTIMATE, MODELLING_ERROR
 from undertow.controllers.tracking_error import check_gains, demanded_acceleration
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
 
@@ -49,15 +50,11 @@ class ADRC(AbstractController):
     def command(self, z: ObserverState, y: Measurement, r: Target):
         model = self.model
         demand = demanded_acceleration(model, self.feedback, y, r)
-        telemetry = Telemetry(
-            estimate=z.estimate,
-            robust=jnp.zeros_like(demand),
-            modelling_error=z.rates - model.rates(y),
-            predicted_position=y.position,
-            predicted_velocity=z.rates,
-            weights=z.estimate[:, None],
-        )
-        return model.invert(y, demand - z.estimate - model.drift(y)), telemetry
+        signals = {"estimate": z.estimate, "modelling_error": z.rates - model.rates(y)}
+        return model.invert(y, demand - z.estimate - model.drift(y)), signals
+
+    def signals(self):
+        return ESTIMATE | MODELLING_ERROR
 
     def advance(self, z: ObserverState, y: Measurement, r: Target, u_applied, dt) -> ObserverState:
         eps = z.rates - self.model.rates(y)

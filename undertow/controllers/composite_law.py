@@ -9,14 +9,15 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.diagnostics import COLUMNS, share_given, tracking_diagnostics, weight_diagnostics
 from undertow.controllers.robust_modification import RobustModification
+from undertow.controllers.signals import ADAPTIVE_LAW, lyapunov_signals, share_given, weight_signals
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractModel, Measurement, Target, Telemetry
+from undertow.core.contracts import AbstractModel, Measurement, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
+from undertow.core.signals import Signal
 from undertow.estimation.series_parallel import SeriesParallel
 from undertow.estimation.tsk import FuzzySystem
 from undertow.numerics.linear import matvec
@@ -31,6 +32,12 @@ IDENTIFICATION_INPUTS = ("applied", "commanded")
 
 _PER_AXIS = ("adaptation", "composite", "robust_gain", "layer", "weights_bound")
 _PER_AXIS_IDENTIFICATION = ("pole", "compensation_gain", "layer")
+
+
+_PREDICTED = {
+    "predicted_position": Signal(("axis",), "[axis]", "position of the identification model"),
+    "predicted_velocity": Signal(("axis",), "[axis]/s", "velocity of the identification model"),
+}
 
 
 class RCAFState(NamedTuple):
@@ -108,18 +115,16 @@ class RCAF(AbstractContinuousController):
         u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
         wanted = -self.model.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
         u = self.model.invert(y, wanted)
-        telemetry = Telemetry(
-            estimate=d_hat,
-            robust=u_r,
-            modelling_error=eps,
-            predicted_position=z.predicted_position,
-            predicted_velocity=z.predicted_velocity,
-            weights=z.weights,
-            diagnostics=tracking_diagnostics(off, self.lyapunov(), self.weight)
-            | weight_diagnostics(z.weights, self.weights_bound)
-            | {"attained_share": share_given(wanted, matvec(self.model.gain(y), u))},
-        )
-        return u, telemetry
+        signals = {
+            "estimate": d_hat,
+            "robust_term": u_r,
+            "modelling_error": eps,
+            "predicted_position": z.predicted_position,
+            "predicted_velocity": z.predicted_velocity,
+            "attained_share": share_given(wanted, matvec(self.model.gain(y), u)),
+        }
+        signals |= lyapunov_signals(off, self.lyapunov(), self.weight)
+        return u, signals | weight_signals(z.weights, self.weights_bound)
 
     def flow(self, z: RCAFState, y: Measurement, r: Target, u_applied) -> RCAFState:
         """Identification model, Eq. (32), and composite adaptive law, Eq. (44)."""
@@ -142,8 +147,8 @@ class RCAF(AbstractContinuousController):
         """Weights back inside their box: |d_hat| stays below `weights_bound`, and no weight drifts away."""
         return z._replace(weights=jnp.clip(z.weights, -self._box(), self._box()))
 
-    def columns(self):
-        return COLUMNS
+    def signals(self):
+        return ADAPTIVE_LAW | _PREDICTED
 
     def lyapunov(self) -> Float[Array, "*n 2 2"]:
         """P of Eq. (21)."""

@@ -5,9 +5,10 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.signals import ESTIMATE, MODELLING_ERROR
 from undertow.controllers.tracking_error import check_gains, demanded_acceleration
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
 
@@ -52,15 +53,11 @@ class INDI(AbstractController):
     def command(self, z: FilterState, y: Measurement, r: Target):
         model, missing = self.model, z.acceleration - z.known
         demand = demanded_acceleration(model, self.feedback, y, r)
-        telemetry = Telemetry(
-            estimate=missing,
-            robust=jnp.zeros_like(demand),
-            modelling_error=z.velocity - model.rates(y),
-            predicted_position=y.position,
-            predicted_velocity=z.velocity,
-            weights=missing[:, None],
-        )
-        return model.invert(y, demand - missing - model.drift(y)), telemetry
+        signals = {"estimate": missing, "modelling_error": z.velocity - model.rates(y)}
+        return model.invert(y, demand - missing - model.drift(y)), signals
+
+    def signals(self):
+        return ESTIMATE | MODELLING_ERROR
 
     def advance(self, z: FilterState, y: Measurement, r: Target, u_applied, dt) -> FilterState:
         known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)

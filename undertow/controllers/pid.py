@@ -11,9 +11,10 @@ from jaxtyping import Array, Float
 from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
+from undertow.controllers.signals import ATTAINED_SHARE, ESTIMATE
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
@@ -75,17 +76,8 @@ class PID(AbstractController):
     def command(self, z: PIDState, y: Measurement, r: Target):
         plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.acceleration_per_force(y)
         forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, self.actuator_rate), self.direction)
-        none = jnp.zeros_like(y.position)
-        telemetry = Telemetry(
-            estimate=-z.integral,
-            robust=none,
-            modelling_error=none,
-            predicted_position=y.position,
-            predicted_velocity=self.model.rates(y),
-            weights=jnp.zeros((y.position.shape[0], 0)),
-            diagnostics={"attained_share": attained(effect, plan.forces, forces)},
-        )
-        return actuators.command(plan.actuators, forces, self.actuator_rate), telemetry
+        signals = {"estimate": -z.integral, "attained_share": attained(effect, plan.forces, forces)}
+        return actuators.command(plan.actuators, forces, self.actuator_rate), signals
 
     def advance(self, z: PIDState, y: Measurement, r: Target, u_applied, dt) -> PIDState:
         """What limits take away is taken from the integral, too: back-calculation, Astrom and Murray (2008), 10.4.
@@ -108,8 +100,8 @@ class PID(AbstractController):
         given = actuators.force(actuators.update_from_report(z.actuators, y.actuator), u_applied)
         return self._drift(y) + matvec(self.model.acceleration_per_force(y), given)
 
-    def columns(self):
-        return {"attained_share": ("share of the wanted acceleration that the actuators can give", "1")}
+    def signals(self):
+        return ESTIMATE | ATTAINED_SHARE
 
     def _actuators(self) -> AbstractActuatorModel:
         actuators = self.model.actuators()

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
 from undertow.core.arrays import as_array
+from undertow.core.signals import Signal
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 
@@ -85,18 +86,6 @@ class Effort(NamedTuple):
 
     power: Inputs  # electrical power drawn, W
     saturated: Inputs  # 1 where an input is at its limit, else 0
-
-
-class Telemetry(NamedTuple):
-    """What a controller lets one look at. Nothing here is carried."""
-
-    estimate: Outputs  # d_hat, m/s^2, rad/s^2
-    robust: Outputs  # u_r
-    modelling_error: Outputs  # eps, m/s, rad/s
-    predicted_position: Outputs  # x_hat
-    predicted_velocity: Outputs
-    weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2; no columns when nothing is learnt
-    diagnostics: dict[str, Array] | None = None  # scalars that this law alone has to tell, by name
 
 
 class AbstractModel(eqx.Module):
@@ -217,11 +206,11 @@ class AbstractPlant(eqx.Module):
         """What a controller is told of this plant; keyword arguments with defaults are the scenario's `model`."""
 
     def diagnostics(self, x: PyTree, u: Inputs) -> dict[str, Array]:
-        """Scalars that this plant alone has and that are worth recording, by name."""
+        """Values of the signals that this plant declares, by name."""
         return {}
 
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of `diagnostics`."""
+    def signals(self) -> dict[str, Signal]:
+        """What is recorded of this plant alone, by name: each entry of `diagnostics`."""
         return {}
 
     def no_load(self) -> Load:
@@ -240,8 +229,11 @@ class AbstractController(eqx.Module):
         """State z before the first measurement is used."""
 
     @abc.abstractmethod
-    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, Telemetry]:
-        """Input u, and what one may look at."""
+    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
+        """Input u, and the values of the declared signals by name. Nothing of them is carried.
+
+        A signal `estimate` is what the law believes of d; it is used where a reading is no number.
+        """
 
     @abc.abstractmethod
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
@@ -251,9 +243,9 @@ class AbstractController(eqx.Module):
         """F + G u: what the law takes for granted of the acceleration; d is all the rest."""
         return self.model.drift(y) + matvec(self.model.gain(y), u_applied)
 
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of the telemetry's `diagnostics`."""
-        return {}
+    @abc.abstractmethod
+    def signals(self) -> dict[str, Signal]:
+        """What `command` lets one look at, by name; {} for nothing."""
 
 
 class AbstractDisturbance(eqx.Module):

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Int
 
-from undertow.core.contracts import AbstractController, AbstractModel, Inputs, Measurement, Outputs, Telemetry, Time
+from undertow.core.contracts import AbstractController, AbstractModel, Inputs, Measurement, Outputs, Time
 
 
 def is_finite(numbers: Array) -> Bool[Array, "..."]:
@@ -41,10 +41,11 @@ class Expected(NamedTuple):
         return whole, self._replace(replaced=self.replaced + jnp.where(all_finite(y), 0, 1))
 
     def after(
-        self, law: AbstractController, z: Any, y: Measurement, telemetry: Telemetry, applied: Inputs, dt: Time
+        self, law: AbstractController, z: Any, y: Measurement, estimate: Outputs | None, applied: Inputs, dt: Time
     ) -> "Expected":
-        """A sampling time later, with an input applied."""
-        acceleration = law.known_acceleration(z, y, applied) + telemetry.estimate
+        """A sampling time later, with an input applied; `estimate` is d_hat of a law that has one."""
+        known = law.known_acceleration(z, y, applied)
+        acceleration = known if estimate is None else known + estimate
         rates = law.model.rates(y) + dt * acceleration
         return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)
 

@@ -16,7 +16,7 @@ from simdjit.program import Program
 from undertow.core.contracts import Outputs
 from undertow.core.status import Status
 from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop, Signals
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.loop.recording import instant
 from undertow.numerics.integrators import METHODS
@@ -38,7 +38,7 @@ class Plan(NamedTuple):
         steps: how many.
         dt: sampling time, s.
         every: steps per record; 0 for none.
-        signals: of a `Signals`, which are recorded.
+        signals: names of those that are recorded.
         method, substeps: integration of the plant within one control_step.
     """
 
@@ -100,8 +100,8 @@ class BatchRunner:
 
         def record(known, carry, k):
             t = instant(k, jnp.asarray(dt))
-            sample = known[0].record(t, *carry[0])
-            return t, {name: getattr(sample, name) for name in plan.signals}
+            signals = known[0].record(t, *carry[0])
+            return t, {name: signals[name] for name in plan.signals}
 
         self._program = Program(realize, start, control_step, record, numbers, constant, lanes, driver)
 
@@ -147,8 +147,8 @@ def simulate(
     run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
     arrays = eqx.filter(run, eqx.is_array)
     constant = [True] * len(jax.tree.leaves(arrays))
-    plan = Plan(steps, dt, record_every, Signals._fields, method, substeps)
+    plan = Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps)
     batch = BatchRunner(run, plan, constant, lanes=1)
     flown = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
     one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, flown)
-    return Outcome(one.time, Signals(**one.series), one.accumulated, one.final, one.status, one.ended, one.input)
+    return Outcome(one.time, one.series, one.accumulated, one.final, one.status, one.ended, one.input)

@@ -39,6 +39,6 @@ def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
         method=plan.method,
         substeps=plan.substeps,
     )
-    series = {name: getattr(outcome.signals, name) for name in plan.signals}
+    series = {name: outcome.signals[name] for name in plan.signals}
     ending = outcome.status, outcome.ended, outcome.input
     return Ended(outcome.accumulated, outcome.final, *ending, outcome.time, series)

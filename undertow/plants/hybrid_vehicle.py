@@ -123,8 +123,8 @@ class HybridVehicle(AbstractPlant):
     def diagnostics(self, x: VehicleState, u):
         return self.power.diagnostics(self.thruster, x.thrusters, x.power, u)
 
-    def columns(self):
-        return self.power.columns()
+    def signals(self):
+        return self.power.signals()
 
     def inputs(self) -> int:
         return self.vehicle.thrusters

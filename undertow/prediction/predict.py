@@ -148,7 +148,8 @@ def _noise(known: OperatingPoint) -> Noise:
     dt, axes = known.linear.dt, known.around.load.shape[1]
     sampled = margins.closed(known.mean, dt)
     one = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
-    of_input, of_estimate = (margins.noise_gain(sampled, name, one) / _NOISE for name in ("u", "estimate"))
+    gain = lambda name: margins.noise_gain(sampled, name, one) / _NOISE
+    of_input, of_estimate = gain("u"), gain("estimate") if "estimate" in sampled.signals else np.zeros(axes)
     low, high = _limits(known.built, known.mean)
     room = np.minimum(high - known.mean.at["u"], known.mean.at["u"] - low)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -165,9 +166,13 @@ def _limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """|e / d| of each output, and |d_hat - d| / |d| of each axis of the law, under a load on the same axis."""
-    answer = {name: margins.response(linear, name, frequency) for name in ("error", "estimate", "uncertainty")}
+    """|e / d| of each output, and |d_hat - d| / |d| of each axis of the law, under a load on the same axis.
+
+    The estimate of a law that has none is zero.
+    """
+    answer = {name: margins.response(linear, name, frequency) for name in ("error", "uncertainty")}
+    estimate = margins.response(linear, "estimate", frequency) if "estimate" in linear.signals else 0.0
     into_axes = linear.direct["uncertainty"]["load"]  # a load on the outputs as the law sees it
-    missed = (answer["estimate"] - answer["uncertainty"]) @ np.linalg.inv(into_axes)
+    missed = (estimate - answer["uncertainty"]) @ np.linalg.inv(into_axes)
     own = lambda matrices: np.abs(np.diagonal(matrices, axis1=1, axis2=2))
     return own(answer["error"]), own(missed)

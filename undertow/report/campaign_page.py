@@ -50,7 +50,7 @@ def write_campaign(title: str, results: Results, found: Mapping[str, Any], folde
         section("endings", "How they ended", *_endings(found)),
         *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(found)),
         section("metrics", "Distributions", drawn["distributions"], distributions(results, found)),
-        *_optional("dependence", "What they depend on", drawn["sensitivity"], *_choices(found)),
+        *_optional("dependence", "What they depend on", drawn["sensitivity"], *_choices(results, found)),
         section("worst", "The worst trials", _how(found), worst(results, found)),
         section("asked", "What was flown", *asked(results)),
     )
@@ -67,8 +67,8 @@ def _endings(found: Mapping[str, Any]) -> list[Html]:
     return [ended, tag("p", "Refused, and so not flown:"), bullets(said)]
 
 
-def _choices(found: Mapping[str, Any]) -> list[Html]:
-    tables = by_choice(found)
+def _choices(results: Results, found: Mapping[str, Any]) -> list[Html]:
+    tables = by_choice(results, found)
     said = "By choice: median [5 %, 95 %] of the trials that lasted, all combinations together."
     return [tag("p", prose(said)), *tables] if tables else []
 

@@ -59,7 +59,7 @@ def condition(verdict: str) -> str:
 
 def ending(entry: dict[str, Any]) -> str:
     """How a run ended, and when if it ended early."""
-    word, when = str(entry.get("status", "ok")).replace("_", " "), entry.get("diverged_at")
+    word, when = str(entry.get("status", "completed")).replace("_", " "), entry.get("diverged_at")
     return word if when is None else f"{word} at {when:.3g} s"
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from undertow.analysis.drift import gain_of
 from undertow.analysis.motor_loop import motor_matrix, rightmost
 from undertow.core.status import Status
+from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import CONTROLLERS, FIDELITIES, law_of, motor_of, scenario
 from undertow.scenario.execute import Executed
 
@@ -64,8 +65,8 @@ def _metrics(run: Executed) -> dict[str, Any]:
         "status": run.status.word,
         "diverged_at": float(run.outcome.ended) if failed else None,
         "simulated_s": float(run.outcome.ended),
-        "steady": run.steady,
-        "whole": run.whole,
+        "steady": with_all_outputs(run.steady),
+        "whole": with_all_outputs(run.whole),
     }
 
 

@@ -10,11 +10,12 @@ import jax
 import numpy as np
 
 from simdjit.machine import lanes_of
-from undertow.analysis.metrics import Metrics, results
+from undertow.analysis.metrics import Gathered, accumulators, results
 from undertow.campaign.campaign_schema import Series
 from undertow.campaign.runs import leaves, planned, run_of
 from undertow.core.status import Status
 from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run
+from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import Built, build
 from undertow.scenario.execute import Executed, execute, save
 from undertow.scenario.part_cache import PartCache, structure
@@ -94,10 +95,9 @@ def start(
     """
     part_cache = PartCache()
     built = {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
-    accumulators = tuple(Metrics(*window) for window in windows)
     groups: dict[Any, dict[str, tuple[Run, int]]] = {}
     for name, one in built.items():
-        run = run_of(one)._replace(accumulators=accumulators)
+        run = run_of(one)._replace(accumulators=_gathered(one, windows))
         plan = planned(one, Series(signals=list(signals), every=every))
         groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
     pieces = [pool.submit(_together, plan, runs) for (_, plan), runs in groups.items()]
@@ -107,6 +107,10 @@ def start(
         return {name: _ran(one, ended[name], windows) for name, one in built.items()}
 
     return finished
+
+
+def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
+    return tuple(one for window in windows for one in accumulators(built.closed_loop.plant, (), *window))
 
 
 def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ended]:
@@ -131,9 +135,8 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ende
 
 def _ran(built: Built, ended: Ended, windows: Sequence[Window]) -> BatchResult:
     status, end = Status(int(ended.status)), float(ended.ended)
-    metrics = [
-        results(state) if end >= stop else None for state, (_, stop) in zip(ended.accumulated, windows, strict=True)
-    ]
+    each = zip(_gathered(built, windows), ended.accumulated, windows, strict=True)
+    metrics = [with_all_outputs(results((one,), (state,))) if end >= stop else None for one, state, (_, stop) in each]
     time = np.asarray(ended.time)
     kept = time <= end
     series = {name: np.asarray(values)[kept] for name, values in ended.series.items()}

@@ -6,9 +6,12 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
+from undertow.analysis.metrics import meanings
+from undertow.analysis.success import criterion_of
 from undertow.core import runtime
 from undertow.core.catalogue import KIND_OF
 from undertow.core.contracts import AbstractDisturbance
+from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
@@ -46,6 +49,7 @@ class Built(NamedTuple):
     closed_loop: ClosedLoop
     scenario: Scenario
     resolved: dict[str, Any]  # the scenario with every default filled in
+    metrics: tuple[AbstractMetric, ...]  # the scenario's own
 
     @in_its_precision
     def advice(self) -> tuple[str, ...]:
@@ -59,6 +63,14 @@ class Built(NamedTuple):
         if self.scenario.precision == "float32" and loop.method != "adaptive" and steps > _TOLD_APART:
             times += (f"float32 tells no instants apart beyond {_TOLD_APART} steps, {_TOLD_APART * loop.dt:.6g} s",)
         return plant.advice() + fast + times + ((late,) if start >= end else ())
+
+    def known_metrics(self) -> dict[str, Metric]:
+        """Metrics that its runs may have, by name, with their units."""
+        return meanings(self.closed_loop, self.metrics)
+
+    def criterion(self) -> dict[str, float]:
+        """What success is judged by: metric -> what it must stay below in the steady window."""
+        return criterion_of(self.scenario.success, self.known_metrics())
 
     def window(self) -> tuple[float, float]:
         """Start and stop of the steady metrics, s."""
@@ -118,4 +130,10 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     check_times(text, scenario.loop, scenario.steady)
     shape = (loop, [value and len(value) for _, value in scenario.initial])
     part_cache.check_once(shape, lambda: check_fit(text, loop, scenario.initial))
-    return Built(loop.starting_at(scenario.initial.position), scenario, resolved)
+    several = [one("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
+    if several:
+        resolved["metrics"] = [description for _, description in several]
+    built = Built(loop.starting_at(scenario.initial.position), scenario, resolved, tuple(part for part, _ in several))
+    placed(text, "controller.signals", loop.signals)
+    criterion = placed(text, "success", built.criterion)
+    return built._replace(resolved=resolved | {"success": criterion})

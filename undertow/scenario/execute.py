@@ -11,7 +11,8 @@ import numpy as np
 import xarray as xr
 
 from simdjit.errors import Unsupported
-from undertow.analysis.metrics import Metrics
+from undertow.analysis.metrics import accumulators
+from undertow.analysis.success import Success
 from undertow.core import runtime
 from undertow.core.status import Status
 from undertow.loop import continuous, sampled, simd_batch
@@ -21,7 +22,7 @@ from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
-from undertow.scenario.results import label
+from undertow.scenario.results import Measuring, label
 from undertow.scenario.schema import Initial, Loop
 from undertow.scenario.step_size import step_failure
 
@@ -34,6 +35,7 @@ class Executed(NamedTuple):
     status: Status
     steady: dict[str, Any] | None  # metrics over the steady window; None when the run did not last
     whole: dict[str, Any]
+    success: Success | None  # None without a criterion
     dataset: xr.Dataset
 
 
@@ -53,7 +55,8 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
 @in_its_precision
 def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
-    gathered = (Metrics(*built.window()),) if scenario.steady.every_step else ()
+    plant = built.closed_loop.plant
+    gathered = accumulators(plant, built.metrics, *built.window()) if scenario.steady.every_step else ()
     outcome, left_to_xla = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
     why = step_failure(built.closed_loop, scenario.loop, outcome)
     attributes = (
@@ -67,7 +70,8 @@ def _execute(built: Built) -> Executed:
             "seed": scenario.seed,
         }
     )
-    finished = label(built.closed_loop, outcome, built.window(), scenario.loop.dt, attributes)
+    how = Measuring(built.window(), scenario.loop.dt, built.metrics, built.criterion(), gathered)
+    finished = label(built.closed_loop, outcome, how, attributes)
     return Executed(built, outcome, *finished)
 
 

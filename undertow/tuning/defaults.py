@@ -1,11 +1,13 @@
 """What is tuned when nothing is said: the numbers that matter of each law, and where to begin."""
 
 from collections.abc import Callable, Mapping
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from undertow.core.contracts import AbstractController
+from undertow.core.param import tuning_ranges
 
 Range = tuple[float, float]
 
@@ -81,9 +83,11 @@ _LAWS = {
 }
 
 
-def law_of(kind: str, preset: str | None) -> Law:
-    """How a controller is tuned; nothing is known of one that is not ours."""
-    return _LAWS.get((kind, preset), Law(lambda dt: {}, {}, {}))
+def law_of(kind: str, preset: str | None, law: AbstractController) -> Law:
+    """How a controller is tuned: as is known of ours, else by the parameters that declare a `range`."""
+    declared = tuning_ranges(law)
+    own = Law(lambda dt: declared, {name: attrgetter(name) for name in declared}, {})
+    return _LAWS.get((kind, preset), own)
 
 
 def now(known: Law, law: AbstractController, option: str, given: Any) -> Any:

@@ -92,7 +92,7 @@ def problem(text: Text) -> Problem:
 
 def _law_of(built: Built) -> Law:
     description = built.resolved["controller"]
-    return law_of(description["kind"], description.get("preset"))
+    return law_of(description["kind"], description.get("preset"), built.closed_loop.controller)
 
 
 def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractController], dict[str, Any]]:

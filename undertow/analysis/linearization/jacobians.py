@@ -17,9 +17,9 @@ from undertow.core.continuous import AbstractContinuousController
 from undertow.core.contracts import Target
 from undertow.loop.closed_loop import ClosedLoop
 
-# Arguments of `Parts.values`, in this order; and what it gives.
+# Arguments of `Parts.values`, in this order; and which signals it gives, as far as the law has them.
 INPUTS = ("plant", "law", "u", "load", "noise")
-SIGNALS = ("error", "estimate", "uncertainty", "modelling_error", "robust")
+SIGNALS = ("error", "uncertainty", "estimate", "modelling_error", "robust_term")
 
 
 class Local(NamedTuple):
@@ -120,19 +120,17 @@ def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array
     pushed = calm._replace(acceleration=calm.acceleration + load)
     truth, axes = plant.output(zero, x), load.shape[0]
     y = truth._replace(position=truth.position + noise[:axes], velocity=truth.velocity + noise[axes:])
-    command, telemetry = law.command(z, y, r)
+    command, of_law = law.command(z, y, r)
     values = {
         "plant": ravel_pytree(plant.dynamics(zero, x, u, pushed))[0],
         "law": ravel_pytree(law.advance(z, y, r, u, dt))[0],
         "u": command,
         "position": truth.position,
         "error": law.model.difference(r.position, truth.position),
-        "estimate": telemetry.estimate,
-        "robust": telemetry.robust,
-        "modelling_error": telemetry.modelling_error,
         "uncertainty": law.model.rates_derivative(truth, plant.acceleration(zero, x, u, pushed))
         - law.known_acceleration(z, truth, u),
     }
+    values |= {name: of_law[name] for name in SIGNALS if name in of_law}
     if isinstance(law, AbstractContinuousController):
         values["flow"] = ravel_pytree(law.flow(z, y, r, u))[0]
     return values

@@ -7,13 +7,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import largest_forces
-from undertow.controllers.diagnostics import COLUMNS, tracking_diagnostics, weight_diagnostics
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter, Room
+from undertow.controllers.signals import ADAPTIVE_LAW, lyapunov_signals, weight_signals
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
 from undertow.core.param import param
 from undertow.estimation.tsk import FuzzySystem
 from undertow.numerics.linear import matvec
@@ -100,18 +100,14 @@ class RobustRCAF(AbstractController):
         actuators, effect = self.model.actuators(), self.model.acceleration_per_force(y)
         forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, self.actuator_rate), self.direction)
         u = actuators.command(plan.actuators, forces, self.actuator_rate)
-        telemetry = Telemetry(
-            estimate=plan.seen.uncertainty,
-            robust=plan.robust,
-            modelling_error=plan.seen.error,
-            predicted_position=y.position,
-            predicted_velocity=z.estimator.rates,
-            weights=z.estimator.weights,
-            diagnostics=tracking_diagnostics(plan.off, self.lyapunov(), self.weight)
-            | weight_diagnostics(z.estimator.weights, self.estimator.bound)
-            | {"attained_share": attained(effect, plan.forces, forces)},
-        )
-        return u, telemetry
+        signals = {
+            "estimate": plan.seen.uncertainty,
+            "robust_term": plan.robust,
+            "modelling_error": plan.seen.error,
+            "attained_share": attained(effect, plan.forces, forces),
+        }
+        signals |= lyapunov_signals(plan.off, self.lyapunov(), self.weight)
+        return u, signals | weight_signals(z.estimator.weights, self.estimator.bound)
 
     def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
         plan, actuators = self._plan(z, y, r), self.model.actuators()
@@ -144,8 +140,8 @@ class RobustRCAF(AbstractController):
     def known_acceleration(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:
         return self._known(self.model.actuators().update_from_report(z.actuators, y.actuator), y, u_applied)
 
-    def columns(self):
-        return COLUMNS
+    def signals(self):
+        return ADAPTIVE_LAW
 
     def lyapunov(self) -> Float[Array, "*n 2 2"]:
         """P of Eq. (21)."""

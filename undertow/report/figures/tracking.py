@@ -15,7 +15,7 @@ def tracking(title: str, runs: Controllers) -> Figure:
     """Figs. 6 and 10."""
     first = next(iter(runs.values()))
     drawn = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    wanted = signals.curve(first, "wanted $x_d$", "target", style.TRUTH)
+    wanted = signals.curve(first, "wanted $x_d$", "reference", style.TRUTH)
     actual = [signals.curve(run, name, "position", look) for run, name, look in drawn]
     errors = [signals.magnitude(signals.curve(run, name, "error", look)) for run, name, look in drawn]
     return small_multiples(

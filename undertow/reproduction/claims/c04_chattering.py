@@ -35,7 +35,7 @@ def judge(runs: Runs, long: Long) -> Finding:
 def perfect_variation(run: Executed) -> float:
     """Total variation, V/s, of the voltages that cancel the prescribed d at the goal, over the steady window."""
     loop, model = run.built.closed_loop, law_of(run).model
-    late = run.dataset["target"].sel(time=slice(*run.built.window()))
+    late = run.dataset["reference"].sel(time=slice(*run.built.window()))
     path, x = loop.realize(jax.random.PRNGKey(0)).disturbance_realization, loop.plant.initial_state()
 
     @jax.jit

@@ -150,7 +150,7 @@ def _limited(n: Numbers) -> str:
 
 def _motor(n: Numbers) -> str:
     paper, robust = n.fidelity("electromechanical", "rcafc"), n.fidelity("electromechanical", "robust")
-    if paper["status"] == "ok":
+    if paper["status"] == "completed":
         return ""
     kept = robust["steady"]["tracking_rms"]
     return (
@@ -201,7 +201,7 @@ def _frequency(n: Numbers) -> str:
 
 def _at_sea(n: Numbers) -> str:
     paper, hand, robust = (n.fidelity("sea", law) for law in ("table1", "hand_tuned", "robust"))
-    if paper["status"] == "ok":
+    if paper["status"] == "completed":
         return ""
     return (
         f"At sea. On BlueROV2 Heavy Table 1 ends after {paper['diverged_at']:.2g} s. The paper's law tuned by hand "

@@ -8,6 +8,7 @@ import xarray as xr
 
 from undertow.bench.workload import W2
 from undertow.core.status import Status
+from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.robust_variant import station_keeping
 from undertow.reproduction.setup import FIDELITIES, HAND_TUNED, RAFC, RCAFC, scenario
 from undertow.scenario.execute import Executed
@@ -138,7 +139,7 @@ def _row(run: Executed) -> dict[str, Any]:
     return {
         "status": run.status.word,
         "diverged_at": None if run.status is Status.OK else float(run.outcome.ended),
-        "steady": run.steady,
+        "steady": with_all_outputs(run.steady),
         "largest_after": _largest_after(run, _PUSHED),
         "position_rms": _late_rms(run, run.dataset["error"]),
         "navigation_rms": _late_rms(run, run.dataset["measured_position"] - run.dataset["position"]),
