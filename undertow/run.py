@@ -12,6 +12,8 @@ from pydantic import ValidationError
 
 from undertow.analysis.metrics import for_people, meanings
 from undertow.analysis.success import Success, criterion_of
+from undertow.core import checks, runtime
+from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
@@ -102,6 +104,7 @@ def simulate(
     seed: int = 0,
     position: Any = None,
     velocity: Any = None,
+    precision: Literal["float64", "float32"] = "float64",
 ) -> Run:
     """Run a plant under a controller. A run that fails says so in its status; nothing is raised.
 
@@ -118,6 +121,7 @@ def simulate(
         seed: of everything random.
         position: outputs at t = 0, shape (n,), m and rad; None for zero.
         velocity: their rates, shape (n,), m/s and rad/s; None for zero.
+        precision: of all numbers of the run, whatever `jax_enable_x64` is; that stays as it was.
 
     Raises:
         BadInput: something given cannot be used, or does not fit the rest.
@@ -134,17 +138,23 @@ def simulate(
     for name, (part, contract) in roles.items():
         if not isinstance(part, contract):
             raise BadInput(name, f"be an {contract.__name__}", f"a {type(part).__name__}")
-    closed_loop = ClosedLoop(*(part for part, _ in roles.values()))
+    checks.choice("precision", precision, ("float64", "float32"))
+    with runtime.in_precision(precision):
+        closed_loop = in_present_precision(ClosedLoop(*(part for part, _ in roles.values())))
+        return _simulate(closed_loop, loop, (duration, dt, record), seed, position, velocity)
+
+
+def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], seed: int, position, velocity) -> Run:
     nowhere = from_data({})
     try:
-        times = {"duration": _plain(duration), "dt": _plain(dt), "record": _plain(record)}
-        settings = Loop.model_validate({"kind": loop, **times})
+        plain = dict(zip(("duration", "dt", "record"), map(_plain, times), strict=True))
+        settings = Loop.model_validate({"kind": kind, **plain})
         start = Initial(position=_plain(position), velocity=_plain(velocity))
         window = Window()
         check_times(nowhere, settings, window)
         check_fit(nowhere, closed_loop, start)
         for sentence in rounded_times(settings):
-            warnings.warn(sentence, stacklevel=2)
+            warnings.warn(sentence, stacklevel=3)
     except ValidationError as errors:
         wrong = complaint(errors, nowhere)
         raise BadInput("loop" if wrong.name == "kind" else wrong.name, wrong.must, wrong.got) from None

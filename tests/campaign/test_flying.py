@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from batch_compiler.emulated_gpu import EmulatedGpu
 
-from simdjit import nvidia
-from simdjit.cuda import Driver
+from simdjit import Driver, nvidia
 from undertow.analysis.metrics import Metrics, results
 from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.campaign_schema import validate
@@ -61,7 +60,7 @@ def test_a_gpu_changes_no_bit(campaign, monkeypatch):
     tasks = [range(0, 50), range(50, 80)]
     found = [columns(two, rows) for rows in tasks]
     emulated = EmulatedGpu()
-    monkeypatch.setattr(nvidia, "ptx", lambda assembly, generation: assembly)
+    monkeypatch.setattr(nvidia, "ptx", lambda assembly, *rest: assembly)
     monkeypatch.setattr(nvidia, "gpu", lambda: Driver(emulated))
     site.cache_clear()
     for rows, expected in zip(tasks, found, strict=True):

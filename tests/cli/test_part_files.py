@@ -86,7 +86,7 @@ def my_bytes():
 def test_a_part_that_lanes_cannot_do_is_told_once_with_the_reason(undertow, tmp_path):
     (tmp_path / "my_bytes.py").write_text(BYTES)
     (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: u1", "kind: ./my_bytes.py:my_bytes"))
-    reason = "lanes (docs/lanes.md) lack something: numbers of type int8."
+    reason = "slower than simd (docs/simd.md): numbers of type int8."
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0, said.err
     assert said.err.count(reason) == 1

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from simdjit.program import Program
+from simdjit import Loop
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
 from undertow.core.errors import BadInput
@@ -67,7 +67,7 @@ def test_a_voltage_that_is_not_a_number_does_not_become_zero_volts(kind):
     thruster, volts = with_zone("static", kind), np.array([[np.nan], [0.3], [-6.0]])
     by_xla = np.asarray(eqx.filter_jit(thruster.terminal)(volts))
     one, nothing = jnp.zeros(1), np.zeros(())
-    program = Program(
+    program = Loop(
         lambda numbers: numbers,
         lambda numbers: nothing,
         lambda numbers, carry, k: carry,

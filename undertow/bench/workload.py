@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from simdjit.cuda import Driver
 from undertow.campaign.runs import planned, run_of
 from undertow.loop.simd_batch import BatchRunner, Plan, Run
 from undertow.scenario.build import build
@@ -84,7 +83,7 @@ def several(run: Run, count: int) -> Any:
     return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
 
 
-def batch(one: Workload, lanes: int = 0, driver: Driver | None = None) -> BatchRunner:
+def batch(one: Workload, lanes: int = 0, driver: Any = None) -> BatchRunner:
     """Its program; arguments as of `BatchRunner`."""
     return BatchRunner(one.run, one.plan, constant(one.run), lanes, driver)
 

@@ -9,8 +9,6 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from simdjit import nvidia
-from simdjit.errors import Unsupported
 from undertow.analysis.metrics import results_of_batch
 from undertow.campaign.campaign_schema import Series
 from undertow.campaign.runs import leaves, planned, run_of, shared_numbers
@@ -143,7 +141,7 @@ def _defined(piece: BatchResult, name: str) -> np.ndarray:
 
 def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
     if kind.backend == "simd":
-        for driver in dict.fromkeys((nvidia.gpu(), None)):
-            with contextlib.suppress(Unsupported):
+        for driver in dict.fromkeys((simd_batch.gpu(), None)):
+            with contextlib.suppress(simd_batch.Unsupported):
                 return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver)
     return vmap_batch.BatchRunner(run, kind.plan)

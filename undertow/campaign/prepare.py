@@ -14,6 +14,7 @@ from undertow.checks.vehicle_findings import vehicle_warnings
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.metric import Metric
+from undertow.loop.simd_batch import unavailable
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.results import rules
@@ -53,7 +54,10 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
         _check(campaign, built, metrics)
         for sentence in (*built.advice(), *vehicle_warnings(built)):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
-    told = (*too_few(campaign), *_refused(several, here), *advice.values())
+    by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
+    why = unavailable() if by_simd else ""
+    slower = (f"trials are computed by backend xla, which is slower: {why}",) if why else ()
+    told = (*slower, *too_few(campaign), *_refused(several, here), *advice.values())
     named = (*(built.resolved for _, built in firsts), *(built.resolved for built in here.alternatives()))
     return Prepared(several, text, folder, firsts[0][1], metrics, named, told)
 

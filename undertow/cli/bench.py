@@ -39,8 +39,14 @@ def bench(as_json: bool) -> int:
         return DONE
     with shares(console) as progress:
         found = interruptible(lambda: measure(progress))
+    if "simd_unavailable" in found:
+        console.print(f"Figures of SIMD batches are left out: {found['simd_unavailable']}.", highlight=False)
     for words, prefix in _WORKLOADS.items():
+        if f"{prefix}steps" not in found:
+            continue
         console.print(_table(words, found, prefix))
+        if f"{prefix}single_compile_s" not in found:
+            continue
         compiling = f"{found[f'{prefix}single_compile_s']:.2g} s for one run"
         if f"{prefix}single_xla_compile_s" in found:
             compiling += f" (XLA {found[f'{prefix}single_xla_compile_s']:.2g} s)"

@@ -39,7 +39,7 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
             warn_of(save_all(lambda: run_drawings(executed.dataset), draft.path / "figures").failures)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
-        typer.echo(f"Advice: left to XLA, which is slower, as lanes (docs/lanes.md) lack something: {why}.", err=True)
+        typer.echo(f"Advice: computed by backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
     expected = predicted.metrics if predicted else None
     known = metrics_of(executed.dataset)
     console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))

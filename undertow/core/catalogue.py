@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.runtime import double_outside_runs
 from undertow.core.user_code import MODULE_PREFIX, python_says
 
 KINDS = (
@@ -40,13 +41,14 @@ Part = Callable[..., Any]
 
 @functools.cache
 def collect(package: ModuleType) -> dict[str, Part]:
-    """Parts that the modules of a package define, by name."""
+    """Parts that the modules of a package define, by name; outside of runs they make double precision of numbers."""
     parts = {}
     for info in pkgutil.iter_modules(package.__path__):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
         part = getattr(module, info.name, None)
         if callable(part):
-            parts[info.name] = part
+            parts[info.name] = double_outside_runs(part)
+            setattr(module, info.name, parts[info.name])
     return parts
 
 

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
 from undertow.core.arrays import as_array
+from undertow.core.runtime import double_outside_runs
 from undertow.core.signals import Signal
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
@@ -160,6 +161,11 @@ class AbstractPlant(eqx.Module):
     outputs: eqx.AbstractVar[tuple[str, ...]]  # names of the n outputs
     output_units: eqx.AbstractVar[tuple[str, ...]]
     input_unit: eqx.AbstractVar[str]
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        if "model" in vars(cls):  # its numbers are made where a plant's own are, before any run
+            cls.model = double_outside_runs(cls.model)
 
     @abc.abstractmethod
     def initial_state(self, position: Outputs | None = None, velocity: Outputs | None = None) -> PyTree:

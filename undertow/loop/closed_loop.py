@@ -3,7 +3,6 @@
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int, PRNGKeyArray, PyTree
@@ -25,6 +24,7 @@ from undertow.core.contracts import (
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
+from undertow.numerics.randomness import keys_for
 
 # Values of one instant by name: what every loop records, and what plant and controller declare.
 Signals = dict[str, Array]
@@ -102,8 +102,9 @@ class ClosedLoop(eqx.Module):
 
     def realize(self, key: PRNGKeyArray) -> "Realization":
         """Draw everything random once."""
-        of_disturbance, of_navigation = jax.random.split(key)
-        return Realization(self, self.disturbance.realize(of_disturbance), self.navigation.realize(of_navigation))
+        keys = keys_for(key, "disturbance", "navigation")
+        disturbance = self.disturbance.realize(keys["disturbance"])
+        return Realization(self, disturbance, self.navigation.realize(keys["navigation"]))
 
 
 class Realization(NamedTuple):

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Pose
 from undertow.core.errors import BadInput
+from undertow.core.runtime import double_outside_runs
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_rate, rotation_from_quaternion
 from undertow.plants.hybrid_model import HybridModel
@@ -49,6 +50,7 @@ class HybridVehicle(AbstractPlant):
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True)
 
+    @double_outside_runs
     def __init__(
         self,
         vehicle: Vehicle,

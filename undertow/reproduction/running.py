@@ -9,12 +9,11 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from simdjit.machine import lanes_of
 from undertow.analysis.metrics import Gathered, accumulators, results
 from undertow.campaign.campaign_schema import Series
 from undertow.campaign.runs import leaves, planned, run_of
 from undertow.core.status import Status
-from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run
+from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run, simd_width
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import Built, build
 from undertow.scenario.execute import Executed, execute, save
@@ -122,7 +121,7 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ende
     ]
     lengths = {steps: [name for name in runs if runs[name][1] == steps] for _, steps in runs.values()}
     # A program for one run is faster than one for eight that runs one.
-    width = min(lanes_of(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
+    width = min(simd_width(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
     batch = BatchRunner(first, plan, constant, width)
     tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}
     for steps, names in lengths.items():

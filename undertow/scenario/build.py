@@ -9,6 +9,7 @@ import numpy as np
 from undertow.analysis.metrics import meanings
 from undertow.analysis.success import criterion_of
 from undertow.core import runtime
+from undertow.core.arrays import in_present_precision
 from undertow.core.catalogue import KIND_OF
 from undertow.core.contracts import AbstractDisturbance
 from undertow.core.metric import AbstractMetric, Metric
@@ -80,6 +81,8 @@ class Built(NamedTuple):
 def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None) -> Built:
     """Objects described by a scenario, made on the processor: the same bits whether or not there is a GPU.
 
+    They are made in double precision and then converted to the one that the scenario names.
+
     Args:
         source: a scenario as read from a file, or as Python data.
         part_cache: where many similar scenarios are built, so that what they share is made once.
@@ -89,8 +92,11 @@ def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None)
     """
     text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
-    with runtime.on_processor(), runtime.in_precision(scenario.precision):
-        return _build(text, scenario, part_cache or PartCache())
+    with runtime.on_processor():
+        with runtime.in_precision("float64"):
+            built = _build(text, scenario, part_cache or PartCache())
+        with runtime.in_precision(scenario.precision):
+            return built._replace(closed_loop=in_present_precision(built.closed_loop))
 
 
 def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:

@@ -10,7 +10,6 @@ import jax
 import numpy as np
 import xarray as xr
 
-from simdjit.errors import Unsupported
 from undertow.analysis.metrics import accumulators
 from undertow.analysis.success import Success
 from undertow.core import runtime
@@ -85,14 +84,15 @@ def run_loop(
     """Run a closed loop as `loop:` and `initial:` of a scenario say; `accumulators` for a sampled one.
 
     Returns:
-        The outcome; and attribute `left_to_xla` of its dataset, the reason, where lanes were asked for in vain.
+        The outcome, in arrays of NumPy; and attribute `left_to_xla` of its dataset, the reason, where the batch
+        compiler was asked for in vain.
     """
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
     common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
     if settings.kind == "continuous":
         adaptive = (settings.rtol, settings.atol) if settings.method == "adaptive" else None
         outcome = continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
-        return jax.block_until_ready(outcome), {}
+        return jax.device_get(outcome), {}
     common |= {
         "dt": settings.dt,
         "record_every": round(settings.record / settings.dt),
@@ -104,9 +104,9 @@ def run_loop(
     if settings.backend == "simd":
         try:
             return simd_batch.simulate(loop, **common), {}
-        except Unsupported as error:
+        except simd_batch.Unsupported as error:
             lacking = {"left_to_xla": str(error)}
-    return jax.block_until_ready(sampled.simulate(loop, **common)), lacking
+    return jax.device_get(sampled.simulate(loop, **common)), lacking
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

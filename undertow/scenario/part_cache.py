@@ -18,7 +18,7 @@ class PartCache:
         self._checked: set[Any] = set()
 
     def part(self, where: str, description: Mapping[str, Any], given: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """Result of `make`, or what it was for the same description and the same other parts, in the same precision.
+        """Result of `make`, or what it was for the same description and the same other parts.
 
         Args:
             where: key of the part.
@@ -30,8 +30,7 @@ class PartCache:
             told = json.dumps(description, sort_keys=True)
         except (TypeError, ValueError):  # arrays in Python data
             return make()
-        double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
-        key = (where, told, double, tuple(id(part) for part in given))
+        key = (where, told, tuple(id(part) for part in given))
         if key not in self._made:
             if len(self._made) >= _MOST:
                 self._made.clear()

@@ -1,56 +1,80 @@
-"""What a program begins with: the numbers of a run, and what is drawn from them."""
+"""The prologue of a loop: the numbers of each run, and what is computed from them before the first step."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
 import numpy as np
 
-from simdjit.batches import batched
-from simdjit.errors import Unsupported
-from simdjit.graph import Graph
-from simdjit.nodes import Nodes, filled
-from simdjit.scalarise import evaluate, nodes_of
+from simdjit.graph import Graph, Nodes, Unsupported, filled
+from simdjit.lowering import evaluate, nodes_of
 from simdjit.tracing import Traced
 
-# Operations; to draw what needs more of them (a spectrum of waves) is left to XLA.
+# Operations; what needs more of them (a spectrum of waves) is left to XLA.
 _MOST = 15_000
 
 
-class Beginning:
-    """What does not depend on the step: drawn in lanes where that can be, and by XLA before where not.
+# The width of a program decides about the last bits of a result, what is in the other places does not: every program
+# has this width, however few runs there are, so that no result depends on how they are cut into tasks.
+_WIDTH = 64
+
+
+def _by_vmap(function: Callable[[Any], Any], numbers: Any) -> Callable[[Any], Any]:
+    """The function with a leading axis over runs, by `jax.vmap`: for what has no rule.
 
     Args:
-        draw: the function, of `numbers`.
+        function: of a tree of arrays.
+        numbers: an example of that.
+    """
+    width = _WIDTH
+    stacked = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((width, *np.shape(leaf)), leaf.dtype), numbers)
+    program = jax.jit(jax.vmap(function)).lower(stacked).compile()
+
+    def run(numbers: Any) -> Any:
+        runs, pieces = len(jax.tree.leaves(numbers)[0]), []
+        for first in range(0, runs, width):
+            which = np.minimum(np.arange(first, first + width), runs - 1)
+            results = program(jax.tree.map(lambda leaf, which=which: leaf[which], numbers))
+            pieces.append(jax.tree.map(np.asarray, results))
+        return jax.tree.map(lambda *parts: np.concatenate(parts)[:runs], *pieces)
+
+    return run
+
+
+class Prologue:
+    """What does not depend on the step: computed in the program where there are rules, and by XLA before where not.
+
+    Args:
+        prepare: the function, of `numbers`.
         numbers: of one run; a tree of arrays.
         constant: which of its leaves are the same in every run.
 
     Attributes:
-        graph: with what is drawn in lanes.
+        graph: with what is computed in the program.
         nodes: of its results.
         inputs: shapes and types of what every lane brings along, in the order of its slots.
 
     Raises:
-        Unsupported: neither lanes nor XLA can do it for many runs at once.
+        Unsupported: neither the program nor XLA can do it for many runs at once.
     """
 
-    def __init__(self, draw: Traced, numbers: Any, constant: list[bool]):
-        given = zip(jax.tree.leaves(numbers), draw.closed.in_avals, strict=True)
+    def __init__(self, prepare: Traced, numbers: Any, constant: Sequence[bool]):
+        given = zip(jax.tree.leaves(numbers), prepare.closed.in_avals, strict=True)
         leaves = [np.asarray(leaf, dtype=kind.dtype) for leaf, kind in given]  # as JAX takes them, doubles or not
         self._varying = [i for i, same in enumerate(constant) if not same]
         self._before: Callable[[Any], list[np.ndarray]] | None = None
         self.inputs = [leaves[i] for i in self._varying]
         try:
             self.graph, given = self._given(leaves)
-            self.nodes = evaluate(self.graph, draw.closed, given, _MOST)
+            self.nodes = evaluate(self.graph, prepare.closed, given, _MOST)
         except Unsupported as lacking:
-            passed_on = draw.passed_on()
+            passed_on = prepare.passed_on()
             made = [place is None for place in passed_on]
-            self.inputs += [leaf for leaf, new in zip(draw.leaves, made, strict=True) if new]
+            self.inputs += [leaf for leaf, new in zip(prepare.leaves, made, strict=True) if new]
             try:
-                self._before = batched(draw.only(made), numbers)
+                self._before = _by_vmap(prepare.only(made), numbers)
             except Exception as error:  # whatever JAX raises for what it cannot do for several at once
-                raise Unsupported(f"{lacking}; nor can JAX draw it for several runs ({error})") from error
+                raise Unsupported(f"{lacking}; nor can JAX compute it for several runs ({error})") from error
             self.graph, given = self._given(leaves)
             further = iter(given[len(leaves) :])
             self.nodes = [next(further) if place is None else given[place] for place in passed_on]

@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 
 from simdjit import elementwise, indexing, regions
-from simdjit.errors import Unsupported
-from simdjit.graph import BOOL, I64, Node
-from simdjit.nodes import Nodes, filled, flat
+from simdjit.graph import BOOL, I64, Node, Nodes, Unsupported, filled, flat
 from simdjit.rules import Equation, rule
 
 # A loop of at most so many rounds is written out.
 _ROUNDS = 64
 
-# Operations of a branch that are worth a look whether any lane needs them.
+# Operations of a branch from which on it is tested whether any lane needs it.
 _WORTH = 300
 
 
@@ -129,7 +127,7 @@ def _long_scan(
 
 
 def _counts(params: dict[str, Any]) -> tuple[int, int]:
-    """How many arguments of a scan are constants, and how many are carried; told differently since JAX 0.12."""
+    """How many arguments of a scan are constants, and how many are carried; in different parameters since JAX 0.12."""
     if "ft_in" in params:
         constants, carried, _ = map(len, params["ft_in"].unpack())
         return constants, carried

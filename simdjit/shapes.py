@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simdjit.nodes import Nodes
+from simdjit.graph import Nodes
 from simdjit.rules import Equation, rule
 
 

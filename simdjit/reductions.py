@@ -7,9 +7,7 @@ from itertools import accumulate
 import numpy as np
 
 from simdjit import elementwise
-from simdjit.errors import Unsupported
-from simdjit.graph import BOOL, Graph, Node
-from simdjit.nodes import Nodes, filled
+from simdjit.graph import BOOL, Graph, Node, Nodes, Unsupported, filled
 from simdjit.rules import Equation, rule
 from simdjit.scalar import Scalar, where
 

@@ -9,14 +9,12 @@ import jax
 import numpy as np
 from jax.extend.core import ClosedJaxpr, Literal
 
-from simdjit import collecting, control, elementwise, indexing, linear, moving, sorting, threefry
-from simdjit.errors import Unsupported
-from simdjit.graph import Graph
-from simdjit.nodes import Nodes, filled
+from simdjit import control_flow, elementwise, indexing, linear_algebra, reductions, shapes, sorting, threefry
+from simdjit.graph import Graph, Nodes, Unsupported, filled
 from simdjit.rules import Equation, results, rule
 
 # Modules whose import registers their rules.
-RULES_OF = (collecting, control, elementwise, indexing, linear, moving, sorting, threefry)
+RULES_OF = (control_flow, elementwise, indexing, linear_algebra, reductions, shapes, sorting, threefry)
 
 
 def nodes_of(graph: Graph, values: Any) -> Nodes:

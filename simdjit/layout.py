@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from simdjit.emit import SLOT
+from simdjit.instructions import SLOT
 
 _CACHE_LINE = 64
 

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from simdjit.errors import Unsupported
-from simdjit.nodes import Nodes
+from simdjit.graph import Nodes, Unsupported
 from simdjit.rules import Equation, rule
 from simdjit.scalar import Scalar, where
 

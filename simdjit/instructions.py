@@ -1,8 +1,4 @@
-"""A program of lanes as LLVM's assembly: every number a vector, one entry per lane.
-
-The program starts every lane, then goes from step to step; now and then it looks. What does not change from step to
-step is done once.
-"""
+"""Nodes as instructions of LLVM's assembly: every scalar of the graph is a vector with one entry per lane."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -2,15 +2,16 @@
 
 import ctypes
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from llvmlite import binding
 
-from simdjit.cache import kept
-from simdjit.errors import Unsupported
+from simdjit.cache import cached
+from simdjit.graph import Unsupported
 
-# Arguments of a program: numbers, carry, series; steps, steps between looks.
+# Arguments of a program: numbers, carry, series; steps, steps between records.
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
 
 
@@ -19,21 +20,22 @@ class Code:
 
     Args:
         assembly: LLVM's, with a function `run`.
+        cache: folder of compiled code; None for the default.
     """
 
-    def __init__(self, assembly: str):
+    def __init__(self, assembly: str, cache: Path | None = None):
         self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
-        self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly)))
+        self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly, cache)))
         self._engine.finalize_object()
         self._run: Callable[..., None] = _SIGNATURE(self._engine.get_function_address("run"))
 
     def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, steps: int, every: int) -> None:
-        """Run it for every group of lanes; memories as `memory.Layout` makes them."""
+        """Run it for every group of lanes; memories as `layout.Layout` makes them."""
         for group in range(len(numbers)):
             self._run(*(memory[group].ctypes.data for memory in (numbers, carry, series)), steps, every)
 
 
-def lanes_of(bits: int) -> int:
+def simd_width(bits: int) -> int:
     """Numbers of so many bits in one vector register of this processor."""
     features = binding.get_host_cpu_features()
     register = 512 if features.get("avx512f") else 256 if features.get("avx2") else 128
@@ -62,6 +64,6 @@ def parsed(assembly: str) -> binding.ModuleRef:
     return module
 
 
-def _object(assembly: str) -> bytes:
-    told = (assembly, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten(), binding.llvm_version_info)
-    return kept(told, ".o", lambda: _target().emit_object(parsed(assembly)))
+def _object(assembly: str, cache: Path | None) -> bytes:
+    key = (assembly, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten(), binding.llvm_version_info)
+    return cached(key, ".o", lambda: _target().emit_object(parsed(assembly)), cache)
