@@ -1,4 +1,4 @@
-"""Strict arithmetic for every test: double precision outside of runs, no silent broadcasting of ranks, no silent promotion of types."""
+"""Strict arithmetic for every test: double precision outside of runs, no silent promotion of types."""
 
 from undertow.process import prepare  # isort: skip  (before JAX is imported
 

@@ -47,7 +47,7 @@ def test_a_loop_for_a_batch(constant):
     pace = np.full(5, 0.01)
     step = lambda numbers, carry, k: (
         carry[0] + numbers[1] * carry[1],
-        carry[1] - numbers[1] * jnp.sin(carry[0]) - k * 1e-4,
+        carry[1] - numbers[1] * jnp.sin(carry[0]) - k.astype(float) * 1e-4,
     )
     loop = simdjit.Loop(
         lambda numbers: numbers,

@@ -12,6 +12,7 @@ from undertow.campaign.campaign_schema import validate
 from undertow.campaign.reading import whole
 from undertow.campaign.task import REFUSED, fly, site
 from undertow.campaign.trials import Trials, trials
+from undertow.loop import simd_batch
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
@@ -61,7 +62,7 @@ def test_a_gpu_changes_no_bit(campaign, monkeypatch):
     found = [columns(two, rows) for rows in tasks]
     emulated = EmulatedGpu()
     monkeypatch.setattr(nvidia, "ptx", lambda assembly, *rest: assembly)
-    monkeypatch.setattr(nvidia, "gpu", lambda: Driver(emulated))
+    monkeypatch.setattr(simd_batch, "gpu", lambda: Driver(emulated))
     site.cache_clear()
     for rows, expected in zip(tasks, found, strict=True):
         jax.tree.map(np.testing.assert_array_equal, columns(two, rows), expected)

@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.scenario.provenance import checksum, content_hash
 
-NOISY = SCENARIO.replace("seed: 3", "seed: 3\nsensor: white_noise\nsteady: {start: 0.05, stop: 0.1}")
+NOISY = SCENARIO.replace("seed: 3", "seed: 3\nnavigation: white_noise\nsteady: {start: 0.05, stop: 0.1}")
 
 
 @pytest.fixture

@@ -88,24 +88,24 @@ def by_parts(precision):
         seed=3,
         precision=precision,
     )
-    return [np.asarray(run.outcome.signals.position), run.metrics["whole"]["input_variation"]]
+    return [run.dataset["position"].values, run.metrics["whole"]["input_variation"]]
 
 
 def by_scenario(precision):
     found = execute(SCENARIO | {"precision": precision, "seed": 3})
-    return [np.asarray(found.outcome.signals.position), found.whole["input_variation"]]
+    return [found.dataset["position"].values, found.whole["input_variation"]]
 
 
 def by_xla(precision):
     found = execute(SCENARIO | {"precision": precision, "seed": 3, "loop": SCENARIO["loop"] | {"backend": "xla"}})
-    return [np.asarray(found.outcome.signals.position), found.whole["input_variation"]]
+    return [found.dataset["position"].values, found.whole["input_variation"]]
 
 
 def by_campaign(precision):
     vary = {"disturbance.amplitude": {"uniform": [0.5, 2.0]}}
     campaign = {"scenario": SCENARIO | {"precision": precision}, "trials": 2, "seed": 7, "vary": vary}
     columns = fly(dump(campaign), "", range(2))
-    return [columns["input_variation"], columns["input_rms"] if "input_rms" in columns else columns["tracking_rms"]]
+    return [columns["input_variation"], columns["position_rms"]]
 
 
 WAYS = {"parts": by_parts, "scenario": by_scenario, "xla": by_xla, "campaign": by_campaign}

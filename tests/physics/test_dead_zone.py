@@ -9,6 +9,7 @@ import pytest
 from simdjit import Loop
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
+from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.disturbances import sinusoid
 from undertow.loop import sampled, simd_batch
@@ -89,7 +90,7 @@ def test_slope_and_precision(kind):
     terminal = with_zone("static", kind).terminal
     slopes = jax.vmap(jax.grad(terminal))(jnp.array([-4.0, -1.0, 1.0, 4.0]))
     np.testing.assert_array_equal(slopes, [1.0, 0.0, 0.0, 1.0])
-    with jax.enable_x64(False):
+    with runtime.in_precision("float32"):
         found = with_zone("static", kind).terminal(jnp.asarray(VOLTS))
     assert found.dtype == jnp.float32
     np.testing.assert_allclose(found, TURNS[kind], rtol=0, atol=2e-7)

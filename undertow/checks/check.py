@@ -16,6 +16,7 @@ from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.runtime import double_outside_runs
 from undertow.core.user_code import place_of
 from undertow.plants.double_integrator import double_integrator
 from undertow.scenario import factory
@@ -48,6 +49,7 @@ class Report(NamedTuple):
         return sum(finding.level == "error" for finding, _ in self.found)
 
 
+@double_outside_runs
 def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> Report:
     """Check a vehicle file, a scenario, a result file, a part by name, or `./file.py:function`.
 

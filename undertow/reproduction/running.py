@@ -12,6 +12,7 @@ import numpy as np
 from undertow.analysis.metrics import Gathered, accumulators, results
 from undertow.campaign.campaign_schema import Series
 from undertow.campaign.runs import leaves, planned, run_of
+from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run, simd_width
 from undertow.reproduction.all_outputs import with_all_outputs
@@ -112,6 +113,7 @@ def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
     return tuple(one for window in windows for one in accumulators(built.closed_loop.plant, (), *window))
 
 
+@double_outside_runs
 def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ended]:
     """Runs of one program, by name with their numbers of steps; those of one length side by side."""
     first = next(iter(runs.values()))[0]

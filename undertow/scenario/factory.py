@@ -224,7 +224,7 @@ def inner_default(name: str, parameter: inspect.Parameter) -> Any:
     return INNER[name][1] if parameter.default is inspect.Parameter.empty else parameter.default
 
 
-def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[str, Any]]:
+def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[str, Any] | list[dict[str, Any]]]:
     kind, default = INNER[name]
     if isinstance(default, tuple):
         if not isinstance(description, list | tuple):

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, AbstractReference, Measurement
 from undertow.core.errors import BadInput
+from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.interop.mujoco_engine.propellers import Propellers
 from undertow.interop.mujoco_engine.submerged import Submerged
@@ -27,6 +28,7 @@ class Flight(NamedTuple):
     status: Status  # of the end; series end with the last sound state
 
 
+@double_outside_runs
 def fly(
     body: Submerged,
     thruster: AbstractThruster,
