@@ -41,6 +41,26 @@ def test_what_it_leaves(campaign_file, tmp_path, capsys):
     assert "40 of 40 trials done" in capsys.readouterr().out
 
 
+def test_variants_are_an_axis_of_the_results(campaign_file, tmp_path, capsys):
+    """The same trials as by `cross`, where a variant changes one key only."""
+    changed = {"slow": 1.0, "brisk": 4.0}
+    ways = (
+        {"variants": {name: {"controller.frequency": w} for name, w in changed.items()}},
+        {"cross": {"controller.frequency": changed}},
+    )
+    rows = []
+    for i, way in enumerate(ways):
+        out = tmp_path / str(i)
+        assert run(["campaign", str(campaign_file(str(i), trials=4, **way)), "--out", str(out)]) == 0
+        rows.append(xr.open_zarr(out / STORE, consolidated=False).load())
+    assert rows[0]["variant"].values.tolist() == ["slow", "brisk"]
+    np.testing.assert_array_equal(rows[0]["tracking_rms"].values, rows[1]["tracking_rms"].values)
+    found = json.loads((tmp_path / "0" / "summary.json").read_text())
+    assert [one["values"] for one in found["combinations"]] == [{"variant": "slow"}, {"variant": "brisk"}]
+    assert "slow" in capsys.readouterr().out
+    assert run(["campaign", str(tmp_path / "0.yaml"), "--out", str(tmp_path / "0"), "--resume"]) == 0
+
+
 def test_rows_stand_by_what_is_crossed_and_drawn(campaign_file, tmp_path):
     """By names where there are such, by numbers elsewhere; `trial` is the number that its own scenario file has."""
     cross = {"plant.limit": [10.0, 20.0], "controller.frequency": {"calm": 1.0, "brisk": 2.0}}

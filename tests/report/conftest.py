@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.report.figures import ladder_figure, run_figures
+from undertow.report.figures import fidelity_figure, run_figures
 from undertow.report.reproduction.report import write_report
 
 
@@ -91,7 +91,7 @@ def results_of_a_study():
         "example1": both,
         "example2": both,
         "table2": {key: lasted | {"steady": metrics(k + 1)} for k, key in enumerate(table)},
-        "ladder": {
+        "fidelity": {
             "ideal": {"rcafc": lasted, "rafc": lasted},
             "electromechanical": {"rcafc": failed, "rafc": lasted},
         },
@@ -118,7 +118,7 @@ def results():
 def page(runs, tmp_path_factory):
     """The report of the study with two figures: its folder and its text."""
     folder, results = tmp_path_factory.mktemp("report"), results_of_a_study()
-    figures = {"fig06": run_figures(runs["rcafc"])["tracking"], "ladder": ladder_figure(results["ladder"])}
+    figures = {"fig06": run_figures(runs["rcafc"])["tracking"], "fidelity": fidelity_figure(results["fidelity"])}
     written = write_report(results, figures, folder)
     assert written == folder / "report.html"
     return written.read_text(encoding="utf-8")

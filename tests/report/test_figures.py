@@ -6,7 +6,7 @@ import pytest
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from PIL import Image
 
-from undertow.report.figures import ladder_figure, paper_figures, png, run_figures, save, svg, sweep_figure
+from undertow.report.figures import fidelity_figure, paper_figures, png, run_figures, save, svg, sweep_figure
 from undertow.report.figures.effort import effort
 from undertow.report.figures.uncertainty import uncertainty
 from undertow.reproduction.thruster_response import thruster_response
@@ -198,8 +198,8 @@ def test_a_run_with_gaps_is_drawn(make_run):
         assert svg(figure)
 
 
-def test_ladder_marks_what_failed(results, make_run):
-    alone = ladder_figure(results["ladder"])
+def test_fidelity_figure_marks_what_failed(results, make_run):
+    alone = fidelity_figure(results["fidelity"])
     assert len(alone.axes) == 4
     tracking = alone.axes[0]
     assert line(tracking, "RAFC").get_ydata() == pytest.approx([1.6e-4, 1.6e-4])
@@ -207,7 +207,7 @@ def test_ladder_marks_what_failed(results, make_run):
     assert [text.get_text() for text in tracking.texts] == ["RCAFC diverged at 3.29 s"]
     pair = {"rcafc": make_run(status="diverged", ended=3.295), "rafc": make_run("rafc")}
     runs = {"ideal": {key: make_run(key) for key in pair}, "electromechanical": pair}
-    whole = ladder_figure(results["ladder"], runs)
+    whole = fidelity_figure(results["fidelity"], runs)
     assert [panel.get_title(loc="left") for panel in whole.axes[:2]] == ["ideal", "electromechanical"]
     assert line(whole.axes[1], "RCAFC, electromechanical").get_xdata()[-1] <= 3.295
     assert svg(whole)

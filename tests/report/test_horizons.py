@@ -25,7 +25,7 @@ def row(level, law, composite, bounded, ended, **more):
     } | more  # fmt: skip
 
 
-LADDER = [
+ROWS_OF_FIDELITIES = [
     row("shaft", "rcafc", 500.0, False, 200.0),
     row("electromechanical", "rcafc", 500.0, False, 1.5),
     row("electromechanical", "rcafc", 500.0, True, 200.0),
@@ -45,11 +45,11 @@ CURVES = {
     "tracking": np.exp(-TIME),
 }
 DRIFTING = {"lag": 0.05, "needed": 453.0, "runs": {"free": CURVES, "bounded": CURVES}}
-RESULTS = {"ladder": {}, "horizons": {"duration": 200.0, "windows": WINDOWS, "rows": LADDER}, "lags": MAP}
+RESULTS = {"fidelity": {}, "horizons": {"duration": 200.0, "windows": WINDOWS, "rows": ROWS_OF_FIDELITIES}, "lags": MAP}
 
 
 def test_growth_is_drawn_up_to_the_end_of_each_run():
-    shaft, motor, survival = horizons_figure(LADDER, 200.0).axes
+    shaft, motor, survival = horizons_figure(ROWS_OF_FIDELITIES, 200.0).axes
     np.testing.assert_array_equal(shaft.lines[0].get_ydata(), [3.0, 30.0, 300.0])
     crosses = sorted(line.get_xdata()[0] for line in motor.lines if line.get_marker() == "X")
     assert crosses == [1.5, 139.4], "a run that is bounded lasts"
@@ -84,4 +84,4 @@ def test_page_says_how_long_everything_lasted(results, tmp_path):
         assert said in words
     assert "from 453 on" in words and "876 to 4382" in words and "never" in words
     assert "Simulated: level ideal, 10 s." in words
-    assert "lasts 20 s" in words, "the ladder of 20 s says so, too"
+    assert "lasts 20 s" in words, "the comparison over 20 s says so, too"

@@ -100,7 +100,7 @@ def test_links_lead_somewhere(page):
 def test_page_shows_every_figure_and_claim(page, results):
     parser = parsed(page)
     shown = [attributes.get("id") for name, attributes in parser.elements if name == "figure"]
-    assert shown == ["figure-fig06", "figure-ladder"]
+    assert shown == ["figure-fig06", "figure-fidelity"]
     words = "".join(parser.words)
     for claim in results["claims"]:
         assert words.count(claim["claim"]) == 2  # at a glance and in the audit
@@ -137,7 +137,7 @@ def test_figures_are_written_as_files_too(results, tmp_path):
     assert written == ["figures/sweep.png", "figures/sweep.svg", "report.html"]
 
 
-@pytest.mark.parametrize("gone", ["example1", "example2", "table2", "ladder", "claims", "provenance"])
+@pytest.mark.parametrize("gone", ["example1", "example2", "table2", "fidelity", "claims", "provenance"])
 def test_missing_parts_are_left_out(results, tmp_path, gone):
     del results[gone]
     parsed(write_report(results, {}, tmp_path).read_text(encoding="utf-8"))

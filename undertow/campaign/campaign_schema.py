@@ -17,6 +17,9 @@ _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
+VARIANT = "variant"  # the axis of `variants`, beside those of `cross`
+
+
 class Spread(Strict):
     """How one parameter is drawn: exactly one of these."""
 
@@ -83,6 +86,10 @@ class Campaign(Strict):
     cross: dict[str, dict[str, Any]] = Field(
         default_factory=dict, description="key path -> values, a list or by names; all fly the same draws and seeds"
     )
+    variants: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="name -> key paths and their values: whatever changes together; an axis after those of `cross`",
+    )
     requirements: dict[str, Requirement] = Field(default_factory=dict, description="metric -> what it must keep to")
     series: Series | None = Field(None, description="signals to keep; metrics only unless given")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="of all draws and of the seeds of the trials")
@@ -106,9 +113,19 @@ class Campaign(Strict):
         return {key: by_name(values) if isinstance(values, list) else values for key, values in given.items()}
 
     @property
+    def axes(self) -> dict[str, dict[str, Any]]:
+        """Values by names along every axis: the key paths of `cross`, then `variant`."""
+        return self.cross | ({VARIANT: self.variants} if self.variants else {})
+
+    @property
+    def keys(self) -> list[str]:
+        """Every key path whose value is not that of the scenario in all trials."""
+        return [*self.vary, *self.cross, *(key for variant in self.variants.values() for key in variant)]
+
+    @property
     def number(self) -> int:
-        """Trials all told: the draws, for every combination of `cross`."""
-        return math.prod(len(entries) for entries in self.cross.values()) * self.trials
+        """Trials all told: the draws, for every combination of `cross` and `variants`."""
+        return math.prod(len(entries) for entries in self.axes.values()) * self.trials
 
 
 def validate(text: Text) -> Campaign:
@@ -127,6 +144,11 @@ def validate(text: Text) -> Campaign:
     pairs = [(section, key) for section in ("vary", "cross") for key in getattr(found, section)]
     for section, key in pairs:
         _check_key(section, key, [other for _, other in pairs], text.where((section, key)))
+    if found.variants and VARIANT in found.cross:
+        raise BadInput(f"cross.{VARIANT}", "be left out beside `variants`", where=text.where(("cross", VARIANT)))
+    for name, variant in found.variants.items():
+        for key in variant:
+            _check_key("variants", key, [*found.vary, key], text.where(("variants", name, key)))
     for key, entries in found.cross.items():
         _check_entries(key, entries, text.where(("cross", key)))
     return found
@@ -143,7 +165,7 @@ def _check_key(section: str, key: str, every: list[str], where: str) -> None:
         hint = "Every trial has one of its own; `seed` of the campaign decides which"
         raise BadInput(f"{section}.seed", "be left out", hint=hint, where=where)
     if every.count(key) > 1:
-        raise BadInput(f"cross.{key}", "not be in `vary`, too", where=where)
+        raise BadInput(f"{section if section == 'variants' else 'cross'}.{key}", "not be in `vary`, too", where=where)
     for other in every:
         if other.startswith((f"{key}.", f"{key}[")):
             raise BadInput(other, f"not be beside {key}, which it is a part of", where=where)

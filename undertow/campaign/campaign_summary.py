@@ -48,7 +48,7 @@ def _combination(results: Results, number: int) -> dict[str, Any]:
     own = results.combinations == number
     rows, lasted, flown = results.rows.isel(trial=own), results.lasted[own], results.flown[own]
     return {
-        "values": dict(zip(results.campaign.cross, results.named(number), strict=True)),
+        "values": dict(zip(results.campaign.axes, results.named(number), strict=True)),
         "trials": int(lasted.size),
         "status": endings(rows),
         "failed": int((flown & ~lasted).sum()),

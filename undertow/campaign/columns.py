@@ -72,7 +72,7 @@ def labels(several: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict
         built: one of them.
         metrics: that any of them may have.
     """
-    found, along = trial_labels(several.campaign, metrics), (*several.campaign.cross, DRAWS)
+    found, along = trial_labels(several.campaign, metrics), (*several.campaign.axes, DRAWS)
     loop = built.closed_loop
     for name in several.campaign.series.signals if several.campaign.series else ():
         signal = loop.signals()[name]
@@ -85,7 +85,7 @@ def trial_labels(campaign: Campaign, metrics: Mapping[str, Metric]) -> dict[str,
     """Labels of the columns that hold a number for each trial, by name."""
     of_metrics = {name: _said(metric.meaning, metric.unit) for name, metric in metrics.items()}
     of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in drawn(campaign)} | ALWAYS | of_metrics
-    along = (*campaign.cross, DRAWS)
+    along = (*campaign.axes, DRAWS)
     return {name: Label(along, said, _DTYPES.get(name, "float64")) for name, said in of_trials.items()}
 
 
@@ -96,8 +96,8 @@ def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
         several: the trials.
         built: one of them.
     """
-    cross = several.campaign.cross
-    found = {key: xr.Variable((key,), _crossed(entries), {"long_name": key}) for key, entries in cross.items()}
+    axes = several.campaign.axes
+    found = {key: xr.Variable((key,), _crossed(entries), {"long_name": key}) for key, entries in axes.items()}
     if several.campaign.series is None:
         return found
     plan = planned(built, several.campaign.series)

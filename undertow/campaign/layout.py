@@ -68,7 +68,7 @@ class Layout(NamedTuple):
 
 def layout(campaign: Campaign) -> Layout:
     """That of a new store: about as many trials in a task as are asked for, rather draws than combinations."""
-    crossed = tuple(len(entries) for entries in campaign.cross.values())
+    crossed = tuple(len(entries) for entries in campaign.axes.values())
     chunk = [min(campaign.chunk, max(campaign.trials, campaign.chunk // math.prod(crossed)))]
     for count in reversed(crossed):
         chunk.insert(0, min(count, campaign.chunk // math.prod(chunk)) or 1)

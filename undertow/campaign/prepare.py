@@ -92,7 +92,7 @@ def _check(campaign: Campaign, built: Built, metrics: Mapping[str, Metric]) -> N
             raise BadInput(f"requirements.{name}", "be a metric", "unknown", hint=did_you_mean(name, metrics))
     if campaign.series is None:
         return
-    for key in (*campaign.vary, *campaign.cross):
+    for key in campaign.keys:
         if key in ("loop", "loop.dt", "loop.duration"):
             raise BadInput("series", "be of runs of one length and sampling time", f"beside {key}, which differs")
     for i, name in enumerate(campaign.series.signals):

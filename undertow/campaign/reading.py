@@ -24,5 +24,6 @@ def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
 
 def whole(campaign: Campaign, scenario: dict) -> str:
     """YAML with everything that is asked; `chunk` and free text say nothing about the results."""
-    data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"})
+    unused = set() if campaign.variants else {"variants"}
+    data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"} | unused)
     return dump(data | {"scenario": scenario})

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import spearmanr
+from scipy.stats import binom, spearmanr
 
 from undertow.campaign.store_results import Results
 
@@ -18,6 +18,17 @@ def quantiles(values: np.ndarray) -> dict[str, float]:
     method: Any = "linear" if np.isfinite(known).all() else "higher"
     found = np.quantile(known, QUANTILES, method=method) if known.size else np.full(len(QUANTILES), np.nan)
     return dict(zip(map(str, QUANTILES), found.tolist(), strict=True))
+
+
+def median_interval(values: np.ndarray, confidence: float = 0.95) -> tuple[float, float]:
+    """Interval that holds the median of the population, whatever its distribution; some values may be infinite.
+
+    The number of values below the median is binomial (count, 1/2), so the r-th smallest and r-th largest enclose it;
+    with few values the smallest and largest are taken. David and Nagaraja (2003), section 7.1.
+    """
+    ordered = np.sort(values)
+    rank = max(int(binom.ppf((1 - confidence) / 2, ordered.size, 0.5)), 1)
+    return float(ordered[rank - 1]), float(ordered[-rank])
 
 
 def defined_quantiles(rows: xr.Dataset, metrics: Iterable[str], which: np.ndarray) -> dict[str, dict[str, float]]:

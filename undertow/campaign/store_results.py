@@ -69,7 +69,7 @@ class Results(NamedTuple):
 
     def named(self, combination: int) -> tuple[str, ...]:
         """Those in a combination."""
-        return list(itertools.product(*self.campaign.cross.values()))[combination]
+        return list(itertools.product(*self.campaign.axes.values()))[combination]
 
     def _combination(self, trial: Any) -> Any:
         """Of one trial or several, as `Trials` numbers them."""
@@ -116,11 +116,11 @@ def load(folder: Path) -> Results:
 
 def _rows(group: Any, campaign: Campaign, stored: Layout, names: Iterable[str]) -> xr.Dataset:
     """All of the store by trial, without series. While room for further draws is made, arrays may be longer."""
-    axes, region = (*campaign.cross, DRAWS), tuple(slice(0, size) for size in stored.shape)
+    axes, region = (*campaign.axes, DRAWS), tuple(slice(0, size) for size in stored.shape)
     arrays = {name: group[name] for name in names if name in group and name != "trial"}
     rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})
     if arrays:
-        rows = rows.stack({"trial": (DRAWS, *campaign.cross)}, create_index=False)  # as they are numbered
+        rows = rows.stack({"trial": (DRAWS, *campaign.axes)}, create_index=False)  # as they are numbered
     return rows.assign_coords(trial=np.arange(campaign.number)).assign_attrs(group.attrs)
 
 

@@ -99,7 +99,7 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     undefined = np.full(len(where), np.nan)
     found = {name: flown.metrics.get(name, undefined) for name in here.metrics()}
     found |= {f"series:{name}": values for name, values in flown.series.items()}
-    if "precision" in (*here.trials.campaign.vary, *here.trials.campaign.cross):  # one array holds both
+    if "precision" in here.trials.campaign.keys:  # one array holds both
         found = {name: values.astype(np.float64) for name, values in found.items()}
     return columns | {name: spread(values, np.nan) for name, values in found.items()}
 

@@ -10,7 +10,7 @@ from undertow.report.campaign_tables import by_xla
 def table(results: Results, found: dict) -> Table:
     """A row for each combination."""
     table = Table(title="Median [5 %, 95 %] of the trials that lasted", title_justify="left", title_style="bold")
-    crossed = list(results.campaign.cross)
+    crossed = list(results.campaign.axes)
     counts = ("trials", "failed", "refused") if found["refused"] else ("trials", "failed")
     for column in (*crossed, *counts, "within"):
         table.add_column(column)

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.robust_modification import RobustModification
 from undertow.controllers.signals import ADAPTIVE_LAW, lyapunov_signals, share_given, weight_signals
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
@@ -27,6 +28,7 @@ from undertow.numerics.smoothing import SWITCHES, switch
 PerAxis = Float[Array, " n"]
 
 FUZZY_INPUTS = ("error", "state")
+IDENTIFICATION_INPUTS = ("applied", "commanded")
 
 _PER_AXIS = ("adaptation", "composite", "robust_gain", "layer", "weights_bound")
 _PER_AXIS_IDENTIFICATION = ("pole", "compensation_gain", "layer")
@@ -76,7 +78,9 @@ class RCAF(AbstractContinuousController):
     weights_bound: Float[Array, "..."] = param(
         "m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=jnp.inf
     )
+    modification: RobustModification | None = None
     switching: str = eqx.field(static=True, default="tanh")
+    identification_input: str = eqx.field(static=True, default="applied")
     fuzzy_input: str = eqx.field(static=True, default="error")
     method: str = eqx.field(static=True, default="euler")
     substeps: int = eqx.field(static=True, default=1)
@@ -88,11 +92,15 @@ class RCAF(AbstractContinuousController):
         checks.positive("weights_bound", self.weights_bound, finite=False)
         checks.choice("switching", self.switching, SWITCHES)
         checks.choice("fuzzy_input", self.fuzzy_input, FUZZY_INPUTS)
+        checks.choice("identification_input", self.identification_input, IDENTIFICATION_INPUTS)
         if self.fuzzy.inputs != 1 + FUZZY_INPUTS.index(self.fuzzy_input):
             raise BadInput("fuzzy", f"have the inputs of `{self.fuzzy_input}`", f"of {self.fuzzy.inputs} input(s)")
         axes = len(self.model.coordinates.angles)
         for name in _PER_AXIS_IDENTIFICATION:
             checks.per_axis(name, getattr(self.identification, name), axes)
+        if self.modification is not None:
+            for name in ("leakage", "e_modification", "dead_zone"):
+                checks.per_axis(name, getattr(self.modification, name), axes)
         check_gains(self.feedback, self.weight, {name: getattr(self, name) for name in _PER_AXIS}, axes)
 
     def init(self, y: Measurement, r: Target) -> RCAFState:
@@ -126,8 +134,11 @@ class RCAF(AbstractContinuousController):
         eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         xi = self._basis(eps, y)
         d_hat = self.fuzzy.output(z.weights, xi)
-        known = dynamics.drift(y) + matvec(dynamics.gain(y), u_applied)
+        u = u_applied if self.identification_input == "applied" else self.command(z, y, r)[0]
+        known = dynamics.drift(y) + matvec(dynamics.gain(y), u)
         theta_rate = -(self.adaptation * (s + self.composite * eps))[:, None] * xi
+        if self.modification is not None:
+            theta_rate = self.modification.rate(theta_rate, self.adaptation, eps, z.weights)
         return RCAFState(
             predicted_position=z.predicted_velocity,
             predicted_velocity=self.identification.acceleration(eps, known, d_hat),

@@ -31,6 +31,12 @@ def tracking(coordinates: AbstractCoordinates, lyapunov: Matrices, y: Measuremen
     return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
 
 
+def demanded_acceleration(coordinates: AbstractCoordinates, gains: Feedback, y: Measurement, r: Target) -> PerAxis:
+    """x_ddot_d + K^T E, m/s^2 and rad/s^2: what state feedback asks for."""
+    error, rate, acceleration = coordinates.tracking_error(y, r)
+    return acceleration + gains[..., 0] * error + gains[..., 1] * rate
+
+
 def check_gains(feedback: Feedback, weight: Matrices, per_axis: dict[str, Any], axes: int) -> None:
     """Whether K, Q and other gains fit the axes, and K and Q what Eq. (21) asks of them.
 

@@ -138,3 +138,15 @@ class LaggedActuator(AbstractActuatorModel):
 
     def quasi_static(self) -> AbstractActuatorModel:
         return self.curve
+
+
+def input_for(actuators: AbstractActuatorModel, force: Forces) -> Inputs:
+    """Input that holds a force, as if the actuators followed at once."""
+    held = actuators.quasi_static()
+    return held.command(held.init(), force, jnp.ones(()))
+
+
+def force_of(actuators: AbstractActuatorModel, u: Inputs) -> Forces:
+    """Force that an input holds, as if the actuators followed at once."""
+    held = actuators.quasi_static()
+    return held.force(held.init(), u)

@@ -97,6 +97,8 @@ class HybridVehicle(AbstractPlant):
         body = altered(self.body, d.scaling, d.payloads)
         thrust = self.thruster.thrust(x.thrusters, u)
         if d.scaling is not None:
+            if d.scaling.thrust.shape not in ((), thrust.shape):
+                raise BadInput("thrusters", f"be {thrust.size}, as the vehicle has", d.scaling.thrust.size)
             thrust = d.scaling.thrust * thrust
         wrench = matvec(self.thruster_matrix, thrust) - d.wrench
         prescribed = d.acceleration

@@ -89,7 +89,7 @@ def worst(results: Results, found: Mapping[str, Any]) -> Html:
         how = ending({"status": ENDINGS[int(row["status"])], "diverged_at": None if lasted else float(row["ended"])})
         errors = [_shown(results, name, float(row[name]) if lasted else None) for name in results.tracking]
         rows.append((str(trial), how, *errors, *crossed, *drawn))
-    keys = [prose(f"`{key}`") for key in (*results.campaign.cross, *results.campaign.vary)]
+    keys = [prose(f"`{key}`") for key in (*results.campaign.axes, *results.campaign.vary)]
     heads = [_headed(results, name) for name in results.tracking]
     return table(("trial", "ended", *heads, *keys), rows, numeric=range(2, 2 + len(heads)), wide=len(keys) > 1)
 
@@ -98,9 +98,9 @@ def asked(results: Results) -> list[Html]:
     """What was flown: how it was drawn, by which versions, and the campaign file."""
     campaign, attributes = results.campaign, results.rows.attrs
     rows = [(prose(f"`{key}`"), prose(_words(spread))) for key, spread in campaign.vary.items()]
-    rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.cross.items()]
+    rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.axes.items()]
     drawn = f"{campaign.trials} draws ({campaign.design}), seed {campaign.seed}"
-    drawn += ", each for every combination below." if campaign.cross else "."
+    drawn += ", each for every combination below." if campaign.axes else "."
     versions = ", ".join(
         f"{key.removeprefix('version_')} {value}" for key, value in attributes.items() if key.startswith("version_")
     )

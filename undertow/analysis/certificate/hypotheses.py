@@ -51,6 +51,9 @@ def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     sentence = "w_bar >= |omega + sigma|, Eq. (43), with sigma = 0 (else it is not recorded)"
     yield Hypothesis("robust_gain", sentence, whole & (omega <= np.asarray(law.robust_gain)).all(-1))
     amplitude = np.asarray(law.identification.compensation_gain)
+    if law.modification is not None or law.identification_input != "applied":
+        sentence = "the weights follow Eq. (44), Eq. (32) is driven by the applied input"
+        yield Hypothesis("adaptation", sentence, np.zeros(run.sizes["time"], bool))
     yield Hypothesis("compensation_gain", "omega_bar >= |omega|, Eq. (33)", (omega <= amplitude).all(-1))
 
 

@@ -1,6 +1,6 @@
 """Figures: matplotlib objects made from datasets and plain numbers, and their files."""
 
-from undertow.report.figures.fidelity import ladder_figure as ladder_figure
+from undertow.report.figures.fidelity import fidelity_figure as fidelity_figure
 from undertow.report.figures.paper import paper_figures as paper_figures
 from undertow.report.figures.run import run_drawings as run_drawings
 from undertow.report.figures.run import run_figures as run_figures

@@ -1,4 +1,4 @@
-"""The fidelity ladder: the same law on four truths of the same thruster."""
+"""Fidelities: the same law on four models of the same thruster."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,24 +22,24 @@ _MARKS = {"rcafc": "o", "rafc": "s"}
 Runs = Mapping[str, Mapping[str, xr.Dataset]]  # fidelity, controller
 
 
-def ladder_figure(ladder: Mapping[str, Mapping[str, Any]], datasets: Runs | None = None) -> Figure:
+def fidelity_figure(compared: Mapping[str, Mapping[str, Any]], datasets: Runs | None = None) -> Figure:
     """Error against time on every fidelity, and metrics over the fidelities.
 
     Args:
-        ladder: by fidelity and controller, `status`, `diverged_at` (s or None), `steady` (metrics or None).
+        compared: by fidelity and controller, `status`, `diverged_at` (s or None), `steady` (metrics or None).
         datasets: the runs, by fidelity and controller; without them only the metrics are drawn.
     """
     runs = datasets or {}
     tall = 1.75 if runs else 0.0
     figure = style.blank(9.6, 0.55 + tall + 1.95)
-    style.head(figure, "Fidelity ladder: one law, four thrusters", dict(style.CONTROLLERS.values()))
-    for number, fidelity in enumerate(fidelity for fidelity in ladder if fidelity in runs):
+    style.head(figure, "Fidelities: one law, four models of the thruster", dict(style.CONTROLLERS.values()))
+    for number, fidelity in enumerate(fidelity for fidelity in compared if fidelity in runs):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.58, 1.75, 1.25)
-        _errors(panel, fidelity, ladder[fidelity], runs[fidelity])
+        _errors(panel, fidelity, compared[fidelity], runs[fidelity])
         style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", fidelity)
     for number, (metric, text) in enumerate(_SHOWN.items()):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.68 + tall, 1.75, 1.35)
-        _metric(panel, ladder, metric)
+        _metric(panel, compared, metric)
         style.label(panel, "", "", text, style.TINY)
     return figure
 
@@ -66,13 +66,13 @@ def _errors(panel: Axes, fidelity: str, entries: Mapping[str, Any], runs: Mappin
             _say(panel, f"{name}: {_ending(entries[key])}", (0.98, 0.9))
 
 
-def _metric(panel: Axes, ladder: Mapping[str, Mapping[str, Any]], metric: str) -> None:
-    fidelities = list(ladder)
+def _metric(panel: Axes, compared: Mapping[str, Mapping[str, Any]], metric: str) -> None:
+    fidelities = list(compared)
     panel.set_yscale("log")
     panel.yaxis.set_major_locator(LogLocator(numticks=5))
     panel.yaxis.set_minor_locator(NullLocator())
     for key, (name, look) in style.CONTROLLERS.items():
-        entries = [ladder[fidelity].get(key) or {} for fidelity in fidelities]
+        entries = [compared[fidelity].get(key) or {} for fidelity in fidelities]
         values = [(entry.get("steady") or {}).get(metric, np.nan) for entry in entries]
         panel.plot(
             range(len(fidelities)),

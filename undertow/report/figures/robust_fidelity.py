@@ -1,4 +1,4 @@
-"""The ladder again: errors against time where it matters, and the steady error of every law at every place."""
+"""Every fidelity again: errors against time where it matters, and the steady error of every law at every place."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -32,7 +32,7 @@ _TITLES = {
 Rows = Sequence[Mapping[str, Any]]
 
 
-def sound_ladder_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dataset]) -> Figure:
+def robust_fidelity_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dataset]) -> Figure:
     """Errors against time at up to four places, and below them the steady tracking error at all of them.
 
     Args:
@@ -44,7 +44,7 @@ def sound_ladder_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Datase
     tall = 1.75 if shown else 0.0
     figure = style.blank(9.6, 0.85 + tall + 0.27 * len(places) + 0.35)
     laws = dict(_LOOKS[row["law"]][:2] for row in rows)
-    style.head(figure, "The ladder again", laws)
+    style.head(figure, "Every fidelity again", laws)
     for number, place in enumerate(shown):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.6, 1.75, 1.2)
         _errors(panel, {law: run for (where, law), run in datasets.items() if where == place})

@@ -28,7 +28,7 @@ ASSUMED = (
     Html(
         "<b>Thruster truth.</b> Example 1 (speed sensor): what is left once a perfect sensor has cancelled &phi;, T"
         " = &alpha;V. Example 2 (sensorless): the motor in its steady state at every instant. The motor as a "
-        "dynamic system is the <a href='#ladder'>ladder</a>."
+        "dynamic system is the <a href='#fidelity'>fidelity comparison</a>."
     ),
     Html(
         "<b>Misprint in Eq. (13).</b> k<sub>2</sub> uses k<sub>e</sub> twice; Eqs. (8) and (9) give k<sub>2</sub> ="
@@ -36,7 +36,7 @@ ASSUMED = (
     ),
     Html(
         "<b>What d contains.</b> In the two examples the prescribed d(t) includes the kinematic term J&#775;&nu;, "
-        "as the paper's Remark 2 has it, although it could be computed. On the two upper fidelities of the ladder the "
+        "as the paper's Remark 2 has it, although it could be computed. On the two upper fidelities the "
         "body moves as it is, and d(t) is added. Either way d is measured from the run."
     ),
 )

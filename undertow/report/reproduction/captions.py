@@ -58,7 +58,9 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
             "As Fig. 9, for RCAFC without speed sensors.",
             _single(two, "input_peak", "Largest voltage, V", "whole"),
         ),
-        "ladder": join("The law of Table 1 on four truths of the same thruster. A cross marks a run that ended early."),
+        "fidelity": join(
+            "The law of Table 1 on four truths of the same thruster. A cross marks a run that ended early."
+        ),
         "sweep": join(
             "Points are measured, lines are the linear theory. Where a point lies above 1, the estimate adds error "
             "instead of removing it."

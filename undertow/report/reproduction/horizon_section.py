@@ -1,4 +1,4 @@
-"""For how long the paper's laws last, behind which motor, and why: parts of the ladder's section of the report."""
+"""For how long the paper's laws last, behind which motor, and why: parts of the section on fidelities of the report."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -30,7 +30,7 @@ CAPTIONS = {
 
 
 def horizon_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
-    """The long ladder, the map of lags and the mechanism; nothing if they were not run.
+    """The long runs, the map of lags and the mechanism; nothing if they were not run.
 
     Args:
         results: of results.json; `horizons`, `lags` and `drifting` are used.

@@ -12,12 +12,12 @@ from undertow.report.page import Html, bullets, document, figure, section, table
 from undertow.report.reproduction import horizon_section, tables
 from undertow.report.reproduction.background import ASSUMED, INTRODUCTION, LEFT_OPEN
 from undertow.report.reproduction.captions import captions
-from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, sound_section
+from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, robust_section
 
 _TITLE = "The paper, reproduced and audited"
 
 # Figures that stand in a section of their own; all others stand in the first.
-_ELSEWHERE = ("ladder", "sweep", *horizon_section.FIGURES, *FIGURES)
+_ELSEWHERE = ("fidelity", "sweep", *horizon_section.FIGURES, *FIGURES)
 
 
 def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path) -> Path:
@@ -25,7 +25,7 @@ def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], fold
 
     Args:
         results: what stands in results.json; parts that are missing are left out of the page.
-        figures: by name: fig02, fig06, ..., fig13, ladder, sweep; others are shown after the paper's.
+        figures: by name: fig02, fig06, ..., fig13, fidelity, sweep; others are shown after the paper's.
         folder: where to write, made if need be.
 
     Returns:
@@ -50,9 +50,9 @@ def _content(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html
     parts = {
         "figures": ("Figures", _figures(results, drawn)),
         "table2": ("Table 2 in numbers", _table2(results)),
-        "ladder": ("The ladder: how much of the thruster is real", _ladder(results, drawn)),
+        "fidelity": ("Fidelities: how much of the thruster is modelled", _fidelity(results, drawn)),
         "audit": ("Audit of the claims", _audit(claims, drawn)),
-        "sound": (TITLE, sound_section(results.get("sound") or {}, drawn)),
+        "robust_variant": (TITLE, robust_section(results.get("robust_variant") or {}, drawn)),
         "open": ("What the paper leaves open, and misprints", _left_open()),
         "provenance": ("Provenance", _provenance(results)),
     }
@@ -92,8 +92,8 @@ def _table2(results: Mapping[str, Any]) -> list[Html]:
     return [tag("p", prose(told)), tables.table2(results["table2"])]
 
 
-def _ladder(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
-    if not results.get("ladder"):
+def _fidelity(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
+    if not results.get("fidelity"):
         return []
     told = (
         "Both controllers at the gains of Table 1 meet the same vehicle and the same disturbance on four levels: each "
@@ -102,8 +102,8 @@ def _ladder(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]
     )
     return [
         tag("p", prose(told)),
-        *(drawn[name] for name in ("ladder",) if name in drawn),
-        tables.ladder(results["ladder"]),
+        *(drawn[name] for name in ("fidelity",) if name in drawn),
+        tables.fidelity(results["fidelity"]),
         *horizon_section.horizon_section(results, drawn),
     ]
 

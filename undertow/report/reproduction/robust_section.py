@@ -1,4 +1,4 @@
-"""The last chapter of the report: the sound version beside the paper's law."""
+"""The last chapter of the report: the robust variant beside the paper's law."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,12 +7,12 @@ from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, tag
 from undertow.report.reproduction import robust_tables as tables
 
-FIGURES = ("sound_ladder", "ablations")
+FIGURES = ("robust_fidelity", "ablations")
 
-TITLE = "The sound version"
+TITLE = "The robust variant"
 
 CAPTIONS = {
-    "sound_ladder": (
+    "robust_fidelity": (
         "Above, the size of the tracking error against time. Below, its rms over the second half of each run. All runs "
         "are sampled, at 1 kHz on ODIN and at 100 Hz on BlueROV2 Heavy; a cross marks a run that ended early."
     ),
@@ -26,15 +26,15 @@ _LISTS = {
     "wins": "Where the paper's idea wins",
     "same": "Where a plain linear observer is as good: axes without a motor, 20 s at most",
     "loses": "Where it loses",
-    "neither": "Where the sound version is no better, or costs something",
+    "neither": "Where the robust variant is no better, or costs something",
 }
 
 
-def sound_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
-    """Conclusions first, then the ladder, then the ablations; nothing if the chapter was not run.
+def robust_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:
+    """Conclusions first, then every fidelity, then the ablations; nothing if the chapter was not run.
 
     Args:
-        results: `sound` of results.json.
+        results: `robust_variant` of results.json.
         drawn: figures by name.
     """
     if not results:
@@ -45,10 +45,10 @@ def sound_section(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list
         "Preset `robust` has the paper's structure, but works in body axes, knows the motors, is fed with what was "
         "applied within limits, keeps its weights in a box and takes its gains from the sampling time. Here it meets "
         "the paper's laws, all of them sampled. The commands are to be typed in the folder of this page: `undertow "
-        "simulate` and the file named below each law."
+        "simulate` and the file named below each law; each ablation is `undertow campaign` and a file of campaigns/."
     )
-    ladder = [tag("h3", "The ladder again"), tag("p", prose(told)), *_figure(drawn, "sound_ladder")]
-    return [*lists, *ladder, tables.ladder(results["ladder"]), *_ablations(results, drawn)]
+    compared = [tag("h3", "Every fidelity again"), tag("p", prose(told)), *_figure(drawn, "robust_fidelity")]
+    return [*lists, *compared, tables.fidelity(results["fidelity"]), *_ablations(results, drawn)]
 
 
 def _ablations(results: Mapping[str, Any], drawn: Mapping[str, Html]) -> list[Html]:

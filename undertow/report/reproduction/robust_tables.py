@@ -1,4 +1,4 @@
-"""The tables of the last chapter: the ladder again, and the ablations."""
+"""The tables of the last chapter: every fidelity again, and the ablations."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,12 +8,12 @@ from undertow.report.formats import ending, number, prose, unit
 from undertow.report.page import Html, join, table, tag
 from undertow.reproduction.all_outputs import unit_of
 
-_LADDER = ("tracking_rms", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
+_FIDELITY = ("tracking_rms", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
 _KINDS = {"yes": "holds", "partly": "partly", "no": "fails"}
 _OWN_UNITS = {"share": "", "lost_axes": ""}
 
 
-def ladder(rows: Sequence[Mapping[str, Any]]) -> Html:
+def fidelity(rows: Sequence[Mapping[str, Any]]) -> Html:
     """Every law at every place, with the command that runs it."""
     shown, last = [], None
     for row in rows:
@@ -22,9 +22,14 @@ def ladder(rows: Sequence[Mapping[str, Any]]) -> Html:
         last = row["words"]
         ended = tag("span", ending(dict(row)), class_=f"chip {'holds' if row['status'] == 'ok' else 'fails'}")
         name = join(row["name"], tag("div", tag("code", row["scenario"]), class_="small"))
-        shown.append((place, name, ended, *(number(steady.get(metric)) for metric in _LADDER)))
-    head = ("where", "law", "how it ended", *(join(metric.replace("_", " "), " ", _unit(metric)) for metric in _LADDER))
-    return table(head, shown, numeric=range(3, 3 + len(_LADDER)), wide=True)
+        shown.append((place, name, ended, *(number(steady.get(metric)) for metric in _FIDELITY)))
+    head = (
+        "where",
+        "law",
+        "how it ended",
+        *(join(metric.replace("_", " "), " ", _unit(metric)) for metric in _FIDELITY),
+    )
+    return table(head, shown, numeric=range(3, 3 + len(_FIDELITY)), wide=True)
 
 
 def answers(ablations: Sequence[Mapping[str, Any]]) -> Html:

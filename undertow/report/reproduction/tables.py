@@ -36,7 +36,7 @@ _TABLE2 = {
 }
 _ROBUSTNESS = ("very good", "fair", "fair", "poor/fair")
 
-_RUNGS = {
+_FIDELITIES = {
     "ideal": "thrust proportional to voltage (Example 1)",
     "static": "motor in its steady state at every instant (Example 2)",
     "shaft": "rotor inertia counts, winding inductance does not",
@@ -71,7 +71,7 @@ def table2(results: dict[str, Any]) -> Html:
     return table(("", *(_COLUMNS[key] for key in keys)), rows, numeric=range(1, 5), wide=True)
 
 
-def ladder(results: dict[str, Any]) -> Html:
+def fidelity(results: dict[str, Any]) -> Html:
     """What happens to both controllers on every fidelity, and why."""
     rows = []
     for fidelity, entries in results.items():
@@ -81,7 +81,7 @@ def ladder(results: dict[str, Any]) -> Html:
             lasted = entry["status"] == "completed"
             said = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
             ended = tag("span", said, class_=f"chip {'holds' if lasted else 'fails'}")
-            place = join(tag("b", fidelity), tag("span", _RUNGS.get(fidelity, ""), class_="said"))
+            place = join(tag("b", fidelity), tag("span", _FIDELITIES.get(fidelity, ""), class_="said"))
             rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
     head = ("fidelity", "controller", "how it ended", "tracking rms", "estimation rms", "voltage variation, V/s", "why")
     return table(head, rows, numeric=(3, 4, 5), wide=True)

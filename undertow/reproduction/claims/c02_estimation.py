@@ -4,8 +4,7 @@ from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.claims import conditions
 from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1
 from undertow.reproduction.horizons import Long
-from undertow.reproduction.matching import equal_gain
-from undertow.reproduction.setup import RAFC, scenario
+from undertow.reproduction.setup import RAFC, equal_gain, scenario
 
 CLAIM = "RCAFC estimates the lumped uncertainty better than RAFC."
 

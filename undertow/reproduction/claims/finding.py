@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from undertow.reproduction.all_outputs import with_all_outputs
-from undertow.reproduction.matching import equal_gain_ratio
+from undertow.reproduction.setup import equal_gain_ratio
 from undertow.scenario.execute import Executed
 
 Runs = Mapping[str, Executed]
