@@ -28,7 +28,7 @@ def main(fast: bool = False, figure: str | None = None) -> dict[str, float]:
     gap = np.abs(mujoco_run.position - run.dataset.position.values).max(axis=0)
     found["position, m"] = float(gap[:3].max())
     found["attitude, rad"] = float(gap[3:].max())
-    found["voltage, V"] = float(np.abs(mujoco_run.voltage - run.dataset.voltage.values).max())
+    found["voltage, V"] = float(np.abs(mujoco_run.voltage - run.dataset["input"].values).max())
     for name, difference in found.items():
         print(f"{name:<26}{difference:8.0e}")
     print(f"run of {mujoco_run.time[-1]:g} s: undertow {run.status.word}, MuJoCo {mujoco_run.status.word}")

@@ -1,6 +1,6 @@
 """Compiled code, kept from one process to the next.
 
-What lies in the cache is run as the user. So it lies in a folder that nobody else may write, and an entry is used
+Code in the cache runs with the user's rights. So it lies in a folder that nobody else may write, and an entry is used
 only if it is the user's own file and its checksum agrees; any other is made again.
 """
 
@@ -16,37 +16,28 @@ _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _DIGEST = hashlib.sha256().digest_size
 
 
-def cache_folder() -> Path:
-    """UNDERTOW_CACHE, or `undertow` in the user's folder of caches."""
-    told = os.environ.get("UNDERTOW_CACHE")
-    return Path(told) if told else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "undertow"
+def default_folder() -> Path:
+    """SIMDJIT_CACHE, or `simdjit` in the user's folder of caches."""
+    given = os.environ.get("SIMDJIT_CACHE")
+    return Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "simdjit"
 
 
-def private_folder(name: str) -> Path:
-    """A folder of the cache that only the user may write; made where there is none.
-
-    Raises:
-        OSError: it cannot be made, or belongs to somebody else, or others may write to it.
-    """
-    folder = cache_folder() / name
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with contextlib.suppress(FileExistsError):
-        folder.mkdir(mode=0o700)
-    _insist_on_private(os.lstat(folder), stat.S_ISDIR)
-    return folder
-
-
-def kept(told: object, suffix: str, make: Callable[[], bytes]) -> bytes:
+def cached(key: object, suffix: str, make: Callable[[], bytes], folder: Path | None = None) -> bytes:
     """Result of `make`, or what it was in an earlier process.
 
     Args:
-        told: everything that it depends on; by its `repr`.
+        key: everything that the result depends on; by its `repr`.
         suffix: of the file.
-        make: what makes it.
+        make: computes the result.
+        folder: of the cache; made where there is none. None for the default.
     """
-    name = f"{hashlib.sha256(repr(told).encode()).hexdigest()}{suffix}"
+    name = f"{hashlib.sha256(repr(key).encode()).hexdigest()}{suffix}"
+    folder = default_folder() if folder is None else folder
     try:
-        folder = private_folder("native")
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+        _insist_on_private(os.lstat(folder), stat.S_ISDIR)
     except OSError:  # a cache that cannot be trusted is none
         return make()
     try:

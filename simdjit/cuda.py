@@ -30,16 +30,16 @@ class Driver:
     def __init__(self, library: Any = None):
         self._library = ctypes.CDLL("libcuda.so.1") if library is None else library
         self._call("cuInit", ctypes.c_uint(0))
-        device = self._told("cuDeviceGet", ctypes.c_int, ctypes.c_int(0))
-        attribute = lambda which: self._told("cuDeviceGetAttribute", ctypes.c_int, ctypes.c_int(which), device).value
+        device = self._answer("cuDeviceGet", ctypes.c_int, ctypes.c_int(0))
+        attribute = lambda which: self._answer("cuDeviceGetAttribute", ctypes.c_int, ctypes.c_int(which), device).value
         self.generation = 10 * attribute(_MAJOR) + attribute(_MINOR)
-        self._context = self._told("cuDevicePrimaryCtxRetain", ctypes.c_void_p, device)
+        self._context = self._answer("cuDevicePrimaryCtxRetain", ctypes.c_void_p, device)
 
     def load(self, assembly: str, name: str) -> ctypes.c_void_p:
         """A kernel of a program, compiled for this GPU."""
         self._enter()
-        module = self._told("cuModuleLoadData", ctypes.c_void_p, ctypes.c_char_p(assembly.encode()))
-        return self._told("cuModuleGetFunction", ctypes.c_void_p, module, ctypes.c_char_p(name.encode()))
+        module = self._answer("cuModuleLoadData", ctypes.c_void_p, ctypes.c_char_p(assembly.encode()))
+        return self._answer("cuModuleGetFunction", ctypes.c_void_p, module, ctypes.c_char_p(name.encode()))
 
     @contextlib.contextmanager
     def room(self, sizes: Sequence[int]) -> Iterator[list[int]]:
@@ -48,7 +48,7 @@ class Driver:
         with contextlib.ExitStack() as taken:
             places = []
             for size in sizes:
-                place = self._told("cuMemAlloc_v2", ctypes.c_uint64, ctypes.c_size_t(max(size, 1)))
+                place = self._answer("cuMemAlloc_v2", ctypes.c_uint64, ctypes.c_size_t(max(size, 1)))
                 taken.callback(self._call, "cuMemFree_v2", place)
                 places.append(place.value)
             yield places
@@ -74,7 +74,7 @@ class Driver:
     def _enter(self) -> None:
         self._call("cuCtxSetCurrent", self._context)
 
-    def _told(self, function: str, kind: Any, *arguments: Any) -> Any:
+    def _answer(self, function: str, kind: Any, *arguments: Any) -> Any:
         """What a function of the driver puts into its first argument."""
         found = kind()
         self._call(function, ctypes.byref(found), *arguments)

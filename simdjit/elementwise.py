@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 
 from simdjit import functions, powers
-from simdjit.errors import Unsupported
-from simdjit.graph import BOOL, Graph, Node
-from simdjit.inverse_error import erf_inv
-from simdjit.nodes import Nodes, filled
+from simdjit.graph import BOOL, Graph, Node, Nodes, Unsupported, filled
+from simdjit.inverse_erf import erf_inv
 from simdjit.rules import Equation, rule
 from simdjit.scalar import Scalar, larger, smaller, where
 

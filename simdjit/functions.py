@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from math import factorial, inf, nan, pi
 from typing import NamedTuple
 
+from simdjit.argument_reduction import quarters_of
 from simdjit.calls import called, rarely
 from simdjit.graph import F64
 from simdjit.scalar import Scalar, larger, smaller, where
-from simdjit.turns import quarters_of
 
 
 class _Format(NamedTuple):

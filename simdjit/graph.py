@@ -5,11 +5,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from simdjit.errors import Unsupported
 from simdjit.simplify import COMPARISONS, RESULTS, simpler
+
+
+class Unsupported(Exception):
+    """A function uses something that the compiler has no rule for; says what."""
+
 
 # An entry of a graph, its position. Arrays of them stand for arrays of scalars: NumPy does all that only moves them.
 Node = int
+
+# Arrays of nodes, one for each scalar of an array.
+Nodes = np.ndarray
 
 BOOL, F64, F32, I64, U64, U32 = "bool", "float64", "float32", "int64", "uint64", "uint32"
 
@@ -166,6 +173,16 @@ class Graph:
 
     def _depth(self, home: int | None) -> int:
         return 0 if home is None else 1 + self._depth(self.parents[home])
+
+
+def filled(shape: Sequence[int], nodes: Sequence[Node]) -> Nodes:
+    """An array of nodes in their order."""
+    return np.array(nodes, dtype=np.int64).reshape(shape)
+
+
+def flat(several: Sequence[Nodes]) -> list[Node]:
+    """All nodes of some arrays, one after another."""
+    return [node for nodes in several for node in nodes.ravel().tolist()]
 
 
 def _supported(dtype: str) -> str:

@@ -9,9 +9,7 @@ from itertools import product
 import numpy as np
 
 from simdjit import elementwise
-from simdjit.errors import Unsupported
-from simdjit.graph import BOOL, I64, Graph, Node
-from simdjit.nodes import Nodes, filled
+from simdjit.graph import BOOL, I64, Graph, Node, Nodes, Unsupported, filled
 from simdjit.rules import Equation, rule
 
 # Places that are chosen among; more of them are quicker taken from memory.

@@ -1,20 +1,21 @@
-"""A program of lanes for an NVIDIA GPU: every run has a thread of its own, and a warp is what a register is elsewhere.
+"""A program for an NVIDIA GPU: every run has a thread of its own, and a warp is what a vector register is elsewhere.
 
 The same operations as on a processor, rounded alike and never contracted: the same bits.
 """
 
 import functools
+from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 from llvmlite import binding
 
-from simdjit.assembly import Head
-from simdjit.cache import kept
+from simdjit.cache import cached
+from simdjit.codegen import Head
+from simdjit.cpu import parsed
 from simdjit.cuda import Driver
-from simdjit.errors import Unsupported
-from simdjit.machine import parsed
+from simdjit.graph import Unsupported
 
 # Threads of a warp, which lie side by side in memory.
 LANES = 32
@@ -45,7 +46,7 @@ def _within(base: str) -> str:
 
 _OWN = "\n".join(map(_own, _MEMORIES))
 
-# Arguments: three memories and the bytes of a group in each; steps, steps between looks, threads.
+# Arguments: three memories and the bytes of a group in each; steps, steps between records, threads.
 THREADS = Head(
     f"""\
 define ptx_kernel void @run(ptr noalias %numbersall, ptr noalias %carryall, ptr noalias %seriesall,
@@ -89,20 +90,21 @@ class Kernel:
     Args:
         assembly: LLVM's, of lanes that begin as THREADS.
         driver: of the GPU.
+        cache: folder of compiled code; None for the default.
 
     Raises:
         Unsupported: it has remainders of division, which LLVM rounds on a GPU.
         OSError: the driver cannot make code of it.
     """
 
-    def __init__(self, assembly: str, driver: Driver):
+    def __init__(self, assembly: str, driver: Driver, cache: Path | None = None):
         if " = frem " in assembly:
             raise Unsupported("a remainder on a GPU")
         self._driver = driver
-        self._function = driver.load(ptx(assembly, min(driver.generation, _NEWEST)), "run")
+        self._function = driver.load(ptx(assembly, min(driver.generation, _NEWEST), cache), "run")
 
     def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, steps: int, every: int) -> None:
-        """Run it for all groups of lanes at once; memories as `memory.Layout` makes them.
+        """Run it for all groups of lanes at once; memories as `layout.Layout` makes them.
 
         Raises:
             OSError: the GPU has not enough memory, or fails.
@@ -116,10 +118,10 @@ class Kernel:
             self._driver.get(places[2], series)
 
 
-def ptx(assembly: str, generation: int) -> str:
+def ptx(assembly: str, generation: int, cache: Path | None = None) -> str:
     """Assembly of NVIDIA's for GPUs from a generation on, such as 90 for Hopper."""
     make = lambda: _target(generation).emit_assembly(parsed(assembly)).encode()
-    return kept((assembly, generation, binding.llvm_version_info), ".ptx", make).decode()
+    return cached((assembly, generation, binding.llvm_version_info), ".ptx", make, cache).decode()
 
 
 def _target(generation: int) -> Any:

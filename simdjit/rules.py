@@ -8,9 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-from simdjit.errors import Unsupported
-from simdjit.graph import TYPES, U32, Graph, Node
-from simdjit.nodes import Nodes
+from simdjit.graph import TYPES, U32, Graph, Node, Nodes, Unsupported
 
 
 class Equation(NamedTuple):

@@ -117,7 +117,7 @@ def smaller(one: Scalar, other: Scalar | float) -> Scalar:
 
 def _chosen(one: Scalar, other: Scalar | float, comparison: str) -> Scalar:
     """A comparison with what is not a number is false, so the second operand is what is left: where one of them is a
-    constant, it stands first, and otherwise the first one is looked at again."""
+    constant, it stands first, and otherwise the first one is tested again."""
     if not isinstance(other, Scalar):
         other = one.constant(other)
     graph = one.graph

@@ -5,9 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from simdjit import elementwise
-from simdjit.errors import Unsupported
-from simdjit.graph import I64, Graph, Node
-from simdjit.nodes import Nodes
+from simdjit.graph import I64, Graph, Node, Nodes, Unsupported
 from simdjit.rules import Equation, rule
 from simdjit.scalar import Scalar, where
 

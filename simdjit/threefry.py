@@ -8,9 +8,7 @@ from collections.abc import Sequence
 import jax
 import numpy as np
 
-from simdjit.errors import Unsupported
-from simdjit.graph import U32, U64, Graph
-from simdjit.nodes import Nodes
+from simdjit.graph import U32, U64, Graph, Nodes, Unsupported
 from simdjit.rules import Equation, rule
 from simdjit.scalar import Scalar
 

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from simdjit.program import Program
+from simdjit import Loop
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def in_lanes():
             example = tuple(jax.numpy.asarray(row[0]) for row in rows)
             fixed = [i in constant for i in range(len(rows))]
             nothing = np.zeros(())
-            program = Program(
+            program = Loop(
                 lambda numbers: numbers,
                 lambda numbers: nothing,
                 lambda numbers, carry, k: carry,

@@ -6,7 +6,7 @@ import re
 
 from llvmlite import binding
 
-from simdjit import machine
+from simdjit import cpu
 
 _KERNEL = ctypes.CFUNCTYPE(None, *[ctypes.c_uint64] * 9)
 _REGISTER = """
@@ -44,7 +44,7 @@ class EmulatedGpu:
         text = text.replace("llvm.nvvm.read.ptx.sreg.", "register.") + "".join(
             map(_REGISTER.format, ("ctaid", "ntid", "tid"))
         )
-        engine = binding.create_mcjit_compiler(binding.parse_assembly(text), machine._target())
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(text), cpu._target())
         engine.finalize_object()
         self.kernels.append(engine)
         return self._give(found, len(self.kernels))

@@ -7,15 +7,14 @@ import sys
 import numpy as np
 import pytest
 
-from simdjit import cache, machine
-from undertow import process
+from simdjit import cache, cpu
 
 CODE = b"compiled " * 1000
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("SIMDJIT_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
 
@@ -26,7 +25,7 @@ def made():
 
 
 def keep(made, told="a program", code=CODE):
-    return cache.kept(told, ".o", lambda: made.append(told) or code)
+    return cache.cached(told, ".o", lambda: made.append(told) or code)
 
 
 def entry(folder):
@@ -109,8 +108,7 @@ def test_a_folder_that_others_may_write_is_no_cache(folder, made, mode):
 
 def test_a_folder_that_is_a_link_is_no_cache(folder, made, tmp_path):
     (tmp_path / "theirs").mkdir(mode=0o700)
-    folder.mkdir()
-    (folder / "native").symlink_to(tmp_path / "theirs")
+    folder.symlink_to(tmp_path / "theirs")
     assert [keep(made), keep(made)] == [CODE, CODE] and len(made) == 2
     assert not list((tmp_path / "theirs").iterdir())
 
@@ -133,7 +131,7 @@ def test_what_belongs_to_somebody_else_is_not_used(folder, made, monkeypatch, wh
 
 def test_what_cannot_be_written_is_made_every_time(made, monkeypatch, tmp_path):
     (tmp_path / "file").write_text("not a folder")
-    monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path / "file"))
+    monkeypatch.setenv("SIMDJIT_CACHE", str(tmp_path / "file"))
     assert [keep(made), keep(made)] == [CODE, CODE] and len(made) == 2
 
 
@@ -152,7 +150,7 @@ def test_a_write_that_fails_leaves_nothing(folder, made, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", full)
     assert keep(made) == CODE
-    assert not list((folder / "native").iterdir())
+    assert not list(folder.iterdir())
 
 
 WRITER = """
@@ -160,17 +158,17 @@ import sys
 from simdjit import cache
 code = sys.argv[1].encode() * 100_000
 for i in range(40):
-    for path in (cache.cache_folder() / "native").glob("*.o"):
+    for path in cache.default_folder().glob("*.o"):
         if i % 4 == 0:
             path.unlink(missing_ok=True)
-    assert cache.kept("shared", ".o", lambda: code) in (b"a" * 100_000, b"b" * 100_000)
+    assert cache.cached("shared", ".o", lambda: code) in (b"a" * 100_000, b"b" * 100_000)
 """
 
 
 def test_two_processes_at_once(folder):
     several = [subprocess.Popen([sys.executable, "-c", WRITER, letter]) for letter in "ab"]
     assert [one.wait() for one in several] == [0, 0]
-    assert [path.suffix for path in (folder / "native").iterdir()] == [".o"]
+    assert [path.suffix for path in folder.iterdir()] == [".o"]
 
 
 def test_machine_code_that_was_truncated_is_compiled_again(folder):
@@ -185,15 +183,5 @@ define void @run(ptr noalias %numbers, ptr noalias %carry, ptr noalias %series, 
         if keep_bytes:
             entry(folder).write_bytes(entry(folder).read_bytes()[:keep_bytes])
         memory[1][:] = 0.0
-        machine.Code(assembly).run(*memory, 1, 0)
+        cpu.Code(assembly).run(*memory, 1, 0)
         assert memory[1][0, 0] == 7.0
-
-
-def test_code_of_xla_is_kept_where_nobody_else_may_write(folder, monkeypatch):
-    monkeypatch.delenv("JAX_COMPILATION_CACHE_DIR", raising=False)
-    process._keep_xla_code()
-    place = os.environ.pop("JAX_COMPILATION_CACHE_DIR")
-    assert os.stat(place).st_mode & 0o077 == 0
-    os.chmod(place, 0o777)
-    process._keep_xla_code()
-    assert "JAX_COMPILATION_CACHE_DIR" not in os.environ

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from batch_compiler.programs import LARGE, SIZE, STEPS, number, program
 
-from simdjit.beginning import inputs
-from simdjit.graph import Graph
-from simdjit.nodes import flat
-from simdjit.scalarise import evaluate, nodes_of
+from simdjit.graph import Graph, flat
+from simdjit.lowering import evaluate, nodes_of
+from simdjit.prologue import inputs
 
 ROWS = 16
 

@@ -8,7 +8,7 @@ import pytest
 import scipy.special
 
 from simdjit.graph import Graph
-from simdjit.scalarise import evaluate, nodes_of
+from simdjit.lowering import evaluate, nodes_of
 from simdjit.tracing import Traced
 
 # Function, what it must equal, where, and how far it may be off in units of the last place.

@@ -5,10 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from simdjit.errors import Unsupported
+from simdjit import Unsupported
 from simdjit.graph import Graph
+from simdjit.lowering import nodes_of
 from simdjit.rules import Equation, results
-from simdjit.scalarise import nodes_of
 
 ROWS = np.random.default_rng(6).normal(size=(11, 5))
 MATRICES = np.random.default_rng(7).normal(size=(11, 3, 4))

@@ -47,8 +47,8 @@ from undertow.scenario.reading import dump
             r"`vary.disturbance.amplitude.uniform` must have at least 2 entries, but is \[3.0\]",
         ),
         (
-            {"requirements": {"tracking_rms": 0.1}},
-            r"`requirements.tracking_rms` must be a mapping of keys to values, but is 0.1",
+            {"requirements": {"position_rms": 0.1}},
+            r"`requirements.position_rms` must be a mapping of keys to values, but is 0.1",
         ),
         (
             {"series": {"every": 0.1}, "vary": {"loop.duration": {"uniform": [1.0, 2.0]}}},
@@ -59,8 +59,8 @@ from undertow.scenario.reading import dump
             r"`vary.plant.limit.unifrom` must be a key of the campaign, .*line 14\). Did you mean `uniform`\?",
         ),
         (
-            {"requirements": {"tracking_rms": {"below": 1.0, "sahre": 0.5}}},
-            r"`requirements.tracking_rms.sahre` must be .* Did you mean `share`\?",
+            {"requirements": {"position_rms": {"below": 1.0, "sahre": 0.5}}},
+            r"`requirements.position_rms.sahre` must be .* Did you mean `share`\?",
         ),
         ({"series": {"evry": 1.0}}, r"`series.evry` must be .* Did you mean `every`\?"),
         (
@@ -86,8 +86,8 @@ from undertow.scenario.reading import dump
             r"`sensor.velocity` must not be given together with sensor, which contains it",
         ),
         (
-            {"requirements": {"tracking_rms": {"below": 1.0, "share": 1.0}}},
-            r"`requirements.tracking_rms.share` must be less than 1, .*; 0.99, for example, but is 1.0",
+            {"requirements": {"position_rms": {"below": 1.0, "share": 1.0}}},
+            r"`requirements.position_rms.share` must be less than 1, .*; 0.99, for example, but is 1.0",
         ),
         (
             {"cross": {"loop.dt": [0.02, 0.02]}},
@@ -190,7 +190,7 @@ def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
     path, out = campaign_file(trials=8, chunk=4), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     before = contents(out)
-    torn = out / STORE / "tracking_rms" / "c" / "1"
+    torn = out / STORE / "position_rms" / "c" / "1"
     torn.write_bytes(torn.read_bytes()[:-1] + b"?")
     capsys.readouterr()
     assert run(["campaign", "status", str(out)]) == 4
@@ -280,7 +280,7 @@ def test_trials_that_will_be_refused_are_told_before(campaign_file, tmp_path, ca
 
 def test_a_share_that_so_few_trials_cannot_show_is_told(campaign_file, tmp_path, capsys):
     """The interval of n out of n starts at 0.025^(1/n): 0.9 needs 36 trials, and they are enough."""
-    required = {"tracking_rms": {"below": 1e6, "share": 0.9}}
+    required = {"position_rms": {"below": 1e6, "share": 0.9}}
     verdicts = []
     for trials in (35, 36):
         out = tmp_path / str(trials)

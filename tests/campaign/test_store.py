@@ -48,8 +48,8 @@ def small(campaign_file, tmp_path):
 
 def test_two_lines_of_xarray_open_it(small, tmp_path):
     results = xr.open_zarr(tmp_path / "whole" / STORE, consolidated=False)
-    assert results["tracking_rms"].sizes == {"sample": 40}
-    assert results["tracking_rms"].attrs["units"] == "m, rad"
+    assert results["position_rms"].sizes == {"sample": 40}
+    assert results["position_rms"].attrs["units"] == "m"
     assert (results["status"] == 0).all() and results["done"].all()
     words = dict(
         zip(results["status"].attrs["flag_values"], results["status"].attrs["flag_meanings"].split(), strict=True)
@@ -57,7 +57,7 @@ def test_two_lines_of_xarray_open_it(small, tmp_path):
     assert words == {-1: "invalid"} | {int(status): status.word for status in Status}
     amplitude = results["vary:disturbance.amplitude"]
     assert 0.5 < float(amplitude.min()) < float(amplitude.max()) < 2.0
-    assert np.corrcoef(amplitude, results["tracking_rms"])[0, 1] > 0.99
+    assert np.corrcoef(amplitude, results["position_rms"])[0, 1] > 0.99
 
 
 def test_order_and_threads_do_not_matter(small, tmp_path):
@@ -98,14 +98,14 @@ def test_an_interrupted_campaign_ends_where_it_would_have(small, tmp_path, count
 
 def test_a_chunk_that_was_torn_is_flown_again(small, tmp_path):
     path, whole = small
-    torn = tmp_path / "whole" / STORE / "tracking_rms" / "c" / "1"
+    torn = tmp_path / "whole" / STORE / "position_rms" / "c" / "1"
     torn.write_bytes(torn.read_bytes()[:-7])
     counted = []
     assert ran(path, tmp_path / "whole", watch=lambda tally: counted.append(tally.done)) == whole
     assert counted == [24, 40]
 
 
-@pytest.mark.parametrize("name", ["tracking_rms", "status"])  # zeros, too
+@pytest.mark.parametrize("name", ["position_rms", "status"])  # zeros, too
 def test_a_chunk_that_is_gone_is_flown_again(small, tmp_path, name):
     path, whole = small
     (tmp_path / "whole" / STORE / name / "c" / "2").unlink()
@@ -244,7 +244,7 @@ def test_a_growth_that_is_cut_short_loses_nothing(campaign_file, tmp_path, monke
     monkeypatch.undo()
     results = load(out)
     assert results.total == 80 and 64 <= results.rows.sizes["trial"] <= 80
-    assert np.isfinite(results.rows["tracking_rms"]).all()
+    assert np.isfinite(results.rows["position_rms"]).all()
     assert ran(path, out) == whole  # nobody has been told of more
     assert ran(more, out) == ran(more, tmp_path / "at once")
 
@@ -306,7 +306,7 @@ EDITS = {
 def test_metadata_that_were_edited_are_told(small, tmp_path, key):
     """With others the same chunks are other numbers. Nothing is read, and nothing flown, until they are put back."""
     path, whole = small
-    file = tmp_path / "whole" / STORE / "tracking_rms" / "zarr.json"
+    file = tmp_path / "whole" / STORE / "position_rms" / "zarr.json"
     before = file.read_text()
     old, new = EDITS[key]
     assert old in before

@@ -42,6 +42,34 @@ def test_every_combination_flies_the_same_draws_and_seeds(campaign):
         assert len({several.seed(4 * sample + i) for i in range(4)}) == 1
 
 
+def test_variants_change_several_keys_together(campaign):
+    """An axis of its own, after those of `cross`, on whose values a variant acts."""
+    fast = {"controller.frequency": 9.0, "loop.dt": 0.01}
+    data = campaign(
+        trials=2, cross={"controller": ["pid", {"kind": "pid", "damping": 2.0}]}, variants={"as is": {}, "fast": fast}
+    )
+    several = made(data)
+    assert several.number == 8 and list(several.campaign.axes) == ["controller", "variant"]
+    assert several.campaign.keys == ["disturbance.amplitude", "controller", "controller.frequency", "loop.dt"]
+    assert several.data(2)["controller"] == {"kind": "pid", "damping": 2.0} and several.data(2)["loop"]["dt"] == 0.02
+    assert several.data(3)["controller"] == {"kind": "pid", "damping": 2.0, "frequency": 9.0}
+    assert several.data(3)["loop"]["dt"] == 0.01 and several.seed(3) == several.seed(0) != several.seed(4)
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ({"variants": {"a": {"seed": 1}}}, "seed` must be left out"),
+        ({"variants": {"a": {"loop..dt": 1}}}, "be a key path"),
+        ({"variants": {"a": {"disturbance.amplitude": 1.0}}}, "not be in `vary`, too"),
+        ({"variants": {"a": {}}, "cross": {"variant": [1, 2]}}, "left out beside `variants`"),
+    ],
+)
+def test_variants_that_cannot_be(campaign, changes, said):
+    with pytest.raises(BadInput, match=said):
+        made(campaign(**changes))
+
+
 def test_parts_have_names(campaign):
     parts = [{"kind": "rcaf", "preset": "robust"}, "pid", {"kind": "pid", "frequency": 3.0}]
     assert list(validate(from_data(campaign(cross={"controller": parts}))).cross["controller"]) == [

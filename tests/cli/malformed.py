@@ -67,7 +67,7 @@ def campaign(chance: random.Random, examples=SCENARIOS) -> str:
         "trials": 2,
         "vary": {"loop.dt": {"choice": [0.01, 0.005]}},
         "cross": {"loop.method": ["rk4", "euler"]},
-        "requirements": {"tracking_rms": {"below": 0.1, "share": 0.5}},
+        "requirements": {"position_rms": {"below": 0.1, "share": 0.5}},
         "series": {"signals": ["position"], "every": 0.01},
         "seed": 1,
         "chunk": 2,

@@ -65,14 +65,14 @@ def test_a_run_is_put_beside_its_prediction(undertow, tmp_path):
         said.out
     )
     found = json.loads((tmp_path / "out" / "metrics.json").read_text())
-    for name in ("tracking_rms", "estimation_rms", "input_rms"):
+    for name in ("position_rms", "estimation_rms", "input_rms"):
         assert found["predicted"][name] == pytest.approx(found["steady"][name], rel=0.1)
 
 
 def test_what_no_linear_prediction_knows_is_named(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST.replace("limit: 8", "limit: 1.5"))
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
-    assert "The run departs from the linear prediction by more than 10 %: tracking_rms by" in said.out
+    assert "The run departs from the linear prediction by more than 10 %: position_rms by" in said.out
     assert "Actuators were saturated" in said.out
 
 

@@ -54,9 +54,23 @@ def pytest_generate_tests(metafunc):
     """Tests with the argument `part` run for every part there is."""
     if "part" in metafunc.fixturenames:
         metafunc.parametrize("part", ALL, ids=["/".join(pair) for pair in ALL], indirect=True)
+    if "part_name" in metafunc.fixturenames:
+        metafunc.parametrize("part_name", ALL, ids=["/".join(pair) for pair in ALL])
 
 
 @pytest.fixture
 def part(request):
     kind, name = request.param
     return kind, make(kind, name)
+
+
+@pytest.fixture
+def made_anew():
+    """Makes a part, and everything that it is made from, once more."""
+
+    def made(part_name):
+        make.cache_clear()
+        required.cache_clear()
+        return make(*part_name)
+
+    return made

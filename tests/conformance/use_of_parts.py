@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from undertow.core.contracts import Load, Measurement, Pose, Target
+from undertow.core.measurement import measurement_of_outputs
 from undertow.numerics.rotations import rotation_from_euler
 from undertow.power import ESC
 from undertow.sensors.estimate import estimate_of, motion_of
@@ -46,7 +47,7 @@ def plants(plant, v):
 
 
 def controllers(controller, v):
-    n = len(controller.model.angles)
+    n = len(controller.model.coordinates.angles)
     rest = Measurement(v[:n], v[6 : 6 + n])
     wanted = Target(v[12 : 12 + n], v[18 : 18 + n], v[24 : 24 + n])
     z = _filled(controller.init(rest, wanted), v)
@@ -72,13 +73,14 @@ def power(part, v):
 
 
 def sensors(sensor, v):
-    truth = Measurement(v[:6], v[6:12], PropellerReport(100 * v[25:33], 10 * v[33:41]))
-    estimate = estimate_of(Measurement(v[13:19], v[19:25], truth.actuator))
+    truth = measurement_of_outputs(v[:6], v[6:12], PropellerReport(100 * v[25:33], 10 * v[33:41]))
+    estimate = estimate_of(measurement_of_outputs(v[13:19], v[19:25], truth.actuator))
     motion = motion_of(truth, v[41:44], 0.01)
     reading = sensor.reading(motion)
     state = sensor.sampling.init(reading, v[: reading.size])
     heard = sensor.sampling.deliver(state, 1 + jnp.abs(v[12]), reading, v[: reading.size + 1])
-    later = sensor.predict(estimate, heard[0].reading).predicted(0.01)
+    moved = sensor.predict(estimate, heard[0].reading) if hasattr(sensor, "predict") else estimate
+    later = moved.predicted(0.01)
     return heard, sensor.correct(later, heard[0].reading)
 
 
@@ -87,10 +89,10 @@ def references(reference, v):
 
 
 def navigation(filter_, v):
-    truth = Measurement(v[:6], v[6:12])
+    truth = measurement_of_outputs(v[:6], v[6:12])
     realization = filter_.realize(jax.random.PRNGKey(2))
     return filter_.measure(
-        realization, filter_.init(realization, Measurement(v[13:19], v[19:25])), jnp.abs(v[12]), truth
+        realization, filter_.init(realization, measurement_of_outputs(v[13:19], v[19:25])), jnp.abs(v[12]), truth
     )
 
 

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-README, LANES, LIMITS = (
-    (ROOT / name).read_text("utf-8") for name in ("README.md", "docs/lanes.md", "docs/known-limits.md")
+README, SIMD, LIMITS = (
+    (ROOT / name).read_text("utf-8") for name in ("README.md", "docs/simd.md", "docs/known-limits.md")
 )
 
 
@@ -15,11 +15,11 @@ def plain(text):
 
 
 def test_speed():
-    """Nanoseconds per step and the factor over NumPy of README are those of the table in docs/lanes.md."""
+    """Nanoseconds per step and the factor over NumPy of README are those of the table in docs/simd.md."""
     said = re.search(r"about (\d+) ns per step .*?, (\d+) times faster than plain NumPy", plain(README))
     assert said is not None
     ns, times = said.groups()
-    row = next(line for line in plain_rows(LANES) if line[0] == "many runs, two threads")
+    row = next(line for line in plain_rows(SIMD) if line[0] == "many runs, two threads")
     assert (ns, times) == (row[1], row[2])
 
 

@@ -26,5 +26,5 @@ def test_the_end_does_not_depend_on_the_records(tolerances):
     np.testing.assert_allclose(often.time[-1], 0.29, atol=1e-15)
     for one, other in zip(*(jax.tree.leaves(run.final) for run in (often, seldom)), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-12)
-    np.testing.assert_allclose(often.signals.position[-1], seldom.final[0].position, rtol=1e-7)
-    assert abs(float(often.signals.position[-1, 0] - often.signals.position[-10, 0])) > 1e-3  # it moves meanwhile
+    np.testing.assert_allclose(often.signals["position"][-1], seldom.final[0].position, rtol=1e-7)
+    assert abs(float(often.signals["position"][-1, 0] - often.signals["position"][-10, 0])) > 1e-3  # it moves meanwhile

@@ -33,12 +33,12 @@ def terms(realization, t, position, velocity, estimates):
     _, acceleration = jax.jvp(lambda x: loop.plant.output(t, x).velocity, (x,), (moved,))
     sample = realization.signals(t, x, z, seen)
     left = seen.r.acceleration - acceleration
-    feedback = law.feedback[0] * sample.error + law.feedback[1] * (seen.r.velocity - sample.velocity)
-    wanted = -model.drift(seen.y) - sample.estimate + feedback + seen.r.acceleration + sample.robust
-    sigma = wanted - model.gain(seen.y) @ seen.command
+    feedback = law.feedback[0] * sample["error"] + law.feedback[1] * (seen.r.velocity - sample["velocity"])
+    wanted = -model.dynamics.drift(seen.y) - sample["estimate"] + feedback + seen.r.acceleration + sample["robust_term"]
+    sigma = wanted - model.dynamics.gain(seen.y) @ seen.command
     prescribed = realization.load(t, x).acceleration
-    right = -feedback + sample.estimate - prescribed - sample.robust
-    return left, right, sigma, sample.uncertainty, prescribed
+    right = -feedback + sample["estimate"] - prescribed - sample["robust_term"]
+    return left, right, sigma, sample["uncertainty"], prescribed
 
 
 @pytest.fixture(scope="module", params=THRUSTERS)

@@ -73,13 +73,13 @@ def test_last_sound_state_is_kept(batch):
     name, (sound, *failed), _ = batch
     for outcome in failed:
         before, after = outcome.time < BREAK, outcome.time > BREAK + 2.0**-6
-        np.testing.assert_allclose(outcome.signals.position[before], sound.signals.position[before], rtol=1e-6)
-        for series in (outcome.signals.position, outcome.signals.velocity, outcome.signals.weights):
+        np.testing.assert_allclose(outcome.signals["position"][before], sound.signals["position"][before], rtol=1e-6)
+        for series in (outcome.signals["position"], outcome.signals["velocity"], outcome.signals["weights"]):
             assert np.isfinite(series).all()
             assert (series[after] == series[after][0]).all(), "records after the failure repeat the last sound one"
         if name == "sampled":
             assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(outcome.final))
-            at_break = np.interp(BREAK, sound.time, sound.signals.position[:, 0])
+            at_break = np.interp(BREAK, sound.time, sound.signals["position"][:, 0])
             assert outcome.final[0].position[0] == pytest.approx(at_break, rel=1e-2)
 
 
@@ -88,7 +88,7 @@ def test_continuous_loop_ends_when_nothing_is_finite():
     outcome = RUNS["continuous"](loop_with(float("nan")))
     assert Status(int(outcome.status)) in (Status.NOT_FINITE, Status.STEPS_EXHAUSTED)
     assert float(outcome.ended) == pytest.approx(BREAK, abs=1e-6)
-    assert np.isfinite(np.asarray(outcome.signals.position)).all()
+    assert np.isfinite(np.asarray(outcome.signals["position"])).all()
 
 
 @pytest.mark.parametrize("kind, most", [(jnp.float64, 1.34e154), (jnp.float32, 1.84e19)])
@@ -107,4 +107,4 @@ def test_neighbours_are_not_hurt(batch):
     pairs = zip(jax.tree.leaves(together[0].samples), jax.tree.leaves(alone.signals), strict=True)
     for one, other in pairs:
         np.testing.assert_allclose(one, np.asarray(other), rtol=1e-9, atol=1e-9)
-    assert np.abs(together[0].samples.velocity).max() > 0.1, name
+    assert np.abs(together[0].samples["velocity"]).max() > 0.1, name

@@ -8,6 +8,7 @@ import pytest
 
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.numerics.rotations import wrap_angle
 from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
 from undertow.sensors.sampling import Sampling
@@ -99,11 +100,11 @@ FREQUENCY = jnp.array([0.3, 0.5, 0.4, 0.7, 0.6, 0.2])
 
 
 def swinging(t):
-    return Measurement(AMPLITUDE * jnp.sin(FREQUENCY * t), AMPLITUDE * FREQUENCY * jnp.cos(FREQUENCY * t))
+    return measurement_of_outputs(AMPLITUDE * jnp.sin(FREQUENCY * t), AMPLITUDE * FREQUENCY * jnp.cos(FREQUENCY * t))
 
 
 def still(t):
-    return Measurement(jnp.array([1.0, 2.0, 3.0, 0.1, -0.2, 2.5]), jnp.zeros(6))
+    return measurement_of_outputs(jnp.array([1.0, 2.0, 3.0, 0.1, -0.2, 2.5]), jnp.zeros(6))
 
 
 @eqx.filter_jit
@@ -178,7 +179,7 @@ def test_noise_of_fixes_is_smoothed_as_an_alpha_beta_filter_does():
 def test_delays_do_not_matter_at_constant_velocity():
     def steady(t):
         rates = jnp.array([0.5, -0.3, 0.1, 0.0, 0.0, 0.2])
-        return Measurement(rates * t, rates.at[:3].set(rates[:3]))
+        return measurement_of_outputs(rates * t, rates.at[:3].set(rates[:3]))
 
     late = {"delay": 0.4, "noise": 0.0}
     parts = [imu(**QUIET_IMU), depth(resolution=0, **late), compass(**late), position_fix(**late)]
@@ -199,7 +200,7 @@ def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
         compass(noise=0),
     ]
     sensor = observer(parts)
-    level = lambda t: Measurement(jnp.zeros(6), jnp.zeros(6))
+    level = lambda t: measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
     realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).states[0].offset[5:]
     velocity = errors(parts, level, 0.01, 40.0, key)[2000:, 6:9]
     before_correction = np.abs(velocity).max(0)
@@ -214,7 +215,7 @@ def test_propeller_speed_and_its_rate(rate):
     """A propeller that speeds up steadily: speed as read, rate from two readings where thrusters report one."""
 
     def motion(t):
-        return Measurement(jnp.zeros(6), jnp.zeros(6), PropellerReport(jnp.array([3.0, -2.0]) * t, rate))
+        return measurement_of_outputs(jnp.zeros(6), jnp.zeros(6), PropellerReport(jnp.array([3.0, -2.0]) * t, rate))
 
     parts = [imu(**QUIET_IMU), propeller_speed(noise=0)]
     told, truth = observe(observer(parts), motion, 100, 0.01, jax.random.PRNGKey(0))

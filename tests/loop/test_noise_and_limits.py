@@ -56,7 +56,7 @@ def test_two_laws_meet_the_same_noise(key):
         law = rcaf(plant.model(), **gains)
         loop = ClosedLoop(plant, law, setpoint(np.ones(2)), sinusoid(), white_noise(0.0, 0.01))
         samples = sampled.simulate(loop, duration=0.2, dt=DT, record_every=1, key=key).signals
-        return np.asarray(samples.predicted_velocity - samples.modelling_error - samples.velocity)
+        return np.asarray(samples["predicted_velocity"] - samples["modelling_error"] - samples["velocity"])
 
     one, other = noise(), noise(composite=0.0, feedback=(4.0, 4.0))
     np.testing.assert_allclose(one, other, atol=1e-12)
@@ -74,25 +74,25 @@ def limited():
 
 def test_limits_are_respected(limited):
     _, samples = limited
-    assert np.abs(samples.command).max() > 3 * LIMIT, "the law does ask for more"
-    np.testing.assert_array_equal(samples.voltage, np.clip(samples.command, -LIMIT, LIMIT))
-    np.testing.assert_array_equal(samples.saturated, (np.abs(samples.voltage) >= LIMIT).astype(float))
-    assert 0 < samples.saturated.mean() < 1
+    assert np.abs(samples["commanded_input"]).max() > 3 * LIMIT, "the law does ask for more"
+    np.testing.assert_array_equal(samples["input"], np.clip(samples["commanded_input"], -LIMIT, LIMIT))
+    np.testing.assert_array_equal(samples["saturated"], (np.abs(samples["input"]) >= LIMIT).astype(float))
+    assert 0 < samples["saturated"].mean() < 1
 
 
 def test_law_is_advanced_with_what_was_applied(limited):
     """One Euler step of Eq. (32) from record to record: right with the applied input, wrong with the command."""
     law, samples = limited
-    eps, now = samples.modelling_error, samples.predicted_velocity
-    own = -150.0 * eps + samples.estimate - 0.1 * np.tanh(eps / 0.5)
-    told = {name: now + DT * (own + getattr(samples, name)) for name in ("voltage", "command")}
-    np.testing.assert_allclose(told["voltage"][:-1], now[1:], atol=1e-12)
-    assert np.abs(told["command"][:-1] - now[1:]).max() > 1e-3
-    xi_sum = samples.weights.shape[-1]
+    eps, now = samples["modelling_error"], samples["predicted_velocity"]
+    own = -150.0 * eps + samples["estimate"] - 0.1 * np.tanh(eps / 0.5)
+    told = {name: now + DT * (own + samples[name]) for name in ("input", "commanded_input")}
+    np.testing.assert_allclose(told["input"][:-1], now[1:], atol=1e-12)
+    assert np.abs(told["commanded_input"][:-1] - now[1:]).max() > 1e-3
+    xi_sum = samples["weights"].shape[-1]
     assert xi_sum == law.fuzzy.rules
 
 
 def test_plant_moves_with_what_was_applied(limited):
     _, samples = limited
-    acceleration = samples.voltage + np.sin(2.0 * DT * np.arange(len(samples.voltage)))[:, None]
-    np.testing.assert_allclose(np.diff(samples.velocity, axis=0) / DT, acceleration[:-1], atol=2e-3)
+    acceleration = samples["input"] + np.sin(2.0 * DT * np.arange(len(samples["input"])))[:, None]
+    np.testing.assert_allclose(np.diff(samples["velocity"], axis=0) / DT, acceleration[:-1], atol=2e-3)

@@ -42,7 +42,7 @@ def scenario(precision, backend="simd"):
 
 def content(precision, backend="simd"):
     found = execute(scenario(precision, backend))
-    assert found.outcome.signals.position.dtype == precision == str(found.dataset["position"].dtype)
+    assert found.outcome.signals["position"].dtype == precision == str(found.dataset["position"].dtype)
     return found.dataset.attrs["content_hash"]
 
 
@@ -94,10 +94,10 @@ def test_a_campaign_across_precisions():
     for task in range(where.tasks):
         rows = where.trials(task).tolist()
         found = fly(text, "", rows)
-        assert found["tracking_rms"].dtype == np.float64
+        assert found["position_rms"].dtype == np.float64
         for place, row in enumerate(rows):
             trial, combination = divmod(row, 2)
-            for name in ("tracking_rms", "input_variation", "weights_peak"):
+            for name in ("position_rms", "input_variation", "weights_peak"):
                 assert found[name][place] == alone[list(alone)[combination]][name][trial], name
     site.cache_clear()
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from undertow.controllers.rcaf import rcaf
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -19,7 +19,7 @@ class PlainRAFC(AbstractContinuousController):
     """theta_dot = -gamma s xi(eps), Eq. (61); everything else as in the composite law."""
 
     law: AbstractContinuousController
-    model: AbstractModel
+    model: Model
     method: str = "euler"
     substeps: int = 1
 
@@ -32,11 +32,11 @@ class PlainRAFC(AbstractContinuousController):
     def flow(self, z, y, r, u_applied):
         law = self.law
         p = law.lyapunov()
-        error, error_rate = self.model.difference(r.position, y.position), r.velocity - y.velocity
+        error, error_rate = self.model.coordinates.difference(r.position, y.position), r.velocity - y.velocity
         s = p[..., 0, 1] * error + p[..., 1, 1] * error_rate
         eps = law.identification.error(z.predicted_velocity, y.velocity)
         xi = law.fuzzy.basis(eps[:, None])
-        known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)
+        known = self.model.dynamics.drift(y) + matvec(self.model.dynamics.gain(y), u_applied)
         return type(z)(
             predicted_position=z.predicted_velocity,
             predicted_velocity=law.identification.acceleration(eps, known, law.fuzzy.output(z.weights, xi)),

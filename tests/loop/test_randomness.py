@@ -1,20 +1,23 @@
 """Every part has a key of its own, and noise is new at every sample however long a run is or however short its steps."""
 
+import inspect
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from undertow.controllers.pid import pid
-from undertow.core import runtime
+from undertow.core import catalogue, runtime
 from undertow.core.contracts import AbstractDisturbance, AbstractNavigation, Measurement
+from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
 from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.observer import observer
 from undertow.navigation.white_noise import white_noise
-from undertow.numerics.randomness import numbered
+from undertow.numerics.randomness import keys_for, numbered
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
@@ -67,7 +70,7 @@ def noise_of_a_run(duration, dt, simulate=sampled.simulate):
     law = pid(plant.model(), sampling_time=dt, frequency=0.05 / dt)
     loop = ClosedLoop(plant, law, setpoint([0.0]), none(), white_noise(DEVIATION, 0.0))
     samples = simulate(loop, duration=duration, dt=dt, record_every=1).signals
-    return np.asarray(samples.measured_position - samples.position)[:-1, 0]
+    return np.asarray(samples["measured_position"] - samples["position"])[:-1, 0]
 
 
 @pytest.mark.parametrize("simulate", [sampled.simulate, simd_batch.simulate], ids=["xla", "simd"])
@@ -91,7 +94,7 @@ def test_instruments_are_heard_and_noisy_at_any_time(precision):
         times = [(0.0, 10.0), (1e7, 10.0)] + [(0.0, 1e-7), (1e5, 1e-7)] * (precision == "float64")
         for start, period in times:
             sensor = observer([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
-            truth = Measurement(jnp.zeros(6), jnp.zeros(6))
+            truth = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
             path = sensor.realize(jax.random.PRNGKey(1))
 
             def step(state, k, sensor=sensor, path=path, truth=truth, start=start, period=period):
@@ -111,3 +114,72 @@ def test_single_precision_noise_outlives_its_clock():
         path, truth, state = sensor.realize(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)), 2**24
         told = [sensor.measure(path, jnp.asarray(state + k), jnp.asarray(1e5), truth)[0].position[0] for k in range(9)]
         assert len(set(map(float, told))) == 9
+
+
+REQUIRED = {"sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()]}
+DRAWING = ("uniform", "normal", "permutation", "bernoulli", "exponential", "choice", "randint")
+BRANCHING = ("split", "fold_in")
+
+
+def every(kind, base):
+    """All parts of a kind that can be made with their defaults."""
+    for part in catalogue.names(kind).values():
+        needed = [p.name for p in inspect.signature(part).parameters.values() if p.default is inspect.Parameter.empty]
+        if set(needed) <= {"sensors"}:
+            made = part(**{name: REQUIRED[name]() for name in needed})
+            if isinstance(made, base):
+                yield made
+
+
+@pytest.fixture
+def used(monkeypatch):
+    """Keys that are drawn from and keys that others are made of, as they are used."""
+    found = {"drawing": [], "branching": []}
+
+    def watched(name, kind):
+        real = getattr(jax.random, name)
+
+        def call(key, *rest, **options):
+            jax.debug.callback(lambda key: found[kind].append(tuple(np.asarray(key).tolist())), key)
+            return real(key, *rest, **options)
+
+        monkeypatch.setattr(jax.random, name, call)
+
+    for name in DRAWING:
+        watched(name, "drawing")
+    for name in BRANCHING:
+        watched(name, "branching")
+    return found
+
+
+@pytest.mark.parametrize("seed", [0, 2**32 - 1])
+def test_no_key_is_used_twice(used, seed):
+    """Every random part of the catalogue in one loop: each draws from keys of its own, and from no key twice."""
+    plant = double_integrator()
+    law = pid(plant.model())
+    disturbance = Together(tuple(every("disturbances", AbstractDisturbance)))
+    for several in every("navigation", AbstractNavigation):
+        used["drawing"].clear()
+        used["branching"].clear()
+        loop = ClosedLoop(plant, law, setpoint([0.0]), disturbance, several)
+        realization = loop.realize(jax.random.PRNGKey(seed))
+        truth = Measurement(jnp.zeros(6), jnp.zeros(6))
+        state = several.init(realization.navigation_realization, truth)
+        for k in range(3):
+            _, state = several.measure(realization.navigation_realization, state, jnp.asarray(0.3 * k), truth)
+        jax.effects_barrier()
+        drawn = used["drawing"]
+        assert len(drawn) > 6 and len(set(drawn)) == len(drawn), "a key is drawn from once"
+        assert not set(drawn) & set(used["branching"]), "and no other key is made of it"
+
+
+def test_keys_by_name():
+    """All different, found by name, and a name that comes in later leaves the others as they were."""
+    key = jax.random.PRNGKey(4)
+    few, more = keys_for(key, "disturbance", "navigation"), keys_for(key, "disturbance", "navigation", "faults")
+    assert list(more) == ["disturbance", "navigation", "faults"]
+    assert len({tuple(np.asarray(one).tolist()) for one in (key, *more.values())}) == 4
+    for name, own in few.items():
+        np.testing.assert_array_equal(own, more[name])
+    with pytest.raises(ValueError, match="not all different: waves, waves"):
+        keys_for(key, "waves", "waves")

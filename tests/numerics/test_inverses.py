@@ -160,7 +160,7 @@ def test_a_partial_inverse_serves_as_many_rows_as_the_rank_allows(name, rank):
 
 def test_bluerov2_is_not_asked_to_pitch():
     """Its horizontal thrusters lie below its centre: G+ would have it surge for the sake of pitch."""
-    model = hybrid_vehicle(bluerov2(), t200()).model().in_body_axes()
+    model = hybrid_vehicle(bluerov2(), t200()).model().in_body_axes().dynamics
     given = np.asarray(model.acceleration_per_thrust @ model.allocation)
     kept = [0, 1, 2, 3, 5]
     np.testing.assert_allclose(given[kept][:, kept], np.eye(5), atol=1e-12)

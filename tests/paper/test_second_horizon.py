@@ -11,9 +11,9 @@ from undertow.controllers.presets.paper import paper
 from undertow.core.status import Status
 from undertow.plants.double_integrator import double_integrator
 from undertow.reproduction import claims, drifting, horizons, lag_map
-from undertow.reproduction.batches import fly
 from undertow.reproduction.claims import c05_fuzzy_input, conditions
 from undertow.reproduction.claims.c04_chattering import perfect_variation
+from undertow.reproduction.running import run_batches
 from undertow.reproduction.setup import FIDELITIES, SIX_AXES, law_of, scenario
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
@@ -22,7 +22,7 @@ WINDOWS = ((10.0, 20.0), (100.0, 200.0))
 
 
 def flown(scenarios, windows=WINDOWS):
-    return fly(scenarios, windows, 1.0, ("weights_peak",))
+    return run_batches(scenarios, windows, 1.0, ("weights_peak",))
 
 
 def shortened(one, seconds):
@@ -88,7 +88,7 @@ def test_the_winding_breaks_it():
 
 def test_weights_drift_until_the_loop_is_stable():
     """Behind 50 ms every axis ends with a gain c beyond what the linearised loop asks for; a box of 20 keeps it away."""
-    found = fly(drifting.scenarios(), ((10.0, 20.0),), 1.0, ("weights", "weights_peak"))
+    found = run_batches(drifting.scenarios(), ((10.0, 20.0),), 1.0, ("weights", "weights_peak"))
     free, bounded = found["drifting_free"], found["drifting_bounded"]
     needed, _ = lag_map.stable_gains(lambda c: lag_map.lag_matrix(law_of(free), drifting.LAG, drifted=c), 2000.0)
     gains = [gain_of(law_of(run), run.series["weights"][-1]) for run in (free, bounded)]
@@ -134,7 +134,7 @@ def test_fuzzy_input_is_judged_on_every_level():
     assert float(one_rule.adaptation) == pytest.approx(100 * float(five.fuzzy.basis_norm_squared()), rel=1e-4)
 
 
-def test_rows_of_the_long_ladder_keep_their_scenarios(tmp_path):
+def test_rows_of_the_long_runs_keep_their_scenarios(tmp_path):
     """One row per run; curves start after the start and are as long as the run."""
     names = [horizons.name_of("shaft", "rafc", bounded) for bounded in (False, True)]
     runs = flown({name: shortened(horizons.scenarios(True)[name], 20.0) for name in names}, WINDOWS[:1])

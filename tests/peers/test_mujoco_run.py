@@ -44,7 +44,7 @@ def test_closed_loops_agree(parts):
     assert np.ptp(mujoco_run.position[:, 0]) > 0.9 and np.abs(mujoco_run.voltage).max() > 3
     np.testing.assert_allclose(mujoco_run.position, run.dataset.position, atol=1e-7)
     np.testing.assert_allclose(mujoco_run.velocity, run.dataset.velocity, atol=1e-6)
-    np.testing.assert_allclose(mujoco_run.voltage, run.dataset.voltage, atol=1e-5)
+    np.testing.assert_allclose(mujoco_run.voltage, run.dataset["input"], atol=1e-5)
 
 
 def test_runs_repeat_bit_for_bit(parts):

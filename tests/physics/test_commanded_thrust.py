@@ -9,8 +9,9 @@ from scipy.optimize import linprog
 
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
+from undertow.core.contracts import AbstractController, Model, Target
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances import none
 from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
@@ -68,7 +69,7 @@ def test_each_side_is_clipped_at_its_own_limit():
 class Asking(AbstractController):
     """A law that asks for the same whatever happens."""
 
-    model: AbstractModel
+    model: Model
     asked: jax.Array
     inner: AbstractController
 
@@ -77,6 +78,9 @@ class Asking(AbstractController):
 
     def command(self, z, y, r):
         return self.asked, self.inner.command(z, y, r)[1]
+
+    def signals(self):
+        return self.inner.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         return self.inner.advance(z, y, r, u_applied, dt)
@@ -89,7 +93,7 @@ def test_metrics_count_each_limit():
     law = Asking(plant.model(), asked, pid(plant.model(), sampling_time=0.02))
     loop = ClosedLoop(plant, law, setpoint([0.0] * 6), none(), perfect())
     run = sampled.simulate(loop, duration=1.0, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 1.0),))
-    found = results(run.accumulated[0])
+    found = results((Metrics(0.0, 1.0),), run.accumulated)
     assert found["saturated_fraction"] == pytest.approx(2 / 8)
     assert found["input_peak"] == pytest.approx(FORWARD)
     assert found["input_rms"] == pytest.approx(np.sqrt((30**2 + 12**2 + 15**2 + 11**2) / 8))
@@ -161,16 +165,16 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
 
     @eqx.filter_jit
     def decide(position):
-        y = Measurement(jnp.zeros(6), jnp.zeros(6))
+        y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
         r = Target(position, jnp.zeros(6), jnp.zeros(6))
         unfiltered = eqx.tree_at(lambda c: c.filter, controller, None)
         z = unfiltered.init(y, r)
-        u, telemetry = unfiltered.command(z, y, r)
+        u, signals = unfiltered.command(z, y, r)
         return (
             u,
-            telemetry.diagnostics["attained_share"],
+            signals["attained_share"],
             unfiltered._plan(z, y, r).forces,
-            own.acceleration_per_force(y),
+            own.dynamics.gain(y),
         )
 
     for _ in range(6):
@@ -199,9 +203,9 @@ def test_a_vehicle_comes_to_its_place_within_both_limits(law):
     loop = ClosedLoop(plant, controller, setpoint([3.0, 0.0, 1.0, 0.0, 0.0, 0.0]), none(), perfect())
     how = dict(duration=30.0, dt=0.05, record_every=5)
     run = sampled.simulate(loop, **how)
-    error, u = np.asarray(run.signals.error), np.asarray(run.signals.voltage)
+    error, u = np.asarray(run.signals["error"]), np.asarray(run.signals["input"])
     assert int(run.status) == 0
-    assert u.min() >= -4.0 and u.max() <= 40.0 and np.asarray(run.signals.saturated).any()
+    assert u.min() >= -4.0 and u.max() <= 40.0 and np.asarray(run.signals["saturated"]).any()
     np.testing.assert_allclose(error[-1], 0.0, atol=0.02)
     assert error[:, :3].min() > -0.05
 
@@ -214,9 +218,9 @@ def test_batches_and_xla_agree(law):
     loop = ClosedLoop(plant, controller, setpoint([3.0, 0.0, 1.0, 0.0, 0.0, 0.0]), none(), perfect())
     how = dict(duration=0.6, dt=0.02, record_every=5)
     found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
-    wrench = lambda samples: np.asarray(samples.voltage) @ np.asarray(plant.thruster_matrix).T
-    for pick in (wrench, lambda samples: np.asarray(samples.position)):
+    wrench = lambda samples: np.asarray(samples["input"]) @ np.asarray(plant.thruster_matrix).T
+    for pick in (wrench, lambda samples: np.asarray(samples["position"])):
         here, there = pick(found.signals), pick(wanted.signals)
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max())
-    np.testing.assert_array_equal(found.signals.saturated, wanted.signals.saturated)
-    assert np.asarray(wanted.signals.saturated).any()
+    np.testing.assert_array_equal(found.signals["saturated"], wanted.signals["saturated"])
+    assert np.asarray(wanted.signals["saturated"]).any()

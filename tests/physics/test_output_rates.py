@@ -44,7 +44,7 @@ def pairs(request):
             "position": (y.position, pose),
             "velocity": (y_rate.position, y.velocity),
             "acceleration": (y_rate.velocity, acceleration),
-            "load": (acceleration, model.drift(y) + j @ plant.body.inverse_mass_matrix @ tau + prescribed),
+            "load": (acceleration, model.dynamics.drift(y) + j @ plant.body.inverse_mass_matrix @ tau + prescribed),
         }
 
     return jax.jit(jax.vmap(compare))(POSE, VELOCITY, VOLTS, PUSH, WRENCH, NOISE)

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 import undertow as ut
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractModel, Telemetry
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.disturbances.none import none
 from undertow.loop import continuous, sampled
@@ -33,7 +33,7 @@ BATTERY = battery(resistance=0.01)
 class Driven(AbstractContinuousController):
     """Voltages size * (bias + sin(7 t + phase)), whatever is measured; the state is the time."""
 
-    model: AbstractModel
+    model: Model
     size: Float[Array, ""]
     bias: Float[Array, ""]
     method: str = eqx.field(static=True, default="rk4")
@@ -43,9 +43,11 @@ class Driven(AbstractContinuousController):
         return jnp.zeros(())
 
     def command(self, z, y, r):
-        zero = jnp.zeros_like(y.position)
         volts = self.size * (self.bias + jnp.sin(7 * z + jnp.arange(8.0)))
-        return volts, Telemetry(zero, zero, zero, zero, zero, zero[:, None])
+        return volts, {}
+
+    def signals(self):
+        return {}
 
     def flow(self, z, y, r, u_applied):
         return jnp.ones(())
@@ -61,7 +63,7 @@ def loop_of(thruster, size=8.0, bias=0.0, **power):
 
 
 def recorded(outcome):
-    return {"time": outcome.time, **outcome.signals.diagnostics}
+    return {"time": outcome.time, **outcome.signals}
 
 
 # ----------------------------------------------------------------------------------------------------- the diagnostics
@@ -264,12 +266,12 @@ def test_limit_holds_along_a_run_and_the_battery_sags(fidelity):
     """With speed controllers, which round down there: no voltage above the bus under the load that it makes."""
     loop = loop_of(t200(fidelity, supply=30.0), size=40.0, battery=battery(resistance=0.1, capacity=0.2), esc=esc())
     outcome = sampled.simulate(loop, duration=1.0, dt=5e-4, record_every=20)
-    top, bus = np.abs(outcome.signals.voltage).max(1), np.asarray(outcome.signals.diagnostics["bus_voltage"])
+    top, bus = np.abs(outcome.signals["input"]).max(1), np.asarray(outcome.signals["bus_voltage"])
     assert (top <= bus * (1 + 1e-12)).all()
-    assert np.asarray(outcome.signals.saturated).any(1).mean() > 0.9
+    assert np.asarray(outcome.signals["saturated"]).any(1).mean() > 0.9
     x, _ = outcome.final
-    assert tight(loop.plant, x, outcome.signals.voltage[-1], 1 / 200)
-    assert outcome.signals.diagnostics["state_of_charge"][-1] < 0.9
+    assert tight(loop.plant, x, outcome.signals["input"][-1], 1 / 200)
+    assert outcome.signals["state_of_charge"][-1] < 0.9
 
 
 # ------------------------------------------------------------------------------------------------ speed controllers

@@ -136,13 +136,13 @@ def test_settling_starts_where_the_plant_does_unless_told():
         "loop": {"duration": 0.1, "dt": 0.01},
         "initial": {"position": [0.1]},
     }
-    assert float(execute(cart).dataset["target"][0, 0]) == 0.1
+    assert float(execute(cart).dataset["reference"][0, 0]) == 0.1
     plant = double_integrator(2)
     for simulate in (sampled.simulate, continuous.simulate):
         law = rcaf(plant.model(), sets=3)
         loop = ClosedLoop(plant, law, setpoint(goal, 4.0), none(), perfect())
         found = simulate(loop, duration=0.1, dt=0.01, position=begun)
-        np.testing.assert_array_equal(found.signals.target[0], begun)
+        np.testing.assert_array_equal(found.signals["reference"][0], begun)
 
 
 def test_settling_may_be_traced_and_zero():

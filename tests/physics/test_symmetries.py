@@ -128,9 +128,9 @@ def test_renaming_the_thrusters_renames_the_voltages_and_nothing_else():
     """In closed loop with the paper's law, gains and disturbances."""
     named = simulate(closed_loop(odin().with_thrusters(range(1, 9))), duration=2.0)
     renamed = simulate(closed_loop(odin().with_thrusters(ORDER)), duration=2.0)
-    volts = np.asarray(named.signals.voltage)
+    volts = np.asarray(named.signals["input"])
     assert np.abs(volts).max() > 10
-    np.testing.assert_allclose(renamed.signals.position, named.signals.position, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(renamed.signals["position"], named.signals["position"], rtol=0, atol=1e-12)
     np.testing.assert_allclose(
-        renamed.signals.voltage, volts[:, np.array(ORDER) - 1], rtol=0, atol=1e-11 * np.abs(volts).max()
+        renamed.signals["input"], volts[:, np.array(ORDER) - 1], rtol=0, atol=1e-11 * np.abs(volts).max()
     )

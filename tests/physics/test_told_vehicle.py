@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.core.contracts import Measurement
+from undertow.core.measurement import measurement_of_outputs
 
-Y = Measurement(jnp.array([1.0, 2.0, 3.0, 0.3, -0.2, 0.5]), jnp.array([0.4, -0.3, 0.2, 0.1, -0.2, 0.3]))
+Y = measurement_of_outputs(jnp.array([1.0, 2.0, 3.0, 0.3, -0.2, 0.5]), jnp.array([0.4, -0.3, 0.2, 0.1, -0.2, 0.3]))
 
 
 def heavy(parameters):
@@ -18,10 +18,10 @@ def test_model_of_another_parameter_set():
     told = heavy("ng2024").model(vehicle=ut.vehicles.bluerov2_heavy("vonbenzon2022"), rate_term=True)
     own = heavy("vonbenzon2022").model(rate_term=True)
     demand = jnp.linspace(-1.0, 1.0, 6)
-    assert np.array_equal(told.drift(Y), own.drift(Y))
-    assert np.array_equal(told.gain(Y), own.gain(Y))
-    assert np.array_equal(told.invert(Y, demand), own.invert(Y, demand))
-    assert np.abs(told.drift(Y) - heavy("ng2024").model(rate_term=True).drift(Y)).max() > 0.1
+    assert np.array_equal(told.dynamics.drift(Y), own.dynamics.drift(Y))
+    assert np.array_equal(told.dynamics.gain(Y), own.dynamics.gain(Y))
+    assert np.array_equal(told.dynamics.invert(Y, demand), own.dynamics.invert(Y, demand))
+    assert np.abs(told.dynamics.drift(Y) - heavy("ng2024").model(rate_term=True).dynamics.drift(Y)).max() > 0.1
 
 
 def test_vehicle_with_other_thrusters_is_refused():

@@ -27,7 +27,7 @@ def certified(make_run):
         }
         for name, values in columns.items():
             run[name] = ("time", values)
-        run["saturated"] = (("time", "input"), np.zeros((len(time), 3)))
+        run["saturated"] = (("time", "actuator"), np.zeros((len(time), 3)))
         run["saturated"][50:60, 1] = 1.0
         run.attrs["certificate"] = json.dumps({"weights_bound": [bound, 1.0]})
         return run

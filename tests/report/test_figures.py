@@ -59,7 +59,7 @@ def test_lines_are_the_data(figures, runs):
         upper, lower = titled(figures["fig06"], axis)
         pick = lambda run, name, column=column: run[name].values[:, column]
         np.testing.assert_array_equal(line(upper, "RAFC").get_ydata(), pick(runs["rafc"], "position"))
-        np.testing.assert_array_equal(line(upper, "desired $x_d$").get_ydata(), pick(runs["rcafc"], "target"))
+        np.testing.assert_array_equal(line(upper, "desired $x_d$").get_ydata(), pick(runs["rcafc"], "reference"))
         np.testing.assert_array_equal(line(lower, "RCAFC").get_ydata(), abs(pick(runs["rcafc"], "error")))
         assert lower.get_yscale() == "log"
         upper, lower = titled(figures["fig07"], axis)
@@ -87,7 +87,7 @@ def test_what_leaves_a_panel_is_written_above_it(figures):
 def test_voltages_are_split_into_start_and_rest(figures, runs):
     start, rest = titled(figures["fig09"], "thruster 3")
     drawn = np.concatenate([line(p, "RCAFC").get_ydata() for p in (start, rest)])
-    volts = runs["rcafc"]["voltage"].values[:, 2]
+    volts = runs["rcafc"]["input"].values[:, 2]
     assert start.get_xlim() == pytest.approx((0, 1))
     assert rest.get_xlim() == pytest.approx((1, 20))
     assert len(drawn) in (len(volts), len(volts) + 1)
@@ -118,7 +118,7 @@ def test_the_fullest_figures_stay_small(make_run):
     """As many samples as a run of 20 s recorded every 10 ms, each of them far from the next."""
     runs = {name: make_run(name, samples=2001) for name in ("rcafc", "rafc")}
     for run in runs.values():
-        run["voltage"] = run["voltage"] * np.cos(60 * run["time"])
+        run["input"] = run["input"] * np.cos(60 * run["time"])
         run["estimate"] = run["estimate"] * np.cos(20 * run["time"])
     for figure in (uncertainty("Fig. 7", runs), effort("Fig. 9", runs)):
         assert len(svg(figure)) < 400_000
@@ -161,8 +161,8 @@ def test_run_figures_for_any_size(make_run, axes, inputs):
     assert list(figures) == ["tracking", "error", "estimate", "effort"]
     assert [len(figure.axes) for figure in figures.values()] == [axes, axes, axes, inputs]
     last = figures["effort"].axes[-1]
-    np.testing.assert_array_equal(line(last, "applied").get_ydata(), run["voltage"].values[:, -1])
-    np.testing.assert_array_equal(line(last, "commanded").get_ydata(), run["command"].values[:, -1])
+    np.testing.assert_array_equal(line(last, "applied").get_ydata(), run["input"].values[:, -1])
+    np.testing.assert_array_equal(line(last, "commanded").get_ydata(), run["commanded_input"].values[:, -1])
     assert last.get_ylabel() == "input, V"
 
 
@@ -193,7 +193,7 @@ def test_diverged_run_is_drawn_up_to_its_end(make_run):
 def test_a_run_with_gaps_is_drawn(make_run):
     run = make_run(axes=2, inputs=1)
     run["estimate"][:, 0] = np.nan
-    run["voltage"][100:] = np.inf
+    run["input"][100:] = np.inf
     for figure in run_figures(run).values():
         assert svg(figure)
 

@@ -76,7 +76,7 @@ def test_delay_margin(name):
     for factor, stable in ((0.9, True), (1.1, False)):
         steps = round(factor * margin / DT - 0.5)
         loop = ClosedLoop(plant, law, setpoint([1e-6]), none(), Late(jnp.asarray(steps)))
-        rate = np.abs(np.asarray(sampled.simulate(loop, duration=4.0, dt=DT, record_every=1).signals.velocity))[:, 0]
+        rate = np.abs(np.asarray(sampled.simulate(loop, duration=4.0, dt=DT, record_every=1).signals["velocity"]))[:, 0]
         assert (rate[-1000:].max() < 0.1 * rate[:1000].max()) == stable, (factor, steps)
 
 
@@ -106,7 +106,7 @@ def test_one_bad_sample(error, spacing, printed):
         law = rcaf(plant.model(), sets=3, reach=(spacing,), weights_bound=bound)
         loop = ClosedLoop(plant, law, setpoint([0.0]), none(), OneBad(error))
         samples = sampled.simulate(loop, duration=0.5, dt=1e-3, record_every=1).signals
-        peaks.append(float(jnp.abs(samples.estimate).max()))
+        peaks.append(float(jnp.abs(samples["estimate"]).max()))
     print(f"{error} m/s, sets {spacing}: {peaks}, printed {printed}")
     assert peaks[0] == pytest.approx(printed, rel=0.1)
     assert peaks[1] <= min(peaks[0], 20.0) * (1 + 1e-12)

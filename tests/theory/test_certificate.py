@@ -77,7 +77,7 @@ def test_its_rate_is_the_one_of_the_proof():
     run = flown(constant([3.0]), dt=1e-4, duration=0.5, loop="continuous")
     series, eps = run.dataset, run.dataset["modelling_error"].values[:, 0]
     s = 5 * (series["error"] - series["velocity"]).values[:, 0]
-    taken = 500 * (150 * eps**2 + eps * 0.1 * np.tanh(eps / 0.5)) + s * series["robust"].values[:, 0]
+    taken = 500 * (150 * eps**2 + eps * 0.1 * np.tanh(eps / 0.5)) + s * series["robust_term"].values[:, 0]
     exact = -(series["lyapunov_decay"].values + taken)
     np.testing.assert_allclose(series["lyapunov_rate"].values[1:], (exact[1:] + exact[:-1]) / 2, rtol=2e-4)
 

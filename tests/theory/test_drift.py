@@ -34,7 +34,7 @@ def noisy(duration, velocity, spacing, **choices):
     law = rcaf(plant.model(), **({"sets": 3, "reach": (spacing,)} | choices))
     loop = ClosedLoop(plant, law, setpoint([0.0]), none(), white_noise(0.0, velocity))
     outcome = sampled.simulate(loop, duration=duration, dt=DT, record_every=10)
-    weights = np.asarray(outcome.signals.weights)[:, 0]
+    weights = np.asarray(outcome.signals["weights"])[:, 0]
     return law, np.asarray(outcome.time), drift.gain_of(law, weights), weights, outcome
 
 
@@ -95,7 +95,7 @@ def test_certificate_separates_what_stays_calm_from_what_does_not():
         law, _, gain, _, outcome = noisy(15.0, 1e-2, 0.1, weights_bound=theta_max)
         assert drift.is_certified(law, DT) == calm
         assert gain.max() <= drift.gain_bound(law) * (1 + 1e-12)
-        late = float(np.sqrt((np.asarray(outcome.signals.modelling_error)[-1000:] ** 2).mean()))
+        late = float(np.sqrt((np.asarray(outcome.signals["modelling_error"])[-1000:] ** 2).mean()))
         print(f"box {theta_max:.4g}: rms of eps {late:.3g} m/s at the end")
         assert (late < 0.04) == calm
 
@@ -108,7 +108,7 @@ def test_ripple_drives_weights_apart_too():
         law = rcaf(plant.model(), sets=3, reach=(spacing,))
         loop = ClosedLoop(plant, law, setpoint([0.0]), sinusoid(5.0, 20.0), perfect())
         outcome = sampled.simulate(loop, duration=100.0, dt=DT, record_every=1000)
-        found[spacing] = float(drift.gain_of(law, np.asarray(outcome.signals.weights)[-1, 0]))
+        found[spacing] = float(drift.gain_of(law, np.asarray(outcome.signals["weights"])[-1, 0]))
         expected = after_ripple(law, 5.0, 20.0, 100.0)
         print(f"sets {spacing}: c = {found[spacing]:.4g}, predicted {expected:.4g}")
         assert found[spacing] == pytest.approx(expected, rel=0.05)

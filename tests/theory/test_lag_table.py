@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from motor_rail import COUNT, MASS, InnerLoop, MotorRail, ThrustModel
+from motor_rail import COUNT, MASS, InnerLoop, MotorRail, thrust_model
 
 from undertow.analysis import motor_loop, small_signal
 from undertow.controllers.rcaf import rcaf
@@ -29,7 +29,7 @@ SPEEDS = np.array([2.0, 10.0, 20.0, 40.0])  # rad/s
 def observer(bandwidth):
     """A pure linear observer in Table 1's letters: no robust term, no share of s, critically damped."""
     nothing = {"robust_gain": 0.0, "compensation_gain": 0.0, "weight": np.eye(2) * 1e-9}
-    rho = float(rcaf(ThrustModel(), sets=3).fuzzy.basis_norm_squared())
+    rho = float(rcaf(thrust_model(), sets=3).fuzzy.basis_norm_squared())
     return nothing | {"sets": 3, "pole": 2 * bandwidth, "composite": bandwidth**2 / (100 * rho)}
 
 
@@ -53,7 +53,7 @@ def departure(law, speed):
     target = Target(*(jnp.zeros(1) for _ in range(3)))
     y = plant.output(0.0, start)
     z = law.init(y, target)
-    held = -(law.model.gain(y) @ volts)
+    held = -(law.model.dynamics.gain(y) @ volts)
     z = z._replace(weights=jnp.broadcast_to(held[:, None], z.weights.shape))
 
     def flow(t, state):
@@ -97,9 +97,9 @@ def test_a_linear_observer_is_stable_between_two_bandwidths():
     """20 to 60 rad/s at every speed from 1 rad/s; slower ones cannot hold motors that hardly turn."""
     rightmost = lambda law, speed: motor_loop.rightmost(motor_loop.motor_matrix(law, WHOLE.motor, speed)).real
     for bandwidth in (20.0, 30.0, 60.0):
-        law = rcaf(ThrustModel(), **observer(bandwidth))
+        law = rcaf(thrust_model(), **observer(bandwidth))
         assert all(rightmost(law, speed) < 0 for speed in (1.0, 2.0, 5.0, 20.0, 40.0, 80.0))
-    slow = rcaf(ThrustModel(), **observer(10.0))
+    slow = rcaf(thrust_model(), **observer(10.0))
     assert rightmost(slow, 1.0) > 0.05 and rightmost(slow, 2.0) < 0
 
 
@@ -132,13 +132,13 @@ def rows():
 def row(fidelity="electromechanical", supply=np.inf, speed_sensor=False, inner=None, dt=1e-3, **choices):
     thruster = paper_table3(fidelity, supply=supply)
     plant = MotorRail(thruster)
-    law = rcaf(plant.model(speed_sensor=speed_sensor) if inner is None else ThrustModel(), **({"sets": 3} | choices))
+    law = rcaf(plant.model(speed_sensor=speed_sensor) if inner is None else thrust_model(), **({"sets": 3} | choices))
     flown = law if inner is None else InnerLoop(law.model, law, thruster, inner)
     loop = ClosedLoop(plant, flown, setpoint([2.0]), sinusoid(0.5, 1.0, offset=0.5), perfect())
     duration = 15.0 + 2 * PERIOD
     run = sampled.simulate(loop, duration=duration, dt=dt, record_every=1, substeps=round(dt / 1e-3))
     late = np.asarray(run.time) > 15.0
-    error, volts = np.asarray(run.signals.error)[late, 0], np.asarray(run.signals.voltage)[late, 0]
+    error, volts = np.asarray(run.signals["error"])[late, 0], np.asarray(run.signals["input"])[late, 0]
     rms = lambda series: float(np.sqrt((series**2).mean()))
     found = {"e": rms(error), "V": rms(volts), "variation": float(np.abs(np.diff(volts)).sum() / (2 * PERIOD))}
     return int(run.status), float(run.ended), found, law

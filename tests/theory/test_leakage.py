@@ -26,7 +26,7 @@ def drift_gain(leakage):
     loop = ClosedLoop(plant, law, setpoint(np.zeros(AXES)), none(), white_noise(0.0, NOISE))
     run = sampled.simulate(loop, duration=100.0, dt=DT, record_every=1000)
     assert int(run.status) == 0
-    return drift.gain_of(law, np.asarray(run.signals.weights)).mean(axis=1), law
+    return drift.gain_of(law, np.asarray(run.signals["weights"])).mean(axis=1), law
 
 
 def test_drift_ends_where_leakage_takes_as_much_as_noise_brings():
@@ -45,7 +45,7 @@ def test_a_constant_load_is_estimated_without_bias():
     law = robust(plant.model(), bandwidth=30.0, reach=(0.5,), leakage=0.5, reference_frequency=0.0)
     loop = ClosedLoop(plant, law, setpoint([0.0]), sinusoid(0.0, 1.0, offset=3.0), perfect())
     last = jax.tree.map(lambda x: x[-1], sampled.simulate(loop, duration=60.0, dt=DT, record_every=1000).signals)
-    np.testing.assert_allclose(last.estimate, 3.0, rtol=1e-9)
+    np.testing.assert_allclose(last["estimate"], 3.0, rtol=1e-9)
 
 
 def test_leakage_alone_never_takes_weights_away_from_those_of_a_constant_load():

@@ -53,31 +53,31 @@ def early():
 
 def test_estimation_error_within_one_percent(record):
     law, time, samples = record
-    measured = amplitudes(time, samples.estimate - samples.uncertainty, *early())
+    measured = amplitudes(time, samples["estimate"] - samples["uncertainty"], *early())
     np.testing.assert_allclose(measured, np.abs(small_signal.estimation_response(law, FREQUENCIES)), rtol=0.01)
 
 
 def test_tracking_error_within_one_percent(record):
     law, time, samples = record
-    measured = amplitudes(time, samples.error, *early())
+    measured = amplitudes(time, samples["error"], *early())
     np.testing.assert_allclose(measured, np.abs(small_signal.tracking_response(law, FREQUENCIES)), rtol=0.01)
 
 
 def test_measured_uncertainty_is_the_disturbance(record):
     _, time, samples = record
-    np.testing.assert_allclose(samples.uncertainty, np.sin(FREQUENCIES * time[:, None]), atol=1e-12)
+    np.testing.assert_allclose(samples["uncertainty"], np.sin(FREQUENCIES * time[:, None]), atol=1e-12)
 
 
 def test_departure_after_a_while_is_the_gain_that_drift_adds(record):
     """Negative control and section 3.8: by the end the fast axes are off by more; d_hat = z - c eps explains it."""
     law, time, samples = record
     starts, ends = np.full(len(FREQUENCIES), 14.0), np.full(len(FREQUENCIES), 16.0)
-    measured = amplitudes(time, samples.estimate - samples.uncertainty, starts, ends)
+    measured = amplitudes(time, samples["estimate"] - samples["uncertainty"], starts, ends)
     plain = np.abs(small_signal.estimation_response(law, FREQUENCIES))
     assert (np.abs(measured / plain - 1)[FAST] > 0.01).all()
     sets = law.fuzzy
     slope = np.asarray(jax.jacfwd(lambda x: memberships(x, sets.centres[0], sets.widths[0]))(jnp.zeros(())))
-    added = -samples.weights[1500] @ slope  # c, 1/s
+    added = -samples["weights"][1500] @ slope  # c, 1/s
     assert (added[FAST] > 1).all() and (added > -1e-9).all()
     for axis in FAST:
         g = small_signal.gains(law)

@@ -148,9 +148,9 @@ def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
     pushed = ClosedLoop(plant, law, still, sinusoid(0.0, offset=load), perfect())
     flown = simulate(pushed, duration=200.0, dt=dt, record_every=100)
     last = jax.tree.map(lambda series: np.asarray(series)[-1], flown.signals)
-    assert abs(last.error[4]) > 0.05
-    np.testing.assert_allclose(found.local.values["error"], last.error, atol=2e-4)
-    np.testing.assert_allclose(found.at["u"], last.voltage, atol=2e-3)
+    assert abs(last["error"][4]) > 0.05
+    np.testing.assert_allclose(found.local.values["error"], last["error"], atol=2e-4)
+    np.testing.assert_allclose(found.at["u"], last["input"], atol=2e-3)
 
 
 def test_a_load_that_no_input_holds_is_told():

@@ -66,7 +66,7 @@ def watch(loop, steps):
     (x, z), _, worst, peak = jax.lax.fori_loop(0, steps, step, (start, first, nothing, nothing))
     end = jnp.asarray(steps * STEP)
     sample = drawn.sample(end, x, z, drawn.decide(end, x, z))
-    return worst / first, peak, sample.error, sample.estimate - sample.uncertainty
+    return worst / first, peak, sample["error"], sample["estimate"] - sample["uncertainty"]
 
 
 def watched(rails, layout, **choices):

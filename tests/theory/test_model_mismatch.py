@@ -58,9 +58,9 @@ def motor(lag):
 def flown(loop):
     run = sampled.simulate(loop, duration=30.0, dt=DT, record_every=5, position=[0.0] * 6)
     late = run.signals
-    half = late.error.shape[0] // 2
-    swings = jnp.abs(jnp.diff(late.voltage[half:], axis=0)).mean() / (5 * DT)
-    return run.status, jnp.sqrt((late.error[half:] ** 2).mean()), swings
+    half = late["error"].shape[0] // 2
+    swings = jnp.abs(jnp.diff(late["input"][half:], axis=0)).mean() / (5 * DT)
+    return run.status, jnp.sqrt((late["error"][half:] ** 2).mean()), swings
 
 
 def error(thruster, nominal, make=robust, navigation=None):

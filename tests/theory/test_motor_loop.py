@@ -95,11 +95,11 @@ def test_linear_model_is_the_jacobian_of_the_code(skew):
     thrust = plant.body.accelerate(plant.thruster_matrix @ MOTOR.thrust(jnp.asarray(speeds)))
     x = plant.initial_state()._replace(thrusters=ElectromechanicalState(jnp.asarray(speeds), current))
     y = plant.output(0.0, x)
-    held = -(thrust + law.model.drift(y))  # the load that these speeds balance
+    held = -(thrust + law.model.dynamics.drift(y))  # the load that these speeds balance
     loop = ClosedLoop(plant, law, setpoint(np.zeros(6)), sinusoid(0.0, 1.0, offset=held), perfect())
     drawn = loop.realize(jax.random.PRNGKey(0))
     _, z = drawn.start()
-    estimate = -(law.model.drift(y) + law.model.gain(y) @ volts)
+    estimate = -(law.model.dynamics.drift(y) + law.model.dynamics.gain(y) @ volts)
     z = z._replace(weights=estimate[:, None] + skew * jnp.array([1.0, 0.0, -1.0]))
     drifted = drift.gain_of(law, np.asarray(z.weights))[0]
     assert drifted == pytest.approx(skew * 0.848, rel=1e-3)

@@ -30,9 +30,9 @@ def simulated(law_of, velocity, position=0.0):
     loop = ClosedLoop(plant, law, setpoint(np.zeros(SEEDS)), none(), white_noise(position, velocity))
     outcome = sampled.simulate(loop, duration=60.0, dt=1e-3, record_every=10)
     assert int(outcome.status) == 0
-    late = lambda name: float(np.sqrt((np.asarray(getattr(outcome.signals, name))[1000:] ** 2).mean()))
-    found = noise.Deviations(late("error"), late("modelling_error"), late("estimate"), late("command"))
-    return law, found, float(drift.gain_of(law, outcome.signals.weights[-1]).mean())
+    late = lambda name: float(np.sqrt((np.asarray(outcome.signals[name])[1000:] ** 2).mean()))
+    found = noise.Deviations(late("error"), late("modelling_error"), late("estimate"), late("commanded_input"))
+    return law, found, float(drift.gain_of(law, outcome.signals["weights"][-1]).mean())
 
 
 SLOW = {"robust, with a tracking share", "Table 1 without robust term"}

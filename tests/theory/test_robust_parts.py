@@ -12,8 +12,9 @@ from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.reference_filter import ReferenceFilter
-from undertow.core.contracts import Measurement, Target
+from undertow.core.contracts import Target
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.estimation.tsk import gaussian_sets
 from undertow.numerics.integrators import rk4
 from undertow.plants import double_integrator, hybrid_vehicle
@@ -103,7 +104,7 @@ def test_settings_that_contradict_each_other(wrong, name):
 
 # Allocation.
 
-EFFECT = np.asarray(hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes().acceleration_per_force(None))
+EFFECT = np.asarray(hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes().dynamics.gain(None))
 FULL = np.full(8, 30.0)
 
 
@@ -278,33 +279,42 @@ def body():
 @pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
 def test_rates_and_their_derivative(body, t):
     eta, rate, bend = motion(t)
-    rates = lambda t: body.rates(Measurement(*motion(t)[:2]))
-    np.testing.assert_allclose(body.rates_derivative(Measurement(eta, rate), bend), jax.jacfwd(rates)(t), atol=1e-10)
+    coordinates = body.coordinates
+    rates = lambda t: coordinates.velocity(measurement_of_outputs(*motion(t)[:2]))
+    np.testing.assert_allclose(
+        coordinates.acceleration(measurement_of_outputs(eta, rate), bend), jax.jacfwd(rates)(t), atol=1e-10
+    )
 
 
 @pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
 def test_wanted_rates_and_their_derivative_seen_from_a_turning_vehicle(body, t):
     """Both move: the target half as fast, along the same way."""
     target = lambda t: Target(*(m * 0.5**k for k, m in enumerate(motion(0.5 * t + 1.0))))
-    wanted = lambda t: body.wanted(Measurement(*motion(t)[:2]), target(t))
-    np.testing.assert_allclose(wanted(t)[1], jax.jacfwd(lambda t: wanted(t)[0])(t), atol=1e-9)
+    seen = lambda t: measurement_of_outputs(*motion(t)[:2])
+
+    def velocity(t):
+        return body.coordinates.tracking_error(seen(t), target(t)).rate + body.coordinates.velocity(seen(t))
+
+    acceleration = body.coordinates.tracking_error(seen(t), target(t)).acceleration
+    np.testing.assert_allclose(acceleration, jax.jacfwd(velocity)(t), atol=1e-9)
 
 
 def test_on_target_nothing_is_wanted_but_its_own_motion(body):
     eta, rate, bend = motion(0.7)
-    y, r = Measurement(eta, rate), Target(eta, rate, bend)
-    np.testing.assert_allclose(body.error(y, r), 0, atol=1e-15)
-    velocity, acceleration = body.wanted(y, r)
-    np.testing.assert_allclose(velocity, body.rates(y), atol=1e-12)
-    np.testing.assert_allclose(acceleration, body.rates_derivative(y, bend), atol=1e-11)
+    y, r = measurement_of_outputs(eta, rate), Target(eta, rate, bend)
+    error, rate, acceleration = body.coordinates.tracking_error(y, r)
+    np.testing.assert_allclose(error, 0, atol=1e-15)
+    np.testing.assert_allclose(rate, 0, atol=1e-12)
+    np.testing.assert_allclose(acceleration, body.coordinates.acceleration(y, bend), atol=1e-11)
 
 
 def test_attitude_errors_go_the_short_way(body):
     """I32: full turns do not matter, and 200 degrees to the right are 160 to the left."""
-    y = Measurement(jnp.zeros(6), jnp.zeros(6))
+    y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
     target = lambda yaw: Target(jnp.zeros(6).at[5].set(yaw), jnp.zeros(6), jnp.zeros(6))
+    error = lambda yaw: body.coordinates.tracking_error(y, target(yaw)).error
     for yaw in RNG.uniform(-3, 3, 20):
-        once, more = body.error(y, target(yaw)), body.error(y, target(yaw + 2 * np.pi))
+        once, more = error(yaw), error(yaw + 2 * np.pi)
         np.testing.assert_allclose(once, more, atol=1e-12)
         np.testing.assert_allclose(once[5], 2 * np.sin(yaw / 2), atol=1e-12)
-    assert float(body.error(y, target(np.radians(200)))[5]) < 0
+    assert float(error(np.radians(200))[5]) < 0

@@ -36,7 +36,7 @@ def test_nonlinear_loop_agrees(rails, rule):
     for factor, stable in ((0.95, True), (1.05, False)):
         dt = factor * LIMITS[rule]
         outcome = sampled.simulate(loop, duration=1000 * dt, dt=dt, record_every=1)
-        eps = np.abs(np.asarray(outcome.signals.modelling_error))[:, 0]
+        eps = np.abs(np.asarray(outcome.signals["modelling_error"]))[:, 0]
         first, later = eps[:100].max(), eps[100:].max()
         assert later < first if stable else later > 10 * first, (rule, factor, first, later)
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.none import none
 from undertow.estimation.tsk import gaussian_sets
 from undertow.loop import sampled
@@ -92,7 +92,7 @@ def test_without_delay_it_is_the_matrix_of_the_package(table1):
 class Stepped(AbstractController):
     """The law with its input one step late, its weights stepped before its identification model, or as it is."""
 
-    model: AbstractModel
+    model: Model
     law: AbstractController
     semi_implicit: bool
     delayed: bool
@@ -101,8 +101,11 @@ class Stepped(AbstractController):
         return self.law.init(y, r), jnp.zeros_like(y.position)
 
     def command(self, z, y, r):
-        asked, telemetry = self.law.command(z[0], y, r)
-        return z[1] if self.delayed else asked, telemetry
+        asked, signals = self.law.command(z[0], y, r)
+        return z[1] if self.delayed else asked, signals
+
+    def signals(self):
+        return self.law.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         asked, _ = self.law.command(z[0], y, r)
@@ -123,6 +126,6 @@ def test_nonlinear_loop_agrees(rule, delayed, rafc, layout):
     for factor in (0.97, 1.03):
         dt = factor * limit(law, rule, delayed)
         samples = sampled.simulate(loop, duration=1500 * dt, dt=dt, record_every=1).signals
-        eps = np.abs(np.asarray(samples.modelling_error))[:, 0]
+        eps = np.abs(np.asarray(samples["modelling_error"]))[:, 0]
         first, later = eps[:50].max(), eps[-200:].max()
         assert later < 1e-2 * first if factor < 1 else later > 100 * first, (factor, first, later)

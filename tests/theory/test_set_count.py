@@ -30,8 +30,8 @@ def rms(rails, **choices):
     outcome = sampled.simulate(loop, duration=5.0, dt=5e-4, record_every=1)
     samples = jax.tree.map(np.asarray, outcome.signals)
     root = lambda series: np.sqrt((series**2).mean(0))
-    peak = np.abs(samples.modelling_error).max()
-    return root(samples.estimate - samples.uncertainty), root(samples.error), peak
+    peak = np.abs(samples["modelling_error"]).max()
+    return root(samples["estimate"] - samples["uncertainty"]), root(samples["error"]), peak
 
 
 @pytest.fixture(scope="module")

@@ -35,7 +35,7 @@ def matrices():
     for name, part in sorted(catalogue.names("vehicles").items()):
         plant = hybrid_vehicle(part(), paper_table3("ideal"))
         if plant.rank() == 6:
-            yield name, np.asarray(plant.model().body_gain)
+            yield name, np.asarray(plant.model().dynamics.body_gain)
 
 
 def test_eigenvalues_lie_between_the_least_and_the_most_that_is_left():
@@ -113,6 +113,12 @@ class LosesEffect(AbstractPlant):
     def effort(self, x, u):
         return self.vehicle.effort(x, u)
 
+    def diagnostics(self, x, u):
+        return self.vehicle.diagnostics(x, u)
+
+    def signals(self):
+        return self.vehicle.signals()
+
     def inputs(self):
         return self.vehicle.inputs()
 
@@ -165,12 +171,12 @@ def test_after_any_single_loss_the_error_is_what_the_linear_loop_predicts(preset
         plant = LosesEffect(vehicle, left, LOSS, vehicle.outputs, vehicle.output_units)
         loop = ClosedLoop(plant, law, setpoint(np.zeros(6)), load, perfect())
         run = sampled.simulate(loop, duration=END, dt=DT, record_every=10)
-        return run.time, jnp.abs(run.signals.error), run.status
+        return run.time, jnp.abs(run.signals["error"]), run.status
 
     lefts = np.concatenate([np.ones((1, 8)), 1 - np.eye(8), 1 - 0.5 * np.eye(8)])
     time, error, status = (np.asarray(found) for found in jax.jit(jax.vmap(flight))(jnp.asarray(lefts)))
     assert (status == 0).all()
-    gain = np.asarray(vehicle.model().body_gain)
+    gain = np.asarray(vehicle.model().dynamics.body_gain)
     predicted = [amplitudes(law, gain * left @ np.linalg.pinv(gain)) for left in lefts]
     found = error[:, time[0] > SETTLED].max(1)
     ratio = found.max(1) / found[0].max()
@@ -185,7 +191,7 @@ def test_a_gain_three_times_too_large(dt, stable):
     plant = linear_plant(((3.0,),))
     law = rcaf(plant.model(gain=((1.0,),)), sets=3)
     loop = ClosedLoop(plant, law, setpoint([1e-6]), none(), perfect())
-    eps = np.abs(np.asarray(sampled.simulate(loop, duration=2.0, dt=dt, record_every=1).signals.modelling_error))
+    eps = np.abs(np.asarray(sampled.simulate(loop, duration=2.0, dt=dt, record_every=1).signals["modelling_error"]))
     assert (eps[-50:].max() < 1e-2 * eps[:20].max()) == stable
     g = small_signal.gains(law)
     assert (dt < g.pole / (3 * g.b2)) == stable

@@ -15,8 +15,8 @@ def transient(rails, **choices):
     loop = rails(1, goal=STEP, **choices)
     outcome = sampled.simulate(loop, duration=1.0, dt=2e-4, record_every=1)
     samples = jax.tree.map(np.asarray, outcome.signals)
-    s = 5 * (samples.error - samples.velocity)[:, 0]
-    return np.asarray(outcome.time), s, samples.estimate[:, 0], samples.modelling_error[:, 0], loop.controller
+    s = 5 * (samples["error"] - samples["velocity"])[:, 0]
+    return np.asarray(outcome.time), s, samples["estimate"][:, 0], samples["modelling_error"][:, 0], loop.controller
 
 
 def test_bias_follows_s(rails):

@@ -37,7 +37,7 @@ def test_ultimate_error_is_within_the_bound(rails):
     assert int(outcome.status) == 0
     samples = jax.tree.map(np.asarray, outcome.signals)
     late = np.asarray(outcome.time) > 120.0
-    measured = np.sqrt((samples.error**2 + samples.velocity**2)[late].mean(0))
+    measured = np.sqrt((samples["error"] ** 2 + samples["velocity"] ** 2)[late].mean(0))
     residue = 0.2785 * (gains["layer"] * gains["robust_gain"] + 0.5 * gains["composite"] * gains["compensation_gain"])
     bound = np.sqrt(2 * residue / gains["weight"][:, 0, 0])
     assert (measured <= bound).all(), measured / bound

@@ -9,7 +9,7 @@ import pytest
 
 from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -29,7 +29,7 @@ SURVIVES = {
 class FedCommanded(AbstractController):
     """A law that never hears of limits."""
 
-    model: AbstractModel
+    model: Model
     law: AbstractController
 
     def init(self, y, r):
@@ -37,6 +37,9 @@ class FedCommanded(AbstractController):
 
     def command(self, z, y, r):
         return self.law.command(z, y, r)
+
+    def signals(self):
+        return self.law.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         commanded, _ = self.law.command(z, y, r)
@@ -51,8 +54,8 @@ def step(name, limit, load=1.0):
     fed = FedCommanded(law.model, law) if name == "commanded" else law
     loop = ClosedLoop(plant, fed, setpoint([2.0]), sinusoid(0.0, 1.0, offset=load), perfect())
     samples = sampled.simulate(loop, duration=40.0, dt=1e-3, record_every=1).signals
-    error, velocity = np.asarray(samples.error)[:, 0], np.asarray(samples.velocity)[:, 0]
-    return error, np.asarray(samples.estimate)[:, 0], 5 * (error - velocity), law
+    error, velocity = np.asarray(samples["error"])[:, 0], np.asarray(samples["velocity"])[:, 0]
+    return error, np.asarray(samples["estimate"])[:, 0], 5 * (error - velocity), law
 
 
 @pytest.mark.parametrize("name", SURVIVES)

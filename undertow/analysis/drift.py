@@ -32,14 +32,13 @@ def basis_slope(fuzzy: FuzzySystem) -> np.ndarray:
 
 def gain_of(law: RCAF | RobustRCAF, weights: np.ndarray) -> np.ndarray:
     """c of weights theta (..., rules), 1/s."""
-    return -np.asarray(weights) @ basis_slope(_fuzzy(law))
+    return -np.asarray(weights) @ basis_slope(law.fuzzy)
 
 
 def gain_bound(law: RCAF | RobustRCAF, axis: int = 0) -> float:
     """Largest c, 1/s, while |theta| <= theta_max: theta_max sum |xi'(0)|; zero for one set, infinite without a box."""
-    bound = law.estimator.bound if isinstance(law, RobustRCAF) else law.weights_bound
-    theta_max = np.broadcast_to(np.asarray(bound, dtype=float), len(law.model.angles))[axis]
-    slope = np.abs(basis_slope(_fuzzy(law))).sum()
+    theta_max = np.broadcast_to(np.asarray(law.weights_bound, dtype=float), len(law.model.coordinates.angles))[axis]
+    slope = np.abs(basis_slope(law.fuzzy)).sum()
     return float(theta_max * slope) if slope > 0 else 0.0
 
 
@@ -84,8 +83,4 @@ def time_to_divergence(law: RCAF | RobustRCAF, dt: float, velocity: float, axis:
 
 
 def _per_square(law: RCAF | RobustRCAF, one: Steps) -> float:
-    return one.of_estimate / one.dt / one.basis_norm_squared * float((basis_slope(_fuzzy(law)) ** 2).sum())
-
-
-def _fuzzy(law: RCAF | RobustRCAF) -> FuzzySystem:
-    return law.estimator.fuzzy if isinstance(law, RobustRCAF) else law.fuzzy
+    return one.of_estimate / one.dt / one.basis_norm_squared * float((basis_slope(law.fuzzy) ** 2).sum())

@@ -122,7 +122,7 @@ def input_rule(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> float:
 
 
 def _robust(law: RobustRCAF, dt: float, axis: int) -> Steps:
-    axes = len(law.model.angles)
+    axes = len(law.model.coordinates.angles)
     at = lambda value, *shape: np.broadcast_to(np.asarray(value, dtype=float), (axes, *shape))[axis]
     filtered = np.append(at(law.lyapunov(), 2, 2)[:, 1], [0.0, 0.0])
     slope = at(law.robust_gain) / at(law.layer)

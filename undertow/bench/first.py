@@ -9,9 +9,9 @@ from undertow.scenario.execute import execute
 
 
 def main() -> None:
-    """Run W1 and print its tracking rms."""
+    """Run W1 and print its rms error of position."""
     steady = execute(W1).steady
-    print(steady and steady["tracking_rms"])
+    print(steady and steady["position_rms"])
 
 
 if __name__ == "__main__":

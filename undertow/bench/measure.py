@@ -12,13 +12,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from simdjit import nvidia
-from simdjit.cuda import Driver
-from simdjit.machine import lanes_of
 from undertow.bench import plain_numpy, workload
 from undertow.bench.workload import W1, W2, Workload
 from undertow.core import runtime
-from undertow.loop import sampled
+from undertow.loop import sampled, simd_batch
 from undertow.loop.vmap_batch import BatchRunner as VmapBatchRunner
 
 # Runs of a batch, and number of repetitions; the shortest time counts.
@@ -41,28 +38,33 @@ def measure(watch: Watch) -> dict[str, Any]:
         Figures of W1 by their names, those of W2 under names that begin with `w2_`.
     """
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    found: dict[str, Any] = {"threads": threads, "simd_width": lanes_of(64)}
+    found: dict[str, Any] = {"threads": threads, "simd_width": simd_batch.simd_width(64)}
+    lacking = simd_batch.unavailable()
+    if lacking:
+        found["simd_unavailable"] = lacking
     watch("first results", 0.0)
     found["first_cold_s"], found["first_kept_s"] = _first_results()
     with runtime.on_processor():
         watch("W1, one run", 0.1)
         one = workload.workload(W1)
-        found |= {"steps": one.steps} | _single(one)
+        found |= {"steps": one.steps} | ({} if lacking else _single(one))
         watch("W1, one run, XLA backend", 0.2)
         found |= _by_xla(one)
-        watch("W2, one run", 0.3)
-        other = workload.workload(W2)
-        second = {"steps": other.steps} | _single(other, _REPETITIONS_W2)
-        second |= _prefixed("batch_float64_", _batch(other, threads, _BATCH_W2, _REPETITIONS_W2))
-        found |= _prefixed("w2_", second)
-    for i, kind in enumerate(("float64", "float32")):
+        if not lacking:
+            watch("W2, one run", 0.3)
+            other = workload.workload(W2)
+            second = {"steps": other.steps} | _single(other, _REPETITIONS_W2)
+            second |= _prefixed("batch_float64_", _batch(other, threads, _BATCH_W2, _REPETITIONS_W2))
+            found |= _prefixed("w2_", second)
+    for i, kind in enumerate(() if lacking else ("float64", "float32")):
         watch(f"W1, batch, {kind}", 0.5 + 0.2 * i)
         with runtime.in_precision(kind):
             found |= _many(kind, threads)
     watch("W1 in plain NumPy", 0.9)
     found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_STEPS), 1) / _NUMPY_STEPS
-    found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
-    found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
+    if not lacking:
+        found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
+        found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
     watch("", 1.0)
     return found
 
@@ -114,7 +116,7 @@ def _many(kind: str, threads: int) -> dict[str, Any]:
         found = _prefixed(f"batch_{kind}_", _batch(one, threads, _BATCH))
     if jax.default_backend() == "gpu":
         found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(_short(one, 200), _ON_GPU)}
-    driver = nvidia.gpu()
+    driver = simd_batch.gpu()
     if driver is not None:
         found |= _prefixed(f"gpu_{kind}_", on_gpu(one, driver, _ON_GPU))
     return found
@@ -134,7 +136,7 @@ def _batch(one: Workload, threads: int, runs: int, repetitions: int = _REPETITIO
     return {"compile_s": compiling, "one_thread_ns": together(1) / each, "ns": together(threads) / each}
 
 
-def on_gpu(one: Workload, driver: Driver, runs: int) -> dict[str, float]:
+def on_gpu(one: Workload, driver: Any, runs: int) -> dict[str, float]:
     """A batch on a GPU with one thread per run, including the copies to and from it."""
     program, compiling = _timed(lambda: workload.batch(one, driver=driver))
     numbers = workload.several(one.run, runs)

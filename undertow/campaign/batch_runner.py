@@ -9,9 +9,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from simdjit import nvidia
-from simdjit.errors import Unsupported
-from undertow.analysis.metrics import overall
+from undertow.analysis.metrics import results_of_batch
 from undertow.campaign.campaign_schema import Series
 from undertow.campaign.runs import leaves, planned, run_of, shared_numbers
 from undertow.core import runtime
@@ -29,7 +27,7 @@ SIMD, XLA = 0, 1
 class BatchResult(NamedTuple):
     """Results of trials, one entry per trial."""
 
-    metrics: dict[str, np.ndarray]  # over the steady window; NaN for failed runs
+    metrics: dict[str, np.ndarray]  # over the steady window; NaN for failed runs and undefined metrics
     status: np.ndarray
     ended: np.ndarray  # s
     backend: np.ndarray  # SIMD or XLA
@@ -91,6 +89,8 @@ class ProgramCache:
         for kind, group in groups.items():
             with runtime.in_precision(kind.precision):
                 pieces.append(self._together(kind, group))
+        names = dict.fromkeys(name for piece in pieces for name in piece.metrics)
+        pieces = [piece._replace(metrics={name: _defined(piece, name) for name in names}) for piece in pieces]
         back = np.argsort([i for group in groups.values() for i in group.members])
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
@@ -103,13 +103,14 @@ class ProgramCache:
         repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
         numbers = [next(own) if shared is None else repeated(shared) for shared in common]
         tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
-        found = self._programs[kind].run(jax.tree.unflatten(tree, numbers))
-        lasted = found.status == int(Status.OK)
-        metrics = {name: np.where(lasted, value, np.nan) for name, value in overall(found.accumulated[0]).items()}
+        result = self._programs[kind].run(jax.tree.unflatten(tree, numbers))
+        lasted = result.status == int(Status.OK)
+        found = results_of_batch(group.first.accumulators, result.accumulated)
+        metrics = {name: np.where(lasted, value, np.nan) for name, value in found.items()}
         backend = np.full(
             count, SIMD if isinstance(self._programs[kind], simd_batch.BatchRunner) else XLA, dtype=np.int8
         )
-        return BatchResult(metrics, found.status.astype(np.int8), found.ended, backend, found.series)
+        return BatchResult(metrics, result.status.astype(np.int8), result.ended, backend, result.series)
 
     def _common(self, kind: _Kind, count: int) -> list[np.ndarray | None]:
         """Constants of the program of a kind, in the order of the leaves of its runs; None for the other leaves."""
@@ -133,9 +134,14 @@ class ProgramCache:
             return self._shared
 
 
+def _defined(piece: BatchResult, name: str) -> np.ndarray:
+    """A metric of some trials; NaN where their law or plant has none of that name."""
+    return piece.metrics.get(name, np.full(len(piece.status), np.nan))
+
+
 def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
     if kind.backend == "simd":
-        for driver in dict.fromkeys((nvidia.gpu(), None)):
-            with contextlib.suppress(Unsupported):
+        for driver in dict.fromkeys((simd_batch.gpu(), None)):
+            with contextlib.suppress(simd_batch.Unsupported):
                 return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver)
     return vmap_batch.BatchRunner(run, kind.plan)

@@ -17,6 +17,9 @@ _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
+VARIANT = "variant"  # the axis of `variants`, beside those of `cross`
+
+
 class Distribution(Strict):
     """Distribution of one parameter: exactly one of these keys."""
 
@@ -86,6 +89,10 @@ class Campaign(Strict):
         default_factory=dict,
         description="sweep: key path -> values, as a list or by name; all combinations run the same samples and seeds",
     )
+    variants: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="name -> key paths and their values: whatever changes together; an axis after those of `cross`",
+    )
     requirements: dict[str, Requirement] = Field(default_factory=dict, description="metric -> bound that it must keep")
     series: Series | None = Field(None, description="signals to record; none by default")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all samples and of the seeds of the trials")
@@ -109,9 +116,19 @@ class Campaign(Strict):
         return {key: by_name(values) if isinstance(values, list) else values for key, values in given.items()}
 
     @property
+    def axes(self) -> dict[str, dict[str, Any]]:
+        """Values by names along every axis: the key paths of `cross`, then `variant`."""
+        return self.cross | ({VARIANT: self.variants} if self.variants else {})
+
+    @property
+    def keys(self) -> list[str]:
+        """Every key path whose value is not that of the scenario in all trials."""
+        return [*self.vary, *self.cross, *(key for variant in self.variants.values() for key in variant)]
+
+    @property
     def number(self) -> int:
-        """Number of trials: the samples, for every combination of `cross`."""
-        return math.prod(len(entries) for entries in self.cross.values()) * self.trials
+        """Number of trials: the samples, for every combination of `cross` and `variants`."""
+        return math.prod(len(entries) for entries in self.axes.values()) * self.trials
 
 
 def validate(text: Text) -> Campaign:
@@ -130,6 +147,11 @@ def validate(text: Text) -> Campaign:
     pairs = [(section, key) for section in ("vary", "cross") for key in getattr(found, section)]
     for section, key in pairs:
         _check_key(section, key, [other for _, other in pairs], text.where((section, key)))
+    if found.variants and VARIANT in found.cross:
+        raise BadInput(f"cross.{VARIANT}", "be left out beside `variants`", where=text.where(("cross", VARIANT)))
+    for name, variant in found.variants.items():
+        for key in variant:
+            _check_key("variants", key, [*found.vary, key], text.where(("variants", name, key)))
     for key, entries in found.cross.items():
         _check_entries(key, entries, text.where(("cross", key)))
     return found
@@ -146,7 +168,9 @@ def _check_key(section: str, key: str, every: list[str], where: str) -> None:
         hint = "Every trial has its own seed, which follows from the `seed` of the campaign"
         raise BadInput(f"{section}.seed", "be left out", hint=hint, where=where)
     if every.count(key) > 1:
-        raise BadInput(f"cross.{key}", "not be in `vary` as well", where=where)
+        raise BadInput(
+            f"{section if section == 'variants' else 'cross'}.{key}", "not be in `vary` as well", where=where
+        )
     for other in every:
         if other.startswith((f"{key}.", f"{key}[")):
             raise BadInput(other, f"not be given together with {key}, which contains it", where=where)

@@ -6,17 +6,14 @@ import numpy as np
 import xarray as xr
 
 from undertow.campaign.batch_runner import XLA
-from undertow.campaign.columns import ENDINGS
+from undertow.campaign.columns import ENDINGS, JUDGEMENTS
 from undertow.campaign.invalid_trials import reasons
 from undertow.campaign.requirements import verdict
-from undertow.campaign.sensitivity import by_choice, correlations, quantiles
+from undertow.campaign.sensitivity import by_choice, correlations, defined_quantiles
 from undertow.campaign.store_results import Results
 from undertow.campaign.trials import Trials
 
 _WORST = 5
-
-# Trials are ranked by this; those that failed come first.
-_RANKED_BY = "tracking_rms"
 
 
 def summary(results: Results, several: Trials) -> dict[str, Any]:
@@ -51,12 +48,13 @@ def _combination(results: Results, number: int) -> dict[str, Any]:
     own = results.combinations == number
     rows, lasted, ran = results.rows.isel(trial=own), results.lasted[own], results.ran[own]
     return {
-        "values": dict(zip(results.campaign.cross, results.named(number), strict=True)),
+        "values": dict(zip(results.campaign.axes, results.named(number), strict=True)),
         "trials": int(lasted.size),
         "status": endings(rows),
         "failed": int((ran & ~lasted).sum()),
         "invalid": int((~ran).sum()),
-        "metrics": {name: quantiles(rows[name].values[lasted]) for name in results.metrics} if lasted.any() else {},
+        "metrics": defined_quantiles(rows, results.metrics, lasted),
+        "success": {word: int((rows["success"].values == code).sum()) for code, word in JUDGEMENTS.items()},
         "requirements": [
             verdict(rows.isel(trial=ran), name, required) for name, required in results.campaign.requirements.items()
         ],
@@ -66,6 +64,7 @@ def _combination(results: Results, number: int) -> dict[str, Any]:
 def _worst(results: Results) -> np.ndarray:
     """Failed trials, the earliest first; then those with the largest error. Invalid trials are left out."""
     rows, lasted = results.rows.isel(trial=results.ran), results.lasted[results.ran]
-    error = np.where(lasted, rows[_RANKED_BY].values, np.inf)
+    errors = rows[results.tracking[0]].values if results.tracking else np.inf
+    error = np.where(lasted, errors, np.inf)
     order = np.lexsort((rows["ended"].values, -error))
     return rows["trial"].values[order[:_WORST]]

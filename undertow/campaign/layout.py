@@ -68,7 +68,7 @@ class Layout(NamedTuple):
 
 def layout(campaign: Campaign) -> Layout:
     """Layout of a new store: about `chunk` trials per task, preferably along the samples."""
-    swept = tuple(len(entries) for entries in campaign.cross.values())
+    swept = tuple(len(entries) for entries in campaign.axes.values())
     chunk = [min(campaign.chunk, max(campaign.trials, campaign.chunk // math.prod(swept)))]
     for count in reversed(swept):
         chunk.insert(0, min(count, campaign.chunk // math.prod(chunk)) or 1)

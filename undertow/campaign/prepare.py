@@ -1,11 +1,9 @@
 """Read a campaign and build its first trials, so that errors appear before the first run."""
 
-import contextlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from undertow.analysis.metrics import OVERALL
 from undertow.campaign import task as tasks
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.invalid_trials import reasons
@@ -15,11 +13,11 @@ from undertow.campaign.trials import Trials, trials
 from undertow.checks.vehicle_findings import vehicle_warnings
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.loop.closed_loop import Signals
+from undertow.core.metric import Metric
+from undertow.loop.simd_batch import unavailable
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.results import rules
-from undertow.scenario.schema import Loop
 
 
 class Prepared(NamedTuple):
@@ -29,6 +27,7 @@ class Prepared(NamedTuple):
     text: str
     folder: Path
     first: Built  # a trial
+    metrics: dict[str, Metric]  # that any of the trials may have
     named: tuple[dict[str, Any], ...]  # scenarios that include the contents of all files they name
     advice: tuple[str, ...]  # warnings about the campaign or its first trials
 
@@ -49,21 +48,18 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
     here = tasks.site(text, str(folder))
     firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]
     _check_shapes(campaign, here.probes().values())
+    metrics = here.metrics()
     advice: dict[str, str] = {}
     for row, built in firsts:
-        _check(campaign, built.scenario.loop)
+        _check(campaign, built, metrics)
         for sentence in (*built.advice(), *vehicle_warnings(built)):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
-    advice_given = (*too_few(campaign), *_invalid(several, here), *advice.values())
-    named = (*(built.resolved for _, built in firsts), *_chosen(several, here))
-    return Prepared(several, text, folder, firsts[0][1], named, advice_given)
-
-
-def _chosen(several: Trials, here: tasks.Site) -> Iterator[dict[str, Any]]:
-    """The first trial with each entry of every choice, where it can be built: an entry may name another file."""
-    for data in several.alternatives():
-        with contextlib.suppress(BadInput):
-            yield tasks.build_data(several, here.part_cache, data).resolved
+    by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
+    why = unavailable() if by_simd else ""
+    slower = (f"trials are computed by backend xla, which is slower: {why}",) if why else ()
+    advice_given = (*slower, *too_few(campaign), *_invalid(several, here), *advice.values())
+    named = (*(built.resolved for _, built in firsts), *(built.resolved for built in here.alternatives()))
+    return Prepared(several, text, folder, firsts[0][1], metrics, named, advice_given)
 
 
 def _invalid(several: Trials, here: tasks.Site) -> tuple[str, ...]:
@@ -86,20 +82,21 @@ def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Bu
     return rows[0], tasks.build_trial(several, here.part_cache, rows[0])
 
 
-def _check(campaign: Campaign, loop: Loop) -> None:
+def _check(campaign: Campaign, built: Built, metrics: Mapping[str, Metric]) -> None:
     """Check what a campaign requires of its runs."""
+    loop = built.scenario.loop
     if loop.kind != "sampled":
         raise BadInput("scenario.loop.kind", "be sampled in a campaign", loop.kind)
     for name in campaign.requirements:
-        if name not in OVERALL:
-            raise BadInput(f"requirements.{name}", "be a metric", "unknown", hint=did_you_mean(name, OVERALL))
+        if name not in metrics:
+            raise BadInput(f"requirements.{name}", "be a metric", "unknown", hint=did_you_mean(name, metrics))
     if campaign.series is None:
         return
-    for key in (*campaign.vary, *campaign.cross):
+    for key in campaign.keys:
         if key in ("loop", "loop.dt", "loop.duration"):
             raise BadInput("series", "be of runs of one length and sampling time", f"given together with {key}")
     for i, name in enumerate(campaign.series.signals):
-        checks.choice(f"series.signals[{i}]", name, [field for field in Signals._fields if field != "books"])
+        checks.choice(f"series.signals[{i}]", name, tuple(built.closed_loop.signals()))
     if not whole_steps(campaign.series.every, loop.dt):
         must = f"be a whole number of sampling times ({loop.dt:g} s)"
         raise BadInput("series.every", must, f"{campaign.series.every:g} s")

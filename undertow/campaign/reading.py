@@ -24,5 +24,6 @@ def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
 
 def whole(campaign: Campaign, scenario: dict) -> str:
     """The complete campaign as YAML, without `chunk` and free text, which do not affect the results."""
-    data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"})
+    unused = set() if campaign.variants else {"variants"}
+    data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"} | unused)
     return dump(data | {"scenario": scenario})

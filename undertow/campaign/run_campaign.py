@@ -1,5 +1,6 @@
 """Run the missing tasks of a campaign with an executor and write their results to the store."""
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -7,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.campaign import task as tasks
-from undertow.campaign.columns import coordinates, labels
+from undertow.campaign.columns import METRICS, coordinates, labels
 from undertow.campaign.executors import Columns, Work
 from undertow.campaign.fingerprint import identity
 from undertow.campaign.layout import layout
@@ -55,8 +56,9 @@ def run_campaign(prepared: Prepared, out: Path, executor: Executor, watch: Watch
         out / STORE,
         layout(several.campaign),
         identity(text, prepared.named),
-        labels(several, prepared.first),
+        labels(several, prepared.first, prepared.metrics),
         coordinates(several, prepared.first),
+        {METRICS: json.dumps({name: list(metric) for name, metric in prepared.metrics.items()})},
     )
     try:
         missing = store.missing()

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from undertow.analysis.metrics import Metrics
+from undertow.analysis.metrics import accumulators
 from undertow.campaign.campaign_schema import Series
 from undertow.loop.simd_batch import Plan, Run
 from undertow.scenario.build import Built, in_its_precision
@@ -21,7 +21,8 @@ def run_of(built: Built) -> Run:
     """Loop, accumulators, start and key of a trial."""
     scenario = built.scenario
     start = built.closed_loop.outputs_at_start(*(getattr(scenario.initial, name) for name in _STARTS))
-    return Run(built.closed_loop, (Metrics(*built.window()),), start, jax.random.PRNGKey(scenario.seed))
+    gathered = accumulators(built.closed_loop.plant, built.metrics, *built.window())
+    return Run(built.closed_loop, gathered, start, jax.random.PRNGKey(scenario.seed))
 
 
 def planned(built: Built, asked: Series | None) -> Plan:

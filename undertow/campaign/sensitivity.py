@@ -1,9 +1,11 @@
 """Sensitivity of the metrics: rank correlations with sampled numbers, distributions by choice."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from scipy.stats import spearmanr
+import xarray as xr
+from scipy.stats import binom, spearmanr
 
 from undertow.campaign.store_results import Results
 
@@ -16,6 +18,23 @@ def quantiles(values: np.ndarray) -> dict[str, float]:
     method: Any = "linear" if np.isfinite(known).all() else "higher"
     found = np.quantile(known, QUANTILES, method=method) if known.size else np.full(len(QUANTILES), np.nan)
     return dict(zip(map(str, QUANTILES), found.tolist(), strict=True))
+
+
+def median_interval(values: np.ndarray, confidence: float = 0.95) -> tuple[float, float]:
+    """Interval that holds the median of the population, whatever its distribution; some values may be infinite.
+
+    The number of values below the median is binomial (count, 1/2), so the r-th smallest and r-th largest enclose it;
+    with few values the smallest and largest are taken. David and Nagaraja (2003), section 7.1.
+    """
+    ordered = np.sort(values)
+    rank = max(int(binom.ppf((1 - confidence) / 2, ordered.size, 0.5)), 1)
+    return float(ordered[rank - 1]), float(ordered[-rank])
+
+
+def defined_quantiles(rows: xr.Dataset, metrics: Iterable[str], which: np.ndarray) -> dict[str, dict[str, float]]:
+    """Quantiles of metrics over some of the rows; what is defined for none of them is not there."""
+    chosen = {name: rows[name].values[which] for name in metrics}
+    return {name: quantiles(values) for name, values in chosen.items() if not np.isnan(values).all()}
 
 
 def correlations(results: Results) -> dict[str, dict[str, float]]:
@@ -46,7 +65,7 @@ def by_choice(results: Results) -> dict[str, dict[str, Any]]:
         for i, word in enumerate(column.attrs.get("choices", ())):
             chosen = column.values == i
             lasted, failed = chosen & results.lasted, chosen & results.ran & ~results.lasted
-            metrics = {name: quantiles(results.rows[name].values[lasted]) for name in results.metrics if lasted.any()}
+            metrics = defined_quantiles(results.rows, results.metrics, lasted)
             counts = {"trials": int(chosen.sum()), "failed": int(failed.sum())}
             found.setdefault(key, {})[word] = counts | {"metrics": metrics}
     return found

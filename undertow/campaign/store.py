@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from undertow.campaign.arrays import check_array, chunk_file, flags, found_array, new_array, opened
-from undertow.campaign.columns import DONE, FLAGS, INPUT_UNIT, Label
+from undertow.campaign.columns import DONE, FLAGS, Label
 from undertow.campaign.fingerprint import Identity, samples
 from undertow.campaign.layout import Layout
 from undertow.core.disk import alone, sync
@@ -27,6 +27,7 @@ class Store:
         identity: fingerprint of the campaign; an existing store must have the same, possibly with fewer samples.
         labels: labels of the columns, by name.
         coordinates: coordinates of the dimensions, by name.
+        attributes: further ones of the store.
 
     Raises:
         BadInput: the folder belongs to another campaign, or another process is writing to it.
@@ -39,15 +40,16 @@ class Store:
         identity: Identity,
         labels: Mapping[str, Label],
         coordinates: Mapping[str, xr.Variable],
+        attributes: Mapping[str, str],
     ):
         self.layout, self._path, self._labels = layout, path, labels
         path.mkdir(parents=True, exist_ok=True)
         with contextlib.ExitStack() as held:
             held.enter_context(alone(path))
-            self._open(identity, coordinates)
+            self._open(identity, coordinates, attributes)
             self._held = held.pop_all()
 
-    def _open(self, identity: Identity, coordinates: Mapping[str, xr.Variable]) -> None:
+    def _open(self, identity: Identity, coordinates: Mapping[str, xr.Variable], attributes: Mapping[str, str]) -> None:
         """Open the arrays of an earlier process, and create the missing ones."""
         for left in self._path.rglob("*.partial"):  # from a process killed while zarr wrote a file
             left.unlink()
@@ -67,9 +69,7 @@ class Store:
         if known.get("campaign") != identity.asked:
             # In one write, so that no process is killed between two; and last, because growing may be interrupted.
             asked = {"campaign": identity.asked, "chunk": list(self.layout.chunk)}
-            if "input_rms" in self._labels:
-                asked[INPUT_UNIT] = self._labels["input_rms"].attributes["units"]
-            self._group.update_attributes({**identity.attributes, **asked})
+            self._group.update_attributes({**attributes, **identity.attributes, **asked})
         for (
             name,
             one,

@@ -1,21 +1,23 @@
 """Results of a campaign, read from its store."""
 
 import itertools
+import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from undertow.analysis.metric_meanings import MEANINGS
 from undertow.campaign.arrays import check_array, chunk_file, flags, to_be_read
 from undertow.campaign.campaign_schema import Campaign
-from undertow.campaign.columns import DONE, FLAGS, INPUT_UNIT, trial_labels
+from undertow.campaign.columns import DONE, FLAGS, METRICS, trial_labels
 from undertow.campaign.layout import SAMPLES, Layout, layout
 from undertow.campaign.reading import read_text
 from undertow.campaign.run_campaign import STORE
 from undertow.campaign.task import INVALID
 from undertow.core.errors import BadInput
+from undertow.core.metric import Metric
 from undertow.core.status import Status
 
 
@@ -24,6 +26,7 @@ class Results(NamedTuple):
 
     campaign: Campaign
     rows: xr.Dataset  # of the tasks that are done
+    known: dict[str, Metric]  # metrics that a trial may have, in the order of tables
 
     @property
     def total(self) -> int:
@@ -34,7 +37,12 @@ class Results(NamedTuple):
     def metrics(self) -> list[str]:
         """Metrics that are defined for at least one completed trial, in the order of tables."""
         known = lambda name: name in self.rows and not np.isnan(self.rows[name].values[self.lasted]).all()
-        return [name for name in MEANINGS if known(name)]
+        return [name for name in self.known if known(name)]
+
+    @property
+    def tracking(self) -> list[str]:
+        """Those of them that tell how well trials track, position first."""
+        return [name for name in ("position_rms", "attitude_rms", "tracking_rms") if name in self.metrics]
 
     def unit(self, metric: str) -> str:
         """Unit of a metric; empty for a dimensionless number."""
@@ -61,7 +69,7 @@ class Results(NamedTuple):
 
     def named(self, combination: int) -> tuple[str, ...]:
         """Names of the values of `cross` in a combination."""
-        return list(itertools.product(*self.campaign.cross.values()))[combination]
+        return list(itertools.product(*self.campaign.axes.values()))[combination]
 
     def _combination(self, trial: Any) -> Any:
         """Combination of one trial or several, as numbered by `Trials`."""
@@ -93,33 +101,35 @@ def load(folder: Path) -> Results:
             raise FileNotFoundError(path)  # from a process killed before its first write
         campaign, _ = read_text(str(group.attrs["campaign"]), Path())
         stored = layout(campaign)._replace(chunk=tuple(group.attrs["chunk"]))
-        labels = trial_labels(campaign, str(group.attrs.get(INPUT_UNIT, "")))
+        known = {name: Metric(*one) for name, one in json.loads(str(group.attrs.get(METRICS, "{}"))).items()}
+        labels = trial_labels(campaign, known)
         for name, label in {**labels, DONE: FLAGS}.items():
             if name in group:
                 check_array(group[name], label, (1,) if name == DONE else stored.chunk, path)
-        return Results(campaign, _rows(group, campaign, stored).isel(trial=_done(group, campaign, stored, path)))
+        rows = _rows(group, campaign, stored, labels)
+        return Results(campaign, rows.isel(trial=_done(group, campaign, stored, path, labels)), known)
     except (FileNotFoundError, BadInput):
         raise
     except Exception as error:  # zarr raises many kinds of errors for damaged files
         raise OSError(f"{path} is damaged ({error}); `undertow campaign --resume` repairs it where possible") from error
 
 
-def _rows(group: Any, campaign: Campaign, stored: Layout) -> xr.Dataset:
+def _rows(group: Any, campaign: Campaign, stored: Layout, names: Iterable[str]) -> xr.Dataset:
     """All rows of the store by trial, without series.
 
     Arrays may be longer while a process makes room for more samples.
     """
-    axes, region = (*campaign.cross, SAMPLES), tuple(slice(0, size) for size in stored.shape)
-    arrays = {name: group[name] for name in trial_labels(campaign) if name in group and name != "trial"}
+    axes, region = (*campaign.axes, SAMPLES), tuple(slice(0, size) for size in stored.shape)
+    arrays = {name: group[name] for name in names if name in group and name != "trial"}
     rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})
     if arrays:
-        rows = rows.stack({"trial": (SAMPLES, *campaign.cross)}, create_index=False)  # as they are numbered
+        rows = rows.stack({"trial": (SAMPLES, *campaign.axes)}, create_index=False)  # as they are numbered
     return rows.assign_coords(trial=np.arange(campaign.number)).assign_attrs(group.attrs)
 
 
-def _done(group: Any, campaign: Campaign, stored: Layout, path: Path) -> np.ndarray:
+def _done(group: Any, campaign: Campaign, stored: Layout, path: Path, names: Iterable[str]) -> np.ndarray:
     """Which trials belong to finished tasks."""
-    done, names = np.zeros(campaign.number, dtype=bool), trial_labels(campaign)
+    done = np.zeros(campaign.number, dtype=bool)
     for task in np.flatnonzero(flags(group[DONE], stored.tasks)) if DONE in group else ():
         block = stored.block(task)
         if all(chunk_file(path, name, block, len(block)).exists() for name in names):

@@ -5,7 +5,7 @@ import itertools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from undertow.campaign.campaign_schema import Campaign
+from undertow.campaign.campaign_schema import VARIANT, Campaign
 from undertow.campaign.labels import is_number, words
 from undertow.campaign.sampling import Samples, value
 from undertow.core.errors import BadInput, nearest
@@ -40,7 +40,8 @@ class Trials(NamedTuple):
     def values(self, trial: int) -> dict[str, Any]:
         """Values that this trial sets in the scenario, by key path."""
         sample, combination = divmod(trial, len(self.combinations))
-        swept = dict(zip(self.campaign.cross, self.combinations[combination], strict=True))
+        swept = dict(zip(self.campaign.axes, self.combinations[combination], strict=True))
+        swept |= swept.pop(VARIANT, {}) if self.campaign.variants else {}
         sampled = zip(self.campaign.vary.items(), self.samples.point(sample), strict=True)
         return swept | {key: value(spread, float(share)) for (key, spread), share in sampled}
 
@@ -77,6 +78,10 @@ class Trials(NamedTuple):
             for key in keys:
                 if name == key or name.startswith((f"{key}.", f"{key}[")):
                     return self.text.where((section, key))
+        for variant, keys in self.campaign.variants.items():
+            for key in keys:
+                if name == key or name.startswith((f"{key}.", f"{key}[")):
+                    return self.text.where(("variants", variant, key))
         return ""
 
     def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
@@ -104,7 +109,7 @@ def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
     """
     if campaign.number >= 2**31:
         raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", campaign.number)
-    combinations = tuple(itertools.product(*(entries.values() for entries in campaign.cross.values())))
+    combinations = tuple(itertools.product(*(entries.values() for entries in campaign.axes.values())))
     return Trials(campaign, text, _scenario(campaign, text, allow_code), Samples(campaign), combinations)
 
 

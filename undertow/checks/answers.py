@@ -15,7 +15,7 @@ _TOLERANCE = 1e-6
 def shaped(name: str, value: Any, *shapes: tuple[int, ...]) -> Iterator[Finding]:
     """An array of one of these shapes, of finite numbers unless it is only traced."""
     if not isinstance(value, jax.Array | jax.ShapeDtypeStruct | np.ndarray | np.generic | float | int):
-        yield error("contract", name, f"give an array of shape {shapes[0]}", _form(value))
+        yield error("contract", name, f"give an array of shape {shapes[0]}", form(value))
     elif jnp.shape(value) not in shapes:
         yield error("contract", name, f"give arrays of shape {shapes[0]}", f"of shape {jnp.shape(value)}")
     elif not isinstance(value, jax.ShapeDtypeStruct) and not np.all(np.isfinite(value)):
@@ -26,17 +26,31 @@ def is_a(name: str, value: Any, kind: type) -> Iterator[Finding]:
     """Something of a class."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIO" else "a"
-        yield error("contract", name, f"give {article} {kind.__name__}", _form(value))
+        yield error("contract", name, f"give {article} {kind.__name__}", form(value))
 
 
-def alike(name: str, value: Any, model: Any, must: str) -> Iterator[Finding]:
-    """The same tree as `model`, with arrays of the same shapes."""
-    forms = [jax.tree.structure(tree) for tree in (value, model)]
-    shapes = [[jnp.shape(leaf) for leaf in jax.tree.leaves(tree)] for tree in (value, model)]
+def two_values(name: str, value: Any, what: str) -> Iterator[Finding]:
+    """A tuple of two, no more and no less."""
+    if type(value) is not tuple or len(value) != 2:
+        says = f"`{name}` must return two values, {what}, but returns {form(value)}"
+        yield Finding("error", "contract", name, says)
+
+
+def alike(name: str, value: Any, model: Any, must: str, types: bool = False) -> Iterator[Finding]:
+    """The same tree as `model`, with arrays of the same shapes; and of the same types of number, where asked for."""
     if type(value) is not type(model):
-        yield error("contract", name, must, f"a {type(value).__name__}, not a {type(model).__name__}")
-    elif forms[0] != forms[1] or shapes[0] != shapes[1]:
-        yield error("contract", name, must, f"of shapes {shapes[0]} instead of {shapes[1]}")
+        yield error("contract", name, must, f"{_kind(value)}, not {_kind(model)}")
+        return
+    (found, tree), (due, model_tree) = map(jax.tree_util.tree_flatten_with_path, (value, model))
+    if tree != model_tree:
+        yield error("contract", name, must, f"a tree of {len(found)} arrays, not of {len(due)}, or with other names")
+        return
+    for (path, one), (_, other) in zip(found, due, strict=True):
+        at = f" in `{jax.tree_util.keystr(path).lstrip('.')}`" if path else ""
+        if jnp.shape(one) != jnp.shape(other):
+            yield error("contract", name, must, f"of shape {jnp.shape(one)} instead of {jnp.shape(other)}{at}")
+        elif types and one.dtype != other.dtype:
+            yield error("contract", name, must, f"of type {one.dtype} instead of {other.dtype}{at}")
 
 
 def agree(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
@@ -49,9 +63,16 @@ def agree(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
         yield error("contract", name, f"agree with {what}", got)
 
 
-def _form(value: Any) -> str:
+def _kind(value: Any) -> str:
+    return "an array" if isinstance(value, jax.Array | jax.ShapeDtypeStruct) else f"a {type(value).__name__}"
+
+
+def form(value: Any) -> str:
+    """What an answer is, in words."""
     if value is None:
         return "nothing (no `return`?)"
     if isinstance(value, jax.Array | jax.ShapeDtypeStruct):
         return f"an array of shape {value.shape}"
-    return f"of type {type(value).__name__}"
+    if type(value) is tuple:
+        return f"{len(value)} values" if len(value) != 1 else "one value"
+    return f"a {type(value).__name__}"

@@ -2,9 +2,11 @@
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from undertow.checks.controller_check import check_stability
 from undertow.checks.finding import Finding
 from undertow.checks.part_check import check_contract, of_plant
 from undertow.checks.plant_check import derived_of_plant
@@ -12,8 +14,11 @@ from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
 from undertow.checks.vehicle_findings import vehicle_facts
 from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint
 from undertow.core import catalogue
-from undertow.core.contracts import AbstractPlant
+from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.runtime import double_outside_runs
+from undertow.core.user_code import place_of
+from undertow.plants.double_integrator import double_integrator
 from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.reading import Text, key_path, read
@@ -44,6 +49,7 @@ class Report(NamedTuple):
         return sum(finding.level == "error" for finding, _ in self.found)
 
 
+@double_outside_runs
 def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> Report:
     """Check a vehicle file, a scenario, a result file, a part by name, or `./file.py:function`.
 
@@ -57,7 +63,11 @@ def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> R
     """
     if Path(thing).suffix == ".nc" or is_vehicle_file(thing):
         return _check_file(Path(thing), options, allow_code)
-    return _joined([_of_part(*_named(thing, options))])
+    name, part, make = _named(thing, options)
+    reports = [_of_part(name, part)]
+    if isinstance(part, AbstractController) and not reports[0].errors:
+        reports.append(_of_feedback(make, len(part.model.coordinates.angles)))
+    return _joined(reports)
 
 
 def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Report:
@@ -94,16 +104,34 @@ def _of_part(name: str, part: Any) -> Report:
     if isinstance(part, AbstractThruster):
         return _of_thruster(part, f"{name} (thruster)")
     found = check_contract(part)
+    where = partial(_place, part)
     said = () if found else getattr(part, "advice", tuple)()
     rows = derived_of_plant(part) if isinstance(part, AbstractPlant) and not found else ()
     own = [Finding("advice", "own", name, sentence.rstrip(".")) for sentence in said]
-    return _report([*found, *own], title=f"{name} (plant)", rows=rows)
+    return _report([*found, *own], where, title=f"{name} (plant)", rows=rows)
+
+
+def _of_feedback(make: Callable[..., Any], axes: int) -> Report:
+    """A controller in a loop with the simplest plant of as many outputs as the vehicle that it was checked with."""
+    plant = double_integrator(axes)
+    try:
+        law = make(plant.model())
+        return _report(check_stability(law, plant), partial(_place, law))
+    except Exception:  # a law may be for vehicles only, or have no slope
+        return _report(())
+
+
+def _place(part: Any, key: str) -> str:
+    """Where in the user's own file a method is that a finding names."""
+    thing, _, method = key.rpartition(".")
+    part = part.model() if thing == "model" and isinstance(part, AbstractPlant) else part
+    return place_of(part, method) if method else ""
 
 
 def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
     findings = lint_thruster(thruster)
     broken = any(finding.level == "error" for finding in findings)
-    return _report(findings, title=title, rows=() if broken else derived_of_thruster(thruster))
+    return _report(findings, partial(_place, thruster), title, () if broken else derived_of_thruster(thruster))
 
 
 @in_its_precision
@@ -119,37 +147,48 @@ def _of_scenario(text: Text) -> list[Report]:
         reports.append(_of_thruster(thruster, "thruster"))
     if any(report.errors for report in reports):
         return reports  # whatever contains these parts would only stumble over them
-    reports.append(_report(check_contract(loop.plant)))
+    reports.append(_report(check_contract(loop.plant), partial(_place, loop.plant)))
     if not reports[-1].errors:
         around = of_plant(loop.plant)
         reports += [
-            _report(check_contract(part, around))
+            _report(check_contract(part, around), partial(_place, part))
             for part in (loop.reference, loop.disturbance, loop.navigation, loop.controller)
         ]
     return reports
 
 
-def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any]:
-    """Name and instance of a part."""
+def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[..., Any]]:
+    """Name and instance of a part, and what makes it, or another one for the model that it is given."""
     if ".py:" in thing:
         try:
             function = catalogue.find("", thing)
         except BadInput as error:
             raise BadInput("THING", error.must, error.got, hint=error.hint) from error.__cause__
-        try:
-            part = factory.call(function, options, _leading(function), Path())[0]
-        except BadInput as error:
-            raise (error if error.name else error.at("THING")) from error.__cause__
+        make = lambda *given: factory.call(function, options, given, Path())[0]
+        part, name = make(*_leading(function)), thing.rpartition(":")[2]
         if not factory.is_part(part):
-            raise BadInput("THING", "return a vehicle, thruster, plant or other part", f"{thing}: {part!r}")
-        return thing.rpartition(":")[2], part
+            raise _no_part(name, part)
+        return name, part, make
     wanted, _, short = thing.rpartition("/")
     known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if wanted in ("", kind)}
     for kind, names in known.items():
         if short in names:
-            return short, factory.make(kind, {"kind": short, **options}, Path(), _leading(names[short]))[0]
+            make = lambda *given, kind=kind: factory.make(kind, {"kind": short, **options}, Path(), given)[0]
+            return short, make(*_leading(names[short])), make
     every = {name for names in known.values() for name in names}
     raise BadInput("THING", "be a file or the name of a part", thing, hint=did_you_mean(short, every))
+
+
+def _no_part(name: str, thing: Any) -> BadInput:
+    """What to say of something that a function returns instead of a part."""
+    contract, shared = factory.contract_like(thing)
+    place, kind = place_of(thing), type(thing).__name__
+    if not place:
+        hint = "Return a vehicle, thruster, plant, controller or another part"
+        return BadInput("", "", f"`{name}` returns {thing!r}, which is not a part", hint=hint)
+    hint = f"Derive `{kind}` from {contract}: it has {', '.join(f'`{one}`' for one in shared)}" if contract else ""
+    hint = hint or f"Derive `{kind}` from the contract of its kind, such as AbstractController"
+    return BadInput("", "", f"`{name}` returns a `{kind}`, which is not a part", hint=hint, where=place)
 
 
 def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:

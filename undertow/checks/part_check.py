@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.checks.answers import agree, alike, is_a, shaped
+from undertow.checks.answers import agree, alike, is_a, shaped, two_values
+from undertow.checks.controller_check import check_controller
 from undertow.checks.finding import Finding, error
 from undertow.checks.plant_check import check_plant
 from undertow.checks.thruster_check import check_thruster
@@ -20,9 +21,9 @@ from undertow.core.contracts import (
     Load,
     Measurement,
     Pose,
-    Target,
 )
-from undertow.core.user_code import python_says
+from undertow.core.measurement import measurement_of_outputs
+from undertow.core.user_code import fault_of
 from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster, PropellerReport
@@ -38,7 +39,7 @@ class DisturbanceProfile(NamedTuple):
 
 
 _BODY = DisturbanceProfile(
-    truth=Measurement(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
+    truth=measurement_of_outputs(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
     pose=Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
 )
 
@@ -61,26 +62,16 @@ def check_contract(part: Any, around: DisturbanceProfile = _BODY) -> tuple[Findi
             try:
                 return tuple(use(part, around))
             except Exception as complaint:
-                got = f"not: {python_says(complaint)}"
-                return (error("contract", type(part).__name__, "be usable as its contract says", got),)
+                return (_failed(part, complaint),)
     return ()
 
 
-def _controller(controller: AbstractController, around: DisturbanceProfile) -> Iterator[Finding]:
-    n = len(controller.model.angles)
-    y = Measurement(0.1 * jnp.ones(n), jnp.zeros(n))
-    r = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n))
-
-    @jax.jit
-    def step():
-        z = controller.init(y, r)
-        u, telemetry = controller.command(z, y, r)
-        return z, u, telemetry.estimate, controller.advance(z, y, r, u, jnp.asarray(1e-3))
-
-    z, u, estimate, after = step()
-    yield from shaped("command", u, (controller.model.gain(y).shape[1],))
-    yield from shaped("command", estimate, (n,))
-    yield from alike("advance", after, z, "have the form of the state")
+def _failed(part: Any, complaint: Exception) -> Finding:
+    """What an exception in a part, or in the use of it, says."""
+    says, hint = fault_of(complaint)
+    if says.startswith("cannot"):
+        return Finding("error", "contract", "", says[:1].upper() + says[1:], hint)
+    return error("contract", type(part).__name__, "be usable as its contract says", f"not: {says}", hint)
 
 
 def _disturbance(disturbance: AbstractDisturbance, around: DisturbanceProfile) -> Iterator[Finding]:
@@ -112,8 +103,12 @@ def _disturbance(disturbance: AbstractDisturbance, around: DisturbanceProfile) -
 def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> Iterator[Finding]:
     realization = jax.eval_shape(navigation.realize, jax.random.PRNGKey(0))
     state = jax.eval_shape(navigation.init, realization, around.truth)
-    y, after = jax.eval_shape(navigation.measure, realization, state, jnp.zeros(()), around.truth)
-    yield from alike("measure", after, state, "give the state in the form of `init`")
+    answer = jax.eval_shape(navigation.measure, realization, state, jnp.zeros(()), around.truth)
+    if unpaired := list(two_values("measure", answer, "the measurement and the state after it")):
+        yield from unpaired
+        return
+    y, after = answer
+    yield from alike("measure", after, state, "return the state in the form that `init` gives it", types=True)
     wrong, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
     yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
 
@@ -121,7 +116,7 @@ def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> I
 def _sensor(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
     """Tried on a body at rest, so that a delay makes no difference."""
     report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
-    truth = Measurement(around.truth.position, jnp.zeros(6), report)
+    truth = measurement_of_outputs(around.truth.position, jnp.zeros(6), report)
     motion, right = motion_of(truth, jnp.zeros(3), jnp.asarray(0.01)), estimate_of(truth)
     reading = sensor.reading(motion)
     if jnp.ndim(reading) != 1:
@@ -155,7 +150,7 @@ def _reference(reference: AbstractReference, around: DisturbanceProfile) -> Iter
 
 _USES: dict[type, Callable[[Any, DisturbanceProfile], Iterator[Finding]]] = {
     AbstractPlant: lambda plant, around: check_plant(plant),
-    AbstractController: _controller,
+    AbstractController: lambda controller, around: check_controller(controller),
     AbstractDisturbance: _disturbance,
     AbstractReference: _reference,
     AbstractNavigation: _navigation,

@@ -11,7 +11,8 @@ from jaxtyping import Array, PyTree
 
 from undertow.checks.answers import agree, alike, is_a, shaped
 from undertow.checks.finding import Finding, error
-from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Measurement
+from undertow.core.contracts import AbstractPlant, Effort, Measurement, Model
+from undertow.core.signals import check_declared
 
 _GRIP = 1e-9  # of the largest entry: below it an input does not act at once
 
@@ -33,22 +34,22 @@ def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
         got = f"{found.held[i]:.4g} for a unit of it on {plant.outputs[i]}"
         hint = "It stands on the left side of Eq. (2): subtract it from the forces"
         yield error("contract", "acceleration", "fall with the wrench of the load", got, hint)
-    yield from agree("model.invert", found.reached, found.reachable, "`model.gain`: G G# a = a")
+    yield from agree("invert", found.reached, found.reachable, "`gain`: G G# a = a")
     if np.abs(found.true_gain).max() > _GRIP and float((found.true_gain * found.gain).sum()) < 0:
         i, j = np.unravel_index(np.abs(found.gain).argmax(), found.gain.shape)
         got = f"{found.gain[i, j]:.4g} where x_ddot changes by {found.true_gain[i, j]:.4g} per unit"
-        yield error("contract", "model.gain", "push where the plant does", got)
+        yield error("contract", "gain", "push where the plant does", got)
 
 
 def derived_of_plant(plant: AbstractPlant) -> tuple[tuple[str, str, str], ...]:
     """(what, value, unit), a row each: at the point where `check_plant` tries it."""
     n, m, t, calm = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
-    x, model = _trial(plant), plant.model()
+    x, dynamics = _trial(plant), plant.model().dynamics
     y, u = plant.output(t, x), plant.admissible(x, jnp.zeros(m))
-    gain = np.asarray(model.gain(y))
+    gain = np.asarray(dynamics.gain(y))
     true = np.asarray(plant.acceleration(t, x, u, calm))
     rows = [("outputs, inputs, rank of G", f"{n}, {m}, {np.linalg.matrix_rank(gain, tol=1e-9)}", "")]
-    for i, (name, unit, told) in enumerate(zip(plant.outputs, plant.output_units, model.drift(y), strict=True)):
+    for i, (name, unit, told) in enumerate(zip(plant.outputs, plant.output_units, dynamics.drift(y), strict=True)):
         at = f"{name} {float(y.position[i]):.3g} {unit}, {float(y.velocity[i]):.3g} {unit}/s"
         rows.append((f"{at}: x_ddot without input, F of the model", f"{true[i]:.4g}, {told:.4g}", f"{unit}/s^2"))
     return tuple(rows)
@@ -85,6 +86,13 @@ def _forms(plant: AbstractPlant) -> Iterator[Finding]:
         yield from shaped("output", y.velocity, (n,))
     if isinstance(effort, Effort):
         yield from (finding for value in effort for finding in shaped("effort", value, (m,)))
+    recorded = jax.eval_shape(plant.diagnostics, x, u)
+    check_declared(plant, recorded)
+    sizes = {"axis": n, "actuator": m}
+    for name, signal in plant.signals().items():
+        if set(signal.dimensions) <= set(sizes):
+            form = tuple(sizes[dimension] for dimension in signal.dimensions)
+            yield from shaped(f"diagnostics, signal {name}", recorded[name], form)
     yield from alike("dynamics", jax.eval_shape(plant.dynamics, t, x, u, calm), x, "have the form of the state")
     yield from shaped("acceleration", jax.eval_shape(plant.acceleration, t, x, u, calm), (n,))
     yield from shaped("status", jax.eval_shape(plant.status, x), ())
@@ -93,13 +101,13 @@ def _forms(plant: AbstractPlant) -> Iterator[Finding]:
 def _forms_of_model(plant: AbstractPlant) -> Iterator[Finding]:
     n, m = len(plant.outputs), plant.inputs()
     model, y = plant.model(), jax.eval_shape(plant.output, jnp.zeros(()), _trial(plant))
-    wrong = list(is_a("model", model, AbstractModel))
+    wrong = list(is_a("model", model, Model))
     yield from wrong
     if not wrong:
-        yield from shaped("model.angles", np.asarray(model.angles, dtype=float), (n,))
-        yield from shaped("model.drift", jax.eval_shape(model.drift, y), (n,))
-        yield from shaped("model.gain", jax.eval_shape(model.gain, y), (n, m))
-        yield from shaped("model.invert", jax.eval_shape(model.invert, y, jnp.zeros(n)), (m,))
+        yield from shaped("angles", np.asarray(model.coordinates.angles, dtype=float), (n,))
+        yield from shaped("drift", jax.eval_shape(model.dynamics.drift, y), (n,))
+        yield from shaped("gain", jax.eval_shape(model.dynamics.gain, y), (n, m))
+        yield from shaped("invert", jax.eval_shape(model.dynamics.invert, y, jnp.zeros(n)), (m,))
 
 
 class _Numbers(NamedTuple):
@@ -124,7 +132,7 @@ def _numbers(plant: AbstractPlant, x: PyTree) -> _Numbers:
     moved = lambda u, load: plant.acceleration(t, x, u, load)
     at_rest = moved(u, calm)
     model, measured = plant.model(), plant.output(t, x)
-    gain = model.gain(measured)
+    gain = model.dynamics.gain(measured)
     reachable = gain @ jnp.linspace(1.0, 2.0, m)
     return _Numbers(
         velocity=y[1],
@@ -136,5 +144,5 @@ def _numbers(plant: AbstractPlant, x: PyTree) -> _Numbers:
         gain=gain,
         true_gain=jax.jacfwd(lambda u: moved(u, calm))(u),
         reachable=reachable,
-        reached=gain @ model.invert(measured, reachable),
+        reached=gain @ model.dynamics.invert(measured, reachable),
     )

@@ -39,14 +39,21 @@ def bench(as_json: bool) -> int:
         return DONE
     with shares(console) as progress:
         found = interruptible(lambda: measure(progress))
+    if "simd_unavailable" in found:
+        console.print(f"Figures of SIMD batches are left out: {found['simd_unavailable']}.", highlight=False)
     for words, prefix in _WORKLOADS.items():
+        if f"{prefix}steps" not in found:
+            continue
         console.print(_table(words, found, prefix))
+        if f"{prefix}single_compile_s" not in found:
+            continue
         compiling = f"{found[f'{prefix}single_compile_s']:.2g} s for one run"
         if f"{prefix}single_xla_compile_s" in found:
             compiling += f" (XLA {found[f'{prefix}single_xla_compile_s']:.2g} s)"
         compiling += f", {found[f'{prefix}batch_float64_compile_s']:.2g} s for a batch"
         figures = (
-            f"{found[f'{prefix}operations']} operations per step, tracking rms {found[f'{prefix}tracking_rms']:.6f}"
+            f"{found[f'{prefix}operations']} operations per step, "
+            f"rms of all six errors {found[f'{prefix}tracking_rms']:.6f}"
         )
         console.print(f"Compile time: {compiling}; {figures}.", highlight=False)
     first = f"{found['first_cold_s']:.2g} s without cached code, {found['first_kept_s']:.2g} s with it"

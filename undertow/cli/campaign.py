@@ -83,7 +83,7 @@ def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path
     for sentence in sentences(found):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
-    return DONE if set(found["status"]) <= {"ok"} else RUN_FAILED
+    return DONE if set(found["status"]) <= {"completed"} else RUN_FAILED
 
 
 def refuse_second(argument: Path) -> NoReturn:

@@ -2,6 +2,7 @@
 
 from rich.table import Table
 
+from undertow.analysis.metrics import for_people
 from undertow.campaign.store_results import Results
 from undertow.report.campaign_tables import by_xla
 
@@ -9,20 +10,31 @@ from undertow.report.campaign_tables import by_xla
 def table(results: Results, found: dict) -> Table:
     """One row per combination of the swept values."""
     table = Table(title="Median [5 %, 95 %] of completed trials", title_justify="left", title_style="bold")
-    swept = list(results.campaign.cross)
+    swept = list(results.campaign.axes)
     counts = ("trials", "failed", "invalid") if found["invalid"] else ("trials", "failed")
-    for column in (*swept, *counts, "tracking rms", "input rms"):
+    for column in (*swept, *counts, "within"):
         table.add_column(column)
+    shown = [*results.tracking, "input_rms"]
+    for name in shown:
+        table.add_column(f"{name.replace('_', ' ')}, {for_people(0.0, results.unit(name))[1]}")
     for one in found["combinations"]:
-        cells = [_spread(one["metrics"].get(name)) for name in ("tracking_rms", "input_rms")]
-        table.add_row(*(one["values"][key] for key in swept), *(str(one[count]) for count in counts), *cells)
+        cells = [_spread(one["metrics"].get(name), results.unit(name)) for name in shown]
+        table.add_row(
+            *(one["values"][key] for key in swept), *(str(one[count]) for count in counts), _within(one), *cells
+        )
     return table
 
 
-def _spread(quantiles: dict | None) -> str:
+def _within(one: dict) -> str:
+    """Share of the trials of a combination that kept to the scenario's criterion of success."""
+    judged = one["success"]["within"] + one["success"]["not_within"]
+    return f"{100 * one['success']['within'] / judged:.1f} %" if judged else "-"
+
+
+def _spread(quantiles: dict | None, unit: str) -> str:
     if quantiles is None:
         return "-"
-    low, middle, high = quantiles.values()
+    low, middle, high = (for_people(value, unit)[0] for value in quantiles.values())
     return f"{middle:.3g} [{low:.3g}, {high:.3g}]"
 
 

@@ -226,7 +226,7 @@ def describe(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A part (see `undertow list`), ./file.py:function, a vehicle file, `scenario` or `metrics`.",
+            help="A part (see `undertow list`), ./file.py:function, a vehicle file, scenario, metrics or signals.",
         ),
     ],
 ) -> None:

@@ -16,7 +16,7 @@ Result = TypeVar("Result")
 _DEPARTS = 0.10
 
 # Peak metrics depend on single moments: shown, not compared.
-_PEAKS = ("tracking_max", "input_peak")
+_PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
 
 # Measured numbers below this share of the largest predicted one count as zero.
 _NOTHING = 1e-9

@@ -12,7 +12,7 @@ from undertow.cli.tables import wide_console
 from undertow.report.reproduction.build import write
 from undertow.reproduction import reproduce as study
 
-_WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios")
+_WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios", "campaigns")
 
 
 def reproduce(out: Path, quick: bool) -> None:

@@ -18,7 +18,7 @@ from undertow.scenario.build import build
 from undertow.scenario.execute import Executed, execute, save
 from undertow.scenario.reading import dump, read
 from undertow.scenario.reproducibility import Repetition, compare
-from undertow.scenario.results import certificate_of, metrics_text
+from undertow.scenario.results import certificate_of, metrics_of, metrics_text
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
@@ -39,16 +39,17 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
             warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures").failures)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
-        typer.echo(f"Advice: the run used the slower XLA backend, because the SIMD backend lacks: {why}.", err=True)
+        typer.echo(f"Advice: the run used backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
     expected = predicted.metrics if predicted else None
-    unit = executed.built.closed_loop.plant.input_unit
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, expected))
+    known = metrics_of(executed.dataset)
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
     if predicted:
         console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)
     certificate = certificate_of(executed.dataset)
     if certificate is not None:
         console.print(certificate_table(certificate, executed.built.window()))
-    console.print(f"Status: {executed.status.word}. Results: {folder}", highlight=False, soft_wrap=True)
+    verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
+    console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
     codes = [_ending_code(executed)] + ([_repetition_code(repetition, console)] if repetition else [])
     return max(codes)
 

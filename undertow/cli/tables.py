@@ -1,18 +1,20 @@
 """Tables of metrics and of the certificate, for the terminal."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from undertow.analysis.metric_meanings import MEANINGS, unit_of
+from undertow.analysis.metrics import for_people
+from undertow.core.metric import Metric
 
 
 def metrics_table(
     steady: dict[str, Any] | None,
     whole: dict[str, Any],
     window: tuple[float, float],
-    input_unit: str,
+    known: Mapping[str, Metric],
     predicted: dict[str, float] | None = None,
 ) -> Table:
     """Predicted and measured metrics of the steady window, and the metrics of the whole run."""
@@ -23,11 +25,12 @@ def metrics_table(
     table.add_column(f"{window[0]:g} to {window[1]:g} s", justify="right")
     table.add_column("whole run", justify="right")
     table.add_column("unit")
-    for name in MEANINGS:
+    for name, metric in known.items():
         if name in whole:
-            shown = [_number(predicted[name]) if name in predicted else ""] if predicted else []
-            late = _number(steady[name]) if steady and name in steady else "-"
-            table.add_row(name, *shown, late, _number(whole[name]), unit_of(name, input_unit))
+            said = lambda values, name=name, metric=metric: _number(for_people(values[name], metric.unit)[0])
+            shown = [said(predicted) if name in predicted else ""] if predicted else []
+            late = said(steady) if steady and name in steady else "-"
+            table.add_row(name, *shown, late, said(whole), for_people(0.0, metric.unit)[1])
     return table
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel, Forces
-from undertow.core.contracts import AbstractModel, Measurement
+from undertow.core.contracts import Model
 from undertow.numerics.linear import matvec
 
 # Largest sensitivity |1 / (1 + L)| that is allowed with a lag that is so many times the nominal one, an actuator that
@@ -90,7 +90,7 @@ class Law(NamedTuple):
 
 
 def axes_of(
-    model: AbstractModel,
+    model: Model,
     sampling_time: float,
     delay: float,
     velocity_noise,
@@ -112,14 +112,14 @@ def axes_of(
     checks.not_negative("delay", delay, "s")
     checks.not_negative("velocity_noise", velocity_noise, "m/s, rad/s")
     checks.positive("load_rate", load_rate)
-    axes = len(model.angles)
+    axes = len(model.coordinates.angles)
     with jax.ensure_compile_time_eval():  # a law may be made inside a compiled function; its bandwidths are numbers
-        actuators, still = model.actuators(), jnp.zeros(axes)
+        actuators, still = model.actuators, jnp.zeros(axes)
         known = actuators.time_constant()
         lag = None if known is None else float(jnp.max(known))
         max_bandwidth = float(actuators.max_bandwidth(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
         reached = np.asarray(
-            matvec(jnp.abs(model.acceleration_per_force(Measurement(still, still))), largest_forces(actuators))
+            matvec(jnp.abs(model.dynamics.gain(model.coordinates.measurement(still, still))), largest_forces(actuators))
         )
     authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()

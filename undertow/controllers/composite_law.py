@@ -9,13 +9,15 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.diagnostics import COLUMNS, share_given, tracking_diagnostics, weight_diagnostics
+from undertow.controllers.robust_modification import RobustModification
+from undertow.controllers.signals import ADAPTIVE_LAW, lyapunov_signals, share_given, weight_signals
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractModel, Measurement, Target, Telemetry
+from undertow.core.contracts import Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
+from undertow.core.signals import Signal
 from undertow.estimation.series_parallel import SeriesParallel
 from undertow.estimation.tsk import FuzzySystem
 from undertow.numerics.linear import matvec
@@ -26,9 +28,16 @@ from undertow.numerics.smoothing import SWITCHES, switch
 PerAxis = Float[Array, " n"]
 
 FUZZY_INPUTS = ("error", "state")
+IDENTIFICATION_INPUTS = ("applied", "commanded")
 
 _PER_AXIS = ("adaptation", "composite", "robust_gain", "layer", "weights_bound")
 _PER_AXIS_IDENTIFICATION = ("pole", "compensation_gain", "layer")
+
+
+_PREDICTED = {
+    "predicted_position": Signal(("axis",), "[axis]", "position of the identification model"),
+    "predicted_velocity": Signal(("axis",), "[axis]/s", "velocity of the identification model"),
+}
 
 
 class RCAFState(NamedTuple):
@@ -47,7 +56,7 @@ class RCAF(AbstractContinuousController):
             system whose number of inputs does not fit `fuzzy_input`.
     """
 
-    model: AbstractModel
+    model: Model
     fuzzy: FuzzySystem
     identification: SeriesParallel
     feedback: Float[Array, "*n 2"] = param(
@@ -69,7 +78,9 @@ class RCAF(AbstractContinuousController):
     weights_bound: Float[Array, "..."] = param(
         "m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=jnp.inf
     )
+    modification: RobustModification | None = None
     switching: str = eqx.field(static=True, default="tanh")
+    identification_input: str = eqx.field(static=True, default="applied")
     fuzzy_input: str = eqx.field(static=True, default="error")
     method: str = eqx.field(static=True, default="euler")
     substeps: int = eqx.field(static=True, default=1)
@@ -81,46 +92,53 @@ class RCAF(AbstractContinuousController):
         checks.positive("weights_bound", self.weights_bound, finite=False)
         checks.choice("switching", self.switching, SWITCHES)
         checks.choice("fuzzy_input", self.fuzzy_input, FUZZY_INPUTS)
+        checks.choice("identification_input", self.identification_input, IDENTIFICATION_INPUTS)
         if self.fuzzy.inputs != 1 + FUZZY_INPUTS.index(self.fuzzy_input):
             raise BadInput("fuzzy", f"have the inputs of `{self.fuzzy_input}`", f"of {self.fuzzy.inputs} input(s)")
-        axes = len(self.model.angles)
+        axes = len(self.model.coordinates.angles)
         for name in _PER_AXIS_IDENTIFICATION:
             checks.per_axis(name, getattr(self.identification, name), axes)
+        if self.modification is not None:
+            for name in ("leakage", "e_modification", "dead_zone"):
+                checks.per_axis(name, getattr(self.modification, name), axes)
         check_gains(self.feedback, self.weight, {name: getattr(self, name) for name in _PER_AXIS}, axes)
 
     def init(self, y: Measurement, r: Target) -> RCAFState:
         axes = y.position.shape[0]
-        return RCAFState(y.position, self.model.rates(y), jnp.zeros((axes, self.fuzzy.rules)))
+        return RCAFState(y.position, self.model.coordinates.velocity(y), jnp.zeros((axes, self.fuzzy.rules)))
 
     def command(self, z: RCAFState, y: Measurement, r: Target):
         """V of Eq. (23), with d_hat of Eq. (42) and u_r of Eq. (43)."""
+        dynamics, coordinates, _ = self.model
         off = self._tracking(y, r)
-        eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
+        eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
         u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
-        wanted = -self.model.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
-        u = self.model.invert(y, wanted)
-        telemetry = Telemetry(
-            estimate=d_hat,
-            robust=u_r,
-            modelling_error=eps,
-            predicted_position=z.predicted_position,
-            predicted_velocity=z.predicted_velocity,
-            weights=z.weights,
-            diagnostics=tracking_diagnostics(off, self.lyapunov(), self.weight)
-            | weight_diagnostics(z.weights, self.weights_bound)
-            | {"attained_share": share_given(wanted, matvec(self.model.gain(y), u))},
-        )
-        return u, telemetry
+        wanted = -dynamics.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
+        u = dynamics.invert(y, wanted)
+        signals = {
+            "estimate": d_hat,
+            "robust_term": u_r,
+            "modelling_error": eps,
+            "predicted_position": z.predicted_position,
+            "predicted_velocity": z.predicted_velocity,
+            "attained_share": share_given(wanted, matvec(dynamics.gain(y), u)),
+        }
+        signals |= lyapunov_signals(off, self.lyapunov(), self.weight)
+        return u, signals | weight_signals(z.weights, self.weights_bound)
 
     def flow(self, z: RCAFState, y: Measurement, r: Target, u_applied) -> RCAFState:
         """Identification model, Eq. (32), and composite adaptive law, Eq. (44)."""
+        dynamics, coordinates, _ = self.model
         s = self._tracking(y, r).filtered
-        eps = self.identification.error(z.predicted_velocity, self.model.rates(y))
+        eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         xi = self._basis(eps, y)
         d_hat = self.fuzzy.output(z.weights, xi)
-        known = self.model.drift(y) + matvec(self.model.gain(y), u_applied)
+        u = u_applied if self.identification_input == "applied" else self.command(z, y, r)[0]
+        known = dynamics.drift(y) + matvec(dynamics.gain(y), u)
         theta_rate = -(self.adaptation * (s + self.composite * eps))[:, None] * xi
+        if self.modification is not None:
+            theta_rate = self.modification.rate(theta_rate, self.adaptation, eps, z.weights)
         return RCAFState(
             predicted_position=z.predicted_velocity,
             predicted_velocity=self.identification.acceleration(eps, known, d_hat),
@@ -131,8 +149,8 @@ class RCAF(AbstractContinuousController):
         """Weights back inside their box: |d_hat| stays below `weights_bound`, and no weight drifts away."""
         return z._replace(weights=jnp.clip(z.weights, -self._box(), self._box()))
 
-    def columns(self):
-        return COLUMNS
+    def signals(self):
+        return ADAPTIVE_LAW | _PREDICTED
 
     def lyapunov(self) -> Float[Array, "*n 2 2"]:
         """P of Eq. (21)."""
@@ -143,7 +161,7 @@ class RCAF(AbstractContinuousController):
         return self.weights_bound[..., None]
 
     def _tracking(self, y: Measurement, r: Target) -> Tracking:
-        return tracking(self.model, self.lyapunov(), y, r)
+        return tracking(self.model.coordinates, self.lyapunov(), y, r)
 
     def _basis(self, eps: PerAxis, y: Measurement) -> Float[Array, "n rules"]:
         """xi of the chosen input: eps (the paper's), or (x_i, x_i_dot) (what Table 2 compares it with)."""

@@ -11,9 +11,10 @@ from jaxtyping import Array, Float
 from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
+from undertow.controllers.signals import ATTAINED_SHARE, ESTIMATE
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
@@ -39,14 +40,14 @@ class Plan(NamedTuple):
     forces: Float[Array, " m"]  # that would give what is wanted
 
 
-class PID(AbstractController):
+class PID(AbstractInformedController):
     """a = a_d + k_p e + k_d e_dot + integral of k_i e, in the model's own axes; forces within limits; no windup.
 
     Raises:
         BadInput: a gain of the wrong sign, or an integral too strong for a stable loop: k_i < k_p k_d (Routh).
     """
 
-    model: AbstractModel
+    model: Model
     filter: ReferenceFilter | None
     proportional: Float[Array, "..."] = param("1/s^2", "acceleration per error", symbol="k_p")
     integral: Float[Array, "..."] = param("1/s^3", "its rate per error", symbol="k_i")
@@ -62,7 +63,7 @@ class PID(AbstractController):
         for name in ("proportional", "derivative", "actuator_rate", "direction"):
             checks.positive(name, getattr(self, name))
         for name in ("proportional", "integral", "derivative"):
-            checks.per_axis(name, getattr(self, name), len(self.model.angles))
+            checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
         most = self.proportional * self.derivative
         if not isinstance(most, Tracer) and np.any(np.asarray(self.integral >= most)):
             worst = np.asarray(self.integral / most).max()
@@ -73,26 +74,17 @@ class PID(AbstractController):
         return PIDState(jnp.zeros_like(y.position), self._actuators().init(), smoothing)
 
     def command(self, z: PIDState, y: Measurement, r: Target):
-        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.acceleration_per_force(y)
+        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.dynamics.gain(y)
         forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, self.actuator_rate), self.direction)
-        none = jnp.zeros_like(y.position)
-        telemetry = Telemetry(
-            estimate=-z.integral,
-            robust=none,
-            modelling_error=none,
-            predicted_position=y.position,
-            predicted_velocity=self.model.rates(y),
-            weights=jnp.zeros((y.position.shape[0], 0)),
-            diagnostics={"attained_share": attained(effect, plan.forces, forces)},
-        )
-        return actuators.command(plan.actuators, forces, self.actuator_rate), telemetry
+        signals = {"estimate": -z.integral, "attained_share": attained(effect, plan.forces, forces)}
+        return actuators.command(plan.actuators, forces, self.actuator_rate), signals
 
     def advance(self, z: PIDState, y: Measurement, r: Target, u_applied, dt) -> PIDState:
         """What limits take away is taken from the integral, too: back-calculation, Astrom and Murray (2008), 10.4.
 
         Its time constant is the geometric mean of those of integral and derivative, or one step where that is longer.
         """
-        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.acceleration_per_force(y)
+        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.dynamics.gain(y)
         heading = lambda u: actuators.target_of(plan.actuators, u, self.actuator_rate)
         asked, going = heading(actuators.command(plan.actuators, plan.forces, self.actuator_rate)), heading(u_applied)
         back = jnp.minimum(jnp.sqrt(self.integral / self.derivative), 1 / dt) * matvec(effect, going - asked)
@@ -100,35 +92,34 @@ class PID(AbstractController):
         return PIDState(
             integral=z.integral + dt * (self.integral * plan.error + back),
             actuators=actuators.advance(plan.actuators, u_applied, dt),
-            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model, share, dt),
+            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model.coordinates, share, dt),
         )
 
     def known_acceleration(self, z: PIDState, y: Measurement, u_applied) -> PerAxis:
         actuators = self._actuators()
         given = actuators.force(actuators.update_from_report(z.actuators, y.actuator), u_applied)
-        return self._drift(y) + matvec(self.model.acceleration_per_force(y), given)
+        return self._drift(y) + matvec(self.model.dynamics.gain(y), given)
 
-    def columns(self):
-        return {"attained_share": ("share of the wanted acceleration that the actuators can give", "1")}
+    def signals(self):
+        return ESTIMATE | ATTAINED_SHARE
 
     def _actuators(self) -> AbstractActuatorModel:
-        actuators = self.model.actuators()
+        actuators = self.model.actuators
         return actuators.quasi_static() if self.motor == "steady" else actuators
 
     def _drift(self, y: Measurement) -> PerAxis:
-        return self.model.drift(y) if self.feedforward else jnp.zeros_like(y.position)
+        return self.model.dynamics.drift(y) if self.feedforward else jnp.zeros_like(y.position)
 
     def _plan(self, z: PIDState, y: Measurement, r: Target) -> Plan:
-        model = self.model
-        target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
-        velocity, acceleration = model.desired_motion(y, target)
-        error, rate = model.error(y, target), velocity - model.rates(y)
+        dynamics, coordinates, _ = self.model
+        target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)
+        error, rate, acceleration = coordinates.tracking_error(y, target)
         demand = acceleration + self.proportional * error + self.derivative * rate + z.integral - self._drift(y)
-        return Plan(self._actuators().update_from_report(z.actuators, y.actuator), error, model.force_for(y, demand))
+        return Plan(self._actuators().update_from_report(z.actuators, y.actuator), error, dynamics.invert(y, demand))
 
 
 def pid(
-    model: AbstractModel,
+    model: Model,
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
@@ -181,7 +172,7 @@ def pid(
         w, zeta, share = (jnp.asarray(value, dtype=float) for value in (frequency, damping, integral_share))
         proportional, integral, derivative = w**2, share * w**3, 2 * zeta * w
     else:
-        checks.per_axis("gains", gains, len(model.angles), (3,))
+        checks.per_axis("gains", gains, len(model.coordinates.angles), (3,))
         proportional, integral, derivative = jnp.moveaxis(jnp.asarray(gains, dtype=float), -1, 0)
     if reference_frequency is None:
         reference_frequency = jnp.minimum(jnp.sqrt(proportional) / 2, 2.0)

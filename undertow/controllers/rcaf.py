@@ -5,12 +5,13 @@ from typing import Any
 from undertow.controllers.presets.paper import paper
 from undertow.controllers.presets.robust import robust
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
+from undertow.core.runtime import double_outside_runs
 
-PRESETS = {"paper": paper, "robust": robust}
+PRESETS = {"paper": double_outside_runs(paper), "robust": double_outside_runs(robust)}
 
 
-def rcaf(model: AbstractModel, *, preset: str = "paper", **options: Any) -> AbstractController:
+def rcaf(model: Model, *, preset: str = "paper", **options: Any) -> AbstractController:
     """Robust composite adaptive fuzzy controller.
 
     Args:

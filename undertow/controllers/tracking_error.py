@@ -1,11 +1,11 @@
-"""How far the plant is from its target, in the coordinates of the model: what every law here feeds back."""
+"""How far the plant is from its target, in the coordinates of the law, and the filtered error s."""
 
 from typing import Any, NamedTuple
 
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel, Measurement, Target
+from undertow.core.contracts import AbstractCoordinates, Measurement, Target
 
 PerAxis = Float[Array, " n"]
 Feedback = Float[Array, "*n 2"]
@@ -25,11 +25,16 @@ class Tracking(NamedTuple):
         return gains[..., 0] * self.error + gains[..., 1] * self.rate
 
 
-def tracking(model: AbstractModel, lyapunov: Matrices, y: Measurement, r: Target) -> Tracking:
+def tracking(coordinates: AbstractCoordinates, lyapunov: Matrices, y: Measurement, r: Target) -> Tracking:
     """Errors of a measurement against a target, with P of Eq. (21)."""
-    velocity, acceleration = model.desired_motion(y, r)
-    error, rate = model.error(y, r), velocity - model.rates(y)
+    error, rate, acceleration = coordinates.tracking_error(y, r)
     return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
+
+
+def demanded_acceleration(coordinates: AbstractCoordinates, gains: Feedback, y: Measurement, r: Target) -> PerAxis:
+    """x_ddot_d + K^T E, m/s^2 and rad/s^2: what state feedback asks for."""
+    error, rate, acceleration = coordinates.tracking_error(y, r)
+    return acceleration + gains[..., 0] * error + gains[..., 1] * rate
 
 
 def check_gains(feedback: Feedback, weight: Matrices, per_axis: dict[str, Any], axes: int) -> None:

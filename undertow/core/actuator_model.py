@@ -49,9 +49,9 @@ class AbstractActuatorModel(eqx.Module):
     def advance(self, state: PyTree, u: Inputs, dt: Float[Array, ""]) -> PyTree:
         """State after a sampling time with an input held."""
 
+    @abc.abstractmethod
     def quasi_static(self) -> "AbstractActuatorModel":
         """The same actuators taken for ones that follow at once."""
-        return self
 
 
 class DirectActuator(AbstractActuatorModel):
@@ -88,6 +88,9 @@ class DirectActuator(AbstractActuatorModel):
 
     def advance(self, state, u, dt) -> tuple[()]:
         return ()
+
+    def quasi_static(self) -> "DirectActuator":
+        return self
 
 
 class LaggedActuator(AbstractActuatorModel):
@@ -135,3 +138,15 @@ class LaggedActuator(AbstractActuatorModel):
 
     def quasi_static(self) -> AbstractActuatorModel:
         return self.curve
+
+
+def input_for(actuators: AbstractActuatorModel, force: Forces) -> Inputs:
+    """Input that holds a force, as if the actuators followed at once."""
+    held = actuators.quasi_static()
+    return held.command(held.init(), force, jnp.ones(()))
+
+
+def force_of(actuators: AbstractActuatorModel, u: Inputs) -> Forces:
+    """Force that an input holds, as if the actuators followed at once."""
+    held = actuators.quasi_static()
+    return held.force(held.init(), u)

@@ -7,10 +7,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.core.runtime import double_outside_runs
+
 _MOST_BYTES = 4096  # of an array; larger ones seldom come twice
 _MOST = 4096  # arrays that are remembered
 
 
+@double_outside_runs
 def as_array(value: Any) -> Any:
     """JAX's array of a number, or of nested lists of them: one array for the same numbers, as none ever changes."""
     if isinstance(value, jax.Array):
@@ -29,3 +32,15 @@ def as_array(value: Any) -> Any:
 def _made(content: bytes, shape: tuple[int, ...], settings: tuple[Any, ...]) -> jax.Array:
     with jax.ensure_compile_time_eval():  # or what is made while JAX traces would be of that trace only
         return jnp.asarray(np.frombuffer(content).reshape(shape))
+
+
+def in_present_precision(tree: Any) -> Any:
+    """The same tree of parts with its numbers in the precision that JAX computes in now."""
+
+    def converted(leaf: Any) -> Any:
+        if not isinstance(leaf, jax.Array) or not jnp.issubdtype(leaf.dtype, jnp.floating):
+            return leaf
+        present = jax.dtypes.canonicalize_dtype(float)
+        return leaf if leaf.dtype == present else as_array(np.asarray(leaf))
+
+    return jax.tree.map(converted, tree)

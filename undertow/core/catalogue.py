@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.runtime import double_outside_runs
 from undertow.core.user_code import MODULE_PREFIX, python_says
 
 KINDS = (
@@ -33,20 +34,21 @@ KINDS = (
 
 # Key of a scenario -> kind of its part.
 KIND_OF = {"plant": "plants", "controller": "controllers", "reference": "references"}
-KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation"}
+KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation", "metrics": "metrics"}
 
 Part = Callable[..., Any]
 
 
 @functools.cache
 def collect(package: ModuleType) -> dict[str, Part]:
-    """Parts that the modules of a package define, by name."""
+    """Parts that the modules of a package define, by name; outside of runs they make double precision of numbers."""
     parts = {}
     for info in pkgutil.iter_modules(package.__path__):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
         part = getattr(module, info.name, None)
         if callable(part):
-            parts[info.name] = part
+            parts[info.name] = double_outside_runs(part)
+            setattr(module, info.name, parts[info.name])
     return parts
 
 
@@ -64,7 +66,7 @@ def publish(package_name: str) -> Callable[[str], Any]:
 
 def names(kind: str) -> dict[str, Part]:
     """All parts of a kind: shipped ones and those of installed entry points."""
-    parts = collect(importlib.import_module(f"undertow.{kind}"))
+    parts = collect(importlib.import_module(f"undertow.{kind}")) if kind in KINDS else {}
     return parts | {entry.name: entry.load() for entry in _entry_points(f"undertow.{kind}")}
 
 
@@ -84,8 +86,21 @@ def find(kind: str, name: str, folder: Path | None = None) -> Part:
         return _from_file(name, folder or Path())
     parts = names(kind)
     if name not in parts:
-        raise BadInput("name", f"be a part in {kind}", name, hint=did_you_mean(name, parts))
+        hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
+        raise BadInput("name", f"be a part in {kind}", name, hint=hint)
     return parts[name]
+
+
+@functools.lru_cache
+def _module(path: Path, contents: bytes) -> ModuleType:
+    """A file as a module: once for the same contents, as two parts from it must be of the same class."""
+    spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ImportError("not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where annotations of the file are looked up
+    spec.loader.exec_module(module)
+    return module
 
 
 def _from_file(name: str, folder: Path) -> Part:
@@ -93,13 +108,8 @@ def _from_file(name: str, folder: Path) -> Part:
     path = (folder / path_text).resolve()
     if not path.is_file():
         raise BadInput("name", "name an existing file", path_text)
-    spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise BadInput("name", "name a Python file", path_text)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where annotations of the file are looked up
     try:
-        spec.loader.exec_module(module)
+        module = _module(path, path.read_bytes())
     except (Exception, SystemExit) as error:
         raise BadInput("name", "name a file that Python can run", f"{path_text}: {python_says(error)}") from error
     part = getattr(module, attribute, None)

@@ -11,8 +11,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
-from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
-from undertow.core.arrays import as_array
+from undertow.core.actuator_model import AbstractActuatorModel, Forces
+from undertow.core.runtime import double_outside_runs
+from undertow.core.signals import Signal
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 
@@ -22,12 +23,25 @@ Inputs = Float[Array, " m"]
 Gain = Float[Array, "n m"]
 
 
+class BodyMotion(NamedTuple):
+    """Attitude and velocity of a body in forms that have no singularity."""
+
+    attitude: Float[Array, "4"]  # unit quaternion, body -> world
+    rotation: Float[Array, "3 3"]  # the same as a matrix
+    nu: Float[Array, "6"]  # m/s, rad/s, body axes
+
+
 class Measurement(NamedTuple):
-    """What is measured of a plant: y; the state X of Eq. (18)."""
+    """What is measured of a plant: y; the state X of Eq. (18).
+
+    The outputs of a body hold its attitude as Euler angles, a view for people and for the paper's law; `body` is the
+    same pose and velocity without them. `undertow.core.measurement` makes both from either.
+    """
 
     position: Outputs  # m, rad
     velocity: Outputs  # m/s, rad/s
     actuator: Any = None  # whatever else the actuators report; None when nothing
+    body: BodyMotion | None = None  # None for a plant that is not a body in space
 
 
 class Target(NamedTuple):
@@ -87,22 +101,12 @@ class Effort(NamedTuple):
     saturated: Inputs  # 1 where an input is at its limit, else 0
 
 
-class Telemetry(NamedTuple):
-    """What a controller lets one look at. Nothing here is carried."""
+class AbstractDynamics(eqx.Module):
+    """What a controller may know of how a plant moves: F and G of x_ddot = F + G f + d. Eq. (17).
 
-    estimate: Outputs  # d_hat, m/s^2, rad/s^2
-    robust: Outputs  # u_r
-    modelling_error: Outputs  # eps, m/s, rad/s
-    predicted_position: Outputs  # x_hat
-    predicted_velocity: Outputs
-    weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2; no columns when nothing is learnt
-    diagnostics: dict[str, Array] | None = None  # scalars that this law alone has to tell, by name
-
-
-class AbstractModel(eqx.Module):
-    """What a controller may know of a plant: x_ddot = F + G u (+ d, unknown). Eq. (17)."""
-
-    angles: eqx.AbstractVar[tuple[bool, ...]]  # which outputs are angles, to be compared modulo 2 pi
+    x_ddot stands for the rate of the velocity of the coordinates, and f for what the actuators give; where these are
+    a `DirectActuator` of gain 1, f is the input u.
+    """
 
     @abc.abstractmethod
     def drift(self, y: Measurement) -> Outputs:
@@ -110,59 +114,68 @@ class AbstractModel(eqx.Module):
 
     @abc.abstractmethod
     def gain(self, y: Measurement) -> Gain:
-        """G, per unit of input."""
+        """G, acceleration per force."""
 
     @abc.abstractmethod
-    def invert(self, y: Measurement, acceleration: Outputs) -> Inputs:
-        """u with G u = acceleration as nearly as the plant allows: G# of Eqs. (22)-(27)."""
+    def invert(self, y: Measurement, acceleration: Outputs) -> Forces:
+        """Smallest f with G f = acceleration as nearly as the plant allows: G# of Eqs. (22)-(27)."""
 
-    def actuators(self) -> AbstractActuatorModel:
-        """What stands between input and force; G is per unit of input unless a model says otherwise."""
-        return DirectActuator()
 
-    def acceleration_per_force(self, y: Measurement) -> Gain:
-        """Acceleration per force of the drive: x_ddot = F + effect force + d."""
-        return self.gain(y)
+class TrackingError(NamedTuple):
+    """How far a plant is from its target, in the coordinates of a law: E of Eq. (19), and what the target does."""
 
-    def force_for(self, y: Measurement, acceleration: Outputs) -> Inputs:
-        """Smallest forces of the drive with effect force = acceleration, as nearly as possible."""
-        return self.invert(y, acceleration)
+    error: Outputs  # e, m, rad
+    rate: Outputs  # velocity of the target less that of the plant, m/s, rad/s
+    acceleration: Outputs  # of the target, m/s^2, rad/s^2
 
-    # The coordinates of the law. They are the outputs themselves unless a model has better ones, such as body axes.
 
-    def error(self, y: Measurement, r: Target) -> Outputs:
-        """How far the target is, m and rad."""
-        return self.difference(r.position, y.position)
+class AbstractCoordinates(eqx.Module):
+    """In what a law compares a plant with its target: the outputs themselves, or axes that turn with a body."""
 
-    def rates(self, y: Measurement) -> Outputs:
-        """Velocity, m/s and rad/s."""
-        return y.velocity
+    angles: eqx.AbstractVar[tuple[bool, ...]]  # which outputs are angles, to be compared modulo 2 pi
+    tolerated_status: eqx.AbstractVar[tuple[Status, ...]]  # of the plant, under which a run goes on
 
-    def output_rates(self, y: Measurement, rates: Outputs) -> Outputs:
-        """Velocity of the outputs for given `rates`, or any small motion likewise."""
-        return rates
+    @abc.abstractmethod
+    def measurement(self, position: Outputs, velocity: Outputs, actuator: Any = None) -> Measurement:
+        """Measurement with given outputs and their rates."""
 
-    def desired_motion(self, y: Measurement, r: Target) -> tuple[Outputs, Outputs]:
-        """Velocity of the target and its time derivative."""
-        return r.velocity, r.acceleration
+    @abc.abstractmethod
+    def tracking_error(self, y: Measurement, r: Target) -> TrackingError:
+        """Errors, the short way round where they are angles."""
 
-    def rates_derivative(self, y: Measurement, acceleration: Outputs) -> Outputs:
-        """Time derivative of `rates` for a second derivative of the outputs."""
-        return acceleration
+    @abc.abstractmethod
+    def velocity(self, y: Measurement) -> Outputs:
+        """Velocity of the plant, m/s and rad/s."""
 
-    def tolerated_status(self) -> tuple[Status, ...]:
-        """Conditions of the plant under which a run goes on, because these coordinates are not touched by them."""
-        return ()
+    @abc.abstractmethod
+    def acceleration(self, y: Measurement, acceleration: Outputs) -> Outputs:
+        """Rate of `velocity` for a second derivative of the outputs."""
 
-    def in_body_axes(self) -> "AbstractModel":
-        """This model in the coordinates that suit the plant best; itself where there are no better ones."""
-        return self
+    @abc.abstractmethod
+    def output_velocity(self, y: Measurement, velocity: Outputs) -> Outputs:
+        """Velocity of the outputs for one in these coordinates, or any small motion likewise."""
+
+    @abc.abstractmethod
+    def in_body_axes(self, dynamics: Any) -> "Model | None":
+        """What is known as `dynamics` in body axes; None where there are no better coordinates than these."""
 
     def difference(self, target: Outputs, actual: Outputs) -> Outputs:
-        """target - actual, angles the short way round."""
+        """target - actual of outputs, angles the short way round."""
         turn = 2 * jnp.pi * jnp.asarray(self.angles, dtype=float)
         raw = target - actual
         return raw - turn * jnp.round(raw / (2 * jnp.pi))
+
+
+class Model(NamedTuple):
+    """What a controller is told of a plant: how it moves, in which coordinates, and what moves it."""
+
+    dynamics: AbstractDynamics
+    coordinates: AbstractCoordinates
+    actuators: AbstractActuatorModel
+
+    def in_body_axes(self) -> "Model":
+        """The same knowledge in the coordinates that suit the plant best; itself where there are no better ones."""
+        return self.coordinates.in_body_axes(self.dynamics) or self
 
 
 class AbstractPlant(eqx.Module):
@@ -171,6 +184,11 @@ class AbstractPlant(eqx.Module):
     outputs: eqx.AbstractVar[tuple[str, ...]]  # names of the n outputs
     output_units: eqx.AbstractVar[tuple[str, ...]]
     input_unit: eqx.AbstractVar[str]
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        if "model" in vars(cls):  # its numbers are made where a plant's own are, before any run
+            cls.model = double_outside_runs(cls.model)
 
     @abc.abstractmethod
     def initial_state(self, position: Outputs | None = None, velocity: Outputs | None = None) -> PyTree:
@@ -213,16 +231,16 @@ class AbstractPlant(eqx.Module):
         """What a user should know before running this plant; each with the numbers that caused it."""
 
     @abc.abstractmethod
-    def model(self) -> AbstractModel:
+    def model(self) -> Model:
         """What a controller is told of this plant; keyword arguments with defaults are the scenario's `model`."""
 
+    @abc.abstractmethod
     def diagnostics(self, x: PyTree, u: Inputs) -> dict[str, Array]:
-        """Scalars that this plant alone has and that are worth recording, by name."""
-        return {}
+        """Values of the signals that this plant declares, by name."""
 
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of `diagnostics`."""
-        return {}
+    @abc.abstractmethod
+    def signals(self) -> dict[str, Signal]:
+        """What is recorded of this plant alone, by name: each entry of `diagnostics`; {} for nothing."""
 
     def no_load(self) -> Load:
         """Load of load surroundings."""
@@ -233,27 +251,41 @@ class AbstractPlant(eqx.Module):
 class AbstractController(eqx.Module):
     """A law. `command` before `advance`: the input leaves first, and adaptation sees what was applied."""
 
-    model: eqx.AbstractVar[AbstractModel]
+    model: eqx.AbstractVar[Model]
 
     @abc.abstractmethod
     def init(self, y: Measurement, r: Target) -> PyTree:
         """State z before the first measurement is used."""
 
     @abc.abstractmethod
-    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, Telemetry]:
-        """Input u, and what one may look at."""
+    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
+        """Input u, and the values of the declared signals by name. Nothing of them is carried.
+
+        A signal `estimate` is what the law believes of d; it is used where a reading is no number.
+        """
 
     @abc.abstractmethod
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
         """State one sampling time later."""
 
-    def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
-        """F + G u: what the law takes for granted of the acceleration; d is all the rest."""
-        return self.model.drift(y) + matvec(self.model.gain(y), u_applied)
+    @abc.abstractmethod
+    def signals(self) -> dict[str, Signal]:
+        """What `command` lets one look at, by name; {} for nothing."""
 
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of the telemetry's `diagnostics`."""
-        return {}
+
+class AbstractInformedController(AbstractController):
+    """A law that knows more of the acceleration than F + G u, such as what its motors do."""
+
+    @abc.abstractmethod
+    def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+        """What the law takes for granted of the acceleration; d is all the rest."""
+
+
+def known_acceleration(law: AbstractController, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+    """What a law takes for granted of the acceleration: F + G u, unless it says otherwise."""
+    if isinstance(law, AbstractInformedController):
+        return law.known_acceleration(z, y, u_applied)
+    return law.model.dynamics.drift(y) + matvec(law.model.dynamics.gain(y), u_applied)
 
 
 class AbstractDisturbance(eqx.Module):
@@ -279,9 +311,18 @@ class AbstractReference(eqx.Module):
     def at(self, t: Time) -> Target:
         """Wanted position, velocity and acceleration at time t."""
 
-    def starting_at(self, position: Outputs) -> "AbstractReference":
-        """This reference for a plant that starts at a position; itself unless it leaves open where it begins."""
-        return self
+
+class AbstractOpenReference(AbstractReference):
+    """A reference that leaves open where it begins."""
+
+    @abc.abstractmethod
+    def starting_at(self, position: Outputs) -> AbstractReference:
+        """This reference for a plant that starts at a position."""
+
+
+def starting_at(reference: AbstractReference, position: Outputs) -> AbstractReference:
+    """A reference for a plant that starts at a position; itself unless it leaves open where it begins."""
+    return reference.starting_at(position) if isinstance(reference, AbstractOpenReference) else reference
 
 
 class AbstractNavigation(eqx.Module):
@@ -301,13 +342,17 @@ class AbstractNavigation(eqx.Module):
     def measure(self, realization: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
         """Measurement at time t, and the state after it."""
 
-    def ignored(self, state: PyTree) -> Int[Array, ""]:
-        """Readings so far that were no numbers, and that it has left out."""
-        return jnp.zeros((), dtype=int)
 
+class AbstractInformedNavigation(AbstractNavigation):
+    """A navigation filter that knows how noisy it is, and which readings it left out."""
+
+    @abc.abstractmethod
     def velocity_noise(self, dt: float) -> Array:
         """What a law is told of it: standard deviation of white noise, new at every step of dt (s), on velocities.
 
         One number or one per output, m/s and rad/s; zero where nothing is known.
         """
-        return as_array(0.0)
+
+    @abc.abstractmethod
+    def ignored(self, state: PyTree) -> Int[Array, ""]:
+        """Readings so far that were no numbers, and that it has left out."""

@@ -16,8 +16,8 @@ class BadInput(ValueError):
 
     Args:
         name: key path or argument, as the user wrote it.
-        must: what it must be, completing "must ...".
-        got: what it is.
+        must: what it must be, completing "must ..."; "" where something could not be done.
+        got: what it is; or what could not be done, and why.
         hint: what to try, a full sentence.
         where: file and line, when known.
     """
@@ -30,6 +30,10 @@ class BadInput(ValueError):
         got = "" if self.got is None else f", but is {_one_line(self.got)}"
         where = f" ({self.where})" if self.where else ""
         hint = f". {self.hint}" if self.hint else ""
+        if not self.must:
+            failed = _one_line(self.got)
+            said = f"`{_one_line(self.name)}`: {failed}" if self.name else failed[:1].upper() + failed[1:]
+            return f"{said}{where}{hint}"
         return f"`{_one_line(self.name)}` must {self.must}{got}{where}{hint}"
 
     def at(self, prefix: str = "", where: str = "") -> "BadInput":

@@ -4,7 +4,10 @@ import enum
 
 
 class Status(enum.IntEnum):
-    """Ending of one run. Codes are data: one bad run never costs the others."""
+    """State of a run at an instant, and at last how it ended. Codes are data: one bad run never costs the others.
+
+    OK goes on; a run that is OK at its end is `completed`, which says nothing of whether control succeeded.
+    """
 
     OK = 0
     DIVERGED = 1
@@ -16,8 +19,8 @@ class Status(enum.IntEnum):
 
     @property
     def word(self) -> str:
-        """Name as it stands in results files."""
-        return self.name.lower()
+        """How a run ended, as it stands in results files."""
+        return "completed" if self is Status.OK else self.name.lower()
 
     @property
     def sentence(self) -> str:

@@ -20,7 +20,8 @@ class Together(AbstractDisturbance):
     members: tuple[AbstractDisturbance, ...]
 
     def realize(self, key) -> tuple[Any, ...]:
-        return tuple(member.realize(jax.random.fold_in(key, i)) for i, member in enumerate(self.members))
+        keys = jax.random.split(key, len(self.members))
+        return tuple(member.realize(own) for member, own in zip(self.members, keys, strict=True))
 
     def at(self, realization, t, pose, load: Load) -> Load:
         for member, own in zip(self.members, realization, strict=True):

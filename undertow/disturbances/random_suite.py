@@ -10,6 +10,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import param
+from undertow.numerics.randomness import keys_for
 
 _SINUSOIDS = 3  # per axis
 
@@ -38,12 +39,12 @@ class RandomSuite(AbstractDisturbance):
 
     def realize(self, key):
         """Frequencies (rad/s, logarithmically uniform) and phases (rad) per axis, and levels (m/s^2, rad/s^2)."""
-        of_rates, of_phases, of_levels = jax.random.split(key, 3)
+        keys = keys_for(key, "rates", "phases", "levels")
         shape, dtype = (self.axes, _SINUSOIDS), self.slowest.dtype
-        octave = jax.random.uniform(of_rates, shape, dtype=dtype)
+        octave = jax.random.uniform(keys["rates"], shape, dtype=dtype)
         rates = self.slowest * (self.fastest / self.slowest) ** octave
-        phases = 2 * jnp.pi * jax.random.uniform(of_phases, shape, dtype=dtype)
-        return rates, phases, self.step * jax.random.normal(of_levels, (self.levels, self.axes), dtype=dtype)
+        phases = 2 * jnp.pi * jax.random.uniform(keys["phases"], shape, dtype=dtype)
+        return rates, phases, self.step * jax.random.normal(keys["levels"], (self.levels, self.axes), dtype=dtype)
 
     def at(self, realization, t, pose, load: Load) -> Load:
         if load.acceleration.shape != (self.axes,):

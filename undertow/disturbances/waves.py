@@ -14,6 +14,7 @@ from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.disturbances.adding import body_of, with_water
 from undertow.disturbances.jonswap import frequencies_of_shares
+from undertow.numerics.randomness import keys_for
 
 _GRAVITY = 9.81  # m/s^2
 
@@ -54,14 +55,14 @@ class Waves(AbstractDisturbance):
 
     def realize(self, key) -> Sea:
         """Frequencies anywhere in their share of the energy, phases anywhere, headings about the mean one."""
-        shares, phases, headings = jax.random.split(key, 3)
+        keys = keys_for(key, "shares", "phases", "headings")
         kind = self.height.dtype
-        uniform = jax.random.uniform(shares, (self.components,), dtype=kind)
+        uniform = jax.random.uniform(keys["shares"], (self.components,), dtype=kind)
         share = (jnp.arange(self.components, dtype=kind) + uniform) / self.components
         return Sea(
             frequency=frequencies_of_shares(share, self.period, self.peakedness),
-            phase=jax.random.uniform(phases, (self.components,), dtype=kind, maxval=2 * jnp.pi),
-            heading=self.heading + self.spreading * jax.random.normal(headings, (self.components,), dtype=kind),
+            phase=jax.random.uniform(keys["phases"], (self.components,), dtype=kind, maxval=2 * jnp.pi),
+            heading=self.heading + self.spreading * jax.random.normal(keys["headings"], (self.components,), dtype=kind),
         )
 
     def at(self, realization: Sea, t, pose, load: Load) -> Load:

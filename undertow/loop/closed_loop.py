@@ -1,17 +1,17 @@
-"""The five roles around one loop, and what is written down about an instant."""
+"""The five roles around one loop, and the signals of an instant."""
 
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
+from jaxtyping import Array, Int, PRNGKeyArray, PyTree
 
 from undertow.core.arrays import as_array
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
+    AbstractInformedNavigation,
     AbstractNavigation,
     AbstractPlant,
     AbstractReference,
@@ -20,35 +20,35 @@ from undertow.core.contracts import (
     Measurement,
     Outputs,
     Target,
-    Telemetry,
     Time,
+    known_acceleration,
+    starting_at,
 )
+from undertow.core.errors import BadInput
+from undertow.core.measurement import completed
+from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
+from undertow.numerics.randomness import keys_for
 
+# Values of one instant by name: what every loop records, and what plant and controller declare.
+Signals = dict[str, Array]
 
-class Signals(NamedTuple):
-    """Everything worth keeping of one instant; names as they stand in result files."""
-
-    position: Outputs
-    velocity: Outputs
-    measured_position: Outputs  # what the controller was told
-    measured_velocity: Outputs
-    target: Outputs
-    error: Outputs
-    uncertainty: Outputs  # d = x_ddot - F - G V, measured, never assumed; holds Delta of Eq. (3) and all else
-    estimate: Outputs
-    robust: Outputs
-    modelling_error: Outputs
-    predicted_position: Outputs
-    predicted_velocity: Outputs
-    weights: Float[Array, "n rules"]  # theta
-    weights_peak: Float[Array, ""]  # max |theta|
-    voltage: Inputs  # applied
-    command: Inputs  # asked for
-    power: Inputs
-    saturated: Inputs
-    bad_readings: Int[Array, ""]  # so far
-    diagnostics: dict[str, Array]  # what this plant alone has to tell, by name
+# What every loop records, as `Realization.signals` computes it. `Signal` says what units stand for.
+RECORDED = {
+    "position": Signal(("axis",), "[axis]", "position"),
+    "velocity": Signal(("axis",), "[axis]/s", "velocity"),
+    "measured_position": Signal(("axis",), "[axis]", "position that the controller is given"),
+    "measured_velocity": Signal(("axis",), "[axis]/s", "velocity that the controller is given"),
+    "reference": Signal(("axis",), "[axis]", "desired position x_d"),
+    "error": Signal(("axis",), "[axis]", "tracking error x_d - x"),
+    # Measured, never assumed; holds Delta of Eq. (3) and all else.
+    "uncertainty": Signal(("axis",), "[axis]/s^2", "lumped uncertainty d = x_ddot - F - G u, measured"),
+    "input": Signal(("actuator",), "[input]", "input applied"),
+    "commanded_input": Signal(("actuator",), "[input]", "input commanded"),
+    "power": Signal(("actuator",), "W", "electrical power drawn"),
+    "saturated": Signal(("actuator",), "1", "1 where the input is at its limit"),
+    "bad_readings": Signal((), "1", "readings so far that were no numbers: left out, or replaced by what is expected"),
+}
 
 
 class MeasurementState(NamedTuple):
@@ -65,7 +65,7 @@ class Decision(NamedTuple):
     r: Target
     command: Inputs
     applied: Inputs
-    telemetry: Telemetry
+    signals: Signals  # that the controller declares
     measuring: Any  # MeasurementState afterwards; () where nothing is remembered
 
 
@@ -87,13 +87,28 @@ class ClosedLoop(eqx.Module):
     def starting_at(self, position: Any) -> "ClosedLoop":
         """This loop with its reference beginning where the plant does; at zero where None."""
         start, _ = self.outputs_at_start(position, None)
-        reference = self.reference.starting_at(start)
+        reference = starting_at(self.reference, start)
         return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.navigation)
+
+    def signals(self) -> dict[str, Signal]:
+        """Declarations of everything that is recorded of this loop, by name.
+
+        Raises:
+            BadInput: two parts declare a signal of the same name.
+        """
+        found = dict(RECORDED)
+        for part in (self.plant, self.controller):
+            for name, signal in part.signals().items():
+                if name in found:
+                    raise BadInput(name, "be the name of one signal only", f"declared again by {type(part).__name__}")
+                found[name] = signal
+        return found
 
     def realize(self, key: PRNGKeyArray) -> "Realization":
         """Draw everything random once."""
-        of_disturbance, of_navigation = jax.random.split(key)
-        return Realization(self, self.disturbance.realize(of_disturbance), self.navigation.realize(of_navigation))
+        keys = keys_for(key, "disturbance", "navigation")
+        disturbance = self.disturbance.realize(keys["disturbance"])
+        return Realization(self, disturbance, self.navigation.realize(keys["navigation"]))
 
 
 class Realization(NamedTuple):
@@ -118,7 +133,7 @@ class Realization(NamedTuple):
         if navigation.smooth is True:  # traced in a part whose field is not static; guarded then
             return MeasurementState(state, None)
         y, _ = navigation.measure(self.navigation_realization, state, zero, truth)
-        return MeasurementState(state, at_start(self.loop.controller.model, truth, y))
+        return MeasurementState(state, at_start(self.loop.controller.model.coordinates, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
         """What the surroundings do to the plant at time t."""
@@ -129,57 +144,60 @@ class Realization(NamedTuple):
         """Measure, compare, command, limit; `measuring` as after the step before."""
         y, measuring = self._read(t, self.loop.plant.output(t, x), measuring)
         r = self.loop.reference.at(t)
-        command, telemetry = self.loop.controller.command(z, y, r)
-        return Decision(y, r, command, self.loop.plant.admissible(x, command), telemetry, measuring)
+        command, signals = self.loop.controller.command(z, y, r)
+        return Decision(y, r, command, self.loop.plant.admissible(x, command), signals, measuring)
 
     def _read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
         """What the law is given, and what is remembered afterwards."""
-        measure = self.loop.navigation.measure
+
+        def measure(realization, state, t, truth):
+            y, state = self.loop.navigation.measure(realization, state, t, truth)
+            return completed(y, truth), state
+
         if not isinstance(measuring, MeasurementState):
             return measure(self.navigation_realization, measuring, t, truth)
         y, state = measure(self.navigation_realization, measuring.navigation, t, truth)
         if measuring.expected is None:
             return y, MeasurementState(state, None)
-        y, expected = measuring.expected.repaired(self.loop.controller.model, y)
+        y, expected = measuring.expected.repaired(self.loop.controller.model.coordinates, y)
         return y, MeasurementState(state, expected)
 
     def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
-        """What is written down about time t. Errors are those of the truth, not of the measurement."""
+        """Everything that is recorded of time t. Errors are those of the truth, not of the measurement."""
         plant, controller = self.loop.plant, self.loop.controller
         truth = plant.output(t, x)
-        y, r, command, applied, telemetry, measuring = decision
+        y, r, command, applied, of_controller, measuring = decision
         acceleration = plant.acceleration(t, x, applied, self.load(t, x))
         effort = plant.effort(x, applied)
-        return Signals(
-            position=truth.position,
-            velocity=truth.velocity,
-            measured_position=y.position,
-            measured_velocity=y.velocity,
-            target=r.position,
-            error=controller.model.difference(r.position, truth.position),
-            uncertainty=controller.model.rates_derivative(truth, acceleration)
-            - controller.known_acceleration(z, truth, applied),
-            estimate=telemetry.estimate,
-            robust=telemetry.robust,
-            modelling_error=telemetry.modelling_error,
-            predicted_position=telemetry.predicted_position,
-            predicted_velocity=telemetry.predicted_velocity,
-            weights=telemetry.weights,
-            weights_peak=jnp.abs(telemetry.weights).max(initial=0.0),
-            voltage=applied,
-            command=command,
-            power=effort.power,
-            saturated=effort.saturated,
-            bad_readings=self._bad_readings(measuring),
-            diagnostics=plant.diagnostics(x, applied) | (telemetry.diagnostics or {}),
-        )
+        of_plant = plant.diagnostics(x, applied)
+        check_declared(plant, of_plant)
+        check_declared(controller, of_controller)
+        recorded = {
+            "position": truth.position,
+            "velocity": truth.velocity,
+            "measured_position": y.position,
+            "measured_velocity": y.velocity,
+            "reference": r.position,
+            "error": controller.model.coordinates.difference(r.position, truth.position),
+            "uncertainty": controller.model.coordinates.acceleration(truth, acceleration)
+            - known_acceleration(controller, z, truth, applied),
+            "input": applied,
+            "commanded_input": command,
+            "power": effort.power,
+            "saturated": effort.saturated,
+            "bad_readings": self._bad_readings(measuring),
+        }
+        return recorded | of_plant | of_controller
 
     def _bad_readings(self, measuring: Any) -> Int[Array, ""]:
         """Readings so far that were no numbers: left out by the sensor, or replaced for the law."""
         if not isinstance(measuring, MeasurementState) or measuring.expected is None:
             return jnp.zeros((), dtype=int)
-        return measuring.expected.replaced + self.loop.navigation.ignored(measuring.navigation)
+        navigation, replaced = self.loop.navigation, measuring.expected.replaced
+        if not isinstance(navigation, AbstractInformedNavigation):
+            return replaced
+        return replaced + navigation.ignored(measuring.navigation)
 
     def record(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Signals:
-        """`sample` of the decision taken at time t."""
+        """Signals of the decision taken at time t."""
         return self.signals(t, x, z, self.decide(t, x, z, measuring))

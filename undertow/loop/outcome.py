@@ -57,7 +57,7 @@ class Outcome(NamedTuple):
 def status_of(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
     """Status code of an instant; what the controller's model can bear is no failure."""
     code = loop.plant.status(x)
-    for borne in loop.controller.model.tolerated_status():
+    for borne in loop.controller.model.coordinates.tolerated_status:
         code = jnp.where(code == int(borne), int(Status.OK), code)
     return jnp.where(all_finite((x, z)), code, int(Status.NOT_FINITE))
 

@@ -6,7 +6,16 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Int
 
-from undertow.core.contracts import AbstractController, AbstractModel, Inputs, Measurement, Outputs, Telemetry, Time
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractCoordinates,
+    Inputs,
+    Measurement,
+    Outputs,
+    Time,
+    known_acceleration,
+)
+from undertow.core.measurement import with_outputs
 
 
 def is_finite(numbers: Array) -> Bool[Array, "..."]:
@@ -33,23 +42,32 @@ class Expected(NamedTuple):
     actuator: Any  # as reported last
     replaced: Int[Array, ""]  # readings so far of which something was replaced
 
-    def repaired(self, model: AbstractModel, y: Measurement) -> tuple[Measurement, "Expected"]:
+    def repaired(self, coordinates: AbstractCoordinates, y: Measurement) -> tuple[Measurement, "Expected"]:
         """The measurement, each entry that is no number replaced by what is expected of it; and the count."""
-        known = Measurement(self.position, self.rates, self.actuator)
-        known = known._replace(velocity=model.output_rates(known, self.rates))
-        whole = jax.tree.map(lambda read, own: jnp.where(is_finite(read), read, own), y, known)
+        own = lambda read, expected: jnp.where(is_finite(read), read, expected)
+        actuator = jax.tree.map(own, y.actuator, self.actuator)
+
+        def repaired():
+            still = coordinates.measurement(self.position, jnp.zeros_like(self.position))
+            velocity = coordinates.output_velocity(still, self.rates)
+            outputs = own(y.position, self.position), own(y.velocity, velocity)
+            return with_outputs(y, *outputs)._replace(actuator=actuator)
+
+        sound = all_finite((y.position, y.velocity))
+        whole = jax.lax.cond(sound, lambda: y._replace(actuator=actuator), repaired)
         return whole, self._replace(replaced=self.replaced + jnp.where(all_finite(y), 0, 1))
 
     def after(
-        self, law: AbstractController, z: Any, y: Measurement, telemetry: Telemetry, applied: Inputs, dt: Time
+        self, law: AbstractController, z: Any, y: Measurement, estimate: Outputs | None, applied: Inputs, dt: Time
     ) -> "Expected":
-        """A sampling time later, with an input applied."""
-        acceleration = law.known_acceleration(z, y, applied) + telemetry.estimate
-        rates = law.model.rates(y) + dt * acceleration
+        """A sampling time later, with an input applied; `estimate` is d_hat of a law that has one."""
+        known = known_acceleration(law, z, y, applied)
+        acceleration = known if estimate is None else known + estimate
+        rates = law.model.coordinates.velocity(y) + dt * acceleration
         return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)
 
 
-def at_start(model: AbstractModel, truth: Measurement, y: Measurement) -> Expected:
+def at_start(coordinates: AbstractCoordinates, truth: Measurement, y: Measurement) -> Expected:
     """Before the first reading `y` the law knows where it was put: the truth, and actuators at rest unless reported."""
     actuator = jax.tree.map(lambda read: jnp.where(is_finite(read), read, jnp.zeros_like(read)), y.actuator)
-    return Expected(truth.position, model.rates(truth), actuator, jnp.zeros((), dtype=int))
+    return Expected(truth.position, coordinates.velocity(truth), actuator, jnp.zeros((), dtype=int))

@@ -21,11 +21,11 @@ class AbstractAccumulator(eqx.Module):
     """Statistics gathered inside the loop, so that a long run need not keep its series."""
 
     @abc.abstractmethod
-    def init(self, sample: Signals) -> PyTree:
-        """State before the first sample; `sample` gives the shapes."""
+    def init(self, signals: Signals) -> PyTree:
+        """State before the first sample; `signals` gives the shapes."""
 
     @abc.abstractmethod
-    def update(self, state: PyTree, t: Float[Array, ""], sample: Signals) -> PyTree:
+    def update(self, state: PyTree, t: Float[Array, ""], signals: Signals) -> PyTree:
         """State with one more sample."""
 
 
@@ -108,8 +108,8 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     loop, t = realization.loop, instant(k, dt)
     decision = realization.decide(t, x, z, measuring)
     if accumulators:
-        sample = realization.signals(t, x, z, decision)
-        gathered = tuple(a.update(g, t, sample) for a, g in zip(accumulators, gathered, strict=True))
+        signals = realization.signals(t, x, z, decision)
+        gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
     motion, h = partial(_motion, realization, decision.applied), dt / substeps
     if substeps == 1:
         new_x = integrate(motion, t, x, h)
@@ -119,7 +119,7 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     new_z = law.advance(z, y, decision.r, decision.applied, dt)
     remembered = decision.measuring
     if remembered.expected is not None:
-        expected = remembered.expected.after(law, z, y, decision.telemetry, decision.applied, dt)
+        expected = remembered.expected.after(law, z, y, decision.signals.get("estimate"), decision.applied, dt)
         remembered = remembered._replace(expected=expected)
     new = (new_x, new_z, remembered)
     state, ending = freeze_on_failure(loop, (x, z, measuring), new, ending, t, dt, decision.command)

@@ -1,9 +1,12 @@
-"""The sampled loop in the lanes of vector registers: any number of runs of one kind at once.
+"""The sampled loop as SIMD batches: any number of runs of one kind at once, by the batch compiler.
 
-Same figures as `sampled.simulate` to rounding; their bits do not depend on the machine, nor on who flies beside.
+Same figures as `sampled.simulate` to rounding; their bits depend neither on the machine nor on the other runs.
+
+The only module that knows `simdjit`, which is optional: without it every program is `Unsupported`, and `unavailable`
+says why.
 """
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -11,15 +14,53 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, PRNGKeyArray
 
-from simdjit.cuda import Driver
-from simdjit.program import Program
 from undertow.core.contracts import Outputs
 from undertow.core.status import Status
 from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop, Signals
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.loop.recording import instant
 from undertow.numerics.integrators import METHODS
+from undertow.process import cache_folder
+
+if TYPE_CHECKING:
+    from simdjit import Driver, Unsupported
+else:
+    try:
+        from simdjit import Unsupported
+    except ImportError as error:
+        _REASON = (
+            f"the batch compiler cannot be imported ({error}). `pip install .` in the folder of undertow installs it"
+        )
+
+        class Unsupported(Exception):
+            """A program that the batch compiler cannot make; says why."""
+
+    else:
+        _REASON = ""
+
+
+def unavailable() -> str:
+    """Why no run can be a SIMD batch on this machine; empty where they can."""
+    return "" if TYPE_CHECKING else _REASON
+
+
+def gpu() -> "Driver | None":
+    """The GPU that runs SIMD batches; None where there is none."""
+    if unavailable():
+        return None
+    import simdjit
+
+    return simdjit.gpu()
+
+
+def simd_width(bits: int) -> int:
+    """Numbers of so many bits in one vector register of this processor; 1 without the batch compiler."""
+    if unavailable():
+        return 1
+    import simdjit
+
+    return simdjit.simd_width(bits)
 
 
 class Run(NamedTuple):
@@ -38,7 +79,7 @@ class Plan(NamedTuple):
         steps: how many.
         dt: sampling time, s.
         every: steps per record; 0 for none.
-        signals: of a `Signals`, which are recorded.
+        signals: names of those that are recorded.
         method, substeps: integration of the plant within one control_step.
     """
 
@@ -74,14 +115,18 @@ class BatchRunner:
         plan: how they are run.
         constant: which arrays of `run` are the same for all, in the order of its leaves; they make the program short.
         lanes: runs at once; as many as fit a register unless given.
-        driver: of the GPU that flies them; None for this processor.
+        driver: of the GPU that runs them; None for this processor.
 
     Raises:
-        Unsupported: a part needs something that lanes cannot do.
+        Unsupported: a part needs something that the batch compiler cannot do, or there is none.
         OSError: the GPU's driver fails.
     """
 
-    def __init__(self, run: Run, plan: Plan, constant: list[bool], lanes: int = 0, driver: Driver | None = None):
+    def __init__(self, run: Run, plan: Plan, constant: list[bool], lanes: int = 0, driver: "Driver | None" = None):
+        if unavailable():
+            raise Unsupported(unavailable())
+        from simdjit import Loop
+
         numbers, rest = eqx.partition(run, eqx.is_array)
         self._plan = plan
         integrate, dt = METHODS[plan.method], plan.dt
@@ -100,10 +145,11 @@ class BatchRunner:
 
         def record(known, carry, k):
             t = instant(k, jnp.asarray(dt))
-            sample = known[0].record(t, *carry[0])
-            return t, {name: getattr(sample, name) for name in plan.signals}
+            signals = known[0].record(t, *carry[0])
+            return t, {name: signals[name] for name in plan.signals}
 
-        self._program = Program(realize, start, control_step, record, numbers, constant, lanes, driver)
+        cache = cache_folder() / "native"
+        self._program = Loop(realize, start, control_step, record, numbers, constant, lanes, driver, cache)
 
     @property
     def operations(self) -> int:
@@ -140,15 +186,15 @@ def simulate(
     """One run; arguments, result and errors of `sampled.simulate`.
 
     Raises:
-        Unsupported: a part needs something that lanes cannot do.
+        Unsupported: a part needs something that the batch compiler cannot do, or there is none.
     """
     steps, loop = sampled.steps_of(duration, dt, record_every), loop.starting_at(position)
     start = loop.outputs_at_start(position, velocity)
     run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
     arrays = eqx.filter(run, eqx.is_array)
     constant = [True] * len(jax.tree.leaves(arrays))
-    plan = Plan(steps, dt, record_every, Signals._fields, method, substeps)
+    plan = Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps)
     batch = BatchRunner(run, plan, constant, lanes=1)
     flown = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
     one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, flown)
-    return Outcome(one.time, Signals(**one.series), one.accumulated, one.final, one.status, one.ended, one.input)
+    return Outcome(one.time, one.series, one.accumulated, one.final, one.status, one.ended, one.input)

@@ -5,10 +5,15 @@ from functools import partial
 from typing import Any
 
 import equinox as eqx
+import jax
+import numpy as np
 
-from simdjit.batches import batched
 from undertow.loop import sampled
 from undertow.loop.simd_batch import Ended, Plan, Run
+
+# The width of a program decides about the last bits of a result, what the other places hold does not: every program
+# has this width, however few runs there are, so that no result depends on how they are cut into tasks.
+_WIDTH = 64
 
 
 class BatchRunner:
@@ -22,7 +27,23 @@ class BatchRunner:
 
     def __init__(self, run: Run, plan: Plan, width: int = 0):
         numbers, rest = eqx.partition(run, eqx.is_array)
-        self.run: Callable[[Any], Ended] = batched(partial(_one, rest, plan), numbers, width)
+        self.run: Callable[[Any], Ended] = _batched(partial(_one, rest, plan), numbers, width or _WIDTH)
+
+
+def _batched(function: Callable[[Any], Any], numbers: Any, width: int) -> Callable[[Any], Any]:
+    """The function of a tree of arrays with a leading axis over runs, `width` of them at once."""
+    stacked = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((width, *np.shape(leaf)), leaf.dtype), numbers)
+    program = jax.jit(jax.vmap(function)).lower(stacked).compile()
+
+    def run(numbers: Any) -> Any:
+        runs, pieces = len(jax.tree.leaves(numbers)[0]), []
+        for first in range(0, runs, width):
+            which = np.minimum(np.arange(first, first + width), runs - 1)
+            results = program(jax.tree.map(lambda leaf, which=which: leaf[which], numbers))
+            pieces.append(jax.tree.map(np.asarray, results))
+        return jax.tree.map(lambda *parts: np.concatenate(parts)[:runs], *pieces)
+
+    return run
 
 
 def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
@@ -39,6 +60,6 @@ def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
         method=plan.method,
         substeps=plan.substeps,
     )
-    series = {name: getattr(outcome.signals, name) for name in plan.signals}
+    series = {name: outcome.signals[name] for name in plan.signals}
     ending = outcome.status, outcome.ended, outcome.input
     return Ended(outcome.accumulated, outcome.final, *ending, outcome.time, series)

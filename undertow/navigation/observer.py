@@ -7,14 +7,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from undertow.core.contracts import AbstractNavigation, Measurement
+from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.errors import BadInput
 from undertow.numerics.randomness import numbered
 from undertow.sensors.estimate import Estimate, estimate_of, motion_of
 from undertow.sensors.imu import IMU
 from undertow.sensors.propeller_speed import PropellerSpeed
 from undertow.sensors.sampling import SensorState
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor
 
 # (m/s)^2 s; less counts as none.
 _NOISELESS = 1e-20
@@ -30,7 +30,7 @@ class NavigationState(NamedTuple):
     ignored: Int[Array, ""]  # readings so far that were no numbers
 
 
-class Navigation(AbstractNavigation):
+class Navigation(AbstractInformedNavigation):
     """Strapdown inertial navigation, corrected by whatever else arrives, each by its own constant share.
 
     Between readings the estimate moves on by rates and acceleration of the IMU. A late reading is compared with what
@@ -58,7 +58,8 @@ class Navigation(AbstractNavigation):
 
     def velocity_noise(self, dt):
         """That of all readings of a second, as if they came evenly at every step; the filters' memory is left out."""
-        told = [one.velocity_noise() ** 2 * one.sampling.period for one in self.sensors]
+        sensors = [one for one in self.sensors if isinstance(one, AbstractVelocitySensor)]
+        told = [one.velocity_noise() ** 2 * one.sampling.period for one in sensors]
         density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in told)
         return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
 
@@ -100,7 +101,8 @@ class Navigation(AbstractNavigation):
         ]
         estimate = state.estimate
         for sensor, (reading, fresh) in news:
-            estimate = _either(fresh, sensor.predict(estimate, reading), estimate)
+            if isinstance(sensor, IMU):
+                estimate = _either(fresh, sensor.predict(estimate, reading), estimate)
         estimate = estimate.predicted(elapsed)
         for sensor, (reading, fresh) in news:
             estimate = _either(fresh, sensor.correct(estimate, reading), estimate)

@@ -6,12 +6,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractNavigation, Measurement
+from undertow.core.contracts import AbstractInformedNavigation, Measurement
+from undertow.core.measurement import with_outputs
 from undertow.core.param import param
 from undertow.numerics.randomness import numbered
 
 
-class WhiteNoise(AbstractNavigation):
+class WhiteNoise(AbstractInformedNavigation):
     """Independent Gaussian errors, new at every sample of the control loop; the number of the sample picks them.
 
     Raises:
@@ -33,17 +34,17 @@ class WhiteNoise(AbstractNavigation):
     def velocity_noise(self, dt):
         return self.velocity
 
+    def ignored(self, state):
+        return jnp.zeros((), dtype=int)
+
     def init(self, realization, truth) -> Int[Array, ""]:
         """Samples so far."""
         return jnp.zeros((), dtype=int)
 
     def measure(self, realization, state, t, truth: Measurement):
         errors = jax.random.normal(numbered(realization, state), (2, *truth.position.shape), dtype=truth.position.dtype)
-        noisy = truth._replace(
-            position=truth.position + self.position * errors[0],
-            velocity=truth.velocity + self.velocity * errors[1],
-        )
-        return noisy, state + 1
+        position, velocity = truth.position + self.position * errors[0], truth.velocity + self.velocity * errors[1]
+        return with_outputs(truth, position, velocity), state + 1
 
 
 def white_noise(position=0.0, velocity=0.01) -> WhiteNoise:

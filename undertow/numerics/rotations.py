@@ -61,15 +61,23 @@ def euler_rate_matrix(angles: Vector3) -> Matrix3:
 
 def quaternion_from_euler(angles: Vector3) -> Quaternion:
     """Unit quaternion of (roll, pitch, yaw)."""
-    (sr, sp, sy), (cr, cp, cy) = jnp.sin(angles / 2), jnp.cos(angles / 2)
-    return jnp.stack(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
+    return _quaternion_from_halves(jnp.sin(angles / 2), jnp.cos(angles / 2))
+
+
+def turning_from_euler(angles: Vector3, rates: Vector3, accelerations: Vector3) -> tuple[Quaternion, Vector3, Vector3]:
+    """Attitude, body rates (rad/s) and their time derivative of a motion in (roll, pitch, yaw), at any pitch.
+
+    Body rates are T^-1 times the rates of the angles, and T^-1 has no singularity; T itself is not formed.
+    """
+    sines, cosines = jnp.sin(angles / 2), jnp.cos(angles / 2)
+    (sr, sp, _), (cr, cp, _) = 2 * sines * cosines, cosines**2 - sines**2
+    roll_rate, pitch_rate, yaw_rate = rates
+    to_body = lambda roll, pitch, yaw: (roll - sp * yaw, cr * pitch + cp * sr * yaw, cp * cr * yaw - sr * pitch)
+    p, q, r = to_body(*rates)
+    p_dot, q_dot, r_dot = to_body(*accelerations)
+    both = pitch_rate * yaw_rate
+    turning = (p_dot - cp * both, q_dot + roll_rate * r - sp * sr * both, r_dot - roll_rate * q - sp * cr * both)
+    return _quaternion_from_halves(sines, cosines), jnp.stack([p, q, r]), jnp.stack(turning)
 
 
 def rotation_from_quaternion(q: Quaternion) -> Matrix3:
@@ -195,5 +203,18 @@ def _rotation_from_quaternion_parts(w: Array, x: Array, y: Array, z: Array) -> M
             jnp.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]),
             jnp.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]),
             jnp.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]),
+        ]
+    )
+
+
+def _quaternion_from_halves(sines: Vector3, cosines: Vector3) -> Quaternion:
+    """From sines and cosines of half of (roll, pitch, yaw)."""
+    (sr, sp, sy), (cr, cp, cy) = sines, cosines
+    return jnp.stack(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
         ]
     )

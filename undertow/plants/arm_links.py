@@ -1,17 +1,17 @@
 """Rigid links of a planar arm with two joints: what both the arm and a controller's model of it are made of."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.contracts import AbstractDynamics, Measurement
 from undertow.core.param import param
 from undertow.numerics.linear import matvec
 
 _BOOK = "Slotine and Li 1991, Example 9.1"
 
 
-class Links(eqx.Module):
+class Links(AbstractDynamics):
     """Rigid links: mass matrix, Coriolis matrix, weight and energy. Slotine and Li 1991, section 9.1.
 
     The outer link carries its load: its centre of mass need not lie on the line through its joint.
@@ -70,7 +70,13 @@ class Links(eqx.Module):
         inner = (self.inner_mass * self.inner_centre + self.outer_mass * self.inner_length) * jnp.sin(q[0])
         return rate @ matvec(self.mass_matrix(q), rate) / 2 + self.gravity * (inner + outer)
 
-    def drift(self, q: Float[Array, "2"], rate: Float[Array, "2"]) -> Float[Array, "2"]:
+    def drift(self, y: Measurement) -> Float[Array, "2"]:
         """-M^-1 (C q_dot + g), rad/s^2."""
-        own = matvec(self.coriolis_matrix(q, rate), rate) + self.weight(q)
-        return -matvec(self.inverse_mass_matrix(q), own)
+        own = matvec(self.coriolis_matrix(y.position, y.velocity), y.velocity) + self.weight(y.position)
+        return -matvec(self.inverse_mass_matrix(y.position), own)
+
+    def gain(self, y: Measurement) -> Float[Array, "2 2"]:
+        return self.inverse_mass_matrix(y.position)
+
+    def invert(self, y: Measurement, acceleration: Float[Array, "2"]) -> Float[Array, "2"]:
+        return matvec(self.mass_matrix(y.position), acceleration)

@@ -1,21 +1,26 @@
 """What a controller may know of a vehicle with thrusters: F and G of Eq. (17), and how to invert G."""
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractModel, Measurement
+from undertow.core.contracts import AbstractDynamics, Measurement, Model
+from undertow.core.coordinates import AbstractOutputCoordinates
+from undertow.core.measurement import body_of, measurement_of_outputs
+from undertow.core.status import Status
 from undertow.numerics.inverses import partial_inverse, pseudo_inverse, regularised_sharp
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import kinematics_from_euler
-from undertow.plants.body_model import BodyModel
+from undertow.numerics.rotations import Kinematics
+from undertow.plants.body_model import EULER_ANGLES, BodyCoordinates, BodyDynamics
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.body import Body
 
 
-class HybridModel(AbstractModel):
-    """x_ddot = F + G V + d, Eq. (17), in Euler angles; valid for |pitch| < 90 deg."""
+class HybridDynamics(AbstractDynamics):
+    """x_ddot = F + G V + d, Eq. (17), in Euler angles; valid for |pitch| < 90 deg. Voltages stand for the forces."""
 
     body: Body
     thruster: AbstractThruster
@@ -26,12 +31,11 @@ class HybridModel(AbstractModel):
     rank: int = eqx.field(static=True)
     speed_sensor: bool = eqx.field(static=True)
     rate_term: bool = eqx.field(static=True)
-    angles: tuple[bool, ...] = eqx.field(static=True, default=(False, False, False, True, True, True))
 
     def drift(self, y: Measurement) -> Float[Array, "6"]:
         """F of Eq. (17): J M^-1 (-C nu - D nu - g), with J M^-1 B phi if speeds are measured."""
-        kinematics = kinematics_from_euler(y.position[3:])
-        nu = kinematics.to_body(y.velocity)
+        moving = body_of(y)
+        kinematics, nu = Kinematics(moving.rotation), moving.nu
         own = self.body.free_acceleration(nu, kinematics.rotation[2])
         if self.speed_sensor:
             phi = self.thruster.speed_term(y.actuator)
@@ -42,7 +46,7 @@ class HybridModel(AbstractModel):
 
     def gain(self, y: Measurement) -> Float[Array, "6 N"]:
         """G = J M^-1 B alpha of Eq. (17); equal to M_J^-1 J^-T B alpha."""
-        return jax.vmap(kinematics_from_euler(y.position[3:]).to_world, in_axes=1, out_axes=1)(self.body_gain)
+        return jax.vmap(Kinematics(body_of(y).rotation).to_world, in_axes=1, out_axes=1)(self.body_gain)
 
     def invert(self, y: Measurement, acceleration: Float[Array, "6"]) -> Float[Array, " N"]:
         """V = G# acceleration, Eq. (23).
@@ -54,17 +58,26 @@ class HybridModel(AbstractModel):
             return matvec(regularised_sharp(self.gain(y), self.regularisation), acceleration)
         if self.rank < 6:
             return matvec(pseudo_inverse(self.gain(y)), acceleration)
-        wrench = matvec(self.body.mass_matrix, kinematics_from_euler(y.position[3:]).to_body(acceleration))
+        wrench = matvec(self.body.mass_matrix, Kinematics(body_of(y).rotation).to_body(acceleration))
         return matvec(self.allocation, wrench)
 
-    def in_body_axes(self) -> BodyModel:
+
+class EulerCoordinates(AbstractOutputCoordinates):
+    """North, east, down and Euler angles, as the paper has them."""
+
+    angles: tuple[bool, ...] = eqx.field(static=True, default=EULER_ANGLES)
+    tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=())
+
+    def measurement(self, position, velocity, actuator: Any = None) -> Measurement:
+        return measurement_of_outputs(position, velocity, actuator)
+
+    def in_body_axes(self, dynamics: HybridDynamics) -> Model:
         """The same knowledge in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
-        count, effect = self.thruster_matrix.shape[1], self.body.inverse_mass_matrix @ self.thruster_matrix
-        alike = 1 / jnp.sqrt(jnp.diagonal(self.body.mass_matrix))  # accelerations of the same kinetic energy
-        return BodyModel(
-            body=self.body,
-            thrusters=self.thruster.actuator_model(count, self.speed_sensor),
-            acceleration_per_thrust=effect,
-            allocation=partial_inverse(effect, alike, self.rank),
-            thrust_per_volt=jnp.broadcast_to(self.thruster.voltage_gain(), (count,)),
+        body, matrix = dynamics.body, dynamics.thruster_matrix
+        effect = body.inverse_mass_matrix @ matrix
+        alike = 1 / jnp.sqrt(jnp.diagonal(body.mass_matrix))  # accelerations of the same kinetic energy
+        return Model(
+            BodyDynamics(body, effect, partial_inverse(effect, alike, dynamics.rank)),
+            BodyCoordinates(),
+            dynamics.thruster.actuator_model(matrix.shape[1], dynamics.speed_sensor),
         )

@@ -10,6 +10,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core.errors import BadInput
+from undertow.core.signals import Signal
 from undertow.power import ledger as diagnostics
 from undertow.power.battery import Battery
 from undertow.power.esc import ESC
@@ -115,14 +116,14 @@ class HybridPower(eqx.Module):
             found |= diagnostics.columns(power.ledger, thruster.stored(state).sum(), cells)
         return found
 
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of `diagnostics`."""
+    def signals(self) -> dict[str, Signal]:
+        """Declarations of `diagnostics`."""
         battery = {
-            "bus_voltage": ("voltage of the bus under load", "V"),
-            "charge_drawn": ("charge drawn from the battery", "C"),
-            "state_of_charge": ("1 when the battery is full, 0 when empty", "1"),
+            "bus_voltage": Signal((), "V", "voltage of the bus under load"),
+            "charge_drawn": Signal((), "C", "charge drawn from the battery"),
+            "state_of_charge": Signal((), "1", "1 when the battery is full, 0 when empty"),
         }
-        energies = {name: (meaning, "J") for name, meaning in diagnostics.COLUMNS.items()}
+        energies = {name: Signal((), "J", meaning) for name, meaning in diagnostics.COLUMNS.items()}
         return (battery if self.battery is not None else {}) | (energies if self.ledger else {})
 
 

@@ -8,11 +8,14 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Pose
+from undertow.core.actuator_model import DirectActuator
+from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Model, Pose
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_pose
+from undertow.core.runtime import double_outside_runs
 from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_rate, rotation_from_quaternion
-from undertow.plants.hybrid_model import HybridModel
+from undertow.numerics.rotations import Kinematics, quaternion_rate, rotation_from_quaternion
+from undertow.plants.hybrid_model import EulerCoordinates, HybridDynamics
 from undertow.plants.hybrid_power import HybridPower, has_motor
 from undertow.plants.hybrid_state import VehicleState, state_at
 from undertow.plants.reachability import open_loop_advice
@@ -49,6 +52,7 @@ class HybridVehicle(AbstractPlant):
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True)
 
+    @double_outside_runs
     def __init__(
         self,
         vehicle: Vehicle,
@@ -81,13 +85,7 @@ class HybridVehicle(AbstractPlant):
         )
 
     def output(self, t, x: VehicleState) -> Measurement:
-        kinematics = Kinematics(rotation_from_quaternion(x.attitude))
-        angles = euler_from_rotation(kinematics.rotation)
-        return Measurement(
-            position=jnp.concatenate([x.position, angles]),
-            velocity=kinematics.to_world(x.nu),
-            actuator=self.thruster.report(x.thrusters),
-        )
+        return measurement_of_pose(x.position, x.attitude, x.nu, self.thruster.report(x.thrusters))
 
     def acceleration(self, t, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
         kinematics = Kinematics(rotation_from_quaternion(x.attitude))
@@ -99,6 +97,8 @@ class HybridVehicle(AbstractPlant):
         body = altered(self.body, d.scaling, d.payloads)
         thrust = self.thruster.thrust(x.thrusters, u)
         if d.scaling is not None:
+            if d.scaling.thrust.shape not in ((), thrust.shape):
+                raise BadInput("thrusters", f"be {thrust.size}, as the vehicle has", d.scaling.thrust.size)
             thrust = d.scaling.thrust * thrust
         wrench = matvec(self.thruster_matrix, thrust) - d.wrench
         prescribed = d.acceleration
@@ -121,8 +121,8 @@ class HybridVehicle(AbstractPlant):
     def diagnostics(self, x: VehicleState, u):
         return self.power.diagnostics(self.thruster, x.thrusters, x.power, u)
 
-    def columns(self):
-        return self.power.columns()
+    def signals(self):
+        return self.power.signals()
 
     def inputs(self) -> int:
         return self.vehicle.thrusters
@@ -147,7 +147,7 @@ class HybridVehicle(AbstractPlant):
         regularisation: float | None = None,
         vehicle: Vehicle | None = None,
         thruster: AbstractThruster | None = None,
-    ) -> HybridModel:
+    ) -> Model:
         """What a controller may know of this plant.
 
         Args:
@@ -172,7 +172,7 @@ class HybridVehicle(AbstractPlant):
             if still is None:  # thrusters without a speed to measure complain here, not in the loop
                 nominal.speed_term(still)
         gain, allocation = _static(told.body.inverse_mass_matrix, told.thruster_matrix, nominal.voltage_gain())
-        return HybridModel(
+        dynamics = HybridDynamics(
             body=told.body,
             thruster=nominal,
             thruster_matrix=told.thruster_matrix,
@@ -183,6 +183,7 @@ class HybridVehicle(AbstractPlant):
             speed_sensor=speed_sensor,
             rate_term=rate_term,
         )
+        return Model(dynamics, EulerCoordinates(), DirectActuator())
 
 
 @jax.jit

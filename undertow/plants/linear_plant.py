@@ -9,14 +9,15 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
-from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
+from undertow.core.coordinates import OutputCoordinates
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.inverses import pseudo_inverse
 from undertow.numerics.linear import matvec
+from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero
 from undertow.plants.nominal_parameters import nominal
-from undertow.plants.reachability import open_loop_advice
 
 _ENVELOPE = 1e6
 
@@ -54,16 +55,11 @@ class LinearState(NamedTuple):
     velocity: Float[Array, " n"]
 
 
-class LinearModel(AbstractModel):
+class LinearDynamics(AbstractDynamics):
     """The matrices that the controller was told of; G# is the Moore-Penrose inverse, whatever the rank."""
 
     system: LinearSystem
     allocation: Float[Array, "m n"]  # G+; constant, so nothing is factorised in the loop
-    actuator: DirectActuator
-    angles: tuple[bool, ...] = eqx.field(static=True)
-
-    def actuators(self) -> DirectActuator:
-        return self.actuator
 
     def drift(self, y: Measurement):
         return self.system.drift(y.position, y.velocity)
@@ -75,7 +71,7 @@ class LinearModel(AbstractModel):
         return matvec(self.allocation, acceleration)
 
 
-class LinearPlant(AbstractPlant):
+class LinearPlant(AbstractMechanism):
     """Coupled axes pushed by inputs of no unit; what lies outside the range of G stays in open loop."""
 
     system: LinearSystem
@@ -88,8 +84,8 @@ class LinearPlant(AbstractPlant):
         checks.not_negative("limit", self.limit, finite=False)
 
     def initial_state(self, position=None, velocity=None) -> LinearState:
-        zero = jnp.zeros(len(self.outputs))
-        return LinearState(zero if position is None else position, zero if velocity is None else velocity)
+        n = len(self.outputs)
+        return LinearState(given_or_zero(position, n), given_or_zero(velocity, n))
 
     def dynamics(self, t, x: LinearState, u, d: Load) -> LinearState:
         return LinearState(x.velocity, self.acceleration(t, x, u, d))
@@ -101,28 +97,18 @@ class LinearPlant(AbstractPlant):
         own = self.system.drift(x.position, x.velocity) + matvec(self.system.gain, u)
         return own + d.acceleration - d.wrench
 
-    def pose(self, x: LinearState) -> None:
-        return None
+    def limits(self):
+        return both_ways(self.limit, self.system.gain.shape[1])
 
-    def admissible(self, x: LinearState, u):
-        return jnp.clip(u, -self.limit, self.limit)
-
-    def effort(self, x: LinearState, u) -> Effort:
-        """Power given to unit masses: u_j times the velocity that it works along."""
-        power = u * matvec(self.system.gain.T, x.velocity)
-        return Effort(power, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
-
-    def inputs(self) -> int:
-        return self.system.gain.shape[1]
+    def power(self, x: LinearState, u):
+        """What is given to unit masses: u_j times the velocity that it works along."""
+        return u * matvec(self.system.gain.T, x.velocity)
 
     def status(self, x: LinearState) -> Array:
         far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
-    def advice(self) -> tuple[str, ...]:
-        return open_loop_advice("the gain matrix", self.system.gain, self.outputs)
-
-    def model(self, *, gain=None, position_term=None, velocity_term=None) -> LinearModel:
+    def model(self, *, gain=None, position_term=None, velocity_term=None) -> Model:
         """What a controller is told of this plant; what is not given is the truth.
 
         Args:
@@ -136,12 +122,9 @@ class LinearPlant(AbstractPlant):
         told = nominal(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
         if told.gain.shape != self.system.gain.shape:
             raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{told.gain.shape}")
-        return LinearModel(
-            system=told,
-            allocation=pseudo_inverse(told.gain),
-            actuator=DirectActuator(low=-self.limit, high=self.limit),
-            angles=(False,) * len(self.outputs),
-        )
+        coordinates = OutputCoordinates(angles=(False,) * len(self.outputs))
+        dynamics = LinearDynamics(told, pseudo_inverse(told.gain))
+        return Model(dynamics, coordinates, DirectActuator(1.0, *self.limits()))
 
 
 def linear_plant(

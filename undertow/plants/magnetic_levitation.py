@@ -8,9 +8,11 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
-from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
+from undertow.core.coordinates import OutputCoordinates
 from undertow.core.status import Status
 from undertow.plants.levitation_rig import RIGS, LevitationRig, PerCoil
+from undertow.plants.mechanism import AbstractMechanism, given_or_zero
 from undertow.plants.nominal_parameters import nominal
 
 FIDELITIES = ("ideal", "coil")
@@ -24,15 +26,10 @@ class LevitationState(NamedTuple):
     current: Float[Array, " coils"]
 
 
-class MagneticLevitationModel(AbstractModel):
+class SteadyCoils(AbstractDynamics):
     """F = g, G = the pull of each coil per squared current: the rig once its currents are where they should be."""
 
     rig: LevitationRig
-    actuator: DirectActuator
-    angles: tuple[bool, ...] = eqx.field(static=True, default=(False,))
-
-    def actuators(self) -> DirectActuator:
-        return self.actuator
 
     def drift(self, y: Measurement):
         return jnp.broadcast_to(self.rig.gravity, (1,))
@@ -45,7 +42,7 @@ class MagneticLevitationModel(AbstractModel):
         return jnp.maximum(acceleration / self.rig.pull(y.position), 0.0)
 
 
-class MagneticLevitation(AbstractPlant):
+class MagneticLevitation(AbstractMechanism):
     """z_ddot = g + pull(z) . I^2. The input is w, the squared current that each coil is asked for.
 
     A duty cycle U reaches the ball through I = k_i U + c_i, a lag, and I^2: neither affine nor of relative degree
@@ -67,9 +64,8 @@ class MagneticLevitation(AbstractPlant):
         checks.choice("fidelity", self.fidelity, FIDELITIES)
 
     def initial_state(self, position=None, velocity=None) -> LevitationState:
-        zero = jnp.zeros(1)
         rest = jnp.broadcast_to(self.rig.smallest_current, (2,)) if self.fidelity == "coil" else jnp.zeros(0)
-        return LevitationState(zero if position is None else position, zero if velocity is None else velocity, rest)
+        return LevitationState(given_or_zero(position, 1), given_or_zero(velocity, 1), rest)
 
     def dynamics(self, t, x: LevitationState, u, d: Load) -> LevitationState:
         steady = self.rig.current_gain * self.rig.duty(u) + self.rig.current_offset
@@ -86,26 +82,17 @@ class MagneticLevitation(AbstractPlant):
     def _squared_current(self, x: LevitationState, u) -> PerCoil:
         return x.current**2 if self.fidelity == "coil" else u
 
-    def pose(self, x: LevitationState) -> None:
-        return None
+    def limits(self):
+        low, high = self.rig.smallest_current**2, self.rig.largest_current**2
+        return jnp.broadcast_to(low, (2,)), jnp.broadcast_to(high, (2,))
 
-    def admissible(self, x: LevitationState, u):
-        return jnp.clip(u, self.rig.smallest_current**2, self.rig.largest_current**2)
-
-    def effort(self, x: LevitationState, u) -> Effort:
-        """Heat in the coils. A coil at rest is not counted as being at its limit."""
-        limited = u >= self.rig.largest_current**2
-        return Effort(power=self.rig.resistance * self._squared_current(x, u), saturated=limited.astype(u.dtype))
-
-    def inputs(self) -> int:
-        return 2
+    def power(self, x: LevitationState, u):
+        """Heat in the coils."""
+        return self.rig.resistance * self._squared_current(x, u)
 
     def status(self, x: LevitationState) -> Array:
         touching = ((x.z < 0) | (x.z > self.rig.travel)).any()
         return jnp.where(touching, int(Status.OUT_OF_RANGE), int(Status.OK))
-
-    def advice(self) -> tuple[str, ...]:
-        return ()
 
     def model(
         self,
@@ -114,7 +101,7 @@ class MagneticLevitation(AbstractPlant):
         force_factor: float | None = None,
         inductance: float | None = None,
         inductance_reach: float | None = None,
-    ) -> MagneticLevitationModel:
+    ) -> Model:
         """What a controller is told of this plant; what is not given is the truth. The lag it is never told of.
 
         Args:
@@ -125,8 +112,7 @@ class MagneticLevitation(AbstractPlant):
         """
         changed = {"inductance": inductance, "inductance_reach": inductance_reach}
         told = nominal(self.rig, mass=mass, force_factor=force_factor, **changed)
-        limits = DirectActuator(low=self.rig.smallest_current**2, high=self.rig.largest_current**2, at_once=False)
-        return MagneticLevitationModel(rig=told, actuator=limits)
+        return Model(SteadyCoils(told), OutputCoordinates((False,)), DirectActuator(1.0, *self.limits(), at_once=False))
 
 
 def magnetic_levitation(rig: str = "balko_rosinova", fidelity: str = "coil") -> MagneticLevitation:

@@ -8,11 +8,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.actuator_model import DirectActuator
-from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.contracts import Load, Measurement, Model
+from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.linear import matvec
 from undertow.plants.arm_links import Links
+from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero
 from undertow.plants.nominal_parameters import nominal
 
 _ENVELOPE = 1e3  # rad, rad/s
@@ -25,27 +27,7 @@ class ArmState(NamedTuple):
     rate: Float[Array, "2"]
 
 
-class TwoLinkArmModel(AbstractModel):
-    """F = -M^-1 (C q_dot + g), G = M^-1 of the links that the controller was told of."""
-
-    links: Links
-    actuator: DirectActuator
-    angles: tuple[bool, ...] = eqx.field(static=True, default=(True, True))
-
-    def actuators(self) -> DirectActuator:
-        return self.actuator
-
-    def drift(self, y: Measurement):
-        return self.links.drift(y.position, y.velocity)
-
-    def gain(self, y: Measurement):
-        return self.links.inverse_mass_matrix(y.position)
-
-    def invert(self, y: Measurement, acceleration):
-        return matvec(self.links.mass_matrix(y.position), acceleration)
-
-
-class TwoLinkArm(AbstractPlant):
+class TwoLinkArm(AbstractMechanism):
     """Shoulder and elbow, turned by torques; the elbow is measured from the inner link."""
 
     links: Links
@@ -55,8 +37,7 @@ class TwoLinkArm(AbstractPlant):
     input_unit: str = eqx.field(static=True, default="N m")
 
     def initial_state(self, position=None, velocity=None) -> ArmState:
-        zero = jnp.zeros(2)
-        return ArmState(zero if position is None else position, zero if velocity is None else velocity)
+        return ArmState(given_or_zero(position, 2), given_or_zero(velocity, 2))
 
     def dynamics(self, t, x: ArmState, u, d: Load) -> ArmState:
         return ArmState(x.rate, self.acceleration(t, x, u, d))
@@ -66,30 +47,21 @@ class TwoLinkArm(AbstractPlant):
 
     def acceleration(self, t, x: ArmState, u, d: Load):
         turned = matvec(self.links.inverse_mass_matrix(x.angle), u - d.wrench)
-        return self.links.drift(x.angle, x.rate) + turned + d.acceleration
+        return self.links.drift(self.output(t, x)) + turned + d.acceleration
 
-    def pose(self, x: ArmState) -> None:
-        return None
+    def limits(self):
+        return both_ways(self.limit, 2)
 
-    def admissible(self, x: ArmState, u):
-        return jnp.clip(u, -self.limit, self.limit)
-
-    def effort(self, x: ArmState, u) -> Effort:
-        return Effort(power=u * x.rate, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
-
-    def inputs(self) -> int:
-        return 2
+    def power(self, x: ArmState, u):
+        return u * x.rate
 
     def status(self, x: ArmState) -> Array:
         far = (jnp.abs(x.angle) > _ENVELOPE).any() | (jnp.abs(x.rate) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
-    def advice(self) -> tuple[str, ...]:
-        return ()
-
     def model(
         self, *, outer_mass: float | None = None, outer_centre: float | None = None, outer_offset: float | None = None
-    ) -> TwoLinkArmModel:
+    ) -> Model:
         """What a controller is told of this plant; what is not given is the truth.
 
         Args:
@@ -98,7 +70,7 @@ class TwoLinkArm(AbstractPlant):
             outer_offset: by how far that centre lags behind the link, rad.
         """
         told = nominal(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
-        return TwoLinkArmModel(links=told, actuator=DirectActuator(low=-self.limit, high=self.limit))
+        return Model(told, OutputCoordinates(angles=(True, True)), DirectActuator(1.0, *self.limits()))
 
 
 def two_link_arm(

@@ -67,7 +67,8 @@ def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     begun = from_start(known.linear, known.mean, *_start(known))
     signals = signals_within(known.mean, begun, known.around, (start, stop), every)
     forbidden = _forbidden(known.built.closed_loop.controller, signals)
-    return (None, forbidden) if forbidden else (metrics_of(signals), "")
+    units = known.built.closed_loop.plant.output_units
+    return (None, forbidden) if forbidden else (metrics_of(signals, units), "")
 
 
 def has_weights(built: Built) -> bool:
@@ -80,8 +81,7 @@ def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
     """A sentence where predicted signals exceed a bound of the controller; otherwise empty."""
     bounds: dict[str, tuple[str, Any]] = {}
     if isinstance(law, RCAF | RobustRCAF):
-        weights = law.weights_bound if isinstance(law, RCAF) else law.estimator.bound
-        bounds = {"robust": ("robust term", law.robust_gain), "estimate": ("estimate", weights)}
+        bounds = {"robust_term": ("robust term", law.robust_gain), "estimate": ("estimate", law.weights_bound)}
     for name, (meaning, bound) in bounds.items():
         share = np.abs(signals[name]) / np.maximum(np.asarray(bound, dtype=float), 1e-300)
         if share.max() > 1 and np.abs(signals[name]).max() > 0:

@@ -107,7 +107,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     law, names = loop.controller, loop.plant.outputs
     metrics, why_not = predicted(known)
     axes = range(len(names))
-    gains = np.asarray(law.model.gain(loop.plant.output(0.0, worst.parts.states(worst.at)[0])))
+    gains = np.asarray(law.model.dynamics.gain(loop.plant.output(0.0, worst.parts.states(worst.at)[0])))
     return Prediction(
         operating_point=known,
         points=points,
@@ -150,7 +150,8 @@ def _noise(known: OperatingPoint) -> Noise:
     dt, axes = known.linear.dt, known.around.load.shape[1]
     sampled = margins.closed(known.mean, dt)
     one = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
-    of_input, of_estimate = (margins.noise_gain(sampled, name, one) / _NOISE for name in ("u", "estimate"))
+    gain = lambda name: margins.noise_gain(sampled, name, one) / _NOISE
+    of_input, of_estimate = gain("u"), gain("estimate") if "estimate" in sampled.signals else np.zeros(axes)
     low, high = _limits(known.built, known.mean)
     room = np.minimum(high - known.mean.at["u"], known.mean.at["u"] - low)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -167,9 +168,13 @@ def _limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """|e / d| of each output, and |d_hat - d| / |d| of each axis of the controller, under a load on the same axis."""
-    answer = {name: margins.response(linear, name, frequency) for name in ("error", "estimate", "uncertainty")}
+    """|e / d| of each output, and |d_hat - d| / |d| of each axis of the controller, under a load on the same axis.
+
+    The estimate of a law that has none is zero.
+    """
+    answer = {name: margins.response(linear, name, frequency) for name in ("error", "uncertainty")}
+    estimate = margins.response(linear, "estimate", frequency) if "estimate" in linear.signals else 0.0
     into_axes = linear.direct["uncertainty"]["load"]  # a load on the outputs in the controller's axes
-    missed = (answer["estimate"] - answer["uncertainty"]) @ np.linalg.inv(into_axes)
+    missed = (estimate - answer["uncertainty"]) @ np.linalg.inv(into_axes)
     own = lambda matrices: np.abs(np.diagonal(matrices, axis1=1, axis2=2))
     return own(answer["error"]), own(missed)

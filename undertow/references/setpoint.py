@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.arrays import as_array
-from undertow.core.contracts import AbstractReference, Target
+from undertow.core.contracts import AbstractOpenReference, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.motion_laws import quintic, with_rates
@@ -41,7 +41,7 @@ class Transition(eqx.Module):
         return Target((1 - share) * start + share * goal, change * rate, change * second)
 
 
-class Setpoint(AbstractReference):
+class Setpoint(AbstractOpenReference):
     """The same position for ever, at rest; or from the end of a transition on.
 
     Raises:

@@ -51,7 +51,7 @@ def write_campaign(title: str, results: Results, found: Mapping[str, Any], folde
         section("status", "Status of the trials", *_endings(found)),
         *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(found)),
         section("metrics", "Distributions", plotted["distributions"], distributions(results, found)),
-        *_optional("sensitivity", "Sensitivity", plotted["sensitivity"], *_choices(found)),
+        *_optional("sensitivity", "Sensitivity", plotted["sensitivity"], *_choices(results, found)),
         section("worst", "The worst trials", _how(found), worst(results, found)),
         section("configuration", "Configuration", *asked(results)),
     )
@@ -68,8 +68,8 @@ def _endings(found: Mapping[str, Any]) -> list[Html]:
     return [ended, tag("p", "The following trials are invalid and did not run:"), bullets(errors)]
 
 
-def _choices(found: Mapping[str, Any]) -> list[Html]:
-    tables = by_choice(found)
+def _choices(results: Results, found: Mapping[str, Any]) -> list[Html]:
+    tables = by_choice(results, found)
     sentence = "Median [5 %, 95 %] of the completed trials for each choice, over all combinations."
     return [tag("p", prose(sentence)), *tables] if tables else []
 

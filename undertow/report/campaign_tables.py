@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from undertow.analysis.metrics import for_people
 from undertow.campaign.campaign_schema import Distribution
 from undertow.campaign.columns import ENDINGS
 from undertow.campaign.labels import words
@@ -12,7 +13,6 @@ from undertow.report.formats import chip, ending, number, prose, unit
 from undertow.report.page import Html, join, table, tag
 
 _DIGITS = 4
-_BY_CHOICE = ("tracking_rms", "input_rms")
 
 
 def named(combination: Mapping[str, Any]) -> str:
@@ -24,9 +24,11 @@ def named(combination: Mapping[str, Any]) -> str:
 
 
 def endings(found: Mapping[str, Any]) -> Html:
-    """Number of trials by status, one column per combination."""
+    """Number of trials by status and number of successes, one column per combination."""
     several = found["combinations"]
     rows = [(word, *(str(one["status"].get(word, 0)) for one in several)) for word in found["status"]]
+    if any(one["success"]["within"] or one["success"]["not_within"] for one in several):
+        rows.append(("within the criterion of success", *(str(one["success"]["within"]) for one in several)))
     head = ("trials", *map(named, several))
     return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 3)
 
@@ -61,22 +63,22 @@ def distributions(results: Results, found: Mapping[str, Any]) -> Html:
     names = dict.fromkeys(name for one in several for name in one["metrics"])
     rows = []
     for name in names:
-        cells = (_spread(one["metrics"].get(name)) for one in several)
-        rows.append((join(_metric(name), " ", unit(results.unit(name))), *cells))
+        cells = (_spread(results, name, one["metrics"].get(name)) for one in several)
+        rows.append((_headed(results, name), *cells))
     head = ("median [5 %, 95 %]", *map(named, several))
     return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 1)
 
 
-def by_choice(found: Mapping[str, Any]) -> list[Html]:
+def by_choice(results: Results, found: Mapping[str, Any]) -> list[Html]:
     """For each choice, a table of the median and the 5 % to 95 % range."""
-    tables = []
+    tables, shown = [], [*results.tracking, "input_rms"]
     for key, entries in found["choices"].items():
         rows = []
         for word, one in entries.items():
-            cells = (_spread(one["metrics"].get(name)) for name in _BY_CHOICE)
+            cells = (_spread(results, name, one["metrics"].get(name)) for name in shown)
             rows.append((word, str(one["trials"]), str(one["failed"]), *cells))
-        head = (prose(f"`{key}`"), "trials", "failed", *map(_metric, _BY_CHOICE))
-        tables.append(table(head, rows, numeric=(1, 2, 3, 4)))
+        head = (prose(f"`{key}`"), "trials", "failed", *(_headed(results, name) for name in shown))
+        tables.append(table(head, rows, numeric=range(1, len(head))))
     return tables
 
 
@@ -88,19 +90,20 @@ def worst(results: Results, found: Mapping[str, Any]) -> Html:
         sampled = [number(one, _DIGITS) if isinstance(one, float) else one for one in results.sampled(trial).values()]
         lasted = int(row["status"]) == int(Status.OK)
         how = ending({"status": ENDINGS[int(row["status"])], "diverged_at": None if lasted else float(row["ended"])})
-        error = number(float(row["tracking_rms"]) if lasted else None, _DIGITS)
-        rows.append((str(trial), how, error, *swept, *sampled))
-    keys = [prose(f"`{key}`") for key in (*results.campaign.cross, *results.campaign.vary)]
-    return table(("trial", "ended", "tracking rms", *keys), rows, numeric=(2,), wide=len(keys) > 1)
+        errors = [_shown(results, name, float(row[name]) if lasted else None) for name in results.tracking]
+        rows.append((str(trial), how, *errors, *swept, *sampled))
+    keys = [prose(f"`{key}`") for key in (*results.campaign.axes, *results.campaign.vary)]
+    heads = [_headed(results, name) for name in results.tracking]
+    return table(("trial", "ended", *heads, *keys), rows, numeric=range(2, 2 + len(heads)), wide=len(keys) > 1)
 
 
 def asked(results: Results) -> list[Html]:
     """The configuration: sampling, versions and the campaign file."""
     campaign, attributes = results.campaign, results.rows.attrs
     rows = [(prose(f"`{key}`"), prose(_words(spread))) for key, spread in campaign.vary.items()]
-    rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.cross.items()]
+    rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.axes.items()]
     sampling = f"{campaign.trials} samples ({campaign.design}), seed {campaign.seed}"
-    sampling += ", each for every combination below." if campaign.cross else "."
+    sampling += ", each for every combination below." if campaign.axes else "."
     versions = ", ".join(
         f"{key.removeprefix('version_')} {value}" for key, value in attributes.items() if key.startswith("version_")
     )
@@ -136,8 +139,17 @@ def _words(spread: Distribution) -> str:
     return "log-uniform, {:g} to {:g}".format(*(spread.log_uniform or ()))
 
 
-def _spread(quantiles: Mapping[str, float] | None) -> Html:
+def _headed(results: Results, name: str) -> Html:
+    """A metric and its unit; angles in degrees."""
+    return join(_metric(name), " ", unit(for_people(0.0, results.unit(name))[1]))
+
+
+def _shown(results: Results, name: str, value: float | None) -> Html:
+    return number(None if value is None else for_people(value, results.unit(name))[0], _DIGITS)
+
+
+def _spread(results: Results, name: str, quantiles: Mapping[str, float] | None) -> Html:
     if quantiles is None:
         return number(None)
-    low, middle, high = (number(value) for value in quantiles.values())
+    low, middle, high = (number(for_people(value, results.unit(name))[0]) for value in quantiles.values())
     return join(middle, " [", low, ", ", high, "]")

@@ -66,7 +66,7 @@ def condition(verdict: str) -> str:
 
 def ending(entry: dict[str, Any]) -> str:
     """Status of a run, with the time if it ended early."""
-    word, when = str(entry.get("status", "ok")).replace("_", " "), entry.get("diverged_at")
+    word, when = str(entry.get("status", "completed")).replace("_", " "), entry.get("diverged_at")
     return word if when is None else f"{word} at {when:.3g} s"
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.analysis.metric_meanings import unit_of
+from undertow.analysis.metrics import for_people
 from undertow.prediction.predict import Prediction
 
 
@@ -144,8 +144,11 @@ def _authority(prediction: Prediction) -> Rows:
 
 
 def _metrics(prediction: Prediction) -> Rows:
-    of_input = prediction.operating_point.built.closed_loop.plant.input_unit
-    rows = [(name, _number(value), unit_of(name, of_input)) for name, value in (prediction.metrics or {}).items()]
+    known = prediction.operating_point.built.known_metrics()
+    rows = []
+    for name, value in (prediction.metrics or {}).items():
+        shown, unit = for_people(value, known[name].unit)
+        rows.append((name, _number(shown), unit))
     return Rows(
         "Predicted metrics of the steady window",
         ("metric", "predicted", "unit"),

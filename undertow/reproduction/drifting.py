@@ -11,10 +11,9 @@ import numpy as np
 
 from undertow.analysis.drift import gain_bound, gain_of
 from undertow.analysis.motor_loop import lag_matrix, stable_gains
-from undertow.reproduction.batches import BatchResult, fly
-from undertow.reproduction.experiments import write_all
 from undertow.reproduction.horizons import BOUND
 from undertow.reproduction.lag_map import lag_thruster
+from undertow.reproduction.running import BatchResult, run_batches, write_all
 from undertow.reproduction.setup import law_of, scenario
 
 LAG = 0.05  # s
@@ -46,7 +45,7 @@ def shown(folder: Path) -> dict[str, Any]:
     """
     wanted = scenarios()
     write_all(wanted, folder)
-    found = fly(wanted, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "voltage", "error"))
+    found = run_batches(wanted, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"))
     law = law_of(found["drifting_free"])
     between = stable_gains(lambda gain: lag_matrix(law, LAG, drifted=gain), 6000.0)
     runs = {name.removeprefix("drifting_"): _curves(run) for name, run in found.items()}
@@ -58,7 +57,7 @@ def _curves(run: BatchResult) -> dict[str, Any]:
     """Every series at the ends of the bins."""
     gain = gain_of(law_of(run), run.series["weights"])
     ends = np.arange(_BIN, len(run.time), _BIN)
-    moved = np.abs(np.diff(run.series["voltage"], axis=0)).mean(1)
+    moved = np.abs(np.diff(run.series["input"], axis=0)).mean(1)
     size = np.sqrt((run.series["error"] ** 2).mean(1))
     return {
         "time": run.time[ends].tolist(),

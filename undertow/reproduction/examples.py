@@ -1,4 +1,4 @@
-"""The paper's two examples, Table 2 in numbers, and the fidelity ladder: what is run, and what is reported."""
+"""The paper's two examples, Table 2 in numbers, and every fidelity: what is run, and what is reported."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 from undertow.analysis.drift import gain_of
 from undertow.analysis.motor_loop import motor_matrix, rightmost
 from undertow.core.status import Status
+from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import CONTROLLERS, FIDELITIES, law_of, motor_of, scenario
 from undertow.scenario.execute import Executed
 
@@ -43,7 +44,7 @@ def table2(runs: Mapping[str, Executed]) -> dict[str, Any]:
     return table
 
 
-def ladder(runs: Mapping[str, Executed]) -> dict[str, Any]:
+def fidelity(runs: Mapping[str, Executed]) -> dict[str, Any]:
     """Both controllers at Table 1 gains on every fidelity: how it ended, when, and why."""
     return {
         fidelity: {
@@ -64,8 +65,8 @@ def _metrics(run: Executed) -> dict[str, Any]:
         "status": run.status.word,
         "diverged_at": float(run.outcome.ended) if failed else None,
         "simulated_s": float(run.outcome.ended),
-        "steady": run.steady,
-        "whole": run.whole,
+        "steady": with_all_outputs(run.steady),
+        "whole": with_all_outputs(run.whole),
     }
 
 
@@ -85,7 +86,7 @@ def _why(runs: Mapping[str, Executed], fidelity: str, controller: str) -> str:
     if growth[worst] < 0:
         return (
             f"At fixed weights the linearised loop is stable from 2 to 60 rad/s: rightmost eigenvalue "
-            f"{growth[worst]:+.2f} 1/s {at}. That says nothing of weights that drift: see the long ladder."
+            f"{growth[worst]:+.2f} 1/s {at}. That says nothing of weights that drift: see the long runs."
         )
     number = sum(value > 0 for value in growth)
     rate = f"{growth[worst]:+.1f} 1/s, {abs(modes[worst].imag):.0f} rad/s, {at}"

@@ -1,4 +1,4 @@
-"""The second horizon of the ladder: 2,000 s of suite U2, because 20 s show nothing of weights that drift.
+"""the second horizon of the fidelities: 2,000 s of suite U2, because 20 s show nothing of weights that drift.
 
 All runs are sampled at 1 kHz, for the paper's laws as they are and with their weights projected into a box.
 """
@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from undertow.reproduction.batches import BatchResult
-from undertow.reproduction.matching import equal_gain
-from undertow.reproduction.setup import FIDELITIES, RAFC, RCAFC, scenario
+from undertow.reproduction.running import BatchResult
+from undertow.reproduction.setup import FIDELITIES, RAFC, RCAFC, equal_gain, scenario
 
 LONG, QUICK = 2000.0, 200.0  # s
 
@@ -46,21 +45,21 @@ def sampled(seconds: float, substeps: int = 1) -> dict[str, Any]:
 
 
 def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
-    """Every run of the long ladder, by name."""
+    """Every long run, by name."""
     return {name: one for name, (_, one) in _runs(quick).items()}
 
 
 def table(long: Long, quick: bool) -> list[dict[str, Any]]:
     """One row per run: how long it lasted; tracking, chattering and weights in every window that it lived to see."""
-    return [described(name, told, long[name]) for name, (told, _) in _runs(quick).items()]
+    return [described(name, facts, long[name]) for name, (facts, _) in _runs(quick).items()]
 
 
-def described(name: str, told: dict[str, Any], run: BatchResult) -> dict[str, Any]:
-    """A row of results.json: what was told about a run, how it ended, metrics by window, growth of its weights."""
+def described(name: str, facts: dict[str, Any], run: BatchResult) -> dict[str, Any]:
+    """A row of results.json: what is said of a run, how it ended, metrics by window, growth of its weights."""
     over = lambda metric: [None if found is None else found[metric] for found in run.windows]
     peaks = run.series["weights_peak"]
     kept = np.unique(np.geomspace(1, max(len(peaks) - 1, 1), _KEPT).round().astype(int)) if len(peaks) > 1 else [0]
-    return told | {
+    return facts | {
         "scenario": f"scenarios/{name}.yaml",
         "status": run.status.word,
         "ended": run.ended,
@@ -74,7 +73,7 @@ def described(name: str, told: dict[str, Any], run: BatchResult) -> dict[str, An
 
 
 def name_of(level: str, law: str, bounded: bool = False) -> str:
-    """Of a run of the long ladder."""
+    """Of a long run."""
     return f"long_{level}_{law}{'_bounded' if bounded else ''}"
 
 
@@ -95,13 +94,13 @@ def _runs(quick: bool) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
             for bounded in (False, True):
                 name = name_of(level, law, bounded)
                 words_too = f"{words}, weights within {BOUND:g}" if bounded else words
-                told = {"level": level, "law": law, "words": words_too, "composite": composite, "bounded": bounded}
-                found[name] = (told, _scenario(words_too, level, quick, composite, gains, bounded))
+                facts = {"level": level, "law": law, "words": words_too, "composite": composite, "bounded": bounded}
+                found[name] = (facts, _scenario(words_too, level, quick, composite, gains, bounded))
         if not quick:
             name = name_of(level, "robust")
-            told = {"level": level, "law": "robust", "words": "robust", "composite": None, "bounded": True}
+            facts = {"level": level, "law": "robust", "words": "robust", "composite": None, "bounded": True}
             one = _scenario("preset robust", level, quick, 0.0, {}, False)
-            found[name] = (told, one | {"controller": {"kind": "rcaf", "preset": "robust"}})
+            found[name] = (facts, one | {"controller": {"kind": "rcaf", "preset": "robust"}})
     return found
 
 

@@ -3,10 +3,9 @@
 from typing import Any
 
 from undertow.analysis.motor_loop import lag_matrix, motor_matrix, stable_gains
-from undertow.reproduction.batches import BatchResult
 from undertow.reproduction.horizons import Long, described, duration, sampled
-from undertow.reproduction.matching import same_loop_gain
-from undertow.reproduction.setup import law_of, motor_of, scenario
+from undertow.reproduction.running import BatchResult
+from undertow.reproduction.setup import law_of, motor_of, same_loop_gain, scenario
 
 _THRUST_PER_VOLT = 17.107  # N/V, alpha of Eq. (15)
 _LAGS = (0.001, 0.005, 0.01, 0.02, 0.05, 0.1, 0.15, 0.3)  # s
@@ -45,8 +44,8 @@ def table(long: Long, quick: bool) -> list[dict[str, Any]]:
             between = damping(kind, value, long)
             for law, (words, _) in _laws(quick).items():
                 name = _name(kind, value, law)
-                told = {"kind": kind, "value": value, "law": law, "words": words}
-                rows.append(described(name, told, long[name]) | {"damping": between})
+                facts = {"kind": kind, "value": value, "law": law, "words": words}
+                rows.append(described(name, facts, long[name]) | {"damping": between})
     return rows
 
 

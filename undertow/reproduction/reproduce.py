@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from undertow.reproduction import claims, drifting, examples, horizons, lag_map
-from undertow.reproduction.batches import start
-from undertow.reproduction.experiments import run_all, write_all
 from undertow.reproduction.robust_variant.chapter import chapter
+from undertow.reproduction.running import run_all, start, write_all
 from undertow.reproduction.setup import CONTROLLERS
 from undertow.reproduction.thruster_response import ThrusterResponse, thruster_response
 from undertow.scenario.execute import Executed
@@ -34,28 +33,28 @@ class Reproduction(NamedTuple):
     response: ThrusterResponse
 
     def datasets(self, fidelity: str) -> dict[str, xr.Dataset]:
-        """Recorded series on a fidelity of the ladder, by controller. Examples 1 and 2 are `ideal` and `static`."""
+        """Recorded series on a fidelity, by controller. Examples 1 and 2 are `ideal` and `static`."""
         return {name: self.runs[f"{fidelity}_{name}"].dataset for name in CONTROLLERS}
 
 
-def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True) -> Reproduction:
+def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: bool = True) -> Reproduction:
     """Run the paper and audit it; writes `runs/`, `scenarios/` and `results.json` into a folder.
 
     Args:
         folder: an existing, empty folder.
         quick: fewer points in the sweeps and a long horizon of 200 s, not 2,000 s; the same accuracy.
         progress: told a message and the share done.
-        sound: whether to run the last chapter, the sound version beside the paper's.
+        robust_variant: whether to run the last chapter, the robust variant beside the paper's.
     """
     wanted = examples.scenarios() | claims.scenarios(quick)
     batched = horizons.scenarios(quick) | lag_map.scenarios(quick) | claims.batched(quick)
     write_all(batched, folder)
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         try:
-            flying = start(batched, horizons.windows(quick), 1.0, ("weights_peak",), pool)
+            running_batches = start(batched, horizons.windows(quick), 1.0, ("weights_peak",), pool)
             runs = run_all(wanted, folder, lambda message, share: progress(message, _PAPER * share))
-            progress(f"{horizons.duration(quick):g} s of the ladder", _PAPER)
-            long = flying()
+            progress(f"{horizons.duration(quick):g} s on every fidelity", _PAPER)
+            long = running_batches()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -65,7 +64,7 @@ def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True)
         "example1": examples.example(runs, 1),
         "example2": examples.example(runs, 2),
         "table2": examples.table2(runs),
-        "fidelity": examples.ladder(runs),
+        "fidelity": examples.fidelity(runs),
         "horizons": {
             "duration": horizons.duration(quick),
             "windows": horizons.windows(quick),
@@ -75,7 +74,7 @@ def reproduce(folder: Path, quick: bool, progress: Progress, sound: bool = True)
         "drifting": drifting.shown(folder),
         "claims": claims.audit(runs, long),
     }
-    if sound:
+    if robust_variant:
         last = chapter(folder, quick, lambda message, share: progress(message, _LONG + (_RUNNING - _LONG) * share))
         results["robust_variant"], runs = last.results, runs | last.runs
     (folder / "results.json").write_text(to_json(results, indent=1) + "\n", encoding="utf-8")

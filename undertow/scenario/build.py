@@ -6,9 +6,13 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
+from undertow.analysis.metrics import meanings
+from undertow.analysis.success import criterion_of
 from undertow.core import runtime
+from undertow.core.arrays import in_present_precision
 from undertow.core.catalogue import KIND_OF
-from undertow.core.contracts import AbstractDisturbance
+from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation
+from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
@@ -46,6 +50,7 @@ class Built(NamedTuple):
     closed_loop: ClosedLoop
     scenario: Scenario
     resolved: dict[str, Any]  # the scenario with every default filled in
+    metrics: tuple[AbstractMetric, ...]  # the scenario's own
 
     @in_its_precision
     def advice(self) -> tuple[str, ...]:
@@ -61,6 +66,14 @@ class Built(NamedTuple):
             times += (f"float32 cannot distinguish instants beyond {limit}",)
         return plant.advice() + fast + times + ((late,) if start >= end else ())
 
+    def known_metrics(self) -> dict[str, Metric]:
+        """Metrics that its runs may have, by name, with their units."""
+        return meanings(self.closed_loop, self.metrics)
+
+    def criterion(self) -> dict[str, float]:
+        """What success is judged by: metric -> what it must stay below in the steady window."""
+        return criterion_of(self.scenario.success, self.known_metrics())
+
     def window(self) -> tuple[float, float]:
         """Start and stop of the steady metrics, s."""
         return self.scenario.steady.of_run(self.scenario.loop.duration)
@@ -68,6 +81,8 @@ class Built(NamedTuple):
 
 def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None) -> Built:
     """Build the objects of a scenario on the CPU, so that the result does not depend on a GPU.
+
+    They are made in double precision and then converted to the one that the scenario names.
 
     Args:
         source: a scenario as read from a file, or as Python data.
@@ -78,8 +93,11 @@ def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None)
     """
     text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
-    with runtime.on_processor(), runtime.in_precision(scenario.precision):
-        return _build(text, scenario, part_cache or PartCache())
+    with runtime.on_processor():
+        with runtime.in_precision("float64"):
+            built = _build(text, scenario, part_cache or PartCache())
+        with runtime.in_precision(scenario.precision):
+            return built._replace(closed_loop=in_present_precision(built.closed_loop))
 
 
 def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
@@ -110,7 +128,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
     model, resolved["model"] = placed(text, "model", lambda: part_cache.part("model", scenario.model, (plant,), known))
     navigation = make("navigation")
-    context["velocity_noise"] = np.asarray(navigation.velocity_noise(scenario.loop.dt)).tolist()
+    noise = isinstance(navigation, AbstractInformedNavigation) and navigation.velocity_noise(scenario.loop.dt)
+    context["velocity_noise"] = np.asarray(noise, dtype=float).tolist()
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
     resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario
@@ -119,4 +138,10 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     check_times(text, scenario.loop, scenario.steady)
     shape = (loop, [value and len(value) for _, value in scenario.initial])
     part_cache.check_once(shape, lambda: check_fit(text, loop, scenario.initial))
-    return Built(loop.starting_at(scenario.initial.position), scenario, resolved)
+    several = [one("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
+    if several:
+        resolved["metrics"] = [description for _, description in several]
+    built = Built(loop.starting_at(scenario.initial.position), scenario, resolved, tuple(part for part, _ in several))
+    placed(text, "controller.signals", loop.signals)
+    criterion = placed(text, "success", built.criterion)
+    return built._replace(resolved=resolved | {"success": criterion})

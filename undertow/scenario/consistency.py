@@ -107,6 +107,9 @@ def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
     if any(signal.shape != (axes,) for signal in load[:2]):
         got = f"of shapes {[signal.shape for signal in load[:2]]}"
         raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
+    rest = jnp.zeros(loop.plant.inputs())
+    moved = lambda realization, x: loop.plant.dynamics(zero, x, rest, realization.load(zero, x))
+    _traced(text, "disturbance", moved, realization, x)
     _traced(
         text,
         "controller",

@@ -11,6 +11,8 @@ import equinox as eqx
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.param import Parameter, parameters
+from undertow.core.signals import Signal
+from undertow.plants.double_integrator import double_integrator
 from undertow.scenario import factory
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 
@@ -32,6 +34,7 @@ class Description(NamedTuple):
     options: tuple[Option, ...]
     parameters: tuple[Parameter, ...]
     advice: tuple[str, ...]
+    signals: dict[str, Signal]  # that it records
 
 
 def describe(name: str) -> tuple[Description, ...]:
@@ -45,7 +48,7 @@ def describe(name: str) -> tuple[Description, ...]:
     """
     if is_vehicle_file(name):
         found = read_vehicle(Path(name), what="NAME")
-        return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), ()),)
+        return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), (), {}),)
     if ".py:" in name:
         try:
             return (_describe("", name, catalogue.find("", name)),)
@@ -58,7 +61,7 @@ def describe(name: str) -> tuple[Description, ...]:
     found = tuple(one for kind, part in named for one in _presets(kind, short, part))
     if not found:
         every = {part for parts_of_kind in known.values() for part in parts_of_kind}
-        raise BadInput("NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "metrics"}))
+        raise BadInput("NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "metrics", "signals"}))
     return found
 
 
@@ -92,6 +95,7 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
         options=_options(kind, part),
         parameters=tuple(parameters(shown)) if described else (),
         advice=advise(),
+        signals=_signals(kind, description or name, instance),
     )
 
 
@@ -101,6 +105,16 @@ def _instance(kind: str, name: Any, part: Any) -> Any:
         return factory.make(kind, name, Path())[0] if kind else part()
     except Exception:
         return None
+
+
+def _signals(kind: str, name: Any, instance: Any) -> dict[str, Signal]:
+    """What the part records beside what every run does; of a law, as it is made for one axis."""
+    if kind == "controllers":
+        try:
+            instance = factory.make(kind, name, Path(), (double_integrator().model(),))[0]
+        except Exception:
+            return {}
+    return getattr(instance, "signals", dict)()
 
 
 def _prose(part: Any) -> str:

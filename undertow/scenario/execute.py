@@ -10,8 +10,8 @@ import jax
 import numpy as np
 import xarray as xr
 
-from simdjit.errors import Unsupported
-from undertow.analysis.metrics import Metrics
+from undertow.analysis.metrics import accumulators
+from undertow.analysis.success import Success
 from undertow.core import runtime
 from undertow.core.status import Status
 from undertow.loop import continuous, sampled, simd_batch
@@ -21,7 +21,7 @@ from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
-from undertow.scenario.results import label
+from undertow.scenario.results import Measuring, label
 from undertow.scenario.schema import Initial, Loop
 from undertow.scenario.step_size import step_failure
 
@@ -34,6 +34,7 @@ class Executed(NamedTuple):
     status: Status
     steady: dict[str, Any] | None  # metrics over the steady window; None when the run ended early
     whole: dict[str, Any]
+    success: Success | None  # None without a criterion
     dataset: xr.Dataset
 
 
@@ -53,7 +54,8 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
 @in_its_precision
 def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
-    gathered = (Metrics(*built.window()),) if scenario.steady.every_step else ()
+    plant = built.closed_loop.plant
+    gathered = accumulators(plant, built.metrics, *built.window()) if scenario.steady.every_step else ()
     outcome, left_to_xla = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
     why = step_failure(built.closed_loop, scenario.loop, outcome)
     attributes = (
@@ -67,7 +69,8 @@ def _execute(built: Built) -> Executed:
             "seed": scenario.seed,
         }
     )
-    finished = label(built.closed_loop, outcome, built.window(), scenario.loop.dt, attributes)
+    how = Measuring(built.window(), scenario.loop.dt, built.metrics, built.criterion(), gathered)
+    finished = label(built.closed_loop, outcome, how, attributes)
     return Executed(built, outcome, *finished)
 
 
@@ -81,14 +84,15 @@ def run_loop(
     """Run a closed loop with the keys `loop` and `initial` of a scenario; `accumulators` are for a sampled loop.
 
     Returns:
-        The outcome; and attribute `left_to_xla` of its dataset, the reason why the SIMD backend could not be used.
+        The outcome, in NumPy arrays; and attribute `left_to_xla` of its dataset, the reason why the SIMD backend could
+        not be used.
     """
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
     common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
     if settings.kind == "continuous":
         adaptive = (settings.rtol, settings.atol) if settings.method == "adaptive" else None
         outcome = continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
-        return jax.block_until_ready(outcome), {}
+        return jax.device_get(outcome), {}
     common |= {
         "dt": settings.dt,
         "record_every": round(settings.record / settings.dt),
@@ -100,9 +104,9 @@ def run_loop(
     if settings.backend == "simd":
         try:
             return simd_batch.simulate(loop, **common), {}
-        except Unsupported as error:
+        except simd_batch.Unsupported as error:
             lacking = {"left_to_xla": str(error)}
-    return jax.block_until_ready(sampled.simulate(loop, **common)), lacking
+    return jax.device_get(sampled.simulate(loop, **common)), lacking
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

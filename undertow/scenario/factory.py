@@ -12,7 +12,8 @@ import numpy as np
 
 from undertow.core import catalogue, checks, contracts
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.core.user_code import python_says
+from undertow.core.metric import AbstractMetric
+from undertow.core.user_code import fault_of
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
 from undertow.scenario.values import checked
@@ -43,6 +44,7 @@ _CONTRACTS = {
     "references": contracts.AbstractReference,
     "sensors": AbstractSensor,
     "navigation": contracts.AbstractNavigation,
+    "metrics": AbstractMetric,
 }
 
 _VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
@@ -169,6 +171,16 @@ def is_part(thing: Any) -> bool:
     return isinstance(thing, tuple(_CONTRACTS.values()))
 
 
+def contract_like(thing: Any) -> tuple[str, list[str]]:
+    """Name of the contract of which something has most methods, and these; "" where it has none of any."""
+    kinds = [kind for contract in _CONTRACTS.values() for kind in typing.get_args(contract) or (contract,)]
+    shared = {
+        kind: [name for name in getattr(kind, "__abstractmethods__", ()) if hasattr(thing, name)] for kind in kinds
+    }
+    nearest = max(kinds, key=lambda kind: len(shared[kind]))
+    return (nearest.__name__ if shared[nearest] else ""), sorted(shared[nearest])
+
+
 def _preset(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Callable[..., Any], dict[str, str]]:
     """The function of the preset in the options, by default the first; and its name."""
     presets = presets_of(function)
@@ -203,7 +215,8 @@ def _made(make: Callable[[], Any]) -> Any:
     except BadInput:
         raise
     except Exception as error:
-        raise BadInput("", "be something that can be made", f"not: {python_says(error)}") from error
+        fault = fault_of(error)
+        raise BadInput("", "", fault.says, hint=fault.hint) from error
 
 
 def inner_default(name: str, parameter: inspect.Parameter) -> Any:
@@ -211,7 +224,7 @@ def inner_default(name: str, parameter: inspect.Parameter) -> Any:
     return INNER[name][1] if parameter.default is inspect.Parameter.empty else parameter.default
 
 
-def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[str, Any]]:
+def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[str, Any] | list[dict[str, Any]]]:
     kind, default = INNER[name]
     if isinstance(default, tuple):
         if not isinstance(description, list | tuple):

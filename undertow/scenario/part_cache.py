@@ -18,7 +18,7 @@ class PartCache:
         self._checked: set[Any] = set()
 
     def part(self, where: str, description: Mapping[str, Any], given: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """Result of `make`, cached by description, other parts and precision.
+        """Result of `make`, cached by description and other parts.
 
         Args:
             where: key of the part.
@@ -30,8 +30,7 @@ class PartCache:
             text = json.dumps(description, sort_keys=True)
         except (TypeError, ValueError):  # arrays in Python data
             return make()
-        double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
-        key = (where, text, double, tuple(id(part) for part in given))
+        key = (where, text, tuple(id(part) for part in given))
         if key not in self._made:
             if len(self._made) >= _MOST:
                 self._made.clear()

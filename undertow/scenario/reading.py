@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import xarray as xr
-from ruamel.yaml import YAML
 
 from undertow.core.errors import BadInput
 from undertow.core.user_code import python_says
 from undertow.scenario.foreign_code import check_allowed
 from undertow.scenario.provenance import checksum
-from undertow.scenario.yaml_text import Path_, load
+
+Path_ = tuple[str | int, ...]
 
 
 class Text(NamedTuple):
@@ -69,6 +69,8 @@ def read(path: Path, what: str = "SCENARIO", allow_code: bool = False) -> Text:
 
 def dump(data: Mapping[str, Any]) -> str:
     """Data as YAML text that reads back to the same data."""
+    from ruamel.yaml import YAML
+
     stream = io.StringIO()
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
@@ -108,6 +110,8 @@ def parse(text: str, name: str, folder: Path, what: str) -> Text:
     Raises:
         BadInput: malformed.
     """
+    from undertow.scenario.yaml_text import load  # what it imports adds filters of warnings to the process
+
     data, lines = load(text, name, what)
     if not isinstance(data, dict):
         got = "empty" if data is None else "a list" if isinstance(data, list) else f"a single {type(data).__name__}"

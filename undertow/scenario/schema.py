@@ -160,6 +160,14 @@ class Scenario(Strict):
     loop: Loop = Field(default_factory=Loop, description="settings of the simulation")
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")
     steady: Window = Field(default_factory=Window, description="window of the steady metrics")
+    metrics: list[NamedPart] = Field(
+        default_factory=list, description="further metrics, each ./file.py:function that returns an AbstractMetric"
+    )
+    success: dict[str, float] | None = Field(
+        None,
+        description="metric -> what it must stay below in the steady window; position_rms 0.05 m and attitude_rms "
+        "0.05 rad unless given",
+    )
     tune: Tune = Field(default_factory=Tune, description="settings of `undertow tune`")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all random numbers")
     precision: Literal["float64", "float32"] = Field("float64", description="precision of all arithmetic")
@@ -259,6 +267,7 @@ def _type_name(annotation: Any) -> str:
         Numbers | None: "list of numbers",
         float | None: "number",
         list[str] | None: "list of names",
+        list[NamedPart]: "list of parts",
         typing.get_args(OneOrMore)[0]: "part or list of parts",
     }
     return words.get(annotation, "mapping")

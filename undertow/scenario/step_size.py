@@ -82,27 +82,27 @@ def step_failure(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> str:
 def _decays(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> list[float]:
     """Fastest decay rates at some records, 1/s, without those where the fastest mode grows."""
     plant, samples = closed_loop.plant, outcome.signals
-    ordinary = np.abs(np.asarray(samples.velocity)).max(axis=1) <= _ordinary(closed_loop, outcome)
+    ordinary = np.abs(np.asarray(samples["velocity"])).max(axis=1) <= _ordinary(closed_loop, outcome)
     rows = np.flatnonzero(ordinary & (np.asarray(outcome.time) <= float(outcome.ended)))
     chosen = rows[np.unique(np.linspace(0, len(rows) - 1, _LOOKS).round().astype(int))] if len(rows) else []
-    first = plant.initial_state(samples.position[0], samples.velocity[0])
+    first = plant.initial_state(samples["position"][0], samples["velocity"][0])
     if loop.kind == "continuous":
         realization = closed_loop.realize(jax.random.PRNGKey(0))
-        flat, tree = ravel_pytree(realization.start(samples.position[0], samples.velocity[0]))
+        flat, tree = ravel_pytree(realization.start(samples["position"][0], samples["velocity"][0]))
         rates = lambda state: ravel_pytree(flow(jnp.zeros(()), tree(state), realization))[0]
         return _fastest(rates, [(flat,)])
     _, tree = ravel_pytree(first)
     still = plant.no_load()
     rates = lambda state, u: ravel_pytree(plant.dynamics(jnp.zeros(()), tree(state), u, still))[0]
-    states = [ravel_pytree(plant.initial_state(samples.position[i], samples.velocity[i]))[0] for i in chosen]
-    return _fastest(rates, [(state, samples.voltage[i]) for state, i in zip(states, chosen, strict=True)])
+    states = [ravel_pytree(plant.initial_state(samples["position"][i], samples["velocity"][i]))[0] for i in chosen]
+    return _fastest(rates, [(state, samples["input"][i]) for state, i in zip(states, chosen, strict=True)])
 
 
 def _ordinary(closed_loop: ClosedLoop, outcome: Outcome) -> float:
     """Largest usual speed, m/s or rad/s: a few times that of the reference or of the start."""
     times = np.linspace(0.0, float(outcome.ended), _LOOKS)
     desired = np.abs([np.asarray(closed_loop.reference.at(jnp.asarray(t)).velocity) for t in times]).max()
-    return max(1.0, 3 * float(desired), 1.5 * float(np.abs(np.asarray(outcome.signals.velocity[0])).max()))
+    return max(1.0, 3 * float(desired), 1.5 * float(np.abs(np.asarray(outcome.signals["velocity"][0])).max()))
 
 
 def _fastest(rates: Callable[..., Any], points: list[tuple[Any, ...]]) -> list[float]:

@@ -5,10 +5,10 @@ import jax.numpy as jnp
 from undertow.numerics.linear import matvec
 from undertow.sensors.estimate import Estimate, Motion
 from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractVelocitySensor
 
 
-class DVL(AbstractSensor):
+class DVL(AbstractVelocitySensor):
     """u, v, w over the ground, m/s."""
 
     def reading(self, motion: Motion):

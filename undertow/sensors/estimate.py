@@ -7,16 +7,15 @@ from jaxtyping import Array, Float
 
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement
+from undertow.core.measurement import body_of, measurement_of_pose
 from undertow.numerics.linear import matvec
 from undertow.numerics.rotations import (
-    Kinematics,
     Matrix3,
     Quaternion,
     Vector3,
     euler_from_rotation,
     quaternion_from_euler,
     quaternion_rate,
-    rotation_from_euler,
     rotation_from_quaternion,
 )
 from undertow.sensors.sampling import Sampling
@@ -51,10 +50,8 @@ class Estimate(NamedTuple):
 
     def measurement(self) -> Measurement:
         """Outputs of the plant and their rates, as a controller wants them."""
-        rotation = self.rotation()
-        nu = jnp.concatenate([matvec(rotation.T, self.velocity), self.rates])
-        position = jnp.concatenate([self.position, euler_from_rotation(rotation)])
-        return Measurement(position, Kinematics(rotation).to_world(nu), self.actuator)
+        nu = jnp.concatenate([matvec(self.rotation().T, self.velocity), self.rates])
+        return measurement_of_pose(self.position, self.attitude, nu, self.actuator)
 
     def predicted(self, elapsed: Float[Array, ""]) -> "Estimate":
         """The same a while later (s), with rates and acceleration as they are."""
@@ -102,17 +99,15 @@ def motion_of(truth: Measurement, velocity_before: Vector3, elapsed) -> Motion:
         velocity_before: of the body in the world at the instant before, m/s.
         elapsed: since then, s; zero at the start.
     """
-    angles = truth.position[3:]
-    rotation = rotation_from_euler(angles)
-    rates = Kinematics(rotation).to_body(truth.velocity)[3:]
-    velocity = truth.velocity[:3]
+    body, velocity = body_of(truth), truth.velocity[:3]
     acceleration = jnp.where(elapsed > 0, (velocity - velocity_before) / jnp.where(elapsed > 0, elapsed, 1.0), 0.0)
-    force = matvec(rotation.T, acceleration - gravity())
-    return Motion(truth.position[:3], angles, rotation, velocity, rates, force, truth.actuator)
+    force = matvec(body.rotation.T, acceleration - gravity())
+    return Motion(truth.position[:3], truth.position[3:], body.rotation, velocity, body.nu[3:], force, truth.actuator)
 
 
 def estimate_of(truth: Measurement) -> Estimate:
     """The truth as a belief: what a vehicle knows when it is put into the water."""
     motion = motion_of(truth, truth.velocity[:3], jnp.zeros(()))
-    attitude = quaternion_from_euler(motion.angles)
-    return Estimate(motion.position, attitude, motion.velocity, motion.rates, jnp.zeros(3), motion.actuator)
+    return Estimate(
+        motion.position, body_of(truth).attitude, motion.velocity, motion.rates, jnp.zeros(3), motion.actuator
+    )

@@ -6,10 +6,10 @@ import numpy as np
 from undertow.numerics.linear import matvec
 from undertow.sensors.estimate import Estimate, Motion, gravity
 from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractVelocitySensor
 
 
-class IMU(AbstractSensor):
+class IMU(AbstractVelocitySensor):
     """Roll, pitch (rad), p, q, r (rad/s), specific force (m/s^2, body axes, the mean since the last step)."""
 
     def reading(self, motion: Motion):

@@ -3,7 +3,6 @@
 import abc
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -32,14 +31,14 @@ class AbstractSensor(eqx.Module):
     def reading(self, motion: Motion) -> Reading:
         """What it would read without any error."""
 
-    def velocity_noise(self) -> Float[Array, "6"]:
-        """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for what it does not read."""
-        return jnp.full(6, jnp.inf)
-
-    def predict(self, estimate: Estimate, reading: Reading) -> Estimate:
-        """Estimate with what this reading says about the time since the last one; before the prediction."""
-        return estimate
-
     @abc.abstractmethod
     def correct(self, estimate: Estimate, reading: Reading) -> Estimate:
         """Estimate after a reading that was taken `sampling.delay` ago; after the prediction."""
+
+
+class AbstractVelocitySensor(AbstractSensor):
+    """A sensor that reads velocities or rates of turn."""
+
+    @abc.abstractmethod
+    def velocity_noise(self) -> Float[Array, "6"]:
+        """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for what it does not read."""

@@ -1,6 +1,6 @@
 """Thrusters without a state of their own: the voltage for a thrust is the inverse of a curve."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import jax.numpy as jnp
 
@@ -8,6 +8,7 @@ from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.thrusters.thruster import PerThruster
 
 
+@runtime_checkable
 class Invertible(Protocol):
     """A thruster whose thrust depends on the voltage alone."""
 
@@ -57,3 +58,6 @@ class QuasiStaticActuator(AbstractActuatorModel):
 
     def advance(self, state, u, dt) -> tuple[()]:
         return ()
+
+    def quasi_static(self) -> "QuasiStaticActuator":
+        return self

@@ -53,18 +53,18 @@ class CostSums(AbstractAccumulator):
     error_scale: Float[Array, " n"] = param("m, rad", "errors with a cost of one")
     input_scale: Scalar = param("unit of the input", "input with a cost of one")
 
-    def init(self, sample: Signals) -> Sums:
+    def init(self, signals: Signals) -> Sums:
         zero = jnp.zeros(())
-        return Sums(zero, zero, zero, zero, zero, (zero, jnp.zeros_like(sample.voltage), zero))
+        return Sums(zero, zero, zero, zero, zero, (zero, jnp.zeros_like(signals["input"]), zero))
 
-    def update(self, state: Sums, t: Scalar, sample: Signals) -> Sums:
+    def update(self, state: Sums, t: Scalar, signals: Signals) -> Sums:
         inside = jnp.where(t >= self.start - _HAIR, 1.0, 0.0)
         last_t, last_share, last_inside = state.last
-        share, between = sample.voltage / self.input_scale, inside * last_inside
+        share, between = signals["input"] / self.input_scale, inside * last_inside
         step = jnp.sqrt((share - last_share) ** 2 + _SMOOTH**2) - _SMOOTH
         return Sums(
             samples=state.samples + inside,
-            tracking=state.tracking + inside * _bounded(((sample.error / self.error_scale) ** 2).mean(), _MOST**2),
+            tracking=state.tracking + inside * _bounded(((signals["error"] / self.error_scale) ** 2).mean(), _MOST**2),
             effort=state.effort + inside * _bounded((share**2).mean(), _MOST**2),
             variation=state.variation + between * step.mean(),
             span=state.span + between * (t - last_t),

@@ -1,11 +1,13 @@
 """Default tunable parameters of each controller, with their ranges."""
 
 from collections.abc import Callable, Mapping
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from undertow.core.contracts import AbstractController
+from undertow.core.param import tuning_ranges
 
 Range = tuple[float, float]
 
@@ -81,9 +83,11 @@ _LAWS = {
 }
 
 
-def law_of(kind: str, preset: str | None) -> Law:
-    """Tunable parameters of a controller; empty for a user's controller."""
-    return _LAWS.get((kind, preset), Law(lambda dt: {}, {}, {}))
+def law_of(kind: str, preset: str | None, law: AbstractController) -> Law:
+    """Tunable parameters of a controller: the known ones, else the parameters that declare a `range`."""
+    declared = tuning_ranges(law)
+    own = Law(lambda dt: declared, {name: attrgetter(name) for name in declared}, {})
+    return _LAWS.get((kind, preset), own)
 
 
 def now(known: Law, law: AbstractController, option: str, given: Any) -> Any:

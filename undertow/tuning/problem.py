@@ -39,7 +39,9 @@ class Problem(NamedTuple):
 
     def options(self, point: Any) -> dict[str, Any]:
         """Options at a point."""
-        return tunable_parameters.options(self.parameters, point, len(self.built.closed_loop.controller.model.angles))
+        return tunable_parameters.options(
+            self.parameters, point, len(self.built.closed_loop.controller.model.coordinates.angles)
+        )
 
     def rounded(self, point: np.ndarray) -> dict[str, Any]:
         """Options at a point, rounded, as written in a scenario."""
@@ -66,7 +68,7 @@ def problem(text: Text) -> Problem:
     if scenario.loop.kind != "sampled":
         where = text.where(("loop", "kind"))
         raise BadInput("loop.kind", "be sampled, for gains to be used on a vehicle", scenario.loop.kind, where=where)
-    known, dt, angles = _law_of(built), scenario.loop.dt, loop.controller.model.angles
+    known, dt, angles = _law_of(built), scenario.loop.dt, loop.controller.model.coordinates.angles
     function, given = _controller(text, built)
     try:
         chosen = _parameters(known, function, tune, dt, angles)
@@ -92,7 +94,7 @@ def problem(text: Text) -> Problem:
 
 def _law_of(built: Built) -> Law:
     description = built.resolved["controller"]
-    return law_of(description["kind"], description.get("preset"))
+    return law_of(description["kind"], description.get("preset"), built.closed_loop.controller)
 
 
 def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractController], dict[str, Any]]:
@@ -154,7 +156,9 @@ def _input_scale(plant: AbstractPlant, law: AbstractController) -> float:
     if most < _FAR:
         return float(most)
     y = plant.output(jnp.zeros(()), x)
-    size = np.abs(np.asarray(law.model.invert(y, jnp.ones(len(plant.outputs))))).max()
+    held = law.model.actuators.quasi_static()
+    forces = law.model.dynamics.invert(y, jnp.ones(len(plant.outputs)))
+    size = np.abs(np.asarray(held.command(held.init(), forces, jnp.ones(())))).max()
     return float(size) if size > 0 else 1.0
 
 

@@ -45,7 +45,7 @@ def certify(
     """
     lived = run.isel(time=run["time"].values <= run.attrs["ended"] + _HAIR)
     axes = run.sizes["axis"]
-    if run.attrs["status"] != "ok":  # it has no steady window
+    if run.attrs["status"] != "completed":  # it has no steady window
         window = np.inf, np.inf
     if not lived.sizes["time"]:
         return None

@@ -11,7 +11,7 @@ import xarray as xr
 from undertow.analysis.certificate.set_point import minimax_weight
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.robust_law import RobustRCAF
-from undertow.core.contracts import AbstractModel, Measurement
+from undertow.core.contracts import Model
 
 # Smaller departures are rounding: shares, or m/s^2 and rad/s^2.
 ROUNDING = 1e-9
@@ -51,6 +51,9 @@ def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     sentence = "w_bar >= |omega + sigma|, Eq. (43), with sigma = 0 (else it is not recorded)"
     yield Hypothesis("robust_gain", sentence, whole & (omega <= np.asarray(law.robust_gain)).all(-1))
     amplitude = np.asarray(law.identification.compensation_gain)
+    if law.modification is not None or law.identification_input != "applied":
+        sentence = "the weights follow Eq. (44), Eq. (32) is driven by the applied input"
+        yield Hypothesis("adaptation", sentence, np.zeros(run.sizes["time"], bool))
     yield Hypothesis("compensation_gain", "omega_bar >= |omega|, Eq. (33)", (omega <= amplitude).all(-1))
 
 
@@ -69,7 +72,7 @@ def _constant(d: np.ndarray) -> np.ndarray:
     return np.concatenate([still[:1], still]) if len(still) else np.ones(len(d), bool)
 
 
-def _full_rank(model: AbstractModel, run: xr.Dataset) -> np.ndarray | None:
+def _full_rank(model: Model, run: xr.Dataset) -> np.ndarray | None:
     """Whether G had as many independent columns as there are axes, where the controller believed to be."""
     try:
         gains = _gains(model, run["measured_position"].values, run["measured_velocity"].values)
@@ -82,5 +85,5 @@ def _full_rank(model: AbstractModel, run: xr.Dataset) -> np.ndarray | None:
 
 
 @eqx.filter_jit
-def _gains(model: AbstractModel, position, velocity):
-    return jax.vmap(lambda x, v: model.gain(Measurement(x, v)))(position, velocity)
+def _gains(model: Model, position, velocity):
+    return jax.vmap(lambda x, v: model.dynamics.gain(model.coordinates.measurement(x, v)))(position, velocity)

@@ -46,9 +46,9 @@ def actuator_authority(loop: ClosedLoop, at: Equilibrium, loads: np.ndarray) -> 
 
 @eqx.filter_jit
 def _reach(loop: ClosedLoop, x, loads):
-    plant, model = loop.plant, loop.controller.model.in_body_axes()
-    y, drive = plant.output(jnp.zeros(()), x), model.actuators()
-    effect = model.acceleration_per_force(y)
+    plant, (dynamics, coordinates, drive) = loop.plant, loop.controller.model.in_body_axes()
+    y = plant.output(jnp.zeros(()), x)
+    effect = dynamics.gain(y)
     inputs = jnp.zeros(plant.inputs())
 
     def at_limit(side):
@@ -63,9 +63,8 @@ def _reach(loop: ClosedLoop, x, loads):
     low, high = at_limit(-1.0), at_limit(1.0)
 
     def required(load):
-        return model.force_for(
-            y, -model.drift(y) - model.rates_derivative(y, load) + model.rates_derivative(y, jnp.zeros_like(load))
-        )
+        pushed = coordinates.acceleration(y, load) - coordinates.acceleration(y, jnp.zeros_like(load))
+        return dynamics.invert(y, -dynamics.drift(y) - pushed)
 
     forces = jax.vmap(required)(loads)
     given = jax.vmap(lambda force: allocate(effect, force, low, high, jnp.asarray(_WHOLE)))(forces)

@@ -49,7 +49,9 @@ def closed_form_poles(law: AbstractController, poles: np.ndarray, names: tuple[s
 def estimator(law: AbstractController, axis: int) -> tuple[float, float] | None:
     """Natural frequency (rad/s) and damping ratio of the estimator; None for a law without one."""
     if isinstance(law, RobustRCAF):
-        at = lambda value: float(np.broadcast_to(np.asarray(value, dtype=float), len(law.model.angles))[axis])
+        at = lambda value: float(
+            np.broadcast_to(np.asarray(value, dtype=float), len(law.model.coordinates.angles))[axis]
+        )
         return at(law.estimator.bandwidth), at(law.estimator.damping)
     if _is_smooth(law) and small_signal.observer_frequency(law, axis) > 0:
         return small_signal.observer_frequency(law, axis), small_signal.observer_damping(law, axis)
@@ -75,7 +77,9 @@ def drift_bound(law: AbstractController, axis: int, dt: float) -> tuple[float, f
 
 def _of_axis(law: AbstractController, axis: int) -> list[tuple[str, complex]]:
     if isinstance(law, RobustRCAF):
-        at = lambda value, *shape: np.broadcast_to(np.asarray(value, dtype=float), (len(law.model.angles), *shape))
+        at = lambda value, *shape: np.broadcast_to(
+            np.asarray(value, dtype=float), (len(law.model.coordinates.angles), *shape)
+        )
         k, p = at(law.feedback, 2)[axis], at(law.lyapunov(), 2, 2)[axis]
         slope = at(law.robust_gain)[axis] / at(law.layer)[axis]
         tracking = np.roots([1.0, k[1] + slope * p[1, 1], k[0] + slope * p[0, 1]])

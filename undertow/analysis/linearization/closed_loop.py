@@ -18,7 +18,7 @@ class LinearLoop(NamedTuple):
     Attributes:
         matrix: A.
         entries: B by name, of `ENTRIES`: load (n), noise on position and velocity (2 n), error of the input (m).
-        signals: C by name: error, estimate, uncertainty, modelling_error, robust (n each), u (m).
+        signals: C by name: u (m), and those of `SIGNALS` that the law has (n each).
         direct: D by name of signal and entry.
         dt: s.
     """
@@ -82,7 +82,7 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
         else:
             matrix[slot, slots[older - 1]] = np.eye(inputs)
     signals, direct = {"u": u}, {"u": {"noise": u_noise}}
-    for name in SIGNALS:
+    for name in filter(slopes.__contains__, SIGNALS):
         applied = slopes[name]["u"]
         signals[name] = of_state(name) + applied @ u
         direct[name] = {"load": slopes[name]["load"], "noise": slopes[name]["noise"] + applied @ u_noise}
@@ -106,7 +106,7 @@ def close_continuous(at: Equilibrium, dt: float) -> LinearLoop:
     to_plant = np.vstack([slopes["plant"]["u"][acting], 0 * slopes["flow"]["u"]])
     step, *entered = _followed(own + push @ u, (load, noise, to_plant), dt)
     signals, direct = {"u": u}, {"u": {"noise": u_noise}}
-    for name in SIGNALS:
+    for name in filter(slopes.__contains__, SIGNALS):
         applied = slopes[name]["u"]
         signals[name] = np.hstack([from_plant(name), slopes[name]["law"]]) + applied @ u
         direct[name] = {"load": slopes[name]["load"], "noise": slopes[name]["noise"] + applied @ u_noise}

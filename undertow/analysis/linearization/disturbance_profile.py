@@ -53,18 +53,20 @@ def disturbance_profile(
 
 @eqx.filter_jit
 def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
-    realization, plant, model, zero = loop.realize(key), loop.plant, loop.controller.model, jnp.zeros(())
+    realization, plant, zero = loop.realize(key), loop.plant, jnp.zeros(())
+    dynamics, coordinates, actuators = loop.controller.model
+    held = actuators.quasi_static()
+    forces = held.force(held.init(), u)
 
     def unknown(t, x, load):
         y = plant.output(t, x)
-        return model.rates_derivative(y, plant.acceleration(t, x, u, load)) - model.drift(y) - model.gain(y) @ u
+        moved = coordinates.acceleration(y, plant.acceleration(t, x, u, load))
+        return moved - dynamics.drift(y) - dynamics.gain(y) @ forces
 
     y_rest = plant.output(zero, x_rest)
     at_rest = unknown(zero, x_rest, plant.no_load())
     still = jnp.zeros_like(y_rest.position)
-    scale = jax.jacfwd(lambda a: model.rates_derivative(y_rest, a))(
-        still
-    )  # outputs -> axes of the law, where the loop rests
+    scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)  # outputs -> axes of the law, at rest
 
     def look(measuring, k):
         t = k * dt
@@ -72,7 +74,7 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
         x = plant.initial_state(r.position, r.velocity)
         truth = plant.output(t, x)
         y, measuring = loop.navigation.measure(realization.navigation_realization, measuring, t, truth)
-        wrong = jnp.concatenate([model.difference(y.position, truth.position), y.velocity - truth.velocity])
+        wrong = jnp.concatenate([coordinates.difference(y.position, truth.position), y.velocity - truth.velocity])
         wrong = jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
         return measuring, (jnp.linalg.solve(scale, unknown(t, x, realization.load(t, x)) - at_rest), wrong)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
 from undertow.analysis.linearization.newton import Balance
-from undertow.core.contracts import AbstractModel, Measurement
+from undertow.core.contracts import Measurement, Model
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.reachability import lost_directions
 
@@ -91,7 +91,7 @@ def _output(parts: Parts, start: dict) -> Measurement:
     return parts.loop.plant.output(jnp.zeros(()), parts.plant_state(jnp.asarray(start["plant"])))
 
 
-def _steered(model: AbstractModel, y: Measurement) -> np.ndarray:
+def _steered(model: Model, y: Measurement) -> np.ndarray:
     """Projection of the outputs on what some input accelerates; one where that is everything."""
     into_axes, effect = _reach(model, y)
     lost = lost_directions(np.linalg.solve(np.asarray(into_axes), np.asarray(effect)))
@@ -99,22 +99,22 @@ def _steered(model: AbstractModel, y: Measurement) -> np.ndarray:
 
 
 @jax.jit
-def _reach(model: AbstractModel, y: Measurement):
+def _reach(model: Model, y: Measurement):
     """From accelerations of the outputs to the axes of the law; and what the forces give there."""
-    return jax.jacfwd(lambda a: model.rates_derivative(y, a))(jnp.zeros_like(y.position)), model.acceleration_per_force(
-        y
-    )
+    into_axes = jax.jacfwd(lambda a: model.coordinates.acceleration(y, a))(jnp.zeros_like(y.position))
+    return into_axes, model.dynamics.gain(y)
 
 
-def _holding_input(model: AbstractModel, y: Measurement, load: np.ndarray) -> np.ndarray:
+def _holding_input(model: Model, y: Measurement, load: np.ndarray) -> np.ndarray:
     return np.asarray(_settled_input(model, y, jnp.asarray(load)))
 
 
 @jax.jit
-def _settled_input(model: AbstractModel, y: Measurement, load):
+def _settled_input(model: Model, y: Measurement, load):
     """Input that gives the forces against drift and load, once the actuators have come to them."""
-    needed = -model.drift(y) - (model.rates_derivative(y, load) - model.rates_derivative(y, jnp.zeros_like(load)))
-    drive, forces = model.actuators(), model.force_for(y, needed)
+    dynamics, coordinates, drive = model
+    pushed = coordinates.acceleration(y, load) - coordinates.acceleration(y, jnp.zeros_like(load))
+    forces = dynamics.invert(y, -dynamics.drift(y) - pushed)
     rate, step = jnp.asarray(20.0), jnp.asarray(5e-3)
     settle = lambda _, state: drive.advance(state, drive.command(state, forces, rate), step)
     return drive.command(jax.lax.fori_loop(0, _SETTLING, settle, drive.init()), forces, rate)

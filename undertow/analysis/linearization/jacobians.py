@@ -15,12 +15,13 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PyTree
 
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import Target
+from undertow.core.contracts import Target, known_acceleration
+from undertow.core.measurement import with_outputs
 from undertow.loop.closed_loop import ClosedLoop
 
-# Arguments of `Parts.values`, in this order; and what it gives.
+# Arguments of `Parts.values`, in this order; and which signals it gives, as far as the law has them.
 INPUTS = ("plant", "law", "u", "load", "noise")
-SIGNALS = ("error", "estimate", "uncertainty", "modelling_error", "robust")
+SIGNALS = ("error", "uncertainty", "estimate", "modelling_error", "robust_term")
 
 
 class Local(NamedTuple):
@@ -120,20 +121,18 @@ def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array
     unloaded = plant.no_load()
     pushed = unloaded._replace(acceleration=unloaded.acceleration + load)
     truth, axes = plant.output(zero, x), load.shape[0]
-    y = truth._replace(position=truth.position + noise[:axes], velocity=truth.velocity + noise[axes:])
-    command, telemetry = law.command(z, y, r)
+    y = with_outputs(truth, truth.position + noise[:axes], truth.velocity + noise[axes:])
+    command, of_law = law.command(z, y, r)
     values = {
         "plant": ravel_pytree(plant.dynamics(zero, x, u, pushed))[0],
         "law": ravel_pytree(law.advance(z, y, r, u, dt))[0],
         "u": command,
         "position": truth.position,
-        "error": law.model.difference(r.position, truth.position),
-        "estimate": telemetry.estimate,
-        "robust": telemetry.robust,
-        "modelling_error": telemetry.modelling_error,
-        "uncertainty": law.model.rates_derivative(truth, plant.acceleration(zero, x, u, pushed))
-        - law.known_acceleration(z, truth, u),
+        "error": law.model.coordinates.difference(r.position, truth.position),
+        "uncertainty": law.model.coordinates.acceleration(truth, plant.acceleration(zero, x, u, pushed))
+        - known_acceleration(law, z, truth, u),
     }
+    values |= {name: of_law[name] for name in SIGNALS if name in of_law}
     if isinstance(law, AbstractContinuousController):
         values["flow"] = ravel_pytree(law.flow(z, y, r, u))[0]
     return values

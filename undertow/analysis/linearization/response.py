@@ -1,5 +1,6 @@
 """Metrics of a run, predicted by driving the linearised loop with the loads along the reference."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -10,10 +11,10 @@ from undertow.analysis.linearization.closed_loop import LinearLoop
 from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.analysis.linearization.minimal_realization import visible
+from undertow.analysis.metrics import output_groups
 
 _ENTRIES = ("load", "noise")
 _START = "start"  # a column: where the states are at first
-_SIGNALS = ("error", "estimate", "uncertainty", "modelling_error", "robust", "u")
 
 
 class Comparison(NamedTuple):
@@ -41,7 +42,7 @@ def signals_within(
         window: start and stop, s.
         every: steps per record; metrics are those of the records, as in a run.
     """
-    small = visible(loop, (*_ENTRIES, _START), _SIGNALS)
+    small = visible(loop, (*_ENTRIES, _START), tuple(loop.signals))
     entry = np.hstack([small.entries[name] for name in _ENTRIES])
     driven = np.hstack([around.load - at.at["load"], around.noise])
     states = np.asarray(_driven(*map(jnp.asarray, (small.entries[_START][:, 0], small.matrix, entry, driven))))
@@ -49,26 +50,28 @@ def signals_within(
     recorded = np.arange(len(around.time)) % every == 0
     inside = recorded & (around.time >= window[0] - hair) & (around.time <= window[1] + hair)
     signals = {}
-    for name in _SIGNALS:
+    for name in loop.signals:
         direct = np.hstack([_direct(loop, name, way) for way in _ENTRIES])
         departure = states @ small.signals[name].T + driven @ direct.T
         signals[name] = (at.local.values[name] + departure)[inside]
     return signals
 
 
-def metrics_of(signals: dict[str, np.ndarray]) -> dict[str, float]:
-    """Metrics of predicted signals, by the names of results files."""
+def metrics_of(signals: dict[str, np.ndarray], units: Sequence[str]) -> dict[str, float]:
+    """Metrics of predicted signals, by the names of results files; `units` are those of the outputs."""
     rms = lambda values: float(np.sqrt((values**2).mean()))
-    return {
-        "tracking_rms": rms(signals["error"]),
-        "tracking_max": float(np.abs(signals["error"]).max()),
-        "estimation_rms": rms(signals["estimate"] - signals["uncertainty"]),
-        "uncertainty_rms": rms(signals["uncertainty"]),
-        "model_rms": rms(signals["modelling_error"]),
-        "robust_rms": rms(signals["robust"]),
-        "input_rms": rms(signals["u"]),
-        "input_peak": float(np.abs(signals["u"]).max()),
-    }
+    found = {}
+    for group, (_, axes) in output_groups(units).items():
+        found |= {f"{group}_rms": rms(signals["error"][:, axes]), f"{group}_max": _peak(signals["error"][:, axes])}
+    if "estimate" in signals:
+        found["estimation_rms"] = rms(signals["estimate"] - signals["uncertainty"])
+    named = {"uncertainty": "uncertainty_rms", "modelling_error": "model_rms", "robust_term": "robust_rms"}
+    found |= {metric: rms(signals[name]) for name, metric in named.items() if name in signals}
+    return found | {"input_rms": rms(signals["u"]), "input_peak": _peak(signals["u"])}
+
+
+def _peak(values: np.ndarray) -> float:
+    return float(np.abs(values).max())
 
 
 def from_start(loop: LinearLoop, at: Equilibrium, plant: np.ndarray, law: np.ndarray) -> LinearLoop:

@@ -3,8 +3,9 @@
 import math
 
 from undertow.controllers.composite_law import FUZZY_INPUTS, RCAF
+from undertow.controllers.robust_modification import modification_of
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.estimation.series_parallel import SeriesParallel
 from undertow.estimation.tsk import gaussian_sets
@@ -15,7 +16,7 @@ _REACH = {"error": (1.0,), "state": (4.0, 2.0)}
 
 
 def paper(
-    model: AbstractModel,
+    model: Model,
     *,
     feedback=(1.0, 2.0),
     weight=((10.0, 0.0), (0.0, 10.0)),
@@ -27,6 +28,10 @@ def paper(
     compensation_gain=0.1,
     compensation_layer=0.5,
     weights_bound=math.inf,
+    leakage=0.0,
+    e_modification=0.0,
+    dead_zone=0.0,
+    identification_input: str = "applied",
     switching: str = "tanh",
     fuzzy_input: str = "error",
     sets: int = 5,
@@ -50,6 +55,11 @@ def paper(
         compensation_layer: boundary layer of the compensation.
         weights_bound: theta_max, m/s^2 and rad/s^2; weights are projected into +-theta_max, and with them the
             estimate. The paper has none.
+        leakage: kappa of the sigma-modification: weights decay at gamma kappa, 1/s. The paper has none.
+        e_modification: factor of |eps| beside `leakage`, s/m and s/rad. The paper has none.
+        dead_zone: largest |eps| that is taken for noise, where adaptation stops, m/s and rad/s. The paper has none.
+        identification_input: what drives the identification model: applied (the input that reached the actuators) or
+            commanded (as if there were no limits).
         switching: tanh (Remark 5) or sign (as in Eqs. (33), (43)).
         fuzzy_input: error (the modelling error) or state (position and velocity).
         sets: fuzzy sets per input; any number from 1.
@@ -82,6 +92,8 @@ def paper(
         robust_gain=robust_gain,
         layer=layer,
         weights_bound=weights_bound,
+        modification=modification_of(leakage, e_modification, dead_zone),
+        identification_input=identification_input,
         switching=switching,
         fuzzy_input=fuzzy_input,
         method=method,

@@ -10,7 +10,7 @@ from undertow.controllers.robust.fuzzy_sets import widened
 from undertow.controllers.robust.reference_filter import ReferenceFilter
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.estimation.tsk import gaussian_sets
 
@@ -19,7 +19,7 @@ _TRACKING_SHARES, _ACTUATORS_FASTER = (0.25, 0.5), 3.0
 
 
 def robust(
-    model: AbstractModel,
+    model: Model,
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel, Outputs, Target
+from undertow.core.contracts import AbstractCoordinates, Outputs, Target
 from undertow.core.param import param
 
 
@@ -54,25 +54,25 @@ class ReferenceFilter(eqx.Module):
         still = jnp.zeros_like(position)
         return FilterState(Target(still, still, still), Target(position, still, still), jnp.zeros(()))
 
-    def smoothed(self, state: FilterState, r: Target, model: AbstractModel) -> Target:
+    def smoothed(self, state: FilterState, r: Target, coordinates: AbstractCoordinates) -> Target:
         """The reference with what is left of its jumps."""
-        offset = self._offset(state, r, model)
+        offset = self._offset(state, r, coordinates)
         return Target(*(own + left for own, left in zip(r, offset, strict=True)))
 
     def advance(
-        self, state: FilterState, r: Target, model: AbstractModel, share, dt, room: Room = UNLIMITED
+        self, state: FilterState, r: Target, coordinates: AbstractCoordinates, share, dt, room: Room = UNLIMITED
     ) -> FilterState:
         """State one sampling time later.
 
         Args:
             state: now.
             r: reference now.
-            model: knows which outputs are angles.
+            coordinates: know which outputs are angles.
             share: of the wanted acceleration that the actuators give; with less than 1 the filter waits.
             dt: sampling time, s.
             room: what the actuators can do.
         """
-        away, rate, bend = self._offset(state, r, model)
+        away, rate, bend = self._offset(state, r, coordinates)
         # From far away it comes more slowly, so that the way home takes half of what the actuators can do.
         far = jnp.maximum(jnp.abs(away), _NEAR)
         w, t = jnp.minimum(self.frequency, jnp.sqrt(jnp.maximum(room.most, _LEAST) / (2 * _PEAK * far))), share * dt
@@ -92,9 +92,9 @@ class ReferenceFilter(eqx.Module):
         )
         return FilterState(offset, expected, dt)
 
-    def _offset(self, state: FilterState, r: Target, model: AbstractModel) -> Target:
+    def _offset(self, state: FilterState, r: Target, coordinates: AbstractCoordinates) -> Target:
         """What is left of earlier jumps, and the one that has just been seen; the acceleration rose evenly."""
         risen = r.acceleration - state.expected.acceleration
-        jump = model.difference(r.position, state.expected.position) - state.elapsed**2 / 6 * risen
+        jump = coordinates.difference(r.position, state.expected.position) - state.elapsed**2 / 6 * risen
         kick = r.velocity - state.expected.velocity - state.elapsed / 2 * risen
         return Target(state.offset.position - jump, state.offset.velocity - kick, state.offset.acceleration)

@@ -7,13 +7,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import largest_forces
-from undertow.controllers.diagnostics import COLUMNS, tracking_diagnostics, weight_diagnostics
 from undertow.controllers.robust.allocation import allocate, attained
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
 from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter, Room
+from undertow.controllers.signals import ADAPTIVE_LAW, lyapunov_signals, weight_signals
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
+from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.param import param
 from undertow.estimation.tsk import FuzzySystem
 from undertow.numerics.linear import matvec
@@ -47,7 +47,7 @@ class Plan(NamedTuple):
     forces: Float[Array, " m"]  # that would give what is wanted
 
 
-class RobustRCAF(AbstractController):
+class RobustRCAF(AbstractInformedController):
     """The paper's structure, in the model's own axes, fed with what was applied, within the actuators' limits.
 
     Gains are one number for all axes or one per axis. With `tracking_share` 0 the estimator is a pure observer: it
@@ -57,7 +57,7 @@ class RobustRCAF(AbstractController):
         BadInput: a gain of the wrong sign, feedback not Hurwitz or weight not positive definite.
     """
 
-    model: AbstractModel
+    model: Model
     estimator: Estimator
     filter: ReferenceFilter | None
     feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
@@ -84,57 +84,57 @@ class RobustRCAF(AbstractController):
             checks.positive(name, getattr(self, name))
         own = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
         estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound", "leakage")}
-        check_gains(self.feedback, self.weight, own | estimators, len(self.model.angles))
+        check_gains(self.feedback, self.weight, own | estimators, len(self.model.coordinates.angles))
 
     @property
     def fuzzy(self) -> FuzzySystem:
         """That of the estimator."""
         return self.estimator.fuzzy
 
+    @property
+    def weights_bound(self) -> Float[Array, "..."]:
+        """theta_max of the estimator, m/s^2 and rad/s^2."""
+        return self.estimator.bound
+
     def init(self, y: Measurement, r: Target) -> RobustState:
         smoothing = None if self.filter is None else self.filter.init(y.position)
-        return RobustState(self.estimator.init(self.model.rates(y)), self.model.actuators().init(), smoothing)
+        _, coordinates, actuators = self.model
+        return RobustState(self.estimator.init(coordinates.velocity(y)), actuators.init(), smoothing)
 
     def command(self, z: RobustState, y: Measurement, r: Target):
-        plan = self._plan(z, y, r)
-        actuators, effect = self.model.actuators(), self.model.acceleration_per_force(y)
+        plan, actuators, effect = self._plan(z, y, r), self.model.actuators, self.model.dynamics.gain(y)
         forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, self.actuator_rate), self.direction)
         u = actuators.command(plan.actuators, forces, self.actuator_rate)
-        telemetry = Telemetry(
-            estimate=plan.seen.uncertainty,
-            robust=plan.robust,
-            modelling_error=plan.seen.error,
-            predicted_position=y.position,
-            predicted_velocity=z.estimator.rates,
-            weights=z.estimator.weights,
-            diagnostics=tracking_diagnostics(plan.off, self.lyapunov(), self.weight)
-            | weight_diagnostics(z.estimator.weights, self.estimator.bound)
-            | {"attained_share": attained(effect, plan.forces, forces)},
-        )
-        return u, telemetry
+        signals = {
+            "estimate": plan.seen.uncertainty,
+            "robust_term": plan.robust,
+            "modelling_error": plan.seen.error,
+            "attained_share": attained(effect, plan.forces, forces),
+        }
+        signals |= lyapunov_signals(plan.off, self.lyapunov(), self.weight)
+        return u, signals | weight_signals(z.estimator.weights, self.estimator.bound)
 
     def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
-        plan, actuators = self._plan(z, y, r), self.model.actuators()
+        plan, actuators, effect = self._plan(z, y, r), self.model.actuators, self.model.dynamics.gain(y)
         # While limits bind, the reference waits, and the tracking error says nothing about d.
-        going, effect = (
-            actuators.target_of(plan.actuators, u_applied, self.actuator_rate),
-            self.model.acceleration_per_force(y),
-        )
+        going = actuators.target_of(plan.actuators, u_applied, self.actuator_rate)
         share = attained(effect, plan.forces, going)
         learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
         known = self._known(plan.actuators, y, u_applied)
         return RobustState(
             estimator=self.estimator.advance(z.estimator, plan.seen, known, learnt, dt),
             actuators=actuators.advance(plan.actuators, u_applied, dt),
-            filter=self.filter and self.filter.advance(z.filter, r, self.model, share, dt, self._room(y, plan.off)),
+            filter=self.filter
+            and self.filter.advance(z.filter, r, self.model.coordinates, share, dt, self._room(y, plan.off)),
         )
 
     def _room(self, y: Measurement, off: Tracking) -> Room:
         """What the actuators can do for each output, and what of the error is out of their reach."""
-        force, effect = largest_forces(self.model.actuators()), self.model.acceleration_per_force(y)
+        dynamics, coordinates, actuators = self.model
+        force, effect = largest_forces(actuators), dynamics.gain(y)
         reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
         away = jnp.abs(off.error) > reach
-        outward = lambda motion: self.model.output_rates(y, motion)
+        outward = lambda motion: coordinates.output_velocity(y, motion)
         return Room(
             most=matvec(jnp.abs(jax.vmap(outward, 1, 1)(effect)), force),
             excess=outward(off.error - jnp.clip(off.error, -reach, reach)),
@@ -142,26 +142,25 @@ class RobustRCAF(AbstractController):
         )
 
     def known_acceleration(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:
-        return self._known(self.model.actuators().update_from_report(z.actuators, y.actuator), y, u_applied)
+        return self._known(self.model.actuators.update_from_report(z.actuators, y.actuator), y, u_applied)
 
-    def columns(self):
-        return COLUMNS
+    def signals(self):
+        return ADAPTIVE_LAW
 
     def lyapunov(self) -> Float[Array, "*n 2 2"]:
         """P of Eq. (21)."""
         return companion_lyapunov(self.feedback, self.weight)
 
     def _known(self, actuators: Any, y: Measurement, u_applied) -> PerAxis:
-        return self.model.drift(y) + matvec(
-            self.model.acceleration_per_force(y), self.model.actuators().force(actuators, u_applied)
-        )
+        dynamics, given = self.model.dynamics, self.model.actuators.force(actuators, u_applied)
+        return dynamics.drift(y) + matvec(dynamics.gain(y), given)
 
     def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
-        model = self.model
-        actuators = model.actuators().update_from_report(z.actuators, y.actuator)
-        target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
-        off = tracking(model, self.lyapunov(), y, target)
+        dynamics, coordinates, actuators = self.model
+        believed = actuators.update_from_report(z.actuators, y.actuator)
+        target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)
+        off = tracking(coordinates, self.lyapunov(), y, target)
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
-        seen = self.estimator.estimate(z.estimator, model.rates(y))
-        demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - model.drift(y)
-        return Plan(actuators, seen, off, u_r, model.force_for(y, demand))
+        seen = self.estimator.estimate(z.estimator, coordinates.velocity(y))
+        demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - dynamics.drift(y)
+        return Plan(believed, seen, off, u_r, dynamics.invert(y, demand))

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractReference, Measurement
+from undertow.core.contracts import AbstractController, AbstractReference, Measurement, starting_at
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
+from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.interop.mujoco_engine.propellers import Propellers
 from undertow.interop.mujoco_engine.submerged import Submerged
@@ -27,6 +29,7 @@ class MujocoRun(NamedTuple):
     status: Status  # of the end; series end with the last valid state
 
 
+@double_outside_runs
 def run_in_mujoco(
     body: Submerged,
     thruster: AbstractThruster,
@@ -63,7 +66,7 @@ def run_in_mujoco(
     propellers = Propellers(thruster, body.model.nu)
     start = np.zeros(6) if position is None else np.asarray(position, dtype=float)
     body.place(start, np.zeros(6))
-    reference = reference.starting_at(jnp.asarray(start))
+    reference = starting_at(reference, jnp.asarray(start))
     command, advance, desired = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
     z, rows, control_steps, status = None, [], round(duration / dt), Status.OK
     for step in range(control_steps + 1):
@@ -86,4 +89,4 @@ def run_in_mujoco(
 
 def _measured(body: Submerged, propellers: Propellers) -> Measurement:
     turning = PropellerReport(jnp.asarray(propellers.speed), None)
-    return Measurement(jnp.asarray(body.position()), jnp.asarray(body.velocity()), turning)
+    return measurement_of_outputs(jnp.asarray(body.position()), jnp.asarray(body.velocity()), turning)

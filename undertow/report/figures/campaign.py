@@ -10,7 +10,15 @@ from matplotlib.ticker import NullFormatter
 from undertow.report.figures import style
 
 # The metrics to plot, where they are defined.
-_SHOWN = ("tracking_rms", "tracking_max", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
+_SHOWN = (
+    "position_rms",
+    "attitude_rms",
+    "tracking_rms",
+    "estimation_rms",
+    "input_rms",
+    "input_variation",
+    "saturated_fraction",
+)
 _LOOKS = (
     style.SOLID,
     style.DASHED,

@@ -12,12 +12,12 @@ def effort(title: str, runs: Controllers) -> Figure:
     """Figs. 9 and 13."""
     first = next(iter(runs.values()))
     looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    curves = [signals.curve(run, name, "voltage", look) for run, name, look in looks]
+    curves = [signals.curve(run, name, "input", look) for run, name, look in looks]
     start, end = settled(first), float(first["time"].values[-1])
     labels = signals.per_input(first, "voltage")
     return small_multiples(
         title,
-        [f"thruster {number}" for number in first["input"].values],
+        [f"thruster {number}" for number in first["actuator"].values],
         [
             Block(curves, labels, height=0.95, window=(0.0, start), titled=True),
             Block(curves, labels, height=0.95, width=2.1, window=(start, end)),

@@ -61,7 +61,7 @@ def _errors(panel: Axes, fidelity: str, entries: Mapping[str, Any], runs: Mappin
             zorder=look.order,
             label=f"{name}, {fidelity}",
         )
-        if entries[key]["status"] != "ok":
+        if entries[key]["status"] != "completed":
             panel.plot(time[-1], size[-1], "X", color=look.colour, markersize=6, zorder=5)
             _say(panel, f"{name}: {_ending(entries[key])}", (0.98, 0.9))
 

@@ -67,7 +67,7 @@ def _errors(panel: Axes, runs: Mapping[str, xr.Dataset]) -> None:
         panel.plot(
             time[kept], size[kept], color=look.colour, linestyle=look.dashes, linewidth=look.width, zorder=look.order
         )
-        if run.attrs["status"] != "ok":
+        if run.attrs["status"] != "completed":
             panel.plot(time[kept][-1], size[kept][-1], "X", color=look.colour, markersize=6, zorder=6)
 
 

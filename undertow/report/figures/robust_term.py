@@ -11,7 +11,7 @@ def robust_term(title: str, runs: Controllers) -> Figure:
     """Fig. 8."""
     first = next(iter(runs.values()))
     looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    curves = [signals.curve(run, name, "robust", look) for run, name, look in looks]
+    curves = [signals.curve(run, name, "robust_term", look) for run, name, look in looks]
     end = float(first["time"].values[-1])
     return small_multiples(
         title,

@@ -27,17 +27,19 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
 def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a run, by name."""
     outputs, columns = signals.axis_names(run), _columns(run.sizes["axis"])
-    inputs = [f"input {number}" for number in run["input"].values]
-    desired = signals.curve(run, "desired $x_d$", "target", style.TRUTH)
+    inputs = [f"input {number}" for number in run["actuator"].values]
+    desired = signals.curve(run, "desired $x_d$", "reference", style.TRUTH)
     actual = signals.curve(run, "actual $x$", "position", style.SOLID)
     error = signals.magnitude(signals.curve(run, "|$x_d - x$|", "error", style.SOLID))
     true = signals.curve(run, "true $d$", "uncertainty", style.TRUTH)
-    estimate = signals.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID)
-    commanded = signals.curve(run, "commanded", "command", style.DASHED)
-    applied = signals.curve(run, "applied", "voltage", style.SOLID)
+    curves = [true]
+    if "estimate" in run:
+        curves.append(signals.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID))
+    commanded = signals.curve(run, "commanded", "commanded_input", style.DASHED)
+    applied = signals.curve(run, "applied", "input", style.SOLID)
     places, errors = signals.places(run), signals.per_axis(run, "|error|")
     rates = signals.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
-    levels = [f"input, {run['voltage'].attrs['units']}"] * run.sizes["input"]
+    levels = [f"input, {run['input'].attrs['units']}"] * run.sizes["actuator"]
     figures: dict[str, Callable[[], Figure]] = {
         "tracking": lambda: small_multiples(
             _titled(run, "Tracking"), outputs, [_block(run, [desired, actual], places, 0.0)], columns
@@ -48,14 +50,14 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
         "estimate": lambda: small_multiples(
             _titled(run, "Lumped uncertainty and its estimate"),
             outputs,
-            [_block(run, [true, estimate], rates, settled(run))],
+            [_block(run, curves, rates, settled(run))],
             columns,
         ),
         "effort": lambda: small_multiples(
             _titled(run, "Inputs"),
             inputs,
             [_block(run, [commanded, applied], levels, settled(run))],
-            _columns(run.sizes["input"]),
+            _columns(run.sizes["actuator"]),
         ),
     }
     if "lyapunov" in run:
@@ -79,7 +81,7 @@ def _apart(run: xr.Dataset) -> list[Block]:
 
 
 def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float) -> Block:
-    failed = run.attrs.get("status", "ok") != "ok"
+    failed = run.attrs.get("status", "completed") != "completed"
     peaks = [np.nanmax(np.abs(curve.values), initial=0.0) for curve in curves]
     early = [early_size(curve.time, curve.values) for curve in curves]
     runaway = failed and max(peaks) > _RUNAWAY * max(early)
@@ -88,8 +90,8 @@ def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: f
 
 
 def _titled(run: xr.Dataset, what: str) -> str:
-    status = run.attrs.get("status", "ok")
-    return what if status == "ok" else f"{what} ({status.replace('_', ' ')} at {run.attrs['ended']:.3g} s)"
+    status = run.attrs.get("status", "completed")
+    return what if status == "completed" else f"{what} ({status.replace('_', ' ')} at {run.attrs['ended']:.3g} s)"
 
 
 def _columns(count: int) -> int:

@@ -15,7 +15,7 @@ def tracking(title: str, runs: Controllers) -> Figure:
     """Figs. 6 and 10."""
     first = next(iter(runs.values()))
     looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    desired = signals.curve(first, "desired $x_d$", "target", style.TRUTH)
+    desired = signals.curve(first, "desired $x_d$", "reference", style.TRUTH)
     actual = [signals.curve(run, name, "position", look) for run, name, look in looks]
     errors = [signals.magnitude(signals.curve(run, name, "error", look)) for run, name, look in looks]
     return small_multiples(

@@ -50,7 +50,8 @@ def robust_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> l
         "uses the applied instead of the commanded input, bounds its weights, and derives its gains from the "
         "sampling time. "
         "This section compares it with the paper's controllers, all of them sampled. Run the commands in the folder of "
-        "this page: `undertow simulate` with the file named below each controller."
+        "this page: `undertow simulate` with the file named below each controller. Each ablation is a file of "
+        "campaigns/ for `undertow campaign`."
     )
     levels = [tag("h3", "Fidelity levels"), tag("p", prose(text)), *_figure(figures, "robust_fidelity")]
     return [*lists, *levels, tables.fidelity(results["fidelity"]), *_ablations(results, figures)]

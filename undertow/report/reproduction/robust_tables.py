@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from undertow.analysis.metric_meanings import unit_of
 from undertow.report.formats import ending, number, prose, unit
 from undertow.report.page import Html, join, table, tag
+from undertow.reproduction.all_outputs import unit_of
 
 _FIDELITY = ("tracking_rms", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
 _KINDS = {"yes": "holds", "partly": "partly", "no": "fails"}
@@ -73,4 +73,4 @@ def _number(value: float) -> Html:
 
 
 def _unit(metric: str) -> Html:
-    return unit(_OWN_UNITS[metric] if metric in _OWN_UNITS else unit_of(metric, "V"))
+    return unit(_OWN_UNITS[metric] if metric in _OWN_UNITS else unit_of(metric))

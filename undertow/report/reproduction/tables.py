@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from undertow.analysis.metric_meanings import unit_of
 from undertow.report.formats import chip, condition, ending, number, percent, prose, unit
 from undertow.report.page import Html, join, table, tag
+from undertow.reproduction.all_outputs import unit_of
 
 # An independent solution of Example 1, steady window: the project's benchmark definitions, section 4.
 REFERENCE = {
@@ -65,7 +65,7 @@ def table2(results: dict[str, Any]) -> Html:
     for metric, (row, words) in _TABLE2.items():
         values = [(results[key].get("steady") or {}).get(metric) for key in keys]
         cells = [_worded(number(v), words[p] if words else "") for v, p in zip(values, places, strict=True)]
-        rows.append((join(row, Html("<br>"), unit(unit_of(metric, "V"))), *cells))
+        rows.append((join(row, Html("<br>"), unit(unit_of(metric))), *cells))
     endings = [_worded(ending(results[key]), _ROBUSTNESS[p]) for key, p in zip(keys, places, strict=True)]
     rows.append(("robustness: how the run ended", *endings))
     return table(("", *(_COLUMNS[key] for key in keys)), rows, numeric=range(1, 5), wide=True)
@@ -78,7 +78,7 @@ def fidelity_levels(results: dict[str, Any]) -> Html:
         for key, entry in entries.items():
             steady = entry.get("steady") or {}
             figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "input_variation")]
-            lasted = entry["status"] == "ok"
+            lasted = entry["status"] == "completed"
             words = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
             ended = tag("span", words, class_=f"chip {'holds' if lasted else 'fails'}")
             place = join(tag("b", fidelity), tag("span", _LEVELS.get(fidelity, ""), class_="said"))
@@ -118,7 +118,7 @@ def provenance(results: dict[str, Any]) -> Html:
 
 
 def _named(metric: str) -> Html:
-    return join(metric.replace("_", " "), Html(" "), unit(unit_of(metric, "V")))
+    return join(metric.replace("_", " "), Html(" "), unit(unit_of(metric)))
 
 
 def _condition(verdict: str) -> Html:

@@ -10,7 +10,7 @@ import pkgutil
 from collections.abc import Mapping
 from typing import Any
 
-from undertow.reproduction.batches import BatchResult
+from undertow.reproduction.running import BatchResult
 from undertow.scenario.execute import Executed
 
 _MODULES = [
@@ -36,7 +36,7 @@ def audit(runs: Mapping[str, Executed], long: Mapping[str, BatchResult]) -> list
 
     Args:
         runs: those of `scenarios`, and of the examples.
-        long: those of `batched`, of the long ladder and of the map of lags.
+        long: those of `batched`, of the long runs and of the map of lags.
     """
     found = []
     for module in _MODULES:

@@ -11,12 +11,12 @@ _SMALL = 1e-3  # m, rad; rms
 
 
 def scenarios(quick: bool) -> dict:
-    """Nothing beyond the ladder, the long ladder and the map of lags."""
+    """Nothing beyond the fidelity comparison, the long runs and the map of lags."""
     return {}
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """On every level of the ladder, for 20 s and for the long horizon; and against the inductance of the winding."""
+    """on every fidelity, for 20 s and for the long horizon; and against the inductance of the winding."""
     lasting = {level: long[name] for level in FIDELITIES if (name := name_of(level, "rcafc")) in long}
     short = {level: one.windows[0] for level, one in lasting.items()}
     horizon = max(one.built.scenario.loop.duration for one in lasting.values())

@@ -1,10 +1,10 @@
 """C2: RCAFC estimates d better than RAFC."""
 
+from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.claims import conditions
 from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1
 from undertow.reproduction.horizons import Long
-from undertow.reproduction.matching import equal_gain
-from undertow.reproduction.setup import RAFC, scenario
+from undertow.reproduction.setup import RAFC, equal_gain, scenario
 
 CLAIM = "RCAFC estimates the lumped uncertainty better than RAFC."
 
@@ -49,5 +49,5 @@ def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Findi
 
 def steady_tracking(runs: Runs) -> tuple[float, float]:
     """Tracking rms of RCAFC, and of RAFC at equal loop gain."""
-    of = lambda name: (runs[name].steady or {})["tracking_rms"]
+    of = lambda name: with_all_outputs(runs[name].steady)["tracking_rms"]
     return of("ideal_rcafc"), of(EQUAL_GAIN)

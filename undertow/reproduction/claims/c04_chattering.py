@@ -3,7 +3,6 @@
 import jax
 import numpy as np
 
-from undertow.core.contracts import Measurement
 from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import law_of
@@ -35,15 +34,15 @@ def judge(runs: Runs, long: Long) -> Finding:
 def perfect_variation(run: Executed) -> float:
     """Total variation, V/s, of the voltages that cancel the prescribed d at the goal, over the steady window."""
     loop, model = run.built.closed_loop, law_of(run).model
-    late = run.dataset["target"].sel(time=slice(*run.built.window()))
+    late = run.dataset["reference"].sel(time=slice(*run.built.window()))
     path, x = loop.realize(jax.random.PRNGKey(0)).disturbance_realization, loop.plant.initial_state()
 
     @jax.jit
     @jax.vmap
     def cancelling(t, goal):
-        y = Measurement(goal, 0 * goal)
+        y = model.coordinates.measurement(goal, 0 * goal)
         load = loop.disturbance.at(path, t, loop.plant.pose(x), loop.plant.no_load())
-        return model.invert(y, -model.drift(y) - load.acceleration)
+        return model.dynamics.invert(y, -model.dynamics.drift(y) - load.acceleration)
 
     # Between the records: a jump of d at a record is followed by the law after it, and several at once are one.
     time = late["time"].values - run.built.scenario.loop.record / 2

@@ -2,11 +2,10 @@
 
 from typing import Any
 
-from undertow.reproduction.batches import BatchResult
 from undertow.reproduction.claims.finding import Finding, Runs, steady
 from undertow.reproduction.horizons import Long, sampled
-from undertow.reproduction.matching import same_loop_gain
-from undertow.reproduction.setup import FIDELITIES, scenario
+from undertow.reproduction.running import BatchResult
+from undertow.reproduction.setup import FIDELITIES, same_loop_gain, scenario
 
 CLAIM = "With the modelling error as input fewer rules are needed than with the state, and the estimate is better."
 
@@ -26,7 +25,7 @@ def scenarios(quick: bool) -> dict:
 
 
 def batched(quick: bool) -> dict:
-    """The state, one rule and five on every level of the ladder, at the same loop gain."""
+    """The state, one rule and five on every fidelity, at the same loop gain."""
     return {
         _name(level, law): scenario(
             f"Table 1 on {level}, fuzzy input: {words}, the same gamma |xi|^2",

@@ -19,7 +19,7 @@ def judge(runs: Runs, long: Long) -> Finding:
     run = runs["static_rcafc"]
     thruster = plant_of(run).thruster
     late = run.dataset.sel(time=slice(run.built.window()[0], None))
-    voltage = late["voltage"].values
+    voltage = late["input"].values
     thrust = np.asarray(thruster.thrust(np.zeros(0), voltage))
     assumed = float(thruster.voltage_gain()) * voltage
     share = float(np.sqrt(((thrust - assumed) ** 2).mean() / (thrust**2).mean()))

@@ -11,7 +11,7 @@ _VALID = 10.0  # %
 
 
 def scenarios(quick: bool) -> dict:
-    """None: Fig. 2 drives the bare motor, and the ladder shows what the difference does to the loop."""
+    """None: Fig. 2 drives the bare motor, and the fidelity comparison shows what the difference does to the loop."""
     return {}
 
 

@@ -2,10 +2,9 @@
 
 from typing import Any
 
-from undertow.reproduction.batches import BatchResult
 from undertow.reproduction.horizons import BOUND, Long, sampled
-from undertow.reproduction.matching import equal_gain
-from undertow.reproduction.setup import RAFC, RCAFC, scenario
+from undertow.reproduction.running import BatchResult
+from undertow.reproduction.setup import RAFC, RCAFC, equal_gain, scenario
 
 LIMITS = (150.0, 100.0, 60.0)  # V
 NOISE = 0.01  # m/s, rad/s
@@ -20,7 +19,7 @@ _LAWS: dict[str, tuple[str, float, dict[str, Any]]] = {
 
 def scenarios() -> dict[str, dict[str, Any]]:
     """Example 1 at 1 kHz with limited voltages, and with noise of 1 cm/s on the velocities."""
-    found, load = {}, {"kind": "u2"}  # which is U1 for 20 s: as the long ladder, so that they share a program
+    found, load = {}, {"kind": "u2"}  # which is U1 for 20 s: as the long runs, so that they share a program
     for law, (words, composite, gains) in _LAWS.items():
         common = {
             "composite": composite,

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from undertow.reproduction.matching import equal_gain_ratio
+from undertow.reproduction.all_outputs import with_all_outputs
+from undertow.reproduction.setup import equal_gain_ratio
 from undertow.scenario.execute import Executed
 
 Runs = Mapping[str, Executed]
@@ -38,7 +39,7 @@ def steady(run: Executed) -> dict[str, Any]:
     """
     if run.steady is None:
         raise RuntimeError(f"a run of the audit ended early: {run.status.word} ({run.built.scenario.description})")
-    return run.steady
+    return with_all_outputs(run.steady)
 
 
 def at_table_1(runs: Runs, metric: str, what: str, unit: str) -> tuple[str, dict[str, float]]:

@@ -1,1 +1,1 @@
-"""The sound version beside the paper's law: the ladder once more, the ablations, and what follows from them."""
+"""The robust variant beside the paper's law: every fidelity once more, the ablations, and what follows from them."""

@@ -1,4 +1,4 @@
-"""Everything of the chapter `The sound version`: the ladder again, the ablations, the conclusions."""
+"""Everything of the chapter `The robust variant`: every fidelity again, the ablations, the conclusions."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.reproduction.ablations import study
-from undertow.reproduction.experiments import run_all
+from undertow.reproduction.ablations.verdicts import ABLATIONS
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
+from undertow.reproduction.running import run_all
 from undertow.scenario.execute import Executed
 
 Progress = Callable[[str, float], None]
@@ -25,22 +26,22 @@ class Chapter(NamedTuple):
 
 
 def chapter(folder: Path, quick: bool, progress: Progress) -> Chapter:
-    """Run it; the scenarios of the ladder are saved as everything else that `reproduce` runs.
+    """Run it; scenarios and campaigns are saved as everything else that `reproduce` runs.
 
     Args:
         folder: where `scenarios/` and `runs/` are.
         quick: fewer fidelities, ablations and seeds.
         progress: told a message and the share done.
     """
-    wanted = [module for module in study.modules() if not (quick and study.is_long(module))]
+    wanted = [one for one in ABLATIONS if not (quick and one.long)]
     silent = lambda message, share: None
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         runs_later = pool.submit(run_all, fidelity.scenarios(quick), folder, silent)
-        later = {pool.submit(study.one, module, quick): module for module in wanted}
+        later = {pool.submit(study.run, one, quick, folder): one for one in wanted}
         try:
             for count, done in enumerate(as_completed([runs_later, *later])):
                 done.result()
-                what = "the ladder again" if done is runs_later else f"ablation {study.identity(later[done])}"
+                what = "every fidelity again" if done is runs_later else f"ablation {later[done].id}"
                 progress(what, (count + 1) / (len(later) + 1))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -49,8 +50,8 @@ def chapter(folder: Path, quick: bool, progress: Progress) -> Chapter:
     rows = fidelity.table(runs, quick)
     results = {
         "quick": quick,
-        "seeds": study.QUICK_SEEDS if quick else study.SEEDS,
-        "left_out": [study.identity(module) for module in study.modules() if module not in wanted],
+        "seeds": found[0]["variants"][0]["seeds"],
+        "left_out": [one.id for one in ABLATIONS if one not in wanted],
         "fidelity": rows,
         "ablations": found,
         "conclusions": conclusions(rows, found),

@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from undertow.bench.workload import W2
 from undertow.core.status import Status
+from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.robust_variant import station_keeping
 from undertow.reproduction.setup import FIDELITIES, HAND_TUNED, RAFC, RCAFC, scenario
 from undertow.scenario.execute import Executed
@@ -109,7 +111,7 @@ def table(runs: Mapping[str, Executed], quick: bool) -> list[dict[str, Any]]:
 
 
 def _name(place: str, law: str) -> str:
-    return f"sound_{place}_{law}"
+    return f"robust_variant_{place}_{law}"
 
 
 def _laws(
@@ -129,34 +131,15 @@ def _laws(
 
 
 def at_sea(description: str, law: dict[str, Any]) -> dict[str, Any]:
-    """As examples/bluerov2_heavy.yaml, with a law to be compared; speed workload W2, too."""
-    sensors = [
-        "imu",
-        {"kind": "dvl", "period": 0.125, "noise": 0.005, "delay": 0.05},
-        "depth",
-        "compass",
-        {"kind": "position_fix", "period": 1, "noise": 0.05, "delay": 0.2},
-    ]
-    return {
-        "description": description,
-        "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
-        "model": {"rate_term": True},
-        "controller": law,
-        "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 20},
-        "disturbance": [
-            {"kind": "current", "velocity": [0.3, 0.2, 0]},
-            {"kind": "waves", "height": 0.5, "period": 5},
-        ],
-        "navigation": {"kind": "observer", "sensors": sensors},
-        "loop": {"kind": "sampled", "dt": 0.01, "duration": 120, "record": 0.05},
-    }
+    """As examples/bluerov2_heavy.yaml, with a law to be compared."""
+    return W2 | {"description": description, "controller": law}
 
 
 def _row(run: Executed) -> dict[str, Any]:
     return {
         "status": run.status.word,
         "diverged_at": None if run.status is Status.OK else float(run.outcome.ended),
-        "steady": run.steady,
+        "steady": with_all_outputs(run.steady),
         "largest_after": _largest_after(run, _PUSHED),
         "position_rms": _late_rms(run, run.dataset["error"]),
         "navigation_rms": _late_rms(run, run.dataset["measured_position"] - run.dataset["position"]),

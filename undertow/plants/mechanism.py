@@ -1,0 +1,59 @@
+"""What plants that are no bodies in water have in common: inputs within limits, and nothing that water could push."""
+
+import abc
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PyTree
+
+from undertow.core.contracts import AbstractPlant, Effort, Inputs, Outputs
+from undertow.core.signals import Signal
+from undertow.plants.reachability import open_loop_advice
+
+
+class AbstractMechanism(AbstractPlant):
+    """A plant given by its equation of motion and the limits of its inputs."""
+
+    @abc.abstractmethod
+    def limits(self) -> tuple[Inputs, Inputs]:
+        """Smallest and largest input, (m,) each; infinite where there is no limit."""
+
+    @abc.abstractmethod
+    def power(self, x: PyTree, u: Inputs) -> Inputs:
+        """What each input costs, W."""
+
+    def inputs(self) -> int:
+        return self.limits()[0].shape[0]
+
+    def admissible(self, x: PyTree, u: Inputs) -> Inputs:
+        return jnp.clip(u, *self.limits())
+
+    def effort(self, x: PyTree, u: Inputs) -> Effort:
+        """An input that cannot be negative rests at its smallest value, and is not counted as limited there."""
+        low, high = self.limits()
+        limited = (u >= high) | ((u <= low) & (low < 0))
+        return Effort(self.power(x, u), limited.astype(u.dtype))
+
+    def pose(self, x: PyTree) -> None:
+        return None
+
+    def advice(self) -> tuple[str, ...]:
+        """Directions that no input can accelerate at zero, where there are any."""
+        y = self.output(jnp.zeros(()), self.initial_state())
+        return open_loop_advice("the gain matrix", self.model().dynamics.gain(y), self.outputs)
+
+    def diagnostics(self, x: PyTree, u: Inputs) -> dict[str, Array]:
+        return {}
+
+    def signals(self) -> dict[str, Signal]:
+        return {}
+
+
+def both_ways(limit: Float[Array, "..."], inputs: int) -> tuple[Inputs, Inputs]:
+    """Limits of inputs that are allowed as much one way as the other."""
+    high = jnp.broadcast_to(limit, (inputs,))
+    return -high, high
+
+
+def given_or_zero(outputs: Outputs | None, count: int) -> Outputs:
+    """Outputs to start from, or zeros."""
+    return jnp.zeros(count) if outputs is None else outputs
