@@ -81,7 +81,7 @@ OPEN = (
 # Phrases in which a retired word is the field's word, or somebody else's name.
 PHRASES = re.compile(
     r"lanes_of|when the sound left|admin\.tick\.interval|tick_params"
-    r"|charge drawn|Nonlinear Dynamics|fly[- ]?wheel",
+    r"|echo.sounder|journal article|charge drawn|Nonlinear Dynamics|fly[- ]?wheel",
     re.I,
 )
 
