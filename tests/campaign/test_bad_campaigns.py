@@ -31,7 +31,7 @@ from undertow.scenario.reading import dump
         ({"series": {"signals": ["positon"]}}, r"`series.signals\[0\]` must be one of .*position.*, but is positon"),
         (
             {"requirements": {"tracking": {"below": 1.0}}},
-            r"`requirements.tracking` must be a metric, but is unknown. Did you mean",
+            r"`requirements.tracking` must be a metric, but is unknown. Known: ",
         ),
         (
             {"vary": {"": {"uniform": [1.0, 2.0]}}},
@@ -52,7 +52,7 @@ from undertow.scenario.reading import dump
         ),
         (
             {"series": {"every": 0.1}, "vary": {"loop.duration": {"uniform": [1.0, 2.0]}}},
-            r"`series` must be of runs of one length and sampling time, but is beside loop.duration, which differs",
+            r"`series` must be of runs of one length and sampling time, but is given together with loop.duration",
         ),
         (
             {"vary": {"plant.limit": {"unifrom": [1.0, 2.0]}}},
@@ -80,10 +80,13 @@ from undertow.scenario.reading import dump
             },
             r"`series` must be of plants with the same outputs and inputs, but is of several",
         ),
-        ({"cross": {"seed": [1, 2]}}, r"`cross.seed` must be left out \(small.yaml, line \d+\). Every trial has one"),
         (
-            {"vary": {"sensor.velocity": {"uniform": [0.0, 1.0]}, "navigation": {"choice": ["perfect"]}}},
-            r"`sensor.velocity` must not be given together with sensor, which contains it",
+            {"cross": {"seed": [1, 2]}},
+            r"`cross.seed` must be left out \(small.yaml, line \d+\). Every trial has its own seed",
+        ),
+        (
+            {"vary": {"navigation.velocity": {"uniform": [0.0, 1.0]}, "navigation": {"choice": ["perfect"]}}},
+            r"`navigation.velocity` must not be given together with navigation, which contains it",
         ),
         (
             {"requirements": {"position_rms": {"below": 1.0, "share": 1.0}}},
@@ -137,7 +140,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
     [
         (
             ["campaign", "scenario.yaml"],
-            r"`CAMPAIGN` must be a campaign, but is a scenario .*`undertow simulate` runs it",
+            r"`CAMPAIGN` must be a campaign, but is a scenario .*Run it with `undertow simulate`",
         ),
         (
             ["simulate", "campaign.yaml"],
@@ -197,7 +200,7 @@ def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
     assert re.search(r"is damaged .* --resume` repairs it where possible\n$", capsys.readouterr().err)
     torn.unlink()
     assert run(["campaign", "status", str(out)]) == 0
-    assert capsys.readouterr().out == "4 of 8 trials done\n  ok: 4\n"
+    assert capsys.readouterr().out == "4 of 8 trials done\n  completed: 4\n"
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
     assert contents(out) == before
 
@@ -217,7 +220,7 @@ def test_a_mass_without_its_weight_is_told(campaign_file, tmp_path, capsys):
 def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):
     path, out = campaign_file(trials=4), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
-    assert "find a campaign to go on with" in capsys.readouterr().err
+    assert "find a campaign to continue" in capsys.readouterr().err
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     before = contents(out)
     assert run(["campaign", str(path), "--out", str(out)]) == 2
@@ -248,7 +251,9 @@ def test_a_store_without_its_first_file_is_told(campaign_file, tmp_path, capsys,
     assert run(["campaign", "status", str(out)]) == 4
     assert re.fullmatch(r"Error: files could not be .* is damaged \(.*\n", capsys.readouterr().err)
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
-    assert re.search(r"Error: `--out` .*zarr.json is damaged \(.*--overwrite begins anew\n", capsys.readouterr().err)
+    assert re.search(
+        r"Error: `--out` .*zarr.json is damaged \(.*Use --overwrite to start again\n", capsys.readouterr().err
+    )
     assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 0
 
 

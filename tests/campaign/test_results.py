@@ -30,7 +30,7 @@ def test_what_it_leaves(campaign_file, tmp_path, capsys):
     assert found["sensitivity"]["disturbance.amplitude"]["position_rms"] > 0.99
     page = re.sub(r"<[^>]+>", " ", (out / "campaign.html").read_text())
     assert "seed 7" in page and "uniform, 0.5 to 2" in page
-    for words in ("Two PIDs", "How they ended", "Requirements", "The worst trials", "0.0 % [0.0"):
+    for words in ("Two PIDs", "Status of the trials", "Requirements", "The worst trials", "0.0 % [0.0"):
         assert words in page
     assert {file.name for file in (out / "figures").glob("*.svg")} == {"distributions.svg", "sensitivity.svg"}
     worst = sorted((out / "worst").iterdir())
@@ -54,7 +54,7 @@ def test_variants_are_an_axis_of_the_results(campaign_file, tmp_path, capsys):
         assert run(["campaign", str(campaign_file(str(i), trials=4, **way)), "--out", str(out)]) == 0
         rows.append(xr.open_zarr(out / STORE, consolidated=False).load())
     assert rows[0]["variant"].values.tolist() == ["slow", "brisk"]
-    np.testing.assert_array_equal(rows[0]["tracking_rms"].values, rows[1]["tracking_rms"].values)
+    np.testing.assert_array_equal(rows[0]["position_rms"].values, rows[1]["position_rms"].values)
     found = json.loads((tmp_path / "0" / "summary.json").read_text())
     assert [one["values"] for one in found["combinations"]] == [{"variant": "slow"}, {"variant": "brisk"}]
     assert "slow" in capsys.readouterr().out
@@ -160,10 +160,10 @@ def test_what_is_drawn_from_words_is_told_apart(campaign_file, tmp_path):
     found = json.loads((out / "summary.json").read_text())["choices"]["navigation"]
     rows = xr.open_zarr(out / STORE, consolidated=False).load()
     for number, one in enumerate(found.values()):
-        chosen = rows["position_rms"].values[rows["vary:sensor"].values == number]
+        chosen = rows["position_rms"].values[rows["vary:navigation"].values == number]
         assert one["trials"] == len(chosen) > 5
         assert one["metrics"]["position_rms"]["0.5"] == np.median(chosen)
-    assert list(found) == rows["vary:sensor"].attrs["choices"]
+    assert list(found) == rows["vary:navigation"].attrs["choices"]
 
 
 def test_a_file_that_the_scenario_names_belongs_to_the_campaign(campaign, campaign_file, tmp_path, capsys):

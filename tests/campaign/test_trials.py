@@ -61,7 +61,7 @@ def test_variants_change_several_keys_together(campaign):
     [
         ({"variants": {"a": {"seed": 1}}}, "seed` must be left out"),
         ({"variants": {"a": {"loop..dt": 1}}}, "be a key path"),
-        ({"variants": {"a": {"disturbance.amplitude": 1.0}}}, "not be in `vary`, too"),
+        ({"variants": {"a": {"disturbance.amplitude": 1.0}}}, "not be in `vary` as well"),
         ({"variants": {"a": {}}, "cross": {"variant": [1, 2]}}, "left out beside `variants`"),
     ],
 )

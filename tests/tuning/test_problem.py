@@ -12,6 +12,7 @@ from undertow.core.errors import BadInput
 from undertow.disturbances import current, sinusoid, wrench
 from undertow.disturbances.adding import Together
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import observer
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
 from undertow.scenario.reading import from_data
