@@ -293,7 +293,7 @@ def test_a_torn_flag_is_no_flag(small, tmp_path, content):
 
 EDITS = {
     "codecs": ('"endian": "little"', '"endian": "big"'),
-    "attributes": ('"units": "m, rad"', '"units": "ft, rad"'),
+    "attributes": ('"units": "m"', '"units": "ft, rad"'),
     "data_type": ('"data_type": "float64"', '"data_type": "int64"'),
     "fill_value": ('"fill_value": "NaN"', '"fill_value": 0.0'),
     "chunk_grid": ('"chunk_shape": [\n        16', '"chunk_shape": [\n        8'),

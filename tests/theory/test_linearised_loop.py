@@ -143,7 +143,7 @@ def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
     plant = hybrid_vehicle(bluerov2(), t200(supply=16.0, dead_zone=0.0))
     law = rcaf(plant.model(), preset="robust", sampling_time=dt)
     still = setpoint([0.0] * 6)
-    found = rest(ClosedLoop(plant, law, still, none(), perfect()), dt, np.zeros(6), load)
+    found = equilibrium(ClosedLoop(plant, law, still, none(), perfect()), dt, np.zeros(6), load)
     assert found.found, found.moving
     pushed = ClosedLoop(plant, law, still, sinusoid(0.0, offset=load), perfect())
     flown = simulate(pushed, duration=200.0, dt=dt, record_every=100)
@@ -206,7 +206,7 @@ def test_what_is_said_of_moving_weights(sets, said):
     """Table 1 on `shaft`: five sets last 2,000 s where one does not, and both have these poles at fixed weights."""
     _, why_not = predicted(operating_point(build(_odin("shaft", {"sets": sets}))))
     assert why_not.startswith("the loop linearised at fixed weights is unstable") and said in why_not
-    assert ("only a run tells" in why_not) == (sets > 1)
+    assert ("only a run shows" in why_not) == (sets > 1)
 
 
 @pytest.mark.parametrize("bound", [None, 20.0])
@@ -214,7 +214,7 @@ def test_no_figure_is_predicted_that_the_law_forbids(bound):
     """W1: the linear model's robust term passes 10 m/s^2, which tanh cannot."""
     choices = {"composite": 20} | ({} if bound is None else {"weights_bound": bound})
     metrics, why_not = predicted(operating_point(build(_odin("electromechanical", choices))))
-    assert metrics is None and "asks for a robust term of" in why_not and "bounds to 10" in why_not
+    assert metrics is None and "requires a robust term of" in why_not and "bounds to 10" in why_not
 
 
 def _odin(fidelity, choices):
