@@ -132,9 +132,8 @@ def _sentences(found: Tuned) -> list[str]:
     return [
         f"Tuned: {options}",
         f"The held-out cost is {given.held_out_cost / tuned.held_out_cost:.3g} times smaller than with the given "
-        "gains. "
-        f"{found.evaluations} evaluations, {found.rejected} rejected without a certificate, {found.elapsed:.0f} s; "
-        f"{ending}.",
+        f"gains. {found.evaluations} evaluations, {found.rejected} rejected without a certificate, {found.elapsed:.0f} "
+        f"s; {ending}.",
     ]
 
 

@@ -46,8 +46,7 @@ def _actuators(prediction: Prediction) -> tuple[str, ...]:
     if authority.held < 1:
         warnings.append(
             f"the actuators meet the demand for only {authority.held:.0%} of the time, and give "
-            f"{authority.share.min():.0%} "
-            "of it at worst. Reduce the demand, or use larger actuators"
+            f"{authority.share.min():.0%} of it at worst. Reduce the demand, or use larger actuators"
         )
     lost = [point for point in prediction.points if not point.found]
     if lost:
@@ -85,8 +84,7 @@ def _noise(prediction: Prediction) -> tuple[str, ...]:
         return ()  # an unstable loop has no stationary noise
     return (
         f"the measured velocities have errors with a standard deviation of {present:.2g} m/s or rad/s; white noise "
-        "above "
-        f"{largest:.2g} alone drives the input to its limit",
+        f"above {largest:.2g} alone drives the input to its limit",
     )
 
 
@@ -99,6 +97,5 @@ def _drift(prediction: Prediction) -> tuple[str, ...]:
     )
     return (
         f"{bound}, and noise or a persistent load can drive them to a gain of {breaks:.3g} 1/s, at which the loop "
-        "becomes "
-        "unstable. Set `weights_bound`, or a smaller one",
+        "becomes unstable. Set `weights_bound`, or a smaller one",
     )

@@ -23,8 +23,7 @@ _CAPTIONS = {
 _INTERVALS = (
     "Share of the trials that keep each requirement, with its 95 % Clopper-Pearson interval. The interval is exact for "
     "random samples and conservative for Latin hypercube and Sobol samples, which are more even. A failed trial does "
-    "not "
-    "keep the requirement; an invalid trial is not counted. The verdict `open` means that more trials are needed: "
+    "not keep the requirement; an invalid trial is not counted. The verdict `open` means that more trials are needed: "
     "increase `trials` and use `--resume`. The interval assumes that the number of trials was fixed beforehand."
 )
 

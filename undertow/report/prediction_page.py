@@ -45,9 +45,8 @@ def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path
 
 
 LEFT_OUT = (
-    "The loop is linearised at its equilibrium. Saturation, dead zones, pulses of speed controllers and large "
-    "motions are "
-    "left out, and a moving reference is treated as one at rest under the loads that the motion causes. `undertow "
+    "The loop is linearised at its equilibrium. Saturation, dead zones, pulses of speed controllers and large motions "
+    "are left out, and a moving reference is treated as one at rest under the loads that the motion causes. `undertow "
     "simulate` reports metrics that depart by more than 10 %."
 )
 

@@ -33,8 +33,7 @@ def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[str, ...]:
     return (
         f"the thrusters have a time constant of {1e3 / rate:.3g} ms, for which integration steps above "
         f"{1e3 * longest:.3g} ms are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically. "
-        "Use "
-        f"{_remedy(loop, longest)}, or another fidelity level",
+        f"Use {_remedy(loop, longest)}, or another fidelity level",
     )
 
 
@@ -72,10 +71,8 @@ def step_failure(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> str:
     what = "plant and controller have" if loop.kind == "continuous" else "the plant has"
     return (
         f"The run diverged numerically, not because the loop is unstable: {what} a time constant of {1e3 / rate:.3g} "
-        "ms, "
-        f"for which steps of {loop.method} above {1e3 * longest:.3g} ms are unstable, but the step is {1e3 * step:g} "
-        "ms. "
-        f"Use {_remedy(loop, longest)}."
+        f"ms, for which steps of {loop.method} above {1e3 * longest:.3g} ms are unstable, but the step is "
+        f"{1e3 * step:g} ms. Use {_remedy(loop, longest)}."
     )
 
 

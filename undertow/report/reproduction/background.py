@@ -14,8 +14,7 @@ INTRODUCTION = join(
     DOI,
     Html(
         ". It recomputes every figure and table of its results and checks each of its claims. <b>RCAFC</b> is the "
-        "robust "
-        "composite adaptive fuzzy controller that the paper proposes. <b>RAFC</b> is the robust adaptive fuzzy "
+        "robust composite adaptive fuzzy controller that the paper proposes. <b>RAFC</b> is the robust adaptive fuzzy "
         "controller, which is the same law with the composite gain "
     ),
     mathml(r"\gamma_\varepsilon = 0"),
@@ -32,9 +31,8 @@ ASSUMED = (
     ),
     Html(
         "<b>Disturbance.</b> The paper shows curves, but no formulas. This reproduction uses suite U1: a swell with "
-        "steps, two sinusoids at 2 and 20 rad/s, a square wave, a pulse, a ramp with reset and a chirp up to 10 "
-        "rad/s, one "
-        "per axis, rms 3.2 m/s<sup>2</sup> and rad/s<sup>2</sup>."
+        "steps, two sinusoids at 2 and 20 rad/s, a square wave, a pulse, a ramp with reset and a chirp up to 10 rad/s, "
+        "one per axis, rms 3.2 m/s<sup>2</sup> and rad/s<sup>2</sup>."
     ),
     Html(
         "<b>Fuzzy sets.</b> Centres and widths are blank in print, and their number is three in the text and five "
@@ -80,8 +78,7 @@ LEFT_OPEN = (
     (
         "Eqs. (4), (5), (17)",
         "A transpose is printed instead of an inverse transpose, and the inverse of the derivative of $J$ instead of "
-        "the "
-        "derivative of its inverse (the former does not exist at rest).",
+        "the derivative of its inverse (the former does not exist at rest).",
         "Derived again; implemented in the form in which $J$ cancels.",
     ),
     (
@@ -97,8 +94,7 @@ LEFT_OPEN = (
     (
         "Table 3",
         "$k_t$ is 117 times $k_e$; in SI units both are equal for a DC motor. The shaft would deliver several times "
-        "the "
-        "electrical power.",
+        "the electrical power.",
         "Used as printed on this page; undertow warns about it.",
     ),
     (
@@ -114,8 +110,7 @@ LEFT_OPEN = (
     (
         "Eqs. (38)-(41)",
         "The optimal weights are defined for a $d$ that is a function of $\\varepsilon$, but $d$ is a function of "
-        "time. Their "
-        "error is then half the range of $d$, which is not small.",
+        "time. Their error is then half the range of $d$, which is not small.",
         "The error is measured, not assumed.",
     ),
     (

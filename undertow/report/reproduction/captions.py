@@ -17,10 +17,8 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
             " and ",
             mathml(r"V = 10 \sin 10 t"),
             ", one period after start-up. With the slow voltage, thrust is nearly a function of current or voltage. "
-            "With "
-            "the fast one it is not: the curves open to loops. The static models are fitted to the slow voltage by "
-            "least "
-            "squares; (c) shows the error of each for both voltages.",
+            "With the fast one it is not: the curves open to loops. The static models are fitted to the slow voltage "
+            "by least squares; (c) shows the error of each for both voltages.",
         ),
         "fig06": join(
             "Both controllers reach the desired pose and look alike; the error on a logarithmic scale shows the "
@@ -44,8 +42,7 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
         "fig09": join(
             "The left panels show the first second, the right panels the rest, on separate scales. The start demands "
             "voltages that no supply gives. After it both controllers need the same voltage, because they counteract "
-            "the "
-            "same disturbance.",
+            "the same disturbance.",
             _pair(one, "input_peak", "Largest voltage, V", "whole"),
             _pair(one, "input_variation", "Variation after 10 s, V/s"),
         ),
@@ -57,14 +54,12 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
         "fig11": join(
             "The state of the series-parallel model coincides with that of the vehicle; the lower panels show the "
             "difference in mm and mrad. Nothing drives the position of the model to that of the vehicle, so the "
-            "initial "
-            "offset stays: it is not an estimate of position.",
+            "initial offset stays: it is not an estimate of position.",
             _single(two, "model_rms", "Rms of the modelling error in velocity after 10 s"),
         ),
         "fig12": join(
             "The characteristic of the motor is now part of the uncertainty, which is larger than in Fig. 7 and has "
-            "kinks "
-            "where a thruster changes direction: near zero volts the motor gives almost no thrust.",
+            "kinks where a thruster changes direction: near zero volts the motor gives almost no thrust.",
             _single(two, "uncertainty_rms", "Rms of d after 10 s"),
             _single(two, "estimation_rms", "Rms error of the estimate"),
         ),

@@ -10,10 +10,9 @@ FIGURES = ("horizons", "lags", "drifting")
 
 CAPTIONS = {
     "horizons": prose(
-        "The upper panels show the largest weight against time; a cross marks a run that ended early. Thin grey "
-        "lines are "
-        "the same controllers with weights bounded by 20. The lower panel shows the time of divergence of RCAFC on the "
-        "full motor model for each composite gain: free weights (blue) drift until the loop diverges; with bounded "
+        "The upper panels show the largest weight against time; a cross marks a run that ended early. Thin grey lines "
+        "are the same controllers with weights bounded by 20. The lower panel shows the time of divergence of RCAFC on "
+        "the full motor model for each composite gain: free weights (blue) drift until the loop diverges; with bounded "
         "weights (grey) it lasts."
     ),
     "lags": prose(
@@ -23,12 +22,10 @@ CAPTIONS = {
     ),
     "drifting": prose(
         "One sinusoid acts per axis. Weights that differ between sets give $\\hat d = z - c \\varepsilon$, and $c$ "
-        "grows "
-        "with the square of the oscillation: $\\dot c = \\gamma \\gamma_\\varepsilon |\\xi'|^2 \\varepsilon^2$. It "
-        "stops "
-        "growing where the linearised loop with this $c$ is stable (dotted); the chattering decays, and the error is "
-        "that "
-        "of Example 1. With weights bounded by 20, $c$ cannot reach this value, and the limit cycle persists."
+        "grows with the square of the oscillation: $\\dot c = \\gamma \\gamma_\\varepsilon |\\xi'|^2 \\varepsilon^2$. "
+        "It stops growing where the linearised loop with this $c$ is stable (dotted); the chattering decays, and the "
+        "error is that of Example 1. With weights bounded by 20, $c$ cannot reach this value, and the limit cycle "
+        "persists."
     ),
 }
 
@@ -55,9 +52,8 @@ def _horizons(found: Mapping[str, Any]) -> list[Html]:
     text = (
         f"The same fidelity levels for {found['duration']:,.0f} s of suite U2, which repeats U1 every 20 s (U1 itself "
         "cannot be continued, because its chirp keeps rising), sampled at 1 kHz. Each controller runs with free "
-        "weights "
-        "and with weights bounded by 20 m/s^2 or rad/s^2. Metrics are computed over three windows, chattering from "
-        "every sample."
+        "weights and with weights bounded by 20 m/s^2 or rad/s^2. Metrics are computed over three windows, chattering "
+        "from every sample."
     )
     return [tag("h3", f"Long runs: {found['duration']:,.0f} s"), tag("p", prose(text))]
 

@@ -70,15 +70,13 @@ def _figures(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Ht
     if content:
         note = (
             "Dotted lines are desired or true values, solid lines RCAFC, dashed lines RAFC. Figures 1 and 3 to 5 of "
-            "the "
-            "paper are block diagrams."
+            "the paper are block diagrams."
         )
         content = [tag("p", note), *content]
     if results.get("example1"):
         text = (
             "A separate script solves Example 1 independently with a fixed step of 1 ms. The two solutions should "
-            "agree "
-            "within 2 %; because of the jumps in $d$ the last digit depends on how the run is sampled."
+            "agree within 2 %; because of the jumps in $d$ the last digit depends on how the run is sampled."
         )
         content += [tag("h3", "Comparison with an independent solution"), tag("p", prose(text))]
         content.append(tables.reference_table(results["example1"]))
@@ -100,10 +98,9 @@ def _fidelity(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[H
         return []
     text = (
         "Both controllers, with the gains of Table 1, control the same vehicle under the same disturbance on four "
-        "fidelity "
-        "levels of the thruster model. First, 20 s of U1 as one differential equation, with tracking rms in m and "
-        "rad and "
-        "estimation rms in m/s^2 and rad/s^2 from 10 s to 20 s. A run that completes 20 s can still diverge later."
+        "fidelity levels of the thruster model. First, 20 s of U1 as one differential equation, with tracking rms in m "
+        "and rad and estimation rms in m/s^2 and rad/s^2 from 10 s to 20 s. A run that completes 20 s can still "
+        "diverge later."
     )
     return [
         tag("p", prose(text)),
@@ -118,8 +115,7 @@ def _audit(claims: list[dict[str, Any]], figures: Mapping[str, Html]) -> list[Ht
         return []
     text = (
         "Each verdict names the run behind it, with the fidelity levels and the simulated time. It does not extend "
-        "beyond "
-        "these. Run the commands in the folder of this page."
+        "beyond these. Run the commands in the folder of this page."
     )
     return [tag("p", prose(text)), tables.audit(claims), *(figures[name] for name in ("sweep",) if name in figures)]
 

@@ -14,14 +14,12 @@ TITLE = "The robust variant"
 CAPTIONS = {
     "robust_fidelity": (
         "The upper panels show the size of the tracking error against time, the lower panel its rms over the second "
-        "half "
-        "of each run. All runs are sampled, at 1 kHz on ODIN and at 100 Hz on BlueROV2 Heavy. A cross marks a run that "
-        "ended early."
+        "half of each run. All runs are sampled, at 1 kHz on ODIN and at 100 Hz on BlueROV2 Heavy. A cross marks a run "
+        "that ended early."
     ),
     "ablations": (
-        "Dots are medians, thick lines the 95 % interval of the median, thin lines the 5 % to 95 % range of the "
-        "seeds. A "
-        "cross marks runs that ended early; where most runs ended early, there is no dot."
+        "Dots are medians, thick lines the 95 % interval of the median, thin lines the 5 % to 95 % range of the seeds. "
+        "A cross marks runs that ended early; where most runs ended early, there is no dot."
     ),
 }
 
@@ -52,23 +50,26 @@ def robust_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> l
     )
     text = (
         "Preset `robust` has the paper's structure, but it works in body axes, includes the motors in its nominal "
-        "model, "
-        "uses the applied instead of the commanded input, bounds its weights, and derives its gains from the "
-        "sampling time. "
-        "This section compares it with the paper's controllers, all of them sampled. Run the commands in the folder of "
-        "this page: `undertow simulate` with the file named below each controller. Each ablation is a file of "
-        "campaigns/ for `undertow campaign`."
+        "model, uses the applied instead of the commanded input, bounds its weights, and derives its gains from the "
+        "sampling time. This section compares it with the paper's controllers, all of them sampled. Run the commands "
+        "in the folder of this page: `undertow simulate` with the file named below each controller. Each ablation is a "
+        "file of campaigns/ for `undertow campaign`."
     )
     levels = [tag("h3", "Fidelity levels"), tag("p", prose(text)), *_figure(figures, "robust_fidelity")]
-    return [tag("p", prose(conditions)), *lists, *levels, tables.fidelity(results["fidelity"]), *_ablations(results, figures)]
+    return [
+        tag("p", prose(conditions)),
+        *lists,
+        *levels,
+        tables.fidelity(results["fidelity"]),
+        *_ablations(results, figures),
+    ]
 
 
 def _ablations(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
     text = (
         f"One element is changed at a time. Disturbances, noise and failures are random, with {results['seeds']} seeds "
-        "that are the same for every variant; gains were tuned on other seeds. Statistics are those of the second "
-        "half of "
-        "each run. A run that ended early counts as infinite."
+        "that are the same for every variant; gains were tuned on other seeds. Statistics are those of the second half "
+        "of each run. A run that ended early counts as infinite."
     )
     if results["left_out"]:
         text += f" This quick report uses fewer seeds and leaves out {', '.join(results['left_out'])}."

@@ -205,8 +205,7 @@ def _at_sea(n: Numbers) -> str:
         return ""
     return (
         f"At sea. On BlueROV2 Heavy Table 1 ends after {paper['diverged_at']:.2g} s. The paper's law tuned by hand "
-        f"holds {hand['steady']['tracking_rms']:.3g}; `robust`, not tuned, "
-        f"{robust['steady']['tracking_rms']:.3g}."
+        f"holds {hand['steady']['tracking_rms']:.3g}; `robust`, not tuned, {robust['steady']['tracking_rms']:.3g}."
     )
 
 
