@@ -27,9 +27,8 @@ from undertow import process
 process.prepare()
 
 from undertow.campaign import task
-from undertow.campaign.clusters import cluster
 from undertow.campaign.columns import labels
-from undertow.campaign.executors import by_dask, in_threads
+from undertow.campaign.executors import by_dask, cluster, in_threads
 from undertow.campaign.fingerprint import Identity
 from undertow.campaign.layout import Layout
 from undertow.campaign.prepare import prepare

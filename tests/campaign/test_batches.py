@@ -8,8 +8,7 @@ from batch_compiler.emulated_gpu import EmulatedGpu
 from simdjit import Driver, nvidia
 from undertow.analysis.metrics import Metrics, results
 from undertow.campaign.batch_runner import ProgramCache
-from undertow.campaign.campaign_schema import validate
-from undertow.campaign.reading import whole
+from undertow.campaign.campaign_schema import validate, whole
 from undertow.campaign.task import INVALID, run_trials, site
 from undertow.campaign.trials import Trials, trials
 from undertow.loop import simd_batch

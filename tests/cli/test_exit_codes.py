@@ -173,7 +173,7 @@ EVERY = {
     "reproduce": ("reproduce", ["reproduce", "--out", "out"]),
     "check": ("check", ["check", "s.yaml"]),
     "describe": ("describe", ["describe", "odin"]),
-    "list": ("list_parts", ["list"]),
+    "list": ("describe", ["list"]),
     "simulate": ("simulate", ["simulate", "s.yaml"]),
 }
 

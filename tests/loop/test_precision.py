@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.campaign.campaign_schema import read_text
 from undertow.campaign.layout import layout
-from undertow.campaign.reading import read_text
 from undertow.campaign.task import fly, site
 from undertow.core import runtime
 from undertow.core.contracts import Load, Pose

@@ -10,7 +10,7 @@ from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.white_noise import white_noise
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 

@@ -7,8 +7,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from PIL import Image
 
 from undertow.report.figures import fidelity_figure, paper_figures, png, run_figures, save, svg, sweep_figure
-from undertow.report.figures.effort import effort
-from undertow.report.figures.uncertainty import uncertainty
+from undertow.report.figures.paper import effort, uncertainty
 from undertow.reproduction.thruster_response import thruster_response
 
 AXES = ["north", "east", "down", "roll", "pitch", "yaw"]

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.analysis.certificate.bounds import residual
-from undertow.analysis.certificate.function import gramian, transition
+from undertow.analysis.certificate.function import gramian, residual, transition
 from undertow.controllers.rcaf import rcaf
 from undertow.controllers.robust.estimator import Estimator
 from undertow.disturbances.sinusoid import sinusoid

@@ -8,7 +8,7 @@ from undertow.analysis import motor_loop, noise, small_signal
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
-from undertow.analysis.linearization.response import compare
+from undertow.analysis.linearization.response import compare_metrics
 from undertow.controllers import rcaf
 from undertow.disturbances import none, sinusoid
 from undertow.loop.closed_loop import ClosedLoop
@@ -196,7 +196,7 @@ def test_runs_do_what_was_foretold(name):
     metrics, why_not = predicted(operating_point(built))
     assert metrics is not None, why_not
     run = execute(built)
-    for one in compare(metrics, run.steady):
+    for one in compare_metrics(metrics, run.steady):
         if one.measured > 1e-6 and not one.name.endswith(("max", "peak")):
             assert one.departure < 0.10, one
 

@@ -2,13 +2,14 @@
 
 import math
 import re
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from undertow.campaign.labels import by_name, words
 from undertow.core.errors import BadInput
-from undertow.scenario.reading import Text
+from undertow.scenario.reading import Text, dump, parse, read
 from undertow.scenario.schema import Scenario, Strict, complaint
 
 # List entries in brackets only: each key has one spelling, so that duplicates are noticed.
@@ -189,3 +190,26 @@ def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
         same = known.setdefault(repr(float(entry) if isinstance(entry, int) else entry), word)
         if same != word:
             raise BadInput(name, "have entries that differ", f"twice {words(entry)}", where=where)
+
+
+def read_campaign(path: Path) -> tuple[Campaign, Text]:
+    """A campaign from its file, and the text of the file.
+
+    Raises:
+        BadInput: the file is not a valid campaign.
+    """
+    text = read(path, "CAMPAIGN")
+    return validate(text), text
+
+
+def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
+    """A campaign from the text of `whole`; relative paths in it start at `folder`."""
+    parsed = parse(text, "", folder, "CAMPAIGN")
+    return validate(parsed), parsed
+
+
+def whole(campaign: Campaign, scenario: dict) -> str:
+    """The complete campaign as YAML, without `chunk` and free text, which do not affect the results."""
+    unused = set() if campaign.variants else {"variants"}
+    data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"} | unused)
+    return dump(data | {"scenario": scenario})

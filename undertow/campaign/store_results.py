@@ -9,12 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from undertow.campaign.arrays import check_array, chunk_file, flags, to_be_read
-from undertow.campaign.campaign_schema import Campaign
+from undertow.campaign.campaign_schema import Campaign, read_text
 from undertow.campaign.columns import DONE, FLAGS, METRICS, trial_labels
 from undertow.campaign.layout import SAMPLES, Layout, layout
-from undertow.campaign.reading import read_text
 from undertow.campaign.run_campaign import STORE
+from undertow.campaign.store import check_array, chunk_file, flags, to_be_read
 from undertow.campaign.task import INVALID
 from undertow.core.errors import BadInput
 from undertow.core.metric import Metric

@@ -11,24 +11,26 @@ from typing import NoReturn
 
 import typer
 from rich.console import Console
+from rich.table import Table
 
+from undertow.analysis.metrics import for_people
 from undertow.campaign.campaign_summary import endings, summary
-from undertow.campaign.clusters import check_cluster, cluster
-from undertow.campaign.executors import by_dask, in_threads
+from undertow.campaign.executors import by_dask, check_cluster, cluster, in_threads
 from undertow.campaign.prepare import Prepared, prepare
 from undertow.campaign.run_campaign import STORE, Executor, Tally, Watch, run_campaign
-from undertow.campaign.store_results import load
+from undertow.campaign.store_results import Results, load
 from undertow.campaign.task import build_trial
-from undertow.cli.campaign_folder import check_folder, clear_folder
-from undertow.cli.campaign_text import sentences, table
+from undertow.cli import results_folder
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import Stages, shares
 from undertow.cli.tables import wide_console
 from undertow.core import checks
+from undertow.core.disk import alone
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import write_campaign
+from undertow.report.campaign_tables import by_xla
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
 from undertow.scenario.results import to_json
@@ -150,3 +152,85 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
         data = data | {"steady": data["steady"] | {"every_step": True}}
         text = f"# Trial {trial} of the campaign.\n{dump(data)}"
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
+
+
+_WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
+
+
+def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
+    """Check that a campaign may be written to a folder.
+
+    Raises:
+        BadInput: the folder cannot be used.
+    """
+    if resume and overwrite:
+        hint = "--resume continues the campaign, --overwrite replaces it"
+        raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
+    if not resume:
+        hint = "Add --resume to continue it, or --overwrite to replace it"
+        results_folder.check_folder(folder, _WRITTEN, STORE, overwrite, hint)
+    elif not (folder / STORE).exists():
+        raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
+
+
+def clear_folder(folder: Path) -> None:
+    """Remove all files of a campaign that is replaced.
+
+    Raises:
+        BadInput: another process is running it.
+    """
+    if not folder.exists():
+        return
+    with alone(folder / STORE):
+        for name in _WRITTEN:
+            target = folder / name
+            shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
+
+
+def table(results: Results, found: dict) -> Table:
+    """One row per combination of the swept values."""
+    table = Table(title="Median [5 %, 95 %] of completed trials", title_justify="left", title_style="bold")
+    swept = list(results.campaign.axes)
+    counts = ("trials", "failed", "invalid") if found["invalid"] else ("trials", "failed")
+    for column in (*swept, *counts, "within"):
+        table.add_column(column)
+    shown = [*results.tracking, "input_rms"]
+    for name in shown:
+        table.add_column(f"{name.replace('_', ' ')}, {for_people(0.0, results.unit(name))[1]}")
+    for one in found["combinations"]:
+        cells = [_spread(one["metrics"].get(name), results.unit(name)) for name in shown]
+        table.add_row(
+            *(one["values"][key] for key in swept), *(str(one[count]) for count in counts), _within(one), *cells
+        )
+    return table
+
+
+def _within(one: dict) -> str:
+    """Share of the trials of a combination that kept to the scenario's criterion of success."""
+    judged = one["success"]["within"] + one["success"]["not_within"]
+    return f"{100 * one['success']['within'] / judged:.1f} %" if judged else "-"
+
+
+def _spread(quantiles: dict | None, unit: str) -> str:
+    if quantiles is None:
+        return "-"
+    low, middle, high = (for_people(value, unit)[0] for value in quantiles.values())
+    return f"{middle:.3g} [{low:.3g}, {high:.3g}]"
+
+
+def sentences(found: dict) -> list[str]:
+    """The numbers of trials by status, and the verdict on each requirement."""
+    ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
+    text = [f"{found['done']} trials: {ended}."]
+    text += [sentence for sentence in (by_xla(found),) if sentence]
+    text += [f"Invalid trials ({one['trials']} with this error): {one['why']}." for one in found["invalid"]]
+    for one in found["combinations"]:
+        of = "".join(f", {key} {value}" for key, value in one["values"].items())
+        for requirement in one["requirements"]:
+            low, high = (100 * bound for bound in requirement["interval"])
+            bound = f"{requirement['metric']} < {requirement['below']:g}"
+            text.append(
+                f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{of}: {requirement['verdict']}; "
+                f"kept by {100 * requirement['kept']:.1f} % (95 % interval {low:.1f} to {high:.1f} %)."
+            )
+    return text

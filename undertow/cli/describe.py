@@ -1,4 +1,4 @@
-"""`undertow describe`: show a part, the scenario file, the metrics, or the signals."""
+"""`undertow list` and `undertow describe`: available parts, and one part, the scenario file, metrics or signals."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,9 +10,12 @@ from rich.text import Text
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.cli.tables import wide_console
+from undertow.core import catalogue
+from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import RECORDED
 from undertow.scenario import describing
+from undertow.scenario.describing import summary
 from undertow.scenario.schema import keys
 
 
@@ -82,3 +85,15 @@ def _text(value: Any) -> str:
 
 def _row(entries: np.ndarray) -> str:
     return f"({', '.join(f'{entry:.6g}' for entry in entries)})"
+
+
+def list_parts(kind: str | None) -> None:
+    """Print the parts of one kind, or of all kinds, with one line each."""
+    if kind is not None and kind not in catalogue.KINDS:
+        raise BadInput("KIND", "be a kind of part", kind, hint=did_you_mean(kind, catalogue.KINDS))
+    table = Table("kind", "name", "description")
+    for shown in (kind,) if kind else catalogue.KINDS:
+        for name, part in sorted(catalogue.names(shown).items()):
+            table.add_row(shown, name, Text(summary(part)))
+        table.add_section()
+    wide_console().print(table)

@@ -215,7 +215,7 @@ def list_parts(
 
     Kinds: vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation.
     """
-    from undertow.cli.list_parts import list_parts
+    from undertow.cli.describe import list_parts
 
     list_parts(kind)
 

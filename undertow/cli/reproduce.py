@@ -9,7 +9,7 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import Draft, output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
-from undertow.report.reproduction.build import write
+from undertow.report.reproduction.report import write
 from undertow.reproduction import reproduce as study
 
 _WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios", "campaigns")

@@ -1,20 +1,25 @@
 """`undertow simulate`: run one scenario and write its results and figures."""
 
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 import typer
 from rich.console import Console
 
+from undertow.analysis.linearization.response import Comparison, compare_metrics
 from undertow.checks.vehicle_findings import vehicle_warnings
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.interruptible import interruptible
-from undertow.cli.prediction_check import PredictedMetrics, comparison, in_results, with_prediction
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import Stages
 from undertow.cli.tables import certificate_table, metrics_table, wide_console
 from undertow.core.status import Status
+from undertow.core.user_code import python_says
+from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.figures import run_plots, save_all
-from undertow.scenario.build import build
+from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.execute import Executed, execute, save
 from undertow.scenario.reading import dump, read
 from undertow.scenario.reproducibility import Repetition, compare
@@ -86,3 +91,78 @@ def _repetition_code(repetition: Repetition, console: Console) -> int:
         return DONE
     complain(repetition.sentence)
     return RUN_FAILED
+
+
+Result = TypeVar("Result")
+
+# A measured metric that departs from the predicted one by more than this share is reported.
+_DEPARTS = 0.10
+
+# Peak metrics depend on single moments: shown, not compared.
+_PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
+
+# Measured numbers below this share of the largest predicted one count as zero.
+_NOTHING = 1e-9
+
+
+class PredictedMetrics(NamedTuple):
+    """Metrics of the steady window from the linearised loop, or the reason why there are none."""
+
+    metrics: dict[str, float] | None
+    why_not: str
+
+
+def with_prediction(work: Callable[[], Result], built: Built, enabled: bool) -> tuple[Result, PredictedMetrics | None]:
+    """Run `work`, and predict the scenario meanwhile in another thread: compiling takes most of the time of both."""
+    if not enabled:
+        return work(), None
+    with ThreadPoolExecutor(1) as other:
+        predicting: Future[PredictedMetrics] = other.submit(_predict, built)
+        return work(), predicting.result()
+
+
+def departures(predicted: PredictedMetrics, executed: Executed) -> list[Comparison]:
+    """Metrics that depart by more than a tenth from the predicted ones."""
+    return [one for one in _compared(predicted, executed) if one.name not in _PEAKS and one.departure > _DEPARTS]
+
+
+def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
+    """One sentence that compares the run with its prediction."""
+    if predicted.metrics is None:
+        return f"No prediction: {predicted.why_not}"
+    if executed.steady is None:
+        return "The prediction is for the steady window, which the run did not reach"
+    departing = departures(predicted, executed)
+    if not departing:
+        return "The run agrees with the prediction: no metric departs by more than 10 %"
+    named = ", ".join(f"{one.name} by {one.departure:.0%}" for one in departing)
+    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed.steady)}"
+
+
+def in_results(predicted: PredictedMetrics | None) -> dict[str, Any]:
+    """Entries of metrics.json."""
+    if predicted is None:
+        return {}
+    return {"predicted": predicted.metrics} | ({"not_predicted": predicted.why_not} if predicted.why_not else {})
+
+
+@in_its_precision
+def _predict(built: Built) -> PredictedMetrics:
+    try:
+        return PredictedMetrics(*predicted(operating_point(built)))
+    except Exception as error:  # a user's part may run and yet not be differentiable
+        return PredictedMetrics(None, f"this loop cannot be linearised: {python_says(error)}")
+
+
+def _compared(predicted: PredictedMetrics, executed: Executed) -> list[Comparison]:
+    if predicted.metrics is None or executed.steady is None:
+        return []
+    largest = max(predicted.metrics.values())
+    return [one for one in compare_metrics(predicted.metrics, executed.steady) if one.measured > _NOTHING * largest]
+
+
+def _because(steady: dict[str, Any]) -> str:
+    limited = steady.get("saturated_fraction", 0.0)
+    if limited > 0:
+        return f". Actuators were saturated {limited:.1%} of the time, which the linear model does not capture"
+    return ". Nonlinear effects matter here: large motions, dead zones, or motors far from their mean speed"

@@ -11,7 +11,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import force_of, input_for
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.param import param
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
 

@@ -19,7 +19,7 @@ import numpy as np
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel, Forces
 from undertow.core.contracts import Model
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 # Largest sensitivity |1 / (1 + L)| that is allowed with a lag that is so many times the nominal one, an actuator that
 # is slower than the model by so many sampling times, and so many sampling times of delay that the law does not know.

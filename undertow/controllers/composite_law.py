@@ -20,10 +20,21 @@ from undertow.core.param import param
 from undertow.core.signals import Signal
 from undertow.estimation.series_parallel import SeriesParallel
 from undertow.estimation.tsk import FuzzySystem
-from undertow.numerics.linear import matvec
-from undertow.numerics.lyapunov import companion_lyapunov
-from undertow.numerics.projection import projected_rate
+from undertow.numerics.linear_algebra import companion_lyapunov, matvec
 from undertow.numerics.smoothing import SWITCHES, switch
+
+
+def projected_rate(
+    value: Float[Array, "..."], rate: Float[Array, "..."], bound: Float[Array, "..."]
+) -> Float[Array, "..."]:
+    """`rate`, but zero where `value` stands at +-bound and would leave.
+
+    What is left out never points towards a point inside the box, so the distance to any such point falls at
+    least as fast as without.
+    """
+    leaving = (jnp.abs(value) >= bound) & (value * rate > 0)
+    return jnp.where(leaving, 0.0, rate)
+
 
 PerAxis = Float[Array, " n"]
 

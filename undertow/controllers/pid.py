@@ -17,7 +17,7 @@ from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
 

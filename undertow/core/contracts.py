@@ -15,7 +15,7 @@ from undertow.core.actuator_model import AbstractActuatorModel, Forces
 from undertow.core.runtime import double_outside_runs
 from undertow.core.signals import Signal
 from undertow.core.status import Status
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 Time = Float[Array, ""]
 Outputs = Float[Array, " n"]

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling, Payload, Pose, Water
 from undertow.core.errors import BadInput
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross
 
 Vector3 = Float[Array, "3"]

@@ -7,7 +7,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.param import param
 from undertow.disturbances.adding import body_of, with_force
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 _TINY = 1e-9  # m
 

@@ -3,19 +3,53 @@
 import math
 from typing import Any, cast
 
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.errors import BadInput
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.one_ode import blamed, flow
-from undertow.loop.outcome import Outcome, going
+from undertow.core.status import Status
+from undertow.loop.closed_loop import ClosedLoop, Realization
+from undertow.loop.outcome import Ending, Outcome, going, status_of
+from undertow.loop.readings import all_finite
 from undertow.loop.recording import freeze_on_failure, instant, record
 from undertow.numerics.integrators import rk4_compact
+
+
+@jax.jit  # traced once, although an integrator calls it in several places
+def flow(t: Float[Array, ""], state: tuple[PyTree, PyTree], realization: Realization) -> tuple[PyTree, PyTree]:
+    """Rates of plant state x and controller state z at time t; undefined where a command is."""
+    x, z = state
+    controller = cast(AbstractContinuousController, realization.loop.controller)
+    decision = realization.decide(t, x, z)
+    x_rate = realization.loop.plant.dynamics(t, x, decision.applied, realization.load(t, x))
+    commanded = jnp.isfinite(decision.command).all()  # limits and dead zones make numbers of what is none
+    x_rate = jax.tree.map(lambda rate: jnp.where(commanded, rate, jnp.nan), x_rate)
+    return x_rate, controller.flow(z, decision.y, decision.r, decision.applied)
+
+
+def blamed(
+    ending: Ending, realization: Realization, t: Float[Array, ""], state: tuple[PyTree, PyTree], dt: Any
+) -> Ending:
+    """The ending of a run that got no further than some states at `t` (s), its cause named if it is a command.
+
+    The command is looked at where Runge and Kutta's method did during the step of dt (s) that failed: at its start, in
+    the middle, at the end.
+    """
+    rate = flow(t, state, realization)
+    for share in (0.0, 0.5, 1.0):
+        there = t + share * dt
+        ahead = jax.tree.map(lambda now, change, share=share: now + share * dt * change, state, rate)
+        at = ahead if share else state
+        blame = ending.blamed(realization.decide(there, *at).command, there)
+        # Of a state that is itself no number, which a load can make, every command is none.
+        ending = Ending(*(jnp.where(all_finite(at), new, old) for new, old in zip(blame, ending, strict=True)))
+    return ending
 
 
 def simulate(
@@ -55,7 +89,7 @@ def simulate(
     key = jax.random.PRNGKey(0) if key is None else key
     start = loop.outputs_at_start(position, velocity)
     if tolerances is not None:
-        from undertow.loop.adaptive import solve
+        from undertow.loop.continuous import solve
 
         times = jnp.asarray(np.arange(records + 1) * record_step, dtype=float)
         until = jnp.maximum(times[-1], duration)
@@ -98,3 +132,48 @@ def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, in
     )
     ending = blamed(ending, realization, ending.time - dt, final, dt)  # where the step that failed began
     return Outcome(time, samples, (), final, *ending.until(instant(steps, dt)))
+
+
+_MAX_STEPS = 2**20
+_FIRST_STEP = 1e-4  # s; the integrator finds its own from there
+
+
+@eqx.filter_jit
+def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
+    """Integrate from `start` to `until` (s) with records at `times` (s); arguments as in `continuous.simulate`."""
+    realization = loop.realize(key)
+    # One flat vector: the integrator's own arithmetic is then compiled once, not once per piece of state.
+    flat, unravel = ravel_pytree(realization.start(*start))
+
+    def flat_flow(t, flat, realization):
+        return ravel_pytree(flow(t, unravel(flat), realization))[0]
+
+    def is_not_finite(t, y, args, **_):
+        return status_of(args.loop, *unravel(y)) != int(Status.OK)
+
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(flat_flow),
+        diffrax.Tsit5(),
+        t0=0.0,
+        t1=until,
+        dt0=_FIRST_STEP,
+        y0=flat,
+        args=realization,
+        saveat=diffrax.SaveAt(subs=(diffrax.SubSaveAt(ts=times), diffrax.SubSaveAt(t1=True))),
+        stepsize_controller=diffrax.ClipStepSizeController(diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=jumps),
+        event=diffrax.Event(is_not_finite),
+        max_steps=_MAX_STEPS,
+        throw=False,
+    )
+    (states, final), (_, ended) = cast(tuple[Any, Any], solution.ys), cast(tuple[Any, Any], solution.ts)
+    code = status_of(loop, *unravel(final[0]))
+    out_of_steps = (solution.result != diffrax.RESULTS.successful) & (code == int(Status.OK))
+    status = jnp.where(out_of_steps, int(Status.STEPS_EXHAUSTED), code)
+    last = jnp.maximum(jnp.isfinite(states).all(axis=1).sum() - 1, 0)  # what was never saved is infinite
+    index = jnp.minimum(jnp.arange(times.shape[0]), last)
+    samples = jax.lax.map(lambda at: realization.record(at[0], *unravel(at[1])), (times[index], states[index]))
+    sound = jnp.where(status == int(Status.OK), final[0], states[last])
+    ending = blamed(
+        going()._replace(status=status, time=ended[0]), realization, ended[0], unravel(final[0]), _FIRST_STEP
+    )
+    return Outcome(times, samples, (), unravel(sound), *ending)

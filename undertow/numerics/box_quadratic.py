@@ -10,8 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from undertow.numerics.elimination import inverse_symmetric, solve_symmetric
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import inverse_symmetric, matvec, solve_symmetric
 
 Vector = Float[Array, " n"]
 

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractDynamics, Measurement
 from undertow.core.param import param
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 _BOOK = "Slotine and Li 1991, Example 9.1"
 

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core.contracts import AbstractCoordinates, AbstractDynamics, Measurement, Target, TrackingError
 from undertow.core.measurement import body_of, measurement_of_outputs
 from undertow.core.status import Status
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import (
     Kinematics,
     attitude_error,

@@ -11,8 +11,7 @@ from undertow.core.contracts import AbstractDynamics, Measurement, Model
 from undertow.core.coordinates import AbstractOutputCoordinates
 from undertow.core.measurement import body_of, measurement_of_outputs
 from undertow.core.status import Status
-from undertow.numerics.inverses import partial_inverse, pseudo_inverse, regularised_sharp
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec, partial_inverse, pseudo_inverse, regularised_sharp
 from undertow.numerics.rotations import Kinematics
 from undertow.plants.body_model import EULER_ANGLES, BodyCoordinates, BodyDynamics
 from undertow.thrusters.thruster import AbstractThruster

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.contracts import Pose
 from undertow.core.status import Status
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import Kinematics, quaternion_from_euler, rotation_from_quaternion
 from undertow.plants.hybrid_power import PowerState
 

@@ -13,7 +13,7 @@ from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Mo
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_pose
 from undertow.core.runtime import double_outside_runs
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import Kinematics, quaternion_rate, rotation_from_quaternion
 from undertow.plants.hybrid_model import EulerCoordinates, HybridDynamics
 from undertow.plants.hybrid_power import HybridPower, has_motor

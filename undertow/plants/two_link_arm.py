@@ -12,7 +12,7 @@ from undertow.core.contracts import Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import param
 from undertow.core.status import Status
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.plants.arm_links import Links
 from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero
 from undertow.plants.nominal_parameters import nominal

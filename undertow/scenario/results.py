@@ -15,7 +15,7 @@ from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
-from undertow.loop.record import to_dataset
+from undertow.loop.recording import to_dataset
 from undertow.power.ledger import closure
 from undertow.scenario.provenance import checksum, content_hash, versions
 

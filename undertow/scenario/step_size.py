@@ -10,7 +10,7 @@ from jax.flatten_util import ravel_pytree
 
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.one_ode import flow
+from undertow.loop.continuous import flow
 from undertow.loop.outcome import Outcome
 from undertow.scenario.schema import Loop
 from undertow.thrusters.thruster import AbstractThruster

@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.sensors.estimate import Estimate, Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractVelocitySensor

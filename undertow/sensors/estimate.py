@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement
 from undertow.core.measurement import body_of, measurement_of_pose
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import (
     Matrix3,
     Quaternion,

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import ModelScaling, Payload
-from undertow.numerics.elimination import inverse_symmetric
+from undertow.numerics.linear_algebra import inverse_symmetric
 from undertow.vehicles.body import Body, rigid_body_mass
 
 

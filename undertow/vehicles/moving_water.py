@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import Water
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross
 
 Vector3 = Float[Array, "3"]

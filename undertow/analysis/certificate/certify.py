@@ -5,13 +5,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from undertow.analysis.certificate import bounds, hypotheses
-from undertow.analysis.certificate.function import Lyapunov, of_paper, of_robust
+from undertow.analysis.certificate import hypotheses
+from undertow.analysis.certificate.function import (
+    Lyapunov,
+    estimation_bound,
+    fastest_uncertainty,
+    lyapunov_residual,
+    of_paper,
+    of_robust,
+)
 from undertow.analysis.certificate.hypotheses import Hypothesis
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.contracts import AbstractController
-from undertow.loop.record import series
+from undertow.loop.recording import series
 
 # V rises where it grows by more than this share of its largest value.
 _RISE = 1e-10
@@ -104,15 +111,15 @@ def _paper_numbers(law: RCAF, run: xr.Dataset, window: tuple[float, float]) -> d
     """U9: on average 1/2 E^T Q E ends below the residual, while all hypotheses hold."""
     late = run["lyapunov_decay"].values[_inside(run["time"].values, window)]
     return {
-        "residual": bounds.residual(law, run.sizes["axis"]),
+        "residual": lyapunov_residual(law, run.sizes["axis"]),
         "decay": float(late.mean()) if late.size else None,
     }
 
 
 def _robust_numbers(law: RobustRCAF, run: xr.Dataset, window: tuple[float, float], dt: float) -> dict[str, Any]:
     """Estimation error allowed by the largest |d_dot| from record to record, and how often it was kept."""
-    rate = bounds.fastest(run)
-    allowed = bounds.estimation_error(law.estimator, dt, rate)
+    rate = fastest_uncertainty(run)
+    allowed = estimation_bound(law.estimator, dt, rate)
     kept = (np.abs(run["estimate"].values - run["uncertainty"].values) <= allowed + hypotheses.ROUNDING).all(-1)
     return {
         "uncertainty_rate": rate.tolist(),

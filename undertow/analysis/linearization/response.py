@@ -80,7 +80,7 @@ def from_start(loop: LinearLoop, at: Equilibrium, plant: np.ndarray, law: np.nda
     return loop._replace(entries=loop.entries | {_START: away[:, None]})
 
 
-def compare(predicted: dict[str, float], measured: dict) -> list[Comparison]:
+def compare_metrics(predicted: dict[str, float], measured: dict) -> list[Comparison]:
     """Predicted metrics beside the measured ones of the same names."""
     return [Comparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
 

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from undertow.controllers.signals import share_given
 from undertow.numerics.box_quadratic import box_minimum
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 # What a force at its limit costs, where losing the wanted acceleration whole costs one.
 _USE = 1e-6

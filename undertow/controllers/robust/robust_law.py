@@ -16,8 +16,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.param import param
 from undertow.estimation.tsk import FuzzySystem
-from undertow.numerics.linear import matvec
-from undertow.numerics.lyapunov import companion_lyapunov
+from undertow.numerics.linear_algebra import companion_lyapunov, matvec
 
 PerAxis = Float[Array, " n"]
 

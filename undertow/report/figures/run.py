@@ -10,7 +10,7 @@ from undertow.report.figures import signals, style
 from undertow.report.figures.certificate import certificate
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
-from undertow.report.figures.uncertainty import settled
+from undertow.report.figures.paper import settled
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
 _RUNAWAY = 1e2

@@ -6,6 +6,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from undertow.report.figures import fidelity_figure, paper_figures, sweep_figure
+from undertow.report.figures.ablations import ablations_figure
+from undertow.report.figures.horizons import horizons_figure
+from undertow.report.figures.lags import drifting_figure, lags_figure
+from undertow.report.figures.robust_fidelity import robust_fidelity_figure
 from undertow.report.figures.writing import save
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
@@ -13,6 +18,7 @@ from undertow.report.reproduction import horizon_section, tables
 from undertow.report.reproduction.background import ASSUMED, INTRODUCTION, LEFT_OPEN
 from undertow.report.reproduction.captions import captions
 from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, robust_section
+from undertow.reproduction.reproduce import Reproduction
 
 _TITLE = "Reproduction of the paper and check of its claims"
 
@@ -136,3 +142,36 @@ def _provenance(results: Mapping[str, Any]) -> list[Html]:
 def _alternative(one: Figure, name: str) -> str:
     """Title of a figure, as its alternative text."""
     return one.texts[0].get_text() if one.texts else name
+
+
+def write(found: Reproduction, folder: Path) -> Path:
+    """Write `report.html` and `figures/`; returns the page.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    return write_report(found.results, make_figures(found), folder)
+
+
+def make_figures(found: Reproduction) -> dict[str, Figure]:
+    """Every figure of the report, by name."""
+    numbers = {claim["id"]: claim["numbers"] for claim in found.results["claims"]}
+    levels = found.results["fidelity"]
+    figures = paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
+        "fidelity": fidelity_figure(levels, {fidelity: found.datasets(fidelity) for fidelity in levels}),
+        "sweep": sweep_figure(numbers["C6"]["sweep"]),
+        "horizons": horizons_figure(found.results["horizons"]["rows"], found.results["horizons"]["duration"]),
+        "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),
+        "drifting": drifting_figure(found.results["drifting"]),
+    }
+    robust = found.results.get("robust_variant")
+    return figures | _of_last_chapter(found, robust) if robust else figures
+
+
+def _of_last_chapter(found: Reproduction, robust: dict[str, Any]) -> dict[str, Figure]:
+    rows = robust["fidelity"]
+    datasets = {(row["place"], row["law"]): found.runs[Path(row["scenario"]).stem].dataset for row in rows}
+    return {
+        "robust_fidelity": robust_fidelity_figure(rows, datasets),
+        "ablations": ablations_figure(robust["ablations"]),
+    }

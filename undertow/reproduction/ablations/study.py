@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.campaign import task
+from undertow.campaign.campaign_schema import read_campaign, whole
 from undertow.campaign.labels import words
-from undertow.campaign.reading import read_campaign, whole
 from undertow.campaign.sensitivity import median_interval, quantiles
 from undertow.campaign.trials import trials
 from undertow.core.status import Status

@@ -1,12 +1,24 @@
-"""Inverses of a gain matrix G (n x m), square or not: Eqs. (22)-(27) and Definition 2.
+"""Small dense products, systems and inverses: gain matrices G (n x m), square or not, Eqs. (21)-(27), Definition 2.
 
 The paper splits cases by the number of inputs m; what matters is the rank. For m < n the product G G+ is an
 orthogonal projector of rank < n, so [G G+]^-1 in Eq. (24) never exists; what remains uncontrolled is the
 residual sigma of Eq. (28). See docs/known-limits.md.
 """
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+
+def matvec(matrix: Float[Array, "m n"], vector: Float[Array, " n"]) -> Float[Array, " m"]:
+    """Product of a small matrix and a vector.
+
+    A multiply and a sum instead of a `dot`: XLA turns every `dot` into a call of its own, which for a
+    6 x 8 matrix costs more than the arithmetic. Written this way the product melts into the elementwise
+    code around it, and one closed-loop step becomes one compiled function.
+    """
+    return (matrix * vector).sum(-1)
+
 
 Gain = Float[Array, "n m"]
 Inverse = Float[Array, "m n"]
@@ -75,3 +87,42 @@ def regularised_sharp(gain: Gain, delta: Float[Array, ""]) -> Inverse:
     if m == n:
         return regularised_inverse(gain, delta)
     return gain.T @ regularised_inverse(gain @ gain.T, delta)
+
+
+def companion_lyapunov(feedback: Float[Array, "*n 2"], weight: Float[Array, "*n 2 2"]) -> Float[Array, "*n 2 2"]:
+    """P of A^T P + P A + Q = 0, A = [[0, 1], [-k1, -k2]], Eq. (21), in closed form for every axis.
+
+    Args:
+        feedback: gains (k1, k2) of each axis, 1/s^2 and 1/s.
+        weight: symmetric Q of each axis.
+    """
+    k1, k2 = feedback[..., 0], feedback[..., 1]
+    p12 = weight[..., 0, 0] / (2 * k1)
+    p22 = (weight[..., 1, 1] + 2 * p12) / (2 * k2)
+    p11 = k1 * p22 + k2 * p12 - weight[..., 0, 1]
+    return jnp.stack([jnp.stack([p11, p12], -1), jnp.stack([p12, p22], -1)], -2)
+
+
+Symmetric = Float[Array, "n n"]
+
+
+def solve_symmetric(matrix: Symmetric, right: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Solution of a symmetric positive definite system."""
+    return _eliminated(matrix, right[:, None])[:, 0]
+
+
+def inverse_symmetric(matrix: Symmetric) -> Symmetric:
+    """Inverse of a symmetric positive definite matrix; it needs no pivots."""
+    return _eliminated(matrix, jnp.eye(matrix.shape[0]))
+
+
+def _eliminated(matrix: Float[Array, "n n"], right: Float[Array, "n k"]) -> Float[Array, "n k"]:
+    """Solutions of symmetric positive definite systems by Gauss-Jordan elimination."""
+
+    def eliminate(k, rows):
+        pivot = rows[k] / rows[k, k]
+        column = rows[:, k].at[k].set(0.0)
+        return (rows - column[:, None] * pivot).at[k].set(pivot)
+
+    n = matrix.shape[0]
+    return jax.lax.fori_loop(0, n, eliminate, jnp.concatenate([matrix, right], axis=1))[:, n:]

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.numerics.inverses import (
+from undertow.numerics.linear_algebra import (
     partial_inverse,
     printed_inverse,
     pseudo_inverse,
