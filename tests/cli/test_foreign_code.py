@@ -9,9 +9,8 @@ from good_scenario import SCENARIO
 from undertow.core.errors import BadInput
 from undertow.run import simulate_scenario
 from undertow.scenario.execute import execute, save
-from undertow.scenario.provenance import checksum
+from undertow.scenario.provenance import checksum, compare
 from undertow.scenario.reading import parse, read
-from undertow.scenario.reproducibility import compare
 
 CODE = """
 import pathlib

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.scenario.provenance import checksum, content_hash
-from undertow.scenario.reproducibility import compare
+from undertow.scenario.provenance import checksum, compare, content_hash
 
 
 def labelled(**columns):

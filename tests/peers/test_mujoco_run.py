@@ -9,7 +9,7 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.interop.mujoco_engine import Submerged, Water, run_in_mujoco
-from undertow.interop.mujoco_engine.propellers import Propellers
+from undertow.interop.mujoco_engine.mujoco_run import Propellers
 from undertow.numerics.integrators import rk4
 
 FLOW = [0.2, -0.1, 0.0]

@@ -14,7 +14,7 @@ from undertow.numerics.rotations import (
     rotation_from_quaternion,
     turning_from_euler,
 )
-from undertow.plants.body_model import BodyCoordinates
+from undertow.plants.hybrid_model import BodyCoordinates
 
 RNG = np.random.default_rng(16)
 

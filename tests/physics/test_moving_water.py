@@ -11,9 +11,8 @@ from undertow.core.errors import BadInput
 from undertow.disturbances.adding import Together
 from undertow.disturbances.current import current
 from undertow.disturbances.gauss_markov_current import gauss_markov_current
-from undertow.disturbances.jonswap import spectrum
 from undertow.disturbances.sheared_current import sheared_current
-from undertow.disturbances.waves import waves
+from undertow.disturbances.waves import spectrum, waves
 from undertow.numerics.integrators import rk4
 from undertow.numerics.rotations import rotation_from_euler
 from undertow.plants.hybrid_vehicle import hybrid_vehicle

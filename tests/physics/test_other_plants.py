@@ -15,7 +15,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.numerics.integrators import rk4
 from undertow.plants import inverted_pendulum, linear_plant, magnetic_levitation, two_link_arm
-from undertow.plants.levitation_rig import RIGS
+from undertow.plants.magnetic_levitation import RIGS
 from undertow.plants.reachability import lost_directions, open_loop_advice
 from undertow.references.setpoint import setpoint
 

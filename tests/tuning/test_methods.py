@@ -7,9 +7,8 @@ import pytest
 
 from undertow.core.errors import BadInput
 from undertow.tuning.checkpoint import Checkpoint, OutOfTime
-from undertow.tuning.evolution import search
-from undertow.tuning.gradient_descent import descend
 from undertow.tuning.objective import Objective
+from undertow.tuning.search import descend, search
 from undertow.tuning.stability import Certificate, no_certificate
 
 RNG = np.random.default_rng(4)

@@ -19,12 +19,10 @@ from undertow.scenario.reading import from_data
 from undertow.sensors import depth, dvl, imu
 from undertow.thrusters import t200
 from undertow.tuning.checkpoint import Checkpoint
-from undertow.tuning.evaluator import Evaluation
-from undertow.tuning.evolution import search
-from undertow.tuning.gradient_descent import descend
+from undertow.tuning.evaluator import Evaluation, scaled
 from undertow.tuning.objective import Objective
 from undertow.tuning.problem import problem
-from undertow.tuning.scaled import scaled
+from undertow.tuning.search import descend, search
 from undertow.tuning.stability import Certifier
 from undertow.tuning.tunable_parameters import options, parameters
 from undertow.vehicles import bluerov2_heavy

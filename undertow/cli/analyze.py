@@ -11,8 +11,7 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
-from undertow.prediction.predict import predict
-from undertow.prediction.prediction_summary import summary
+from undertow.prediction.predict import predict, summary
 from undertow.prediction.warnings import advice
 from undertow.report.prediction_page import write_prediction
 from undertow.report.prediction_tables import Rows, tables

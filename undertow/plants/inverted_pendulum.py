@@ -12,8 +12,7 @@ from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import param
 from undertow.core.status import Status
-from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero
-from undertow.plants.nominal_parameters import nominal
+from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
 
 _FLAT = 0.01  # rad short of 90 deg, where the force has all but lost its grip: G is 1 % of what it is upright
 

@@ -15,8 +15,7 @@ from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec, pseudo_inverse
-from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero
-from undertow.plants.nominal_parameters import nominal
+from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
 
 _ENVELOPE = 1e6
 

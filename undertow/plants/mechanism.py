@@ -1,13 +1,23 @@
 """What plants that are no bodies in water have in common: inputs within limits, and nothing that water could push."""
 
 import abc
+from dataclasses import replace
+from typing import Any, TypeVar
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
 from undertow.core.contracts import AbstractPlant, Effort, Inputs, Outputs
 from undertow.core.signals import Signal
 from undertow.plants.reachability import open_loop_advice
+
+Part = TypeVar("Part", bound=eqx.Module)
+
+
+def nominal(truth: Part, **told: Any) -> Part:
+    """The same part with other values of the named parameters; None leaves the true one."""
+    return replace(truth, **{name: value for name, value in told.items() if value is not None})
 
 
 class AbstractMechanism(AbstractPlant):

@@ -3,8 +3,7 @@
 import jax.numpy as jnp
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractSensor, Sampling
 
 
 class Compass(AbstractSensor):

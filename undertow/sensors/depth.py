@@ -1,8 +1,7 @@
 """Depth from pressure."""
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractSensor, Sampling
 
 _DOWN = slice(2, 3)
 

@@ -4,8 +4,7 @@ import jax.numpy as jnp
 
 from undertow.numerics.linear_algebra import matvec
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractVelocitySensor
+from undertow.sensors.sensor import AbstractVelocitySensor, Sampling
 
 
 class DVL(AbstractVelocitySensor):

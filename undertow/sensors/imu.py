@@ -5,8 +5,7 @@ import numpy as np
 
 from undertow.numerics.linear_algebra import matvec
 from undertow.sensors.estimate import Estimate, Motion, gravity
-from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractVelocitySensor
+from undertow.sensors.sensor import AbstractVelocitySensor, Sampling
 
 
 class IMU(AbstractVelocitySensor):

@@ -1,8 +1,7 @@
 """Position fixes: acoustic positioning (USBL, LBL), or a satellite receiver at the surface."""
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractSensor, Sampling
 
 _LEVEL = slice(0, 2)
 

@@ -2,8 +2,7 @@
 
 from undertow.core.errors import BadInput
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractSensor, Sampling
 
 
 class PropellerSpeed(AbstractSensor):

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param, sources_field
-from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.memoryless import AbstractMotorlessThruster
 from undertow.thrusters.thruster import PerThruster
 
 

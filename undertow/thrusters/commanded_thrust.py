@@ -11,7 +11,7 @@ from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.first_order import LaggedThrust
-from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.memoryless import AbstractMotorlessThruster
 from undertow.thrusters.thruster import PerThruster
 
 

@@ -11,8 +11,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import LaggedActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.thrusters.memoryless import MemorylessThruster
-from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.memoryless import AbstractMotorlessThruster, MemorylessThruster
 from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import PerThruster
 

@@ -7,9 +7,27 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.thrusters.motorless import AbstractMotorlessThruster
 from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
-from undertow.thrusters.thruster import PerThruster
+from undertow.thrusters.thruster import AbstractThruster, PerThruster
+
+
+class AbstractMotorlessThruster(AbstractThruster):
+    """No books to keep, no speed to report, and a gain that is given because it does not follow from anything."""
+
+    linear_gain: eqx.AbstractVar[Float[Array, ""]]  # N/V
+
+    def powers(self, state, voltage) -> None:
+        return None
+
+    def stored(self, state) -> PerThruster:
+        return jnp.zeros(())
+
+    def report(self, state) -> None:
+        return None
+
+    def voltage_gain(self):
+        return self.linear_gain
+
 
 _LEAST = 1e-30  # stands for 0, where a power has no slope
 

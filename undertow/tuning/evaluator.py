@@ -13,13 +13,51 @@ from jaxtyping import Array, Float
 
 from undertow.analysis.linearization.jacobians import without
 from undertow.core import runtime
-from undertow.core.contracts import AbstractController, AbstractPlant
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractDisturbance,
+    AbstractPlant,
+    Load,
+    ModelScaling,
+    Payload,
+    Water,
+)
+from undertow.core.param import param
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.schema import Loop, Weights
 from undertow.tuning.cost import CostSums, Shares, shares
-from undertow.tuning.scaled import scaled
 from undertow.tuning.training_runs import Trials
+
+
+class Scaled(AbstractDisturbance):
+    """`size` times a disturbance: loads and water in proportion, factors on the body as powers."""
+
+    inner: AbstractDisturbance
+    size: Float[Array, ""] = param("", "1 leaves the disturbance as it is")
+
+    def realize(self, key):
+        return self.inner.realize(key)
+
+    def at(self, realization, t, pose, load: Load) -> Load:
+        whole, size = self.inner.at(realization, t, pose, load), self.size
+        water, factors = whole.water, whole.scaling
+        return Load(
+            acceleration=load.acceleration + size * (whole.acceleration - load.acceleration),
+            wrench=load.wrench + size * (whole.wrench - load.wrench),
+            water=water and Water(size * water.velocity, size * water.acceleration),
+            scaling=factors and ModelScaling(*(factor**size for factor in factors)),
+            payloads=tuple(Payload(size * each.mass, size * each.weight, each.point) for each in whole.payloads),
+        )
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return self.inner.jumps(duration)
+
+
+def scaled(inner: AbstractDisturbance, size) -> Scaled:
+    """A disturbance times a size, which may be traced."""
+    return Scaled(inner, jnp.asarray(size, dtype=float))
+
 
 # Compiling dominates a short tuning; a lower optimisation level halves its time at the same speed.
 _COMPILER = {"xla_backend_optimization_level": "1"}

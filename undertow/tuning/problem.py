@@ -16,10 +16,9 @@ from undertow.scenario.consistency import placed
 from undertow.scenario.reading import Text, key_path
 from undertow.tuning import tunable_parameters as tunable_parameters
 from undertow.tuning.cost import CostSums
-from undertow.tuning.defaults import SHARED, Law, law_of, now
 from undertow.tuning.evaluator import TrainingLoop
 from undertow.tuning.training_runs import Trials, training_and_held_out
-from undertow.tuning.tunable_parameters import TunableParameter
+from undertow.tuning.tunable_parameters import SHARED, Law, TunableParameter, law_of, now
 
 _LONGEST = 20.0  # s, default limit of the duration of a run
 _DIGITS = 5  # of a tuned gain

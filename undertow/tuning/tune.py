@@ -15,10 +15,9 @@ from undertow.scenario.reading import Text, dump
 from undertow.tuning.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.cost import Shares
 from undertow.tuning.evaluator import AT_ONCE, Evaluation
-from undertow.tuning.evolution import search, spread_points
-from undertow.tuning.gradient_descent import descend
 from undertow.tuning.objective import Objective, Step, Watch
 from undertow.tuning.problem import Problem, problem
+from undertow.tuning.search import descend, search, spread_points
 from undertow.tuning.stability import Certificate, Certifier, no_certificate
 
 METHODS = ("gradient", "search")

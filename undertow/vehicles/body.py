@@ -1,10 +1,13 @@
 """Rigid body in water: M, C(nu) nu, D(nu) nu and g of Eq. (2), in the form of Fossen (2021), ch. 3, 6 and 8."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.core.contracts import Water
 from undertow.core.param import param
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross, skew
@@ -92,3 +95,37 @@ def coriolis_matrix(mass_matrix: Matrix6, nu: Vector6) -> Matrix6:
     momentum = matvec(symmetric, nu)
     linear, angular = skew(momentum[:3]), skew(momentum[3:])
     return -jnp.block([[jnp.zeros((3, 3)), linear], [linear, angular]])
+
+
+class SeenFromWater(NamedTuple):
+    """What the equation of motion is evaluated with, body axes."""
+
+    nu: Vector6  # velocity through the water, m/s, rad/s
+    down: Vector3  # direction of what is felt as gravity, in units of gravity
+    rate: Vector6 | Float[Array, ""]  # nu_dot less that of the velocity through the water, m/s^2
+
+
+def seen_from_water(
+    water: Water | None, rotation: Float[Array, "3 3"], nu: Vector6, gravity: Float[Array, ""]
+) -> SeenFromWater:
+    """The body as seen from the water around it, Fossen (2021), ch. 10.3.
+
+    Where the water is uniform over the body, the world seen from the moving water is still water. If the water
+    accelerates as well, everything in it, the body's own mass and the water it displaces, feels that as gravity.
+
+    Args:
+        water: how the water moves, world axes; None for water at rest.
+        rotation: body -> world.
+        nu: body velocity over ground, m/s and rad/s.
+        gravity: m/s^2.
+    """
+    if water is None:
+        return SeenFromWater(nu, rotation[2], jnp.zeros(()))
+    flow = matvec(rotation.T, water.velocity)
+    acceleration = matvec(rotation.T, water.acceleration)
+    rest = jnp.zeros(3)
+    return SeenFromWater(
+        nu=nu - jnp.concatenate([flow, rest]),
+        down=rotation[2] - acceleration / gravity,
+        rate=jnp.concatenate([acceleration - cross(nu[3:], flow), rest]),
+    )

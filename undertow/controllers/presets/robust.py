@@ -5,8 +5,7 @@ import numpy as np
 from jax.core import Tracer
 
 from undertow.controllers.bandwidths import Axis, Bandwidths, alike, axes_of, robust_bandwidths
-from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.fuzzy_sets import widened
+from undertow.controllers.robust.estimator import Estimator, widened
 from undertow.controllers.robust.reference_filter import ReferenceFilter
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core import checks

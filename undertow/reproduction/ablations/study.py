@@ -9,8 +9,8 @@ import numpy as np
 
 from undertow.campaign import task
 from undertow.campaign.campaign_schema import read_campaign, whole
+from undertow.campaign.campaign_summary import median_interval, quantiles
 from undertow.campaign.labels import words
-from undertow.campaign.sensitivity import median_interval, quantiles
 from undertow.campaign.trials import trials
 from undertow.core.status import Status
 from undertow.reproduction.ablations.verdicts import Ablation
