@@ -28,6 +28,13 @@ from undertow.scenario.results import certificate_of, metrics_of, metrics_text
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
 
+class PredictedMetrics(NamedTuple):
+    """Metrics of the steady window from the linearised loop, or the reason why there are none."""
+
+    metrics: dict[str, float] | None
+    why_not: str
+
+
 def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool) -> int:
     """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
     console = wide_console()
@@ -103,13 +110,6 @@ _PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
 
 # Measured numbers below this share of the largest predicted one count as zero.
 _NOTHING = 1e-9
-
-
-class PredictedMetrics(NamedTuple):
-    """Metrics of the steady window from the linearised loop, or the reason why there are none."""
-
-    metrics: dict[str, float] | None
-    why_not: str
 
 
 def with_prediction(work: Callable[[], Result], built: Built, enabled: bool) -> tuple[Result, PredictedMetrics | None]:

@@ -16,6 +16,9 @@ LAWS = style.Look("#555555", (0, (1, 1.2)), 1.2, 4)
 LAWS_SECOND = style.Look("#555555", (0, (5, 1.2, 1, 1.2)), 1.0, 4)
 
 
+Controllers = Mapping[str, xr.Dataset]  # rcafc, rafc or both
+
+
 def thruster_laws(response: ThrusterResponse) -> Figure:
     """Thrust against current, thrust against voltage, and the error of each static model."""
     figure = style.blank(9.6, 3.5)
@@ -162,9 +165,6 @@ def uncertainty(title: str, runs: Controllers) -> Figure:
 def settled(run: xr.Dataset) -> float:
     """Time, s, after which the y axes fit the values: the first twentieth of a run is start-up."""
     return float(run["time"].values[-1]) / 20
-
-
-Controllers = Mapping[str, xr.Dataset]  # rcafc, rafc or both
 
 
 def tracking(title: str, runs: Controllers) -> Figure:

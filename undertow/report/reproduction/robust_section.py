@@ -6,7 +6,6 @@ from typing import Any
 
 from undertow.report.formats import ending, number, prose, unit
 from undertow.report.page import Html, bullets, join, table, tag
-from undertow.report.reproduction import robust_tables as tables
 from undertow.reproduction.all_outputs import unit_of
 
 FIGURES = ("robust_fidelity", "ablations")
@@ -62,7 +61,7 @@ def robust_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> l
         tag("p", prose(conditions)),
         *lists,
         *levels,
-        tables.fidelity(results["fidelity"]),
+        fidelity_table(results["fidelity"]),
         *_ablations(results, figures),
     ]
 
@@ -78,9 +77,9 @@ def _ablations(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[
     return [
         tag("h3", "Ablations"),
         tag("p", prose(text)),
-        tables.answers(results["ablations"]),
+        answers_table(results["ablations"]),
         *_figure(figures, "ablations"),
-        tag("details", tag("summary", "Every variant in numbers"), tables.numbers(results["ablations"])),
+        tag("details", tag("summary", "Every variant in numbers"), numbers_table(results["ablations"])),
     ]
 
 
@@ -102,7 +101,7 @@ _KINDS = {"yes": "holds", "partly": "partly", "no": "fails"}
 _OWN_UNITS = {"share": "", "lost_axes": ""}
 
 
-def fidelity(rows: Sequence[Mapping[str, Any]]) -> Html:
+def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
     """Every controller in every case, with the command that runs it."""
     shown, last = [], None
     for row in rows:
@@ -121,7 +120,7 @@ def fidelity(rows: Sequence[Mapping[str, Any]]) -> Html:
     return table(head, shown, numeric=range(3, 3 + len(_FIDELITY)), wide=True)
 
 
-def answers(ablations: Sequence[Mapping[str, Any]]) -> Html:
+def answers_table(ablations: Sequence[Mapping[str, Any]]) -> Html:
     """One row per ablation: question, prediction, whether it holds, and the answer with its numbers."""
     rows = []
     for one in ablations:
@@ -132,7 +131,7 @@ def answers(ablations: Sequence[Mapping[str, Any]]) -> Html:
     return table(("", "question, and prediction of the theory", "", "answer"), rows, wide=True)
 
 
-def numbers(ablations: Sequence[Mapping[str, Any]]) -> Html:
+def numbers_table(ablations: Sequence[Mapping[str, Any]]) -> Html:
     """Every variant of every ablation: settings, medians with intervals, runs that ended early."""
     rows = []
     for one in ablations:
