@@ -9,8 +9,9 @@ from good_scenario import SCENARIO
 from undertow.core.errors import BadInput
 from undertow.run import simulate_scenario
 from undertow.scenario.execute import execute, save
-from undertow.scenario.provenance import checksum, compare
+from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
+from undertow.scenario.reproducibility import compare
 
 CODE = """
 import pathlib

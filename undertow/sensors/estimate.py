@@ -18,7 +18,7 @@ from undertow.numerics.rotations import (
     quaternion_rate,
     rotation_from_quaternion,
 )
-from undertow.sensors.sensor import Sampling
+from undertow.sensors.sampling import Sampling
 
 
 def gravity() -> Vector3:
