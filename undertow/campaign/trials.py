@@ -162,6 +162,3 @@ def _entry(node: Any, step: str | int, key: str) -> Any:
     if isinstance(step, int):
         raise BadInput(key, "name an entry of a list only where there is a list", f"[{step}] of {', '.join(node)}")
     return node.get(step)
-
-
-# Trials that are built again: each takes milliseconds.
