@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 from good_scenario import SCENARIO
 
+from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.run import simulate_scenario
 from undertow.scenario.execute import execute, save
@@ -42,6 +43,7 @@ def his(folder):
     """The same, where the code has left no trace yet."""
     (folder / "my_rov.py").write_text(CODE)
     (folder / "it ran").unlink(missing_ok=True)
+    catalogue._module.cache_clear()  # else the same contents would not run twice in this process
     return folder
 
 

@@ -9,6 +9,7 @@ import pytest
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
+from undertow.navigation.observer import observer
 from undertow.numerics.rotations import wrap_angle
 from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
 from undertow.sensors.sampling import Sampling
