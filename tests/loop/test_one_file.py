@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.campaign.task import fly
+from undertow.campaign.task import run_trials
 from undertow.cli.main import run as command
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
@@ -109,7 +109,7 @@ def test_a_metric_of_ones_own_in_a_campaign(folder, backend):
     """A column like every other, and a criterion of success: each trial is what its run is."""
     scenario = SCENARIO | {"loop": SCENARIO["loop"] | {"backend": backend}, "success": {"overshoot": 0.2}}
     text = dump({"scenario": scenario, "trials": 1, "cross": {"controller.frequency": [1.0, 4.0]}})
-    found = fly(text, str(folder), [0, 1])
+    found = run_trials(text, str(folder), [0, 1])
     for trial, frequency in enumerate((1.0, 4.0)):
         again = scenario | {
             "controller": {"kind": "pid", "frequency": frequency, "reference_frequency": 0},
@@ -132,7 +132,7 @@ def test_a_signal_of_ones_own(folder):
     assert run["surface"].attrs == {"long_name": "sliding surface", "units": "m/s"}
     assert run["surface"].dims == ("time", "axis") and run["distance"].dims == ("time",)
     asked = {"scenario": SCENARIO | {"controller": law}, "trials": 1, "series": {"signals": ["surface"], "every": 0.02}}
-    found = fly(dump(asked), str(folder), [0])
+    found = run_trials(dump(asked), str(folder), [0])
     np.testing.assert_allclose(found["series:surface"][0], run["surface"], rtol=1e-9, atol=1e-12)
 
 

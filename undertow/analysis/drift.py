@@ -5,7 +5,6 @@ the square of eps and never decreases: it adds damping at first, and destabilise
 """
 
 import numpy as np
-from scipy.integrate import quad
 
 from undertow.analysis.noise import Steps, steps
 from undertow.controllers.composite_law import RCAF
@@ -73,6 +72,8 @@ def noise_square(law: RCAF | RobustRCAF, dt: float, velocity: float, gain: float
 
 def time_to_divergence(law: RCAF | RobustRCAF, dt: float, velocity: float, axis: int = 0) -> float:
     """Time, s, in which white velocity noise drives c from zero to `largest_gain`; infinite where it cannot."""
+    from scipy.integrate import quad  # takes longer to import than all a run needs
+
     one, end = steps(law, dt, axis), largest_gain(law, dt, axis)
     rate = _per_square(law, one) * velocity**2
     if rate == 0 or gain_bound(law, axis) < end:

@@ -8,7 +8,6 @@ position and velocity are new at every step; the law takes y - S n for the truth
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
 
 from undertow.analysis.small_signal import gains
 from undertow.controllers.composite_law import RCAF
@@ -93,6 +92,8 @@ def deviations(
     Raises:
         BadInput: the sampled law is unstable.
     """
+    from scipy.linalg import solve_discrete_lyapunov  # takes longer to import than all a run needs
+
     one = steps(law, dt, axis)
     matrix, entry = step_matrices(one, gain)
     radius = float(np.abs(np.linalg.eigvals(matrix)).max())
