@@ -49,7 +49,7 @@ THRUSTERS = {
 SETS = {"bluerov2": ["li2020", "einarsson_lipenitis2020", "gazebo_box_drag"]}
 
 # Where the position is known to a centimetre: else the navigation decides, and no controller.
-INSTRUMENTS = [
+SENSORS = [
     "imu",
     {"kind": "dvl", "period": 0.125, "noise": 0.003},
     "depth",
@@ -60,14 +60,14 @@ INSTRUMENTS = [
 
 def scenario(vehicle, controller):
     sets = SETS.get(vehicle)
-    told = {"parameters": sets[0]} if sets else {}
+    nominal = {"parameters": sets[0]} if sets else {}
     return {
-        "plant": {"vehicle": {"kind": vehicle, **told}, "thruster": THRUSTERS[vehicle], "ledger": False},
+        "plant": {"vehicle": {"kind": vehicle, **nominal}, "thruster": THRUSTERS[vehicle], "ledger": False},
         "model": {"rate_term": True},
         "controller": {"kind": "rcaf", **controller},
         "reference": {"kind": "setpoint", "position": [2.0, 1.0, 1.0, 0.0, 0.0, 0.5], "settling": 15.0},
         "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0.0]}, {"kind": "waves", "height": 0.5}],
-        "navigation": {"kind": "observer", "sensors": INSTRUMENTS},
+        "navigation": {"kind": "observer", "sensors": SENSORS},
         "loop": {"dt": 0.02, "duration": 60.0, "record": 0.1},
         "tune": {"duration": 16.0, "train": {"sets": sets and sets[:2]}, "held_out": {"sets": sets}},
     }

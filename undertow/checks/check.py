@@ -169,8 +169,8 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
         if not factory.is_part(part):
             raise _no_part(name, part)
         return name, part, make
-    wanted, _, short = thing.rpartition("/")
-    known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if wanted in ("", kind)}
+    kind_named, _, short = thing.rpartition("/")
+    known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if kind_named in ("", kind)}
     for kind, names in known.items():
         if short in names:
             make = lambda *given, kind=kind: factory.make(kind, {"kind": short, **options}, Path(), given)[0]

@@ -224,10 +224,10 @@ def _cost(axis: Axis, frequency: np.ndarray, from_y: Law, held: np.ndarray, open
     return np.hypot(by_load, by_noise) / _ERROR_SCALE + _VARIATION_PRICE * variation / axis.authority
 
 
-def _at(wanted: float, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _at(at: float, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values at one frequency, linear in its logarithm."""
-    above = np.clip(np.searchsorted(frequency, wanted), 1, len(frequency) - 1)
-    share = np.clip(np.log(wanted / frequency[above - 1]) / np.log(frequency[above] / frequency[above - 1]), 0, 1)
+    above = np.clip(np.searchsorted(frequency, at), 1, len(frequency) - 1)
+    share = np.clip(np.log(at / frequency[above - 1]) / np.log(frequency[above] / frequency[above - 1]), 0, 1)
     return (1 - share) * values[..., above - 1] + share * values[..., above]
 
 

@@ -125,15 +125,15 @@ class RCAF(AbstractContinuousController):
         eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
         u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
-        wanted = -dynamics.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
-        u = dynamics.invert(y, wanted)
+        desired = -dynamics.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
+        u = dynamics.invert(y, desired)
         signals = {
             "estimate": d_hat,
             "robust_term": u_r,
             "modelling_error": eps,
             "predicted_position": z.predicted_position,
             "predicted_velocity": z.predicted_velocity,
-            "attained_share": share_given(wanted, matvec(dynamics.gain(y), u)),
+            "attained_share": share_given(desired, matvec(dynamics.gain(y), u)),
         }
         signals |= lyapunov_signals(off, self.lyapunov(), self.weight)
         return u, signals | weight_signals(z.weights, self.weights_bound)

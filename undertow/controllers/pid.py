@@ -37,7 +37,7 @@ class Plan(NamedTuple):
 
     actuators: Any
     error: PerAxis  # m, rad
-    forces: Float[Array, " m"]  # that would give what is wanted
+    forces: Float[Array, " m"]  # that would give the desired acceleration
 
 
 class PID(AbstractInformedController):
@@ -53,7 +53,7 @@ class PID(AbstractInformedController):
     integral: Float[Array, "..."] = param("1/s^3", "its rate per error", symbol="k_i")
     derivative: Float[Array, "..."] = param("1/s", "acceleration per error of the rates", symbol="k_d")
     actuator_rate: Float[Array, ""] = param("1/s", "how fast actuators are made to follow", symbol="lambda")
-    direction: Float[Array, ""] = param("", "what departing from the wanted direction costs beside losing size")
+    direction: Float[Array, ""] = param("", "what a departure from the desired direction costs beside losing size")
     feedforward: bool = eqx.field(static=True, default=True)
     motor: str = eqx.field(static=True, default="steady")
 
@@ -155,7 +155,7 @@ def pid(
         reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of the natural
             frequency, 2 at most; 0 for no filter.
         actuator_rate: with motor = computed, how fast it is made to follow, 1/s; None: 0.15 per sampling time.
-        direction: what departing from the wanted direction costs, where limits bind, beside losing size.
+        direction: what a departure from the desired direction costs, where limits bind, beside losing size.
 
     Raises:
         BadInput: a value is out of its range.

@@ -45,10 +45,10 @@ def weight_signals(weights: Float[Array, "n rules"], bound: Float[Array, "..."])
     }
 
 
-def share_given(wanted: PerAxis, given: PerAxis) -> Scalar:
-    """Share of a wanted acceleration that another one gives, along its direction, 0 to 1; 1 where nothing is wanted."""
-    size = (wanted**2).sum()
-    share = (wanted * given).sum() / jnp.where(size > 0, size, 1.0)
+def share_given(desired: PerAxis, given: PerAxis) -> Scalar:
+    """Share of a wanted acceleration that another one gives, along its direction, 0 to 1; 1 where nothing is desired."""
+    size = (desired**2).sum()
+    share = (desired * given).sum() / jnp.where(size > 0, size, 1.0)
     return jnp.where(size > 0, jnp.clip(share, 0.0, 1.0), 1.0)
 
 

@@ -172,8 +172,8 @@ def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
     last = jnp.maximum(jnp.isfinite(states).all(axis=1).sum() - 1, 0)  # what was never saved is infinite
     index = jnp.minimum(jnp.arange(times.shape[0]), last)
     samples = jax.lax.map(lambda at: realization.record(at[0], *unravel(at[1])), (times[index], states[index]))
-    sound = jnp.where(status == int(Status.OK), final[0], states[last])
+    valid = jnp.where(status == int(Status.OK), final[0], states[last])
     ending = blamed(
         going()._replace(status=status, time=ended[0]), realization, ended[0], unravel(final[0]), _FIRST_STEP
     )
-    return Outcome(times, samples, (), unravel(sound), *ending)
+    return Outcome(times, samples, (), unravel(valid), *ending)

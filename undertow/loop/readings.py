@@ -53,8 +53,8 @@ class Expected(NamedTuple):
             outputs = own(y.position, self.position), own(y.velocity, velocity)
             return with_outputs(y, *outputs)._replace(actuator=actuator)
 
-        sound = all_finite((y.position, y.velocity))
-        whole = jax.lax.cond(sound, lambda: y._replace(actuator=actuator), repaired)
+        finite = all_finite((y.position, y.velocity))
+        whole = jax.lax.cond(finite, lambda: y._replace(actuator=actuator), repaired)
         return whole, self._replace(replaced=self.replaced + jnp.where(all_finite(y), 0, 1))
 
     def after(

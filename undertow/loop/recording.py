@@ -69,8 +69,8 @@ def freeze_on_failure(
         time = jnp.where(wrong > 0, t, time)
     failing = (ending.status == int(Status.OK)) & (code != int(Status.OK))
     ending = Ending(*(jnp.where(failing, now, was) for now, was in zip((code, time, wrong), ending, strict=True)))
-    sound = ending.status == int(Status.OK)
-    return jax.tree.map(lambda n, o: jnp.where(sound, n, o), new, old), ending
+    valid = ending.status == int(Status.OK)
+    return jax.tree.map(lambda n, o: jnp.where(valid, n, o), new, old), ending
 
 
 def instant(control_step: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:

@@ -114,7 +114,7 @@ class BatchRunner:
         run: one of them.
         plan: how they are run.
         constant: which arrays of `run` are the same for all, in the order of its leaves; they make the program short.
-        lanes: runs at once; as many as fit a register unless given.
+        width: runs at once; as many as fit a register unless given.
         driver: of the GPU that runs them; None for this processor.
 
     Raises:
@@ -122,7 +122,7 @@ class BatchRunner:
         OSError: the GPU's driver fails.
     """
 
-    def __init__(self, run: Run, plan: Plan, constant: list[bool], lanes: int = 0, driver: "Driver | None" = None):
+    def __init__(self, run: Run, plan: Plan, constant: list[bool], width: int = 0, driver: "Driver | None" = None):
         if unavailable():
             raise Unsupported(unavailable())
         from simdjit import Loop
@@ -149,7 +149,7 @@ class BatchRunner:
             return t, {name: signals[name] for name in plan.signals}
 
         cache = cache_folder() / "native"
-        self._program = Loop(realize, start, control_step, record, numbers, constant, lanes, driver, cache)
+        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache)
 
     @property
     def operations(self) -> int:
@@ -194,7 +194,7 @@ def simulate(
     arrays = eqx.filter(run, eqx.is_array)
     constant = [True] * len(jax.tree.leaves(arrays))
     plan = Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps)
-    batch = BatchRunner(run, plan, constant, lanes=1)
-    flown = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
-    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, flown)
+    batch = BatchRunner(run, plan, constant, width=1)
+    ended = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
+    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, ended)
     return Outcome(one.time, one.series, one.accumulated, one.final, one.status, one.ended, one.input)

@@ -58,8 +58,8 @@ class Navigation(AbstractInformedNavigation):
     def velocity_noise(self, dt):
         """That of all readings of a second, as if they came evenly at every step; the filters' memory is left out."""
         sensors = [one for one in self.sensors if isinstance(one, AbstractVelocitySensor)]
-        told = [one.velocity_noise() ** 2 * one.sampling.period for one in sensors]
-        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in told)
+        densities = [one.velocity_noise() ** 2 * one.sampling.period for one in sensors]
+        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in densities)
         return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
 
     def init(self, realization, truth: Measurement) -> NavigationState:
@@ -83,13 +83,13 @@ class Navigation(AbstractInformedNavigation):
         motion = motion_of(truth, state.velocity, elapsed)
         readings = [sensor.reading(motion) for sensor in self.sensors]
         numbers = jnp.stack([sensor.sampling.number(t) for sensor in self.sensors])
-        heard = [
+        deliveries = [
             sensor.sampling.deliver(states, t, reading, chance)
             for sensor, states, reading, chance in zip(
                 self.sensors, state.states, readings, _chances(realization, numbers, readings), strict=True
             )
         ]
-        arrivals = [arrival for arrival, _ in heard]
+        arrivals = [arrival for arrival, _ in deliveries]
         finite = [jnp.isfinite(reading).all() for reading, _ in arrivals]
         ignored = state.ignored + sum(
             jnp.where(fresh & ~good, 1, 0) for (_, fresh), good in zip(arrivals, finite, strict=True)
@@ -105,7 +105,7 @@ class Navigation(AbstractInformedNavigation):
         estimate = estimate.predicted(elapsed)
         for sensor, (reading, fresh) in news:
             estimate = _either(fresh, sensor.correct(estimate, reading), estimate)
-        states = tuple(states for _, states in heard)
+        states = tuple(states for _, states in deliveries)
         return estimate.measurement(), NavigationState(t, motion.velocity, states, estimate, ignored)
 
     def ignored(self, state: NavigationState):
@@ -113,10 +113,10 @@ class Navigation(AbstractInformedNavigation):
 
 
 def _chances(keys, numbers, readings) -> list:
-    """Standard normal numbers, one per entry of each reading and one more; drawn together, which compiles faster."""
+    """Standard normal numbers, one per entry of each reading and one more; sampled together, which compiles faster."""
     most = max(reading.size for reading in readings) + 1
-    draw = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
-    together = jax.vmap(draw)(keys, numbers)
+    normal = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
+    together = jax.vmap(normal)(keys, numbers)
     return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]
 
 

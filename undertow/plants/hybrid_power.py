@@ -25,7 +25,7 @@ _ROUNDING = 1e-6  # share by which a limited voltage may miss its limit: single 
 class PowerState(NamedTuple):
     """What the electrical side remembers; None for what is not there."""
 
-    drawn: Any = None  # charge, C
+    charge: Any = None  # that has left the battery, C
     ledger: Any = None  # J, a Ledger
 
 
@@ -58,15 +58,15 @@ class HybridPower(eqx.Module):
 
     def initial_state(self, thrusters: int) -> PowerState:
         """Full battery, empty ledger."""
-        drawn = None if self.battery is None else jnp.zeros(())
-        return PowerState(drawn, diagnostics.opened(thrusters) if self.ledger else None)
+        charge = None if self.battery is None else jnp.zeros(())
+        return PowerState(charge, diagnostics.opened(thrusters) if self.ledger else None)
 
     def dynamics(self, thruster: AbstractThruster, state: Any, rates: Any, power: PowerState, u) -> PowerState:
         """Rates of the electrical state, with those of the thrusters given."""
         taken = thruster.electrical_power(state, u).sum()
         current = loss = None
         if self.battery is not None:
-            current, loss = self.battery.current(power.drawn, taken), self.battery.loss(power.drawn, taken)
+            current, loss = self.battery.current(power.charge, taken), self.battery.loss(power.charge, taken)
         flows = thruster.powers(state, u) if self.ledger else None
         if flows is None:
             return PowerState(current)
@@ -77,16 +77,16 @@ class HybridPower(eqx.Module):
 
     def admissible(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
         """Voltages within the supply, within what the battery can give, in whole pulses."""
-        wanted, limited = jnp.clip(u, *thruster.limits()), False
+        command, limited = jnp.clip(u, *thruster.limits()), False
         if self.battery is not None:
-            within = lambda voltage: jnp.clip(wanted, -voltage, voltage)
+            within = lambda voltage: jnp.clip(command, -voltage, voltage)
             taken = lambda voltage: thruster.electrical_power(state, within(voltage)).sum()
-            most = self.battery.limit(power.drawn, taken, jnp.abs(wanted).max())
-            wanted, limited = within(most), most < jnp.abs(wanted).max()
+            most = self.battery.limit(power.charge, taken, jnp.abs(command).max())
+            command, limited = within(most), most < jnp.abs(command).max()
         if self.esc is not None:
-            bus = self.bus_voltage(thruster, state, power, wanted)
-            wanted = self.esc.voltage(self.esc.pulse(wanted, bus, limited), bus)
-        return wanted
+            bus = self.bus_voltage(thruster, state, power, command)
+            command = self.esc.voltage(self.esc.pulse(command, bus, limited), bus)
+        return command
 
     def saturated(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
         """True where an applied voltage is at the limit of the supply, or of the battery."""
@@ -95,23 +95,23 @@ class HybridPower(eqx.Module):
         if self.battery is None:
             return limited
         top, more = jnp.abs(u).max(), (1 + _AT_LIMIT) * u
-        spare = self.battery.allows(power.drawn, jnp.abs(more).max(), thruster.electrical_power(state, more).sum())
+        spare = self.battery.allows(power.charge, jnp.abs(more).max(), thruster.electrical_power(state, more).sum())
         return limited | ((jnp.abs(u) >= (1 - _AT_LIMIT) * top) & ~spare)
 
     def bus_voltage(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> Scalar:
         """Voltage of the bus, V, while the thrusters get u."""
         if self.battery is None:
             return thruster.supply
-        return self.battery.bus_voltage(power.drawn, thruster.electrical_power(state, u).sum())
+        return self.battery.bus_voltage(power.charge, thruster.electrical_power(state, u).sum())
 
     def diagnostics(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> dict[str, Scalar]:
         """What is worth recording, by name."""
         found, cells = {}, None
         if self.battery is not None:
-            cells = self.battery.energy(power.drawn)
+            cells = self.battery.energy(power.charge)
             found["bus_voltage"] = self.bus_voltage(thruster, state, power, u)
-            found["charge_drawn"] = power.drawn
-            found["state_of_charge"] = self.battery.state_of_charge(power.drawn)
+            found["charge_drawn"] = power.charge
+            found["state_of_charge"] = self.battery.state_of_charge(power.charge)
         if self.ledger:
             found |= diagnostics.columns(power.ledger, thruster.stored(state).sum(), cells)
         return found

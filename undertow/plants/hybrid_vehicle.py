@@ -62,7 +62,7 @@ def state_at(position: Any, velocity: Any, thrusters: Any, power: PowerState) ->
     return VehicleState(position[:3], attitude, nu, thrusters, power)
 
 
-_FREEDOMS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+_DOF_NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 class HybridVehicle(AbstractPlant):
@@ -167,7 +167,7 @@ class HybridVehicle(AbstractPlant):
         return x.status()
 
     def advice(self) -> tuple[str, ...]:
-        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _FREEDOMS)
+        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _DOF_NAMES)
 
     def rank(self) -> int:
         """Rank of the thruster matrix; that of G too, wherever J is regular."""
@@ -198,23 +198,23 @@ class HybridVehicle(AbstractPlant):
                 vehicle with another number of thrusters.
         """
         nominal = self.thruster if thruster is None else thruster
-        told = self if vehicle is None else HybridVehicle(vehicle, nominal)
-        if told.inputs() != self.inputs():
-            raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{told.inputs()}")
+        known = self if vehicle is None else HybridVehicle(vehicle, nominal)
+        if known.inputs() != self.inputs():
+            raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{known.inputs()}")
         if regularisation is not None:
             checks.positive("regularisation", regularisation)
         if speed_sensor:
             still = nominal.report(nominal.initial_state(self.inputs()))
             if still is None:  # thrusters without a speed to measure complain here, not in the loop
                 nominal.speed_term(still)
-        gain, allocation = _static(told.body.inverse_mass_matrix, told.thruster_matrix, nominal.voltage_gain())
+        gain, allocation = _static(known.body.inverse_mass_matrix, known.thruster_matrix, nominal.voltage_gain())
         dynamics = HybridDynamics(
-            body=told.body,
+            body=known.body,
             thruster=nominal,
-            thruster_matrix=told.thruster_matrix,
+            thruster_matrix=known.thruster_matrix,
             body_gain=gain,
             allocation=allocation,
-            rank=told.rank(),
+            rank=known.rank(),
             regularisation=regularisation,
             speed_sensor=speed_sensor,
             rate_term=rate_term,

@@ -118,8 +118,8 @@ class InvertedPendulum(AbstractMechanism):
             pole_mass: kg.
             half_length: half the length of the pole, m.
         """
-        told = nominal(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
-        return Model(told, OutputCoordinates(angles=(True,)), DirectActuator(1.0, *self.limits()))
+        cart_pole = nominal(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
+        return Model(cart_pole, OutputCoordinates(angles=(True,)), DirectActuator(1.0, *self.limits()))
 
 
 def inverted_pendulum(

@@ -117,11 +117,11 @@ class LinearPlant(AbstractMechanism):
         Raises:
             BadInput: another shape than the truth.
         """
-        told = nominal(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
-        if told.gain.shape != self.system.gain.shape:
-            raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{told.gain.shape}")
+        system = nominal(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
+        if system.gain.shape != self.system.gain.shape:
+            raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{system.gain.shape}")
         coordinates = OutputCoordinates(angles=(False,) * len(self.outputs))
-        dynamics = LinearDynamics(told, pseudo_inverse(told.gain))
+        dynamics = LinearDynamics(system, pseudo_inverse(system.gain))
         return Model(dynamics, coordinates, DirectActuator(1.0, *self.limits()))
 
 

@@ -208,8 +208,8 @@ class MagneticLevitation(AbstractMechanism):
             inductance_reach: gap over which it falls e times, m.
         """
         changed = {"inductance": inductance, "inductance_reach": inductance_reach}
-        told = nominal(self.rig, mass=mass, force_factor=force_factor, **changed)
-        return Model(SteadyCoils(told), OutputCoordinates((False,)), DirectActuator(1.0, *self.limits(), at_once=False))
+        rig = nominal(self.rig, mass=mass, force_factor=force_factor, **changed)
+        return Model(SteadyCoils(rig), OutputCoordinates((False,)), DirectActuator(1.0, *self.limits(), at_once=False))
 
 
 def magnetic_levitation(rig: str = "balko_rosinova", fidelity: str = "coil") -> MagneticLevitation:

@@ -15,9 +15,9 @@ from undertow.plants.reachability import open_loop_advice
 Part = TypeVar("Part", bound=eqx.Module)
 
 
-def nominal(truth: Part, **told: Any) -> Part:
+def nominal(truth: Part, **given: Any) -> Part:
     """The same part with other values of the named parameters; None leaves the true one."""
-    return replace(truth, **{name: value for name, value in told.items() if value is not None})
+    return replace(truth, **{name: value for name, value in given.items() if value is not None})
 
 
 class AbstractMechanism(AbstractPlant):

@@ -142,8 +142,8 @@ class TwoLinkArm(AbstractMechanism):
             outer_centre: from the elbow to their centre of mass, m.
             outer_offset: by how far that centre lags behind the link, rad.
         """
-        told = nominal(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
-        return Model(told, OutputCoordinates(angles=(True, True)), DirectActuator(1.0, *self.limits()))
+        links = nominal(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
+        return Model(links, OutputCoordinates(angles=(True, True)), DirectActuator(1.0, *self.limits()))
 
 
 def two_link_arm(

@@ -43,46 +43,46 @@ class Battery(eqx.Module):
             must = f"be at most the full voltage ({float(self.full_voltage):g} V)"
             raise BadInput("empty_voltage", must, f"{float(self.empty_voltage):g} V")
 
-    def state_of_charge(self, drawn: Scalar) -> Scalar:
+    def state_of_charge(self, charge: Scalar) -> Scalar:
         """1 when full, 0 when empty."""
-        return 1 - drawn / (3600 * self.capacity)
+        return 1 - charge / (3600 * self.capacity)
 
-    def open_circuit_voltage(self, drawn: Scalar) -> Scalar:
+    def open_circuit_voltage(self, charge: Scalar) -> Scalar:
         """E, V, linear in the state of charge."""
-        return self.empty_voltage + (self.full_voltage - self.empty_voltage) * self.state_of_charge(drawn)
+        return self.empty_voltage + (self.full_voltage - self.empty_voltage) * self.state_of_charge(charge)
 
-    def bus_voltage(self, drawn: Scalar, power: Scalar) -> Scalar:
+    def bus_voltage(self, charge: Scalar, power: Scalar) -> Scalar:
         """v, V, while the converters take a power in W: the larger root; E / 2 from E^2 / (4 R) on."""
-        emf = self.open_circuit_voltage(drawn)
+        emf = self.open_circuit_voltage(charge)
         under_root = emf**2 - 4 * self.resistance * power
         return (emf + jnp.sqrt(jnp.maximum(under_root, _KNEE * emf**2))) / 2
 
-    def current(self, drawn: Scalar, power: Scalar) -> Scalar:
+    def current(self, charge: Scalar, power: Scalar) -> Scalar:
         """dq/dt = P / v, A."""
-        return power / self.bus_voltage(drawn, power)
+        return power / self.bus_voltage(charge, power)
 
-    def loss(self, drawn: Scalar, power: Scalar) -> Scalar:
+    def loss(self, charge: Scalar, power: Scalar) -> Scalar:
         """Heat in the battery, W: E i - P, which is R i^2 wherever the power can be drawn."""
-        return self.open_circuit_voltage(drawn) * self.current(drawn, power) - power
+        return self.open_circuit_voltage(charge) * self.current(charge, power) - power
 
-    def energy(self, drawn: Scalar) -> Scalar:
+    def energy(self, charge: Scalar) -> Scalar:
         """Energy that has left the cells when a charge has been drawn: the integral of E dq, J."""
-        return drawn * (self.full_voltage + self.open_circuit_voltage(drawn)) / 2
+        return charge * (self.full_voltage + self.open_circuit_voltage(charge)) / 2
 
-    def allows(self, drawn: Scalar, voltage: Scalar, power: Scalar) -> Array:
+    def allows(self, charge: Scalar, voltage: Scalar, power: Scalar) -> Array:
         """Whether a power can be taken, in W, with at least this voltage left on the bus."""
-        emf = self.open_circuit_voltage(drawn)
+        emf = self.open_circuit_voltage(charge)
         lowest = jnp.maximum(voltage, emf / 2)
         return self.resistance * power <= lowest * (emf - lowest)
 
-    def limit(self, drawn: Scalar, power_at: Callable[[Scalar], Scalar], top: Scalar) -> Scalar:
+    def limit(self, charge: Scalar, power_at: Callable[[Scalar], Scalar], top: Scalar) -> Scalar:
         """Largest voltage up to `top` that the battery can give to loads that take power_at(voltage).
 
         Found by halving, on its safe side: load and bus voltage belong together, and neither is known before the other.
         """
 
         def possible(voltage):
-            return self.allows(drawn, voltage, power_at(voltage))
+            return self.allows(charge, voltage, power_at(voltage))
 
         def halve(_, bounds):
             low, high = bounds

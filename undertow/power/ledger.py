@@ -39,14 +39,14 @@ class Ledger(NamedTuple):
         """All thrusters together."""
         return jax.tree.map(jnp.sum, self)
 
-    def books(self) -> JoulePerThruster:
+    def residual(self) -> JoulePerThruster:
         """What the integrated columns leave over, J."""
         return self.source + self.conversion - self.spent() - self.stored
 
     def defect(self, stored: JoulePerThruster, cells: Joule | None) -> JoulePerThruster:
         """What is left over against the state itself, J: stored energy now, and energy that left the cells."""
-        drawn = self.source if cells is None else cells - self.battery
-        return drawn + self.conversion - self.spent() - stored
+        supplied = self.source if cells is None else cells - self.battery
+        return supplied + self.conversion - self.spent() - stored
 
     def spent(self) -> JoulePerThruster:
         """Copper, friction and water, J."""
@@ -76,7 +76,7 @@ def columns(ledger: Ledger, stored: Joule, cells: Joule | None) -> dict[str, Jou
     """Entries of COLUMNS at one instant, of all thrusters together."""
     total = ledger.total()
     kept = {f"energy_{name}": value for name, value in total._asdict().items()}
-    return kept | {"energy_residual": total.books(), "energy_integration_error": total.defect(stored, cells)}
+    return kept | {"energy_residual": total.residual(), "energy_integration_error": total.defect(stored, cells)}
 
 
 def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.inf) -> dict[str, float]:
@@ -95,6 +95,6 @@ def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.
         values = np.asarray(recorded[f"energy_{name}"])[inside]
         return np.abs(values - values[:1])
 
-    drawn = change("source")[-1:].sum()
-    share = lambda name: float(change(name).max() / drawn) if drawn else 0.0
+    supplied = change("source")[-1:].sum()
+    share = lambda name: float(change(name).max() / supplied) if supplied else 0.0
     return {"energy_balance_residual": share("residual"), "energy_integration_residual": share("integration_error")}

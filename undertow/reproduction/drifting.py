@@ -43,9 +43,9 @@ def shown(folder: Path) -> dict[str, Any]:
     Args:
         folder: where `scenarios/` is written.
     """
-    wanted = scenarios()
-    write_all(wanted, folder)
-    found = run_batches(wanted, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"))
+    named = scenarios()
+    write_all(named, folder)
+    found = run_batches(named, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"))
     law = law_of(found["drifting_free"])
     between = stable_gains(lambda gain: lag_matrix(law, LAG, drifted=gain), 6000.0)
     runs = {name.removeprefix("drifting_"): _curves(run) for name, run in found.items()}

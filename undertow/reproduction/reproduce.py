@@ -43,16 +43,16 @@ def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: boo
     Args:
         folder: an existing, empty folder.
         quick: fewer points in the sweeps and a long horizon of 200 s, not 2,000 s; the same accuracy.
-        progress: told a message and the share done.
+        progress: called with a message and the share done.
         robust_variant: whether to run the last chapter, the robust variant beside the paper's.
     """
-    wanted = examples.scenarios() | claims.scenarios(quick)
+    named = examples.scenarios() | claims.scenarios(quick)
     batched = horizons.scenarios(quick) | lag_map.scenarios(quick) | claims.batched(quick)
     write_all(batched, folder)
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         try:
             running_batches = start(batched, horizons.windows(quick), 1.0, ("weights_peak",), pool)
-            runs = run_all(wanted, folder, lambda message, share: progress(message, _PAPER * share))
+            runs = run_all(named, folder, lambda message, share: progress(message, _PAPER * share))
             progress(f"{horizons.duration(quick):g} s on every fidelity", _PAPER)
             long = running_batches()
         except BaseException:
@@ -60,7 +60,7 @@ def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: boo
             raise
     progress("judging the claims", _LONG)
     results = {
-        "provenance": {"quick": quick, "scenarios": sorted(wanted | batched), **versions()},
+        "provenance": {"quick": quick, "scenarios": sorted(named | batched), **versions()},
         "example1": examples.example(runs, 1),
         "example2": examples.example(runs, 2),
         "table2": examples.table2(runs),

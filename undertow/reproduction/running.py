@@ -31,7 +31,7 @@ def run_all(scenarios: Scenarios, folder: Path, progress: Callable[[str, float],
     Args:
         scenarios: name -> scenario.
         folder: where the results go.
-        progress: told a message and the share done.
+        progress: called with a message and the share done.
     """
     write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)

@@ -92,11 +92,11 @@ def _actuators(thruster: AbstractThruster, frequency: Float[Array, ""]):
 
 def _law(text: str, unit: str, pick, long: Period, short: Period) -> Law:
     """Least squares through the origin on the long period: output = coefficient * input."""
-    given, wanted = pick(long)
-    coefficient = float(given @ wanted / (given @ given))
+    given, measured = pick(long)
+    coefficient = float(given @ measured / (given @ given))
 
     def error(period: Period) -> float:
-        given, wanted = pick(period)
-        return float(100 * np.sqrt(np.mean((wanted - coefficient * given) ** 2) / np.mean(wanted**2)))
+        given, measured = pick(period)
+        return float(100 * np.sqrt(np.mean((measured - coefficient * given) ** 2) / np.mean(measured**2)))
 
     return Law(text, coefficient, unit, error(long), error(short))

@@ -30,7 +30,7 @@ def depth(
     Args:
         period: between samples, s.
         noise: standard deviation, m.
-        bias: standard deviation of a constant offset, drawn once per run, m.
+        bias: standard deviation of a constant offset, sampled once per run, m.
         resolution: step of the reading, m; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.

@@ -37,7 +37,7 @@ def dvl(
     Args:
         period: between pings, s; it grows with the distance to the bottom.
         noise: standard deviation of each component, m/s.
-        bias: standard deviation of a constant offset, drawn once per run, m/s.
+        bias: standard deviation of a constant offset, sampled once per run, m/s.
         resolution: step of the reading, m/s; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that the bottom is lost.

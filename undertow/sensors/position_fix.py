@@ -30,7 +30,7 @@ def position_fix(
     Args:
         period: between fixes, s.
         noise: standard deviation of each, m.
-        bias: standard deviation of a constant offset, drawn once per run, m.
+        bias: standard deviation of a constant offset, sampled once per run, m.
         resolution: step of the reading, m; 0 for none.
         delay: until a fix is delivered, s.
         dropout: probability that a fix is lost.

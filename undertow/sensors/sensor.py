@@ -43,7 +43,7 @@ class Sampling(eqx.Module):
     """Sample k is taken at k period, or at the first step of the loop after it, and delivered a delay later.
 
     reading = resolution round((truth + bias + noise) / resolution). The noise is new for every sample and depends on
-    its number only, not on the rate of the loop; the bias is drawn once for a run. Where several samples fall between
+    its number only, not on the rate of the loop; the bias is sampled once per run. Where several samples fall between
     two steps, the newest is delivered. In single precision more than 2^24 samples are too many to be told apart.
 
     Raises:
@@ -52,7 +52,7 @@ class Sampling(eqx.Module):
 
     period: Float[Array, ""] = param("s", "between two samples")
     noise: Float[Array, "..."] = param("as read", "standard deviation, new for every sample", default=0.0)
-    bias: Float[Array, "..."] = param("as read", "standard deviation of an offset, drawn once per run", default=0.0)
+    bias: Float[Array, "..."] = param("as read", "standard deviation of an offset, sampled once per run", default=0.0)
     resolution: Float[Array, "..."] = param("as read", "step of the reading; 0 for none", default=0.0)
     delay: Float[Array, ""] = param("s", "from taking a sample to delivering it", default=0.0)
     dropout: Float[Array, ""] = param("", "probability that a sample is lost", default=0.0)

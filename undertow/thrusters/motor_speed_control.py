@@ -90,9 +90,9 @@ class SpeedControlledMotor(AbstractActuatorModel):
     def command(self, state: MotorState, force, rate) -> PerThruster:
         motor = self.thruster.motor
         pull = motor.rotor_inertia * rate * (motor.speed_at(force) - state.speed)
-        wanted = motor.steady_current(state.speed) + pull / motor.torque_constant
-        held = motor.resistance * wanted + motor.back_emf_constant * state.speed
-        return self.thruster.commanded(held + self._boost(rate) * (wanted - state.current))
+        current = motor.steady_current(state.speed) + pull / motor.torque_constant
+        held = motor.resistance * current + motor.back_emf_constant * state.speed
+        return self.thruster.commanded(held + self._boost(rate) * (current - state.current))
 
     def target_of(self, state: MotorState, u, rate) -> PerThruster:
         motor, boost = self.thruster.motor, self._boost(rate)

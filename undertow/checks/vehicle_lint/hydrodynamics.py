@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
-from undertow.vehicles.facts import FREEDOMS, FRESH_WATER, Facts
+from undertow.vehicles.facts import DOF_NAMES, FRESH_WATER, Facts
 
 _SAMPLES = 4000
 _SPHERE = 0.5  # added mass of a sphere per displaced mass
@@ -95,11 +95,11 @@ def _sphere(facts: Facts) -> Iterator[Finding]:
 def _shown(values: np.ndarray, which: np.ndarray) -> str:
     if not np.any(values[which]):
         return f"zero in {_names(which)}"
-    return ", ".join(f"{values[i]:.4g} in {FREEDOMS[i]}" for i in np.flatnonzero(which))
+    return ", ".join(f"{values[i]:.4g} in {DOF_NAMES[i]}" for i in np.flatnonzero(which))
 
 
 def _names(which: np.ndarray) -> str:
-    return ", ".join(FREEDOMS[i] for i in np.flatnonzero(which))
+    return ", ".join(DOF_NAMES[i] for i in np.flatnonzero(which))
 
 
 def _metres(size: np.ndarray) -> str:

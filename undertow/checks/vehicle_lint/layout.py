@@ -6,7 +6,7 @@ import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
 from undertow.plants.reachability import open_loop_advice
-from undertow.vehicles.facts import FREEDOMS, Facts
+from undertow.vehicles.facts import DOF_NAMES, Facts
 
 _ROUNDING = 5e-3
 _WORST_CONDITION = 10.0
@@ -45,12 +45,12 @@ def arms(facts: Facts) -> Iterator[Finding]:
 
 def rank(facts: Facts) -> Iterator[Finding]:
     """Which directions no thruster pushes, and how unevenly the others are pushed; moments per longest arm."""
-    for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, FREEDOMS):
+    for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, DOF_NAMES):
         yield Finding("advice", "rank", "thrusters", sentence)
         return
     left, sizes, _ = np.linalg.svd(scaled(facts.thruster_matrix))
     if sizes[0] > _WORST_CONDITION * sizes[5]:
-        weakest = FREEDOMS[int(np.argmax(np.abs(left[:, 5])))]
+        weakest = DOF_NAMES[int(np.argmax(np.abs(left[:, 5])))]
         got = f"such that the best is pushed {sizes[0] / sizes[5]:.3g} times harder than the worst, {weakest}"
         yield advice("condition", "thrusters", "push all directions alike", got)
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, error
-from undertow.vehicles.facts import FREEDOMS, Facts
+from undertow.vehicles.facts import DOF_NAMES, Facts
 
 _ROUNDING = 0.02  # of the largest entry of a row: printed matrices have two or three digits
 
@@ -20,7 +20,7 @@ def printed_matrix(facts: Facts) -> Iterator[Finding]:
         off = np.flatnonzero(np.abs(printed - computed) > _ROUNDING * largest)
         if len(off):
             j = int(off[np.argmax(np.abs(printed - computed)[off])])
-            must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {FREEDOMS[row]}"
+            must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {DOF_NAMES[row]}"
             got = f"{printed[j]:.4g}{_others(off)}"
             yield error("printed_matrix", f"thruster_matrix[{row}]", must, got, _likely(printed[off], computed[off]))
 

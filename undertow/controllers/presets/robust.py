@@ -72,7 +72,7 @@ def robust(
             `tracking`, 2 at most; 0 for no filter.
         actuator_rate: how fast motors are made to follow, 1/s; None: chosen with the bandwidth, and beside one that
             is given three times as fast, if sampling allows.
-        direction: what departing from the wanted direction costs, where limits bind, beside losing size.
+        direction: what a departure from the desired direction costs, where limits bind, beside losing size.
         sets: fuzzy sets; any number from 1.
         reach: outermost centres, m/s and rad/s; None: so far that weights anywhere in their box add at most a tenth
             to the damping of the estimator.

@@ -43,7 +43,7 @@ class Plan(NamedTuple):
     seen: Estimate
     off: Tracking  # from the target, smoothed if there is a filter
     robust: PerAxis  # u_r
-    forces: Float[Array, " m"]  # that would give what is wanted
+    forces: Float[Array, " m"]  # that would give the desired acceleration
 
 
 class RobustRCAF(AbstractInformedController):
@@ -73,7 +73,7 @@ class RobustRCAF(AbstractInformedController):
     )
 
     direction: Float[Array, ""] = param(
-        "", "what departing from the wanted direction costs, where limits bind, beside losing size", default=1.0
+        "", "what a departure from the desired direction costs, where limits bind, beside losing size", default=1.0
     )
 
     def __check_init__(self):

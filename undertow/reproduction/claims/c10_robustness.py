@@ -31,14 +31,14 @@ def scenarios(quick: bool) -> dict:
         for name, value in _TABLE1.items()
         for factor in (0.5, 2.0)
     }
-    draws = np.random.default_rng(1).uniform(-1, 1, (_STARTS, 2, 6))
+    samples = np.random.default_rng(1).uniform(-1, 1, (_STARTS, 2, 6))
     reach = np.array([3.0, 3.0, 3.0, 1.0, 0.7, 3.0])
     starts = {
         f"c10_start_{i + 1}": scenario(
             f"RCAFC from random start {i + 1}",
-            initial={"position": (draw[0] * reach).round(3).tolist(), "velocity": (0.5 * draw[1]).round(3).tolist()},
+            initial={"position": (sample[0] * reach).round(3).tolist(), "velocity": (0.5 * sample[1]).round(3).tolist()},
         )
-        for i, draw in enumerate(draws)
+        for i, sample in enumerate(samples)
     }
     if quick:
         gains = dict(list(gains.items())[:2])

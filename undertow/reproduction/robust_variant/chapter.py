@@ -31,13 +31,13 @@ def chapter(folder: Path, quick: bool, progress: Progress) -> Chapter:
     Args:
         folder: where `scenarios/` and `runs/` are.
         quick: fewer fidelities, ablations and seeds.
-        progress: told a message and the share done.
+        progress: called with a message and the share done.
     """
-    wanted = [one for one in ABLATIONS if not (quick and one.long)]
+    selected = [one for one in ABLATIONS if not (quick and one.long)]
     silent = lambda message, share: None
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         runs_later = pool.submit(run_all, fidelity.scenarios(quick), folder, silent)
-        later = {pool.submit(study.run, one, quick, folder): one for one in wanted}
+        later = {pool.submit(study.run, one, quick, folder): one for one in selected}
         try:
             for count, done in enumerate(as_completed([runs_later, *later])):
                 done.result()
@@ -51,7 +51,7 @@ def chapter(folder: Path, quick: bool, progress: Progress) -> Chapter:
     results = {
         "quick": quick,
         "seeds": found[0]["variants"][0]["seeds"],
-        "left_out": [one.id for one in ABLATIONS if one not in wanted],
+        "left_out": [one.id for one in ABLATIONS if one not in selected],
         "fidelity": rows,
         "ablations": found,
         "conclusions": conclusions(rows, found),

@@ -6,7 +6,7 @@ with every published parameter set as the truth in turn.
 
 from typing import Any
 
-_TOLD, _TRUE = "vonbenzon2022", "ng2024"
+_NOMINAL, _TRUE = "vonbenzon2022", "ng2024"
 _START, _END = 30.0, 60.0  # s
 
 _PID, _ROBUST = ("pid", "PID, tuned"), ("robust", "robust, tuned")
@@ -61,7 +61,7 @@ def _scenario(description: str, law: dict[str, Any], sensor: str) -> dict[str, A
     return {
         "description": description,
         "plant": {"vehicle": vehicle(_TRUE), "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
-        "model": {"vehicle": vehicle(_TOLD), "rate_term": True},
+        "model": {"vehicle": vehicle(_NOMINAL), "rate_term": True},
         "controller": law,
         "reference": {"kind": "setpoint", "position": [0] * 6},
         "disturbance": [
