@@ -46,7 +46,7 @@ def weight_signals(weights: Float[Array, "n rules"], bound: Float[Array, "..."])
 
 
 def share_given(desired: PerAxis, given: PerAxis) -> Scalar:
-    """Share of a wanted acceleration that another one gives, along its direction, 0 to 1; 1 where nothing is desired."""
+    """Share of a desired acceleration that another one gives, along its direction, 0 to 1; 1 where none is desired."""
     size = (desired**2).sum()
     share = (desired * given).sum() / jnp.where(size > 0, size, 1.0)
     return jnp.where(size > 0, jnp.clip(share, 0.0, 1.0), 1.0)

@@ -97,7 +97,7 @@ class Load(NamedTuple):
 class Effort(NamedTuple):
     """Cost of driving the actuators."""
 
-    power: Inputs  # electrical power drawn, W
+    power: Inputs  # electrical power, W
     saturated: Inputs  # 1 where an input is at its limit, else 0
 
 

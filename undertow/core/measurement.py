@@ -20,7 +20,7 @@ Vector6 = Float[Array, "6"]
 def measurement_of_pose(
     position: Float[Array, "3"], attitude: Float[Array, "4"], nu: Vector6, actuator: Any = None
 ) -> Measurement:
-    """Measurement of a body from its position (m), unit quaternion (body -> world) and velocity in body axes (m/s, rad/s)."""
+    """Measurement of a body from position (m), unit quaternion (body -> world) and velocity (body axes, m/s, rad/s)."""
     rotation = rotation_from_quaternion(attitude)
     outputs = jnp.concatenate([position, euler_from_rotation(rotation)])
     return Measurement(outputs, Kinematics(rotation).to_world(nu), actuator, BodyMotion(attitude, rotation, nu))

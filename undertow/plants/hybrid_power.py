@@ -18,19 +18,19 @@ from undertow.thrusters.thruster import AbstractThruster
 
 Scalar = Float[Array, ""]
 
-_AT_LIMIT = 0.005  # share of the largest voltage within which a thruster counts as limited: two steps of a pulse
-_ROUNDING = 1e-6  # share by which a limited voltage may miss its limit: single precision
+_AT_LIMIT = 0.005  # share of the largest voltage within which a thruster counts as saturated: two steps of a pulse
+_ROUNDING = 1e-6  # relative rounding of a limited voltage in single precision
 
 
 class PowerState(NamedTuple):
-    """What the electrical side remembers; None for what is not there."""
+    """State of the electrical side; None for an absent part."""
 
-    charge: Any = None  # that has left the battery, C
+    charge: Any = None  # drawn from the battery, C
     ledger: Any = None  # J, a Ledger
 
 
 class HybridPower(eqx.Module):
-    """Between the commanded voltages and those that the thrusters get. The voltage is held over a sampling time.
+    """Map from commanded to applied voltages. The voltage is held over a sampling time.
 
     Raises:
         BadInput: speed controllers without a bus voltage, or a ledger for thrusters without a motor.
@@ -41,19 +41,19 @@ class HybridPower(eqx.Module):
     ledger: bool = eqx.field(static=True)
 
     def check(self, thruster: AbstractThruster) -> None:
-        """Whether it goes together with these thrusters."""
+        """Check that it fits these thrusters."""
         for name, kind in (("battery", Battery), ("esc", ESC)):
             part = getattr(self, name)
             if part is not None and not isinstance(part, kind):
                 raise BadInput(name, f"be a {kind.__name__}", type(part).__name__)
             if part is not None and thruster.input_unit != "V":
-                hint = "A battery and speed controllers deal in volts: take a thruster with a motor, such as t200"
+                hint = "A battery and speed controllers need thrusters commanded in volts, such as t200"
                 raise BadInput(name, f"be left out with a thruster commanded in {thruster.input_unit}", hint=hint)
         if self.esc is not None and self.battery is None and not _finite(thruster.supply):
             hint = "Give the thruster a supply, or the vehicle a battery"
-            raise BadInput("esc", "have a bus voltage to share out", "on an infinite supply", hint=hint)
+            raise BadInput("esc", "have a finite bus voltage", "on an infinite supply", hint=hint)
         if self.ledger and not has_motor(thruster):
-            hint = "There is no motor behind this thruster whose diagnostics could be kept"
+            hint = "This thruster has no model of its motor, so its energies are unknown"
             raise BadInput("ledger", "be false", "true", hint=hint)
 
     def initial_state(self, thrusters: int) -> PowerState:
@@ -62,7 +62,7 @@ class HybridPower(eqx.Module):
         return PowerState(charge, diagnostics.opened(thrusters) if self.ledger else None)
 
     def dynamics(self, thruster: AbstractThruster, state: Any, rates: Any, power: PowerState, u) -> PowerState:
-        """Rates of the electrical state, with those of the thrusters given."""
+        """Rates of the electrical state, from those of the thrusters."""
         taken = thruster.electrical_power(state, u).sum()
         current = loss = None
         if self.battery is not None:
@@ -76,7 +76,7 @@ class HybridPower(eqx.Module):
         return PowerState(current, rows)
 
     def admissible(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
-        """Voltages within the supply, within what the battery can give, in whole pulses."""
+        """Voltages limited by the supply and the battery, rounded to pulses of the speed controllers."""
         command, limited = jnp.clip(u, *thruster.limits()), False
         if self.battery is not None:
             within = lambda voltage: jnp.clip(command, -voltage, voltage)
@@ -89,7 +89,7 @@ class HybridPower(eqx.Module):
         return command
 
     def saturated(self, thruster: AbstractThruster, state: Any, power: PowerState, u):
-        """True where an applied voltage is at the limit of the supply, or of the battery."""
+        """True where an applied voltage is at the limit of the supply or of the battery."""
         low, high = thruster.limits()
         limited = (u <= low + _ROUNDING * jnp.abs(low)) | (u >= high - _ROUNDING * jnp.abs(high))
         if self.battery is None:
@@ -99,13 +99,13 @@ class HybridPower(eqx.Module):
         return limited | ((jnp.abs(u) >= (1 - _AT_LIMIT) * top) & ~spare)
 
     def bus_voltage(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> Scalar:
-        """Voltage of the bus, V, while the thrusters get u."""
+        """Voltage of the bus, V, with u applied to the thrusters."""
         if self.battery is None:
             return thruster.supply
         return self.battery.bus_voltage(power.charge, thruster.electrical_power(state, u).sum())
 
     def diagnostics(self, thruster: AbstractThruster, state: Any, power: PowerState, u) -> dict[str, Scalar]:
-        """What is worth recording, by name."""
+        """Values of `signals`, by name."""
         found, cells = {}, None
         if self.battery is not None:
             cells = self.battery.energy(power.charge)
@@ -128,7 +128,7 @@ class HybridPower(eqx.Module):
 
 
 def has_motor(thruster: AbstractThruster) -> bool:
-    """Whether a motor stands behind the thrust, so that diagnostics can be kept; traced, not computed."""
+    """Whether the thruster models its motor, so that a ledger can be kept; traced, not computed."""
     return jax.eval_shape(thruster.powers, thruster.initial_state(1), jnp.zeros(1)) is not None
 
 

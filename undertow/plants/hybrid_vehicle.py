@@ -1,4 +1,4 @@
-"""The vehicle together with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
+"""The vehicle with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
 
 from typing import Any, NamedTuple
 
@@ -27,7 +27,7 @@ from undertow.vehicles.alteration import altered
 from undertow.vehicles.body import Body, seen_from_water
 from undertow.vehicles.vehicle import Vehicle
 
-_ENVELOPE = 1e3  # m, m/s, rad/s; far beyond any vehicle
+_ENVELOPE = 1e3  # m, m/s, rad/s; far above the values of any vehicle
 
 
 class VehicleState(NamedTuple):
@@ -40,12 +40,12 @@ class VehicleState(NamedTuple):
     power: PowerState = PowerState()  # battery and ledger
 
     def pose(self) -> Pose:
-        """Where the body is and how it moves."""
+        """Pose and velocity of the body."""
         rotation = rotation_from_quaternion(self.attitude)
         return Pose(self.position, rotation, matvec(rotation, self.nu[:3]))
 
     def status(self) -> Array:
-        """Status code: Euler angles exist, and nothing is far beyond any vehicle."""
+        """Status code: OK if Euler angles are defined and all values are within the plausible range."""
         third_row = rotation_from_quaternion(self.attitude)[2]
         near_vertical = third_row[1] ** 2 + third_row[2] ** 2 < 1e-6
         far = (jnp.abs(self.position) > _ENVELOPE).any() | (jnp.abs(self.nu) > _ENVELOPE).any()
@@ -68,15 +68,15 @@ _DOF_NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 class HybridVehicle(AbstractPlant):
     """x = (north, east, down, roll, pitch, yaw) driven by thruster voltages.
 
-    On the fidelities `ideal` and `static` a prescribed acceleration load is the whole of d, J_dot nu included
-    (Remark 2); on the others the body moves as it does and the load is added to x_ddot.
+    At the fidelities `ideal` and `static` a prescribed acceleration load is all of d, J_dot nu included (Remark 2); at
+    the others J_dot nu is part of the dynamics, and the load is added to x_ddot.
 
     Args:
         vehicle: hull and thruster layout.
-        thruster: what turns volts into thrust.
-        battery: what feeds the thrusters; None for the thruster's supply.
-        esc: speed controllers before them; None for none.
-        ledger: whether to keep account of the thrusters' energy along the run; None wherever there is a motor.
+        thruster: model of every thruster.
+        battery: power supply of the thrusters; None for the thruster's own supply.
+        esc: electronic speed controllers; None for none.
+        ledger: whether to integrate the energies of the thrusters; None for yes where there is a motor.
     """
 
     vehicle: Vehicle
@@ -129,7 +129,7 @@ class HybridVehicle(AbstractPlant):
         return kinematics.to_world(nu_rate) + kinematics.rate_term(x.nu)
 
     def _body_acceleration(self, kinematics: Kinematics, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
-        """nu_dot of Eq. (2): thrust (6), the body's own motion, and the loads."""
+        """nu_dot of Eq. (2): thrust of Eq. (6), dynamics of the body, and the loads."""
         body = altered(self.body, d.scaling, d.payloads)
         thrust = self.thruster.thrust(x.thrusters, u)
         if d.scaling is not None:
@@ -170,7 +170,7 @@ class HybridVehicle(AbstractPlant):
         return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _DOF_NAMES)
 
     def rank(self) -> int:
-        """Rank of the thruster matrix; that of G too, wherever J is regular."""
+        """Rank of the thruster matrix, which is that of G where J is regular."""
         if isinstance(self.thruster_matrix, Tracer):
             return min(6, self.inputs())
         return int(np.linalg.matrix_rank(np.asarray(self.thruster_matrix), tol=1e-9))
@@ -184,7 +184,7 @@ class HybridVehicle(AbstractPlant):
         vehicle: Vehicle | None = None,
         thruster: AbstractThruster | None = None,
     ) -> Model:
-        """What a controller may know of this plant.
+        """Nominal model of this plant for the controller.
 
         Args:
             speed_sensor: whether phi of Eq. (15) is known from propeller-speed sensors (Example 1) or left in d.

@@ -7,7 +7,7 @@ _DOWN = slice(2, 3)
 
 
 class Depth(AbstractSensor):
-    """Down, m. The sensor is at the body origin, and waves do not press on it."""
+    """Down, m. The sensor is at the body origin, and the pressure of waves is neglected."""
 
     def reading(self, motion: Motion):
         return motion.position[_DOWN]
@@ -34,6 +34,6 @@ def depth(
         resolution: step of the reading, m; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.
-        blend: alpha of the alpha-beta filter that takes it in.
+        blend: alpha of the alpha-beta filter of the estimate.
     """
     return Depth(Sampling(period, noise, bias, resolution, delay, dropout), blend)

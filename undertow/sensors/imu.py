@@ -37,7 +37,7 @@ def imu(
     dropout: float = 0.0,
     blend: float = 0.05,
 ) -> IMU:
-    """Gyroscopes, accelerometers and the inclination that they are fused to. Defaults are of the cheap kind (MEMS).
+    """Gyroscopes, accelerometers and the inclination fused from them. Defaults are those of cheap MEMS devices.
 
     Args:
         period: between samples, s.

@@ -34,6 +34,6 @@ def position_fix(
         resolution: step of the reading, m; 0 for none.
         delay: until a fix is delivered, s.
         dropout: probability that a fix is lost.
-        blend: alpha of the alpha-beta filter that takes it in.
+        blend: alpha of the alpha-beta filter of the estimate.
     """
     return PositionFix(Sampling(period, noise, bias, resolution, delay, dropout), blend)

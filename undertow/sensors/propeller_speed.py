@@ -1,4 +1,4 @@
-"""Propeller speeds, as sensorless drives or encoders report them."""
+"""Propeller speeds, reported by sensorless drives or encoders."""
 
 from undertow.core.errors import BadInput
 from undertow.sensors.estimate import Estimate, Motion
@@ -6,7 +6,7 @@ from undertow.sensors.sensor import AbstractSensor, Sampling
 
 
 class PropellerSpeed(AbstractSensor):
-    """Speed of every propeller, rad/s; its rate of change is told from successive readings.
+    """Speed of every propeller, rad/s; its rate of change is the difference of successive readings.
 
     Raises:
         BadInput: the thrusters have no speed that could be measured.

@@ -1,4 +1,4 @@
-"""The contract of an sensor."""
+"""The contract of a sensor, and its sampling."""
 
 import abc
 import math
@@ -18,12 +18,12 @@ from undertow.sensors.estimate import Estimate, Motion
 
 Reading = Float[Array, " width"]
 
-# Of a sampling period: instants of the loop are products of a step, and no product is exact.
+# Share of a sampling period: times of the loop are multiples of a step, which are rounded.
 _EARLY = 1e-6
 
 
 class SensorState(NamedTuple):
-    """What is under way from the sensor to its listener."""
+    """Samples that are taken but not yet delivered."""
 
     taken: Int[Array, ""]  # number of the last sample taken, from 0
     arrived: Int[Array, ""]  # number of the last sample delivered
@@ -33,7 +33,7 @@ class SensorState(NamedTuple):
 
 
 class Delivery(NamedTuple):
-    """What the listener gets at one instant."""
+    """Reading that is delivered at one instant."""
 
     reading: Reading
     fresh: Bool[Array, ""]  # whether it is new
@@ -44,7 +44,7 @@ class Sampling(eqx.Module):
 
     reading = resolution round((truth + bias + noise) / resolution). The noise is new for every sample and depends on
     its number only, not on the rate of the loop; the bias is sampled once per run. Where several samples fall between
-    two steps, the newest is delivered. In single precision more than 2^24 samples are too many to be told apart.
+    two steps, the newest is delivered. Single precision cannot count more than 2^24 samples.
 
     Raises:
         BadInput: a period not positive, a probability of one or more, anything else negative.
@@ -56,7 +56,7 @@ class Sampling(eqx.Module):
     resolution: Float[Array, "..."] = param("as read", "step of the reading; 0 for none", default=0.0)
     delay: Float[Array, ""] = param("s", "from taking a sample to delivering it", default=0.0)
     dropout: Float[Array, ""] = param("", "probability that a sample is lost", default=0.0)
-    slots: int = eqx.field(static=True, default=0)  # samples that can be under way; found from delay and period
+    slots: int = eqx.field(static=True, default=0)  # undelivered samples at most; from delay and period
 
     def __post_init__(self):
         checks.positive("period", self.period, "s")
@@ -68,11 +68,11 @@ class Sampling(eqx.Module):
             self.slots = math.ceil(float(np.asarray(self.delay) / np.asarray(self.period)) - _EARLY) + 1
 
     def init(self, reading: Reading, chance: Reading) -> SensorState:
-        """Nothing taken yet.
+        """State before the first sample.
 
         Args:
             reading: any, for its shape.
-            chance: one standard normal number per entry, for the offset.
+            chance: one standard normal number per entry, for the bias.
         """
         nothing = jnp.asarray(-1, dtype=int)
         readings = jnp.zeros((self.slots, *reading.shape), reading.dtype)
@@ -85,16 +85,16 @@ class Sampling(eqx.Module):
     def deliver(
         self, state: SensorState, t, truth: Reading, chance: Float[Array, " width+1"]
     ) -> tuple[Delivery, SensorState]:
-        """What is delivered at time t, and the state afterwards.
+        """Delivery at time t, and the state afterwards.
 
         Args:
-            state: after the instant before.
+            state: that after the previous instant.
             t: s.
-            truth: what a perfect sensor would read now.
+            truth: exact reading at time t.
             chance: standard normal numbers of sample `number(t)`: one per entry, one for being lost.
         """
         newest, due = self.number(t), self.number(t - self.delay)
-        # Numbers that passed between two steps are all answered with the present truth.
+        # Samples between two steps are all taken of the present true state.
         numbers = newest - (newest - jnp.arange(self.slots)) % self.slots
         new = numbers > state.taken
         readings = jnp.where(
@@ -112,7 +112,7 @@ class Sampling(eqx.Module):
 
 
 class AbstractSensor(eqx.Module):
-    """Reads something of the motion, and knows how a reading corrects what the observer believes.
+    """A sensor: its reading of the motion, and how a reading corrects the estimate.
 
     Raises:
         BadInput: a blend outside (0, 1].
@@ -128,11 +128,11 @@ class AbstractSensor(eqx.Module):
 
     @abc.abstractmethod
     def reading(self, motion: Motion) -> Reading:
-        """What it would read without any error."""
+        """Reading without error."""
 
     @abc.abstractmethod
     def correct(self, estimate: Estimate, reading: Reading) -> Estimate:
-        """Estimate after a reading that was taken `sampling.delay` ago; after the prediction."""
+        """Estimate corrected by a reading that was taken `sampling.delay` ago; called after the prediction."""
 
 
 class AbstractVelocitySensor(AbstractSensor):
@@ -140,4 +140,4 @@ class AbstractVelocitySensor(AbstractSensor):
 
     @abc.abstractmethod
     def velocity_noise(self) -> Float[Array, "6"]:
-        """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for what it does not read."""
+        """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for entries that it lacks."""

@@ -36,9 +36,9 @@ def scenarios(quick: bool) -> dict:
     starts = {
         f"c10_start_{i + 1}": scenario(
             f"RCAFC from random start {i + 1}",
-            initial={"position": (sample[0] * reach).round(3).tolist(), "velocity": (0.5 * sample[1]).round(3).tolist()},
+            initial={"position": (one[0] * reach).round(3).tolist(), "velocity": (0.5 * one[1]).round(3).tolist()},
         )
-        for i, sample in enumerate(samples)
+        for i, one in enumerate(samples)
     }
     if quick:
         gains = dict(list(gains.items())[:2])
