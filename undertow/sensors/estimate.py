@@ -18,7 +18,6 @@ from undertow.numerics.rotations import (
     quaternion_rate,
     rotation_from_quaternion,
 )
-from undertow.sensors.sensor import Sampling
 
 
 def gravity() -> Vector3:
@@ -77,8 +76,8 @@ class Estimate(NamedTuple):
         """Body -> world."""
         return rotation_from_quaternion(self.attitude)
 
-    def fixed(self, axes: slice, reading: Float[Array, " k"], sampling: Sampling, share) -> "Estimate":
-        """The estimate `moved` on some axes by a position that was read `sampling.delay` ago."""
+    def fixed(self, axes: slice, reading: Float[Array, " k"], sampling, share) -> "Estimate":
+        """The estimate `moved` on some axes by a position that was read `sampling.delay` ago (a `Sampling`)."""
         then = self.position[axes] - sampling.delay * self.velocity[axes]
         return self.moved(jnp.zeros(3).at[axes].set(reading - then), share, sampling.period)
 
