@@ -104,7 +104,7 @@ def test_a_state_whose_square_overflows_is_not_finite(kind, most, share, code):
 
 def test_neighbours_are_not_hurt(batch):
     name, together, alone = batch
-    pairs = zip(jax.tree.leaves(together[0].samples), jax.tree.leaves(alone.signals), strict=True)
+    pairs = zip(jax.tree.leaves(together[0].signals), jax.tree.leaves(alone.signals), strict=True)
     for one, other in pairs:
         np.testing.assert_allclose(one, np.asarray(other), rtol=1e-9, atol=1e-9)
-    assert np.abs(together[0].samples["velocity"]).max() > 0.1, name
+    assert np.abs(together[0].signals["velocity"]).max() > 0.1, name

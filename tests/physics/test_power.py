@@ -299,7 +299,7 @@ def test_applied_voltages_are_whole_pulses_and_pass_unchanged_a_second_time():
 
 
 def test_speed_controllers_need_a_bus_voltage():
-    with pytest.raises(BadInput, match="`esc` must have a bus voltage"):
+    with pytest.raises(BadInput, match="`esc` must have a finite bus voltage"):
         hybrid_vehicle(odin(), paper_table3(), esc=esc())
     hybrid_vehicle(odin(), paper_table3(), esc=esc(), battery=battery())
 

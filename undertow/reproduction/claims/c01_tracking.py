@@ -11,12 +11,12 @@ _SMALL = 1e-3  # m, rad; rms
 
 
 def scenarios(quick: bool) -> dict:
-    """Nothing beyond the fidelity comparison, the long runs and the map of lags."""
+    """No runs besides the fidelity comparison, the long runs and the map of lags."""
     return {}
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """on every fidelity, for 20 s and for the long horizon; and against the inductance of the winding."""
+    """At every fidelity level, for 20 s and for the long horizon; and against the inductance of the winding."""
     lasting = {level: long[name] for level in FIDELITIES if (name := name_of(level, "rcafc")) in long}
     short = {level: one.windows[0] for level, one in lasting.items()}
     horizon = max(one.built.scenario.loop.duration for one in lasting.values())
@@ -36,7 +36,7 @@ def judge(runs: Runs, long: Long) -> Finding:
     lost = {value: run for value, run in windings(long).items() if run.windows[0] is None}
     text = f"RCAFC at Table 1, 1 kHz, U2 for {horizon:g} s. " + "; ".join(said) + ". Inductance of the winding: "
     text += ", ".join(f"{1e3 * value:g} mH {_lived(run)}" for value, run in windings(long).items())
-    text += " (Table 3: 10 mH). Behind a lag alone weights that drift apart are damping that the theorem does not know."
+    text += " (Table 3: 10 mH). With a lag only, weights that drift apart add damping, unknown to the theorem."
     numbers = {
         "tracking_rms_short": {level: found and found["tracking_rms"] for level, found in short.items()},
         "ended": {level: None if run.lasted else run.ended for level, run in lasting.items()},
