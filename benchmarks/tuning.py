@@ -22,7 +22,7 @@ BY_HAND = {
     "compensation_gain": 0.0,
     "weights_bound": 40.0,
 }
-# A vehicle that cannot pitch is not made to.
+# Pitch of this vehicle cannot be controlled.
 BY_HAND_TOO = {
     "bluerov2": {
         "feedback": [[4.0, 7.0]] * 3 + [[20.0, 13.0], [1.0, 2.0], [20.0, 13.0]],

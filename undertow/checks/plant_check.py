@@ -1,4 +1,4 @@
-"""Does a plant keep its contract, and does its model tell the same story?"""
+"""Checks of a plant: its contract, and agreement with its model."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -18,7 +18,7 @@ _GRIP = 1e-9  # of the largest entry: below it an input does not act at once
 
 
 def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
-    """Every method once, near the origin; and each answer against another way to the same number."""
+    """Findings from every method near the origin, each result against another way to the same number."""
     wrong = [*_forms(plant), *is_a("advice", plant.advice(), tuple)]
     wrong = wrong or list(_forms_of_model(plant))
     if wrong:
@@ -42,7 +42,7 @@ def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
 
 
 def derived_of_plant(plant: AbstractPlant) -> tuple[tuple[str, str, str], ...]:
-    """(what, value, unit), a row each: at the point where `check_plant` tries it."""
+    """Rows (what, value, unit) at the point of `check_plant`."""
     n, m, t, no_load = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
     x, dynamics = _trial(plant), plant.model().dynamics
     y, u = plant.output(t, x), plant.admissible(x, jnp.zeros(m))
@@ -56,18 +56,18 @@ def derived_of_plant(plant: AbstractPlant) -> tuple[tuple[str, str, str], ...]:
 
 
 def _trial(plant: AbstractPlant):
-    """A state near the origin, at rest in nothing."""
+    """A state near the origin with motion in every output."""
     n = len(plant.outputs)
     return plant.initial_state(jnp.linspace(0.1, 0.5, n), jnp.linspace(0.2, -0.1, n))
 
 
 def _extra(plant: AbstractPlant):
-    """A lumped acceleration to try."""
+    """A lumped acceleration for the test."""
     return jnp.linspace(1.0, 2.0, len(plant.outputs))
 
 
 def _forms(plant: AbstractPlant) -> Iterator[Finding]:
-    """Types and shapes; traced, so that nothing is computed, and what does not compile complains."""
+    """Types and shapes, by tracing, which also raises the errors of compilation."""
     n, m, t, no_load = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
     if len(plant.output_units) != n:
         yield error("contract", "output_units", f"have {n} entries, one per output", f"{len(plant.output_units)} long")
@@ -111,7 +111,7 @@ def _forms_of_model(plant: AbstractPlant) -> Iterator[Finding]:
 
 
 class _Numbers(NamedTuple):
-    """What the plant answers, in two ways each."""
+    """Results of the plant, each in two ways."""
 
     velocity: Array
     position_rate: Array

@@ -1,4 +1,4 @@
-"""Does a thruster keep its contract, and does it push the way it says?"""
+"""Checks of a thruster: its contract, and sign and gain of its thrust."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -22,10 +22,10 @@ _FACTOR = 3.0  # between the gain the model takes and that at full voltage
 
 
 def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
-    """Every method once, for three thrusters at different voltages."""
+    """Findings from every method, for three thrusters at different voltages."""
     volts = full_voltage(thruster) * jnp.array([0.4, -0.7, 1.0])
     state = thruster.initial_state(_COUNT)
-    jax.eval_shape(thruster.dynamics, state, volts)  # whether it compiles
+    jax.eval_shape(thruster.dynamics, state, volts)  # raises if it does not compile
     jax.eval_shape(thruster.thrust, state, volts)
     each, once = (_COUNT,), ()
     powers, report = thruster.powers(state, volts), thruster.report(state)
@@ -49,13 +49,13 @@ def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
 
 
 def full_voltage(thruster: AbstractThruster) -> float:
-    """Full voltage, V, or full command of one that is commanded otherwise; a moderate one where there is no limit."""
+    """Full voltage, V, or full command in another unit; a moderate one where there is no limit."""
     supply = float(np.min(thruster.supply))
     return supply if np.isfinite(supply) else _VOLTAGE
 
 
 def settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, float]:
-    """Thrust, N, long after a voltage within the limits, and after its opposite, was applied to thrusters at rest."""
+    """Steady thrust, N, of a voltage within the limits, and of its opposite."""
     volts = jnp.clip(jnp.array([voltage, -voltage]), *thruster.limits())
     start = thruster.initial_state(2)
     flat, tree = ravel_pytree(start)
@@ -68,7 +68,7 @@ def settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, f
 
 
 def _ways(thruster: AbstractThruster) -> Iterator[Finding]:
-    """Positive voltage pushes forward, and about as much as the controller's model is told."""
+    """Positive voltage gives positive thrust, about that of the nominal gain."""
     full, gain = full_voltage(thruster), float(np.min(thruster.voltage_gain()))
     forward, reverse = settled_thrust(thruster, full)
     for thrust, volts, word in ((forward, full, "positive"), (-reverse, -full, "negative")):
@@ -84,7 +84,7 @@ def _ways(thruster: AbstractThruster) -> Iterator[Finding]:
 
 
 def lint_thruster(thruster: AbstractThruster) -> tuple[Finding, ...]:
-    """Everything that is wrong or odd about a thruster."""
+    """All errors and advice on a thruster."""
     broken = check_contract(thruster)
     return broken if any(finding.level == "error" for finding in broken) else (*broken, *_findings(thruster))
 
@@ -101,7 +101,7 @@ def _findings(thruster: AbstractThruster) -> Iterator[Finding]:
 
 
 def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str], ...]:
-    """(what, value, unit), a row each."""
+    """Rows (what, value, unit)."""
     supply, limit, unit = float(thruster.supply), full_voltage(thruster), thruster.input_unit
     rows = [
         (
@@ -123,7 +123,7 @@ def _of_motor(motor: DCMotor, limit: float, volts: Any) -> list[tuple[str, str, 
     speed = motor.steady_speed(volts)
     powers = motor.powers(volts, motor.steady_current(speed), speed)
     share = np.asarray((powers.water + powers.friction) / powers.source)
-    # R J / (k_t (k_2 + 2 k_3 c_q Om)): how fast the speed settles near this speed.
+    # R J / (k_t (k_2 + 2 k_3 c_q Om)): time constant of the speed near this speed.
     slope = motor.k2 + 2 * motor.k3 * motor.torque_coefficient * speed[0]
     return [
         ("torque constant / back-EMF constant", f"{float(motor.torque_constant / motor.back_emf_constant):.4g}", ""),

@@ -1,4 +1,4 @@
-"""Where the thrusters are and what they can do together."""
+"""Positions of the thrusters, and their joint authority."""
 
 from collections.abc import Iterator
 
@@ -22,7 +22,7 @@ def unit_directions(facts: Facts) -> Iterator[Finding]:
 
 
 def arms(facts: Facts) -> Iterator[Finding]:
-    """Thrusters sit on the vehicle."""
+    """Thrusters are on the vehicle."""
     if facts.size is None:
         side = np.cbrt(facts.displaced_mass / (facts.water_density or 1000.0))
         share = facts.lever / side
@@ -44,7 +44,7 @@ def arms(facts: Facts) -> Iterator[Finding]:
 
 
 def rank(facts: Facts) -> Iterator[Finding]:
-    """Which directions no thruster pushes, and how unevenly the others are pushed; moments per longest arm."""
+    """Directions without thrust, and the condition of the others; moments per longest arm."""
     for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, DOF_NAMES):
         yield Finding("advice", "rank", "thrusters", sentence)
         return
@@ -56,7 +56,7 @@ def rank(facts: Facts) -> Iterator[Finding]:
 
 
 def same_line(facts: Facts) -> Iterator[Finding]:
-    """Two thrusters on one line of action do the work of one: often a sign has been lost."""
+    """Two thrusters on one line of action act as one: often a sign has been lost."""
     columns = scaled(facts.thruster_matrix).T
     for j in range(len(columns)):
         for i in range(j):
@@ -68,7 +68,7 @@ def same_line(facts: Facts) -> Iterator[Finding]:
 
 
 def mirror(facts: Facts) -> Iterator[Finding]:
-    """Left and right: where most thrusters have a mirror image, one that has none is suspect."""
+    """Symmetry: where most thrusters have a mirror image, one without is suspect."""
     columns = scaled(facts.thruster_matrix).T
     images = columns * np.array([1, -1, 1, -1, 1, -1])
     distance = np.minimum(*(np.abs(images[:, None] - sign * columns).max(axis=2) for sign in (1, -1)))

@@ -1,4 +1,4 @@
-"""A thruster matrix as printed, against the poses of the thrusters."""
+"""Comparison of a printed thruster matrix with the poses of the thrusters."""
 
 from collections.abc import Iterator
 
@@ -11,7 +11,7 @@ _ROUNDING = 0.02  # of the largest entry of a row: printed matrices have two or 
 
 
 def printed_matrix(facts: Facts) -> Iterator[Finding]:
-    """Each row against the poses; one finding per row that is off."""
+    """Compare each row with the poses; one finding per wrong row."""
     if facts.printed_matrix is None:
         return
     expected = facts.thruster_matrix + 0.0  # no minus zeros
@@ -30,7 +30,7 @@ def _others(off: np.ndarray) -> str:
 
 
 def _likely(printed: np.ndarray, computed: np.ndarray) -> str:
-    """What the mistake looks like."""
+    """Likely mistake."""
     if np.allclose(printed, -computed, rtol=_ROUNDING):
         return "Opposite sign" if len(printed) == 1 else "They have the opposite sign: another frame, or a wrong one"
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -49,9 +49,9 @@ def judge(runs: Runs, long: Long) -> Finding:
         for level in levels
     ]
     text = (
-        f"At the same gamma the state has {same_gamma[0] / same_gamma[1]:.2g} times the estimation error at ideal, since "
-        "its loop gain is smaller. At the same loop gain, rms estimation error in m/s^2 and chattering from 10 s to "
-        f"20 s of U1, 1 kHz: {'. '.join(said)}."
+        f"At the same gamma the state has {same_gamma[0] / same_gamma[1]:.2g} times the estimation error at ideal, "
+        "since its loop gain is smaller. At the same loop gain, rms estimation error in m/s^2 and chattering "
+        f"from 10 s to 20 s of U1, 1 kHz: {'. '.join(said)}."
     )
     numbers = {"same_gamma": list(same_gamma), "levels": found}
     simulated = f"levels {', '.join(levels)}, U1 at 1 kHz, 20 s"

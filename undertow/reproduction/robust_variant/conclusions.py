@@ -232,8 +232,8 @@ def _recovery(n: Numbers) -> str:
     how = "back at" if after < _RECOVERED else "not back yet, but at"
     return (
         f"An overload of 1.5 s. Beyond the authority of its motors at 24 V, the error of `robust` is up to "
-        f"{robust['largest_after']:.2g}, after 7.5 s {how} {after:.2g}; Table 1 up to {paper['largest_after']:.2g}, then "
-        f"{paper['steady']['tracking_rms']:.2g}."
+        f"{robust['largest_after']:.2g}, after 7.5 s {how} {after:.2g}; Table 1 up to {paper['largest_after']:.2g}, "
+        f"then {paper['steady']['tracking_rms']:.2g}."
     )
 
 
