@@ -96,7 +96,7 @@ def simulate(
     reference: AbstractReference,
     *,
     disturbance: AbstractDisturbance | Sequence[AbstractDisturbance] | None = None,
-    sensor: AbstractNavigation | None = None,
+    navigation: AbstractNavigation | None = None,
     duration: float = 20.0,
     loop: Literal["sampled", "continuous"] = "sampled",
     dt: float = 1e-3,
@@ -113,7 +113,7 @@ def simulate(
         controller: the law, made from `plant.model()`.
         reference: what to follow.
         disturbance: what the surroundings do; several as a list, None for nothing.
-        sensor: what stands before the measurement; None for the truth.
+        navigation: filter that estimates position and velocity from measurements; None for the true ones.
         duration: s. The steady metrics are taken over its second half.
         loop: `sampled` (input held over each dt) or `continuous` (one ODE, the paper's setting).
         dt: sampling time of the controller, or step of the ODE, s.
@@ -133,7 +133,7 @@ def simulate(
         "controller": (controller, AbstractController),
         "reference": (reference, AbstractReference),
         "disturbance": (none() if disturbance is None else disturbance, AbstractDisturbance),
-        "navigation": (perfect() if sensor is None else sensor, AbstractNavigation),
+        "navigation": (perfect() if navigation is None else navigation, AbstractNavigation),
     }
     for name, (part, contract) in roles.items():
         if not isinstance(part, contract):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.scenario.provenance import checksum, compare, content_hash
+from undertow.scenario.provenance import checksum, content_hash
+from undertow.scenario.reproducibility import compare
 
 
 def labelled(**columns):

@@ -48,7 +48,7 @@ def test_scenario_as_data():
             {"disturbance": ut.disturbances.wrench([1.0])},
             "`disturbance.value` must have 6 entries, but is of shape (1,)",
         ),
-        ({"navigation": 3}, "`sensor` must be an AbstractNavigation, but is a int"),
+        ({"navigation": 3}, "`navigation` must be an AbstractNavigation, but is a int"),
     ],
 )
 def test_bad_argument_is_one_line(parts, options, said):

@@ -4,7 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from undertow.core.contracts import Load, Measurement, Pose, Target
+from undertow.core.contracts import Load, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
 from undertow.numerics.rotations import rotation_from_euler
 from undertow.power import ESC
@@ -48,11 +48,11 @@ def plants(plant, v):
 
 def controllers(controller, v):
     n = len(controller.model.coordinates.angles)
-    rest = Measurement(v[:n], v[6 : 6 + n])
+    rest = controller.model.coordinates.measurement(v[:n], v[6 : 6 + n])
     wanted = Target(v[12 : 12 + n], v[18 : 18 + n], v[24 : 24 + n])
     z = _filled(controller.init(rest, wanted), v)
-    u, telemetry = controller.command(z, rest, wanted)
-    return u, telemetry, controller.advance(z, rest, wanted, u, jnp.asarray(1e-3))
+    u, signals = controller.command(z, rest, wanted)
+    return u, signals, controller.advance(z, rest, wanted, u, jnp.asarray(1e-3))
 
 
 def disturbances(disturbance, v):

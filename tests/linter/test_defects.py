@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from undertow.checks.thruster_check import derived_of_thruster, lint_thruster
+from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
 from undertow.checks.vehicle_lint import lint
 from undertow.scenario.vehicle_file import read_vehicle
 from undertow.thrusters import paper_table3, t200

@@ -25,7 +25,7 @@ from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
 from undertow.sensors import compass, dvl, imu, position_fix
 from undertow.sensors.depth import Depth
-from undertow.sensors.sensor import Sampling
+from undertow.sensors.sampling import Sampling
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2_heavy
 

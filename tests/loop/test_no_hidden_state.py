@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.campaign.task import fly, site
+from undertow.campaign.task import run_trials, site
 from undertow.core.errors import BadInput
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
@@ -81,7 +81,7 @@ def by_parts(precision):
         law,
         ut.references.setpoint([1.0]),
         disturbance=ut.disturbances.sinusoid(amplitude=0.7),
-        sensor=ut.navigation.white_noise(velocity=0.01),
+        navigation=ut.navigation.white_noise(velocity=0.01),
         duration=0.5,
         dt=0.01,
         record=0.02,
@@ -104,7 +104,7 @@ def by_xla(precision):
 def by_campaign(precision):
     vary = {"disturbance.amplitude": {"uniform": [0.5, 2.0]}}
     campaign = {"scenario": SCENARIO | {"precision": precision}, "trials": 2, "seed": 7, "vary": vary}
-    columns = fly(dump(campaign), "", range(2))
+    columns = run_trials(dump(campaign), "", range(2))
     return [columns["input_variation"], columns["position_rms"]]
 
 

@@ -60,7 +60,7 @@ def test_simulate(folder, hidden):
 
     done = without(hidden, folder, "simulate", "scenario.yaml", "--out", "run")
     assert done.returncode == 0, done.stderr
-    assert done.stderr.count("computed by backend xla") == 1
+    assert done.stderr.count("the run used backend xla") == 1
     assert f"the batch compiler cannot be imported (No module named '{hidden}')" in " ".join(done.stderr.split())
     with xr.open_dataset(folder / "run" / "run.nc") as found:
         assert "`pip install .`" in found.attrs["left_to_xla"]
@@ -97,7 +97,7 @@ def test_bench_leaves_out_what_it_cannot_measure(monkeypatch, capsys):
     assert run(["bench"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "Figures of SIMD batches are left out: there is no compiler." in said
-    assert "one run, by XLA" in said and "one run in plain NumPy" in said and "many runs" not in said
+    assert "one run, XLA backend" in said and "one run in plain NumPy" in said and "many runs" not in said
     assert run(["bench", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["simd_unavailable"] == "there is no compiler"

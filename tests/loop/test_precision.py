@@ -11,7 +11,7 @@ import pytest
 
 from undertow.campaign.campaign_schema import read_text
 from undertow.campaign.layout import layout
-from undertow.campaign.task import fly, site
+from undertow.campaign.task import run_trials, site
 from undertow.core import runtime
 from undertow.core.contracts import Load, Pose
 from undertow.disturbances.u1 import u1
@@ -85,7 +85,7 @@ def test_a_campaign_across_precisions():
     campaign = {"scenario": SCENARIO, "trials": 3, "chunk": 2, "seed": 7}
     campaign["vary"] = {"disturbance.amplitude": {"uniform": [0.5, 2.0]}}
     alone = {
-        precision: fly(dump(campaign | {"scenario": scenario(precision)}), "", range(3))
+        precision: run_trials(dump(campaign | {"scenario": scenario(precision)}), "", range(3))
         for precision in ("float64", "float32")
     }
     text = dump(campaign | {"cross": {"precision": list(alone)}})
@@ -93,7 +93,7 @@ def test_a_campaign_across_precisions():
     assert where.tasks == 4
     for task in range(where.tasks):
         rows = where.trials(task).tolist()
-        found = fly(text, "", rows)
+        found = run_trials(text, "", rows)
         assert found["position_rms"].dtype == np.float64
         for place, row in enumerate(rows):
             trial, combination = divmod(row, 2)

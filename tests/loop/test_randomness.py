@@ -163,10 +163,12 @@ def test_no_key_is_used_twice(used, seed):
         used["branching"].clear()
         loop = ClosedLoop(plant, law, setpoint([0.0]), disturbance, several)
         realization = loop.realize(jax.random.PRNGKey(seed))
-        truth = Measurement(jnp.zeros(6), jnp.zeros(6))
+        truth = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
         state = several.init(realization.navigation_realization, truth)
         for k in range(3):
-            _, state = several.measure(realization.navigation_realization, state, jnp.asarray(0.3 * k), truth)
+            _, state = several.measure(
+                realization.navigation_realization, state, jnp.asarray(1.5 * k), truth
+            )  # a new reading of each
         jax.effects_barrier()
         drawn = used["drawing"]
         assert len(drawn) > 6 and len(set(drawn)) == len(drawn), "a key is drawn from once"

@@ -5,7 +5,7 @@ import pytest
 
 from undertow.analysis.metrics import Metrics, for_people, output_groups, results
 from undertow.analysis.success import judged
-from undertow.campaign.task import NOT_JUDGED, fly
+from undertow.campaign.task import NOT_JUDGED, run_trials
 from undertow.controllers.pid import pid
 from undertow.core.metric import Metric
 from undertow.core.status import Status
@@ -100,7 +100,7 @@ def test_success_of_trials():
         "trials": 1,
         "cross": {"disturbance.amplitude": [1.0, 2.0, 1e300]},
     }
-    found = fly(dump(asked), "", [0, 1, 2])
+    found = run_trials(dump(asked), "", [0, 1, 2])
     assert found["success"].tolist() == [1, 0, 0] and found["status"][2] != 0
     free = asked | {"scenario": SCENARIO | {"success": {}}, "cross": {}}
-    assert fly(dump(free), "", [0])["success"].tolist() == [NOT_JUDGED]
+    assert run_trials(dump(free), "", [0])["success"].tolist() == [NOT_JUDGED]

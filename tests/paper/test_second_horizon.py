@@ -11,6 +11,7 @@ from undertow.controllers.presets.paper import paper
 from undertow.core.status import Status
 from undertow.plants.double_integrator import double_integrator
 from undertow.reproduction import claims, drifting, horizons, lag_map
+from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.claims import c05_fuzzy_input, conditions
 from undertow.reproduction.claims.c04_chattering import perfect_variation
 from undertow.reproduction.running import run_batches
@@ -46,7 +47,7 @@ def test_a_batch_is_its_runs_one_by_one():
         alone = execute(runs[name] | {"steady": {"start": start, "stop": stop, "every_step": True}})
         window = found[name].windows[0 if name == "a" else 1]
         for metric in ("tracking_rms", "input_variation", "weights_peak"):
-            assert window[metric] == pytest.approx(alone.steady[metric], rel=1e-12), (name, metric)
+            assert window[metric] == pytest.approx(with_all_outputs(alone.steady)[metric], rel=1e-12), (name, metric)
         same = alone.dataset["weights_peak"].sel(time=found[name].time, method="nearest")
         np.testing.assert_allclose(found[name].series["weights_peak"], same, rtol=1e-12)
     assert found["a"].windows[1] is None and found["a"].lasted, "it was over before the end of the window"
@@ -109,7 +110,8 @@ def test_limits_and_noise_decide_between_rcafc_and_rafc_at_the_same_gain():
     for volts in conditions.LIMITS:
         rcafc, rafc, bounded = (found[f"c02_{law}_{volts:g}V"].windows[0] for law in ("rcafc", "rafc", "rafc_bounded"))
         assert rcafc["tracking_rms"] == pytest.approx(1.6e-4, rel=0.02)
-        assert rafc is None or rafc["tracking_rms"] > 0.5
+        # Its weights wind up, and how far it strays is chaotic: 0.3 to 16 in the last digit of a rounding.
+        assert rafc is None or rafc["tracking_rms"] > 1000 * rcafc["tracking_rms"]
         assert bounded["tracking_rms"] == pytest.approx(1.58e-4, rel=0.02)
     noisy = [found[f"c02_{law}_noise"].windows[0]["estimation_rms"] for law in ("rcafc", "rafc")]
     assert noisy[1] > 4 * noisy[0]

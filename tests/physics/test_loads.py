@@ -86,7 +86,7 @@ def test_factor_scales_its_term_of_the_equation_of_motion(name):
 
 
 def test_factors_are_drawn_from_their_ranges():
-    drawn = jax.vmap(parameter_error(mass=(0.9, 1.1), damping=(0.5, 2.0)).draw)(
+    drawn = jax.vmap(parameter_error(mass=(0.9, 1.1), damping=(0.5, 2.0)).realize)(
         jax.random.split(jax.random.PRNGKey(1), 2000)
     )
     for values, (low, high) in ((drawn.mass, (0.9, 1.1)), (drawn.damping, (0.5, 2.0))):

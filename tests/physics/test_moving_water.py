@@ -121,7 +121,7 @@ def test_variance_of_orbital_velocity(depth):
 
 def test_wandering_current_has_its_variance_and_correlation():
     process = gauss_markov_current(mean=(0.3, 0.0, 0.0), deviation=(0.1, 0.2, 0.0), correlation_time=10.0, step=0.5)
-    paths = np.asarray(jax.vmap(process.draw)(jax.random.split(jax.random.PRNGKey(3), 500)))
+    paths = np.asarray(jax.vmap(process.realize)(jax.random.split(jax.random.PRNGKey(3), 500)))
     np.testing.assert_allclose(paths.std(axis=(0, 1)), [0.1, 0.2, 0.0], rtol=0.02)
     lag = 20  # 10 s
     correlation = (paths[:, :-lag, :2] * paths[:, lag:, :2]).mean(axis=(0, 1)) / paths[..., :2].var(axis=(0, 1))

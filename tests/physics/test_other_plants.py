@@ -336,7 +336,7 @@ def test_under_actuated_error_equation_holds_along_the_controlled_rows():
         x, z = drawn.start(jnp.asarray(rng.normal(size=3)), jnp.asarray(rng.normal(size=3)))
         z = z._replace(weights=jnp.asarray(rng.normal(size=z.weights.shape)))
         seen = drawn.decide(t, x, z)
-        sample = drawn.sample(t, x, z, seen)
+        sample = drawn.signals(t, x, z, seen)
         acceleration = plant.acceleration(t, x, seen.applied, drawn.load(t, x))
         k1, k2 = loop.controller.feedback
         left = seen.r.acceleration - acceleration + k1 * sample["error"] + k2 * (seen.r.velocity - sample["velocity"])

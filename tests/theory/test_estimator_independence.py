@@ -57,7 +57,7 @@ def free(rails):
 def test_same_estimator_behind_any_controller(rails, free, case):
     eps, d_til, samples = estimator(rails(2, disturbance=sinusoid(**PROBES), **(COMPOSITE_ONLY | CASES[case])))
     assert np.abs(eps - free[0]).max() <= 1e-9 and np.abs(d_til - free[1]).max() <= 1e-9
-    assert np.abs(samples["position"] - free[2].position).max() > 1e-2, "yet the motion is another one"
+    assert np.abs(samples["position"] - free[2]["position"]).max() > 1e-2, "yet the motion is another one"
 
 
 def test_s_branch_spoils_it(rails):

@@ -214,7 +214,7 @@ def test_no_figure_is_predicted_that_the_law_forbids(bound):
     """W1: the linear model's robust term passes 10 m/s^2, which tanh cannot."""
     choices = {"composite": 20} | ({} if bound is None else {"weights_bound": bound})
     metrics, why_not = predicted(operating_point(build(_odin("electromechanical", choices))))
-    assert metrics is None and "requires a robust term of" in why_not and "bounds to 10" in why_not
+    assert metrics is None and "requires a robust term of" in why_not and "limits to 10" in why_not
 
 
 def _odin(fidelity, choices):

@@ -54,7 +54,7 @@ def watch(loop, steps):
     def step(k, carry):
         (x, z), before, worst, peak = carry
         t = k.astype(float) * STEP
-        peak = jnp.maximum(peak, jnp.abs(drawn.decide(t, x, z).telemetry.estimate))
+        peak = jnp.maximum(peak, jnp.abs(drawn.decide(t, x, z).signals["estimate"]))
         x, z = rk4(flow, t, (x, z), STEP)
         state = x, loop.controller.project(z)
         after = value(t + STEP, state)
@@ -65,7 +65,7 @@ def watch(loop, steps):
     nothing = jnp.full_like(first, -jnp.inf)
     (x, z), _, worst, peak = jax.lax.fori_loop(0, steps, step, (start, first, nothing, nothing))
     end = jnp.asarray(steps * STEP)
-    sample = drawn.sample(end, x, z, drawn.decide(end, x, z))
+    sample = drawn.record(end, x, z)
     return worst / first, peak, sample["error"], sample["estimate"] - sample["uncertainty"]
 
 

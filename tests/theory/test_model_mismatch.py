@@ -67,7 +67,7 @@ def error(thruster, nominal, make=robust, navigation=None):
     """Rms error over the second half, m and rad; it must have lasted, and not swing (V/s)."""
     plant = hybrid_vehicle(bluerov2_heavy(), thruster, ledger=False)
     law = make(plant.model(rate_term=True, thruster=nominal), sampling_time=DT)
-    status, rms, swings = flown(ClosedLoop(plant, law, setpoint(GOAL, settling=8.0), SEA, sensor or perfect()))
+    status, rms, swings = flown(ClosedLoop(plant, law, setpoint(GOAL, settling=8.0), SEA, navigation or perfect()))
     assert int(status) == 0
     return float(rms), float(swings)
 

@@ -157,10 +157,10 @@ def test_one_sided_limits():
 
 def followed(chosen, at, start, dt, steps, share=1.0):
     """Filtered reference at every step."""
-    model, state, found = double_integrator(1).model(), chosen.init(jnp.asarray([start])), []
+    coordinates, state, found = double_integrator(1).model().coordinates, chosen.init(jnp.asarray([start])), []
     for k in range(steps):
-        found.append(np.ravel(chosen.smoothed(state, at(k * dt), model)))
-        state = chosen.advance(state, at(k * dt), model, share, dt)
+        found.append(np.ravel(chosen.smoothed(state, at(k * dt), coordinates)))
+        state = chosen.advance(state, at(k * dt), coordinates, share, dt)
     return np.array(found)
 
 

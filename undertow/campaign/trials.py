@@ -2,15 +2,13 @@
 
 import copy
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from undertow.campaign.campaign_schema import VARIANT, Campaign
 from undertow.campaign.labels import is_number, words
 from undertow.campaign.sampling import Samples, value
-from undertow.campaign.task import build_trial
 from undertow.core.errors import BadInput, nearest
-from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text, key_path, read
 
 # Trials of each combination that are built first, to find errors and the numbers that differ.
@@ -164,30 +162,3 @@ def _entry(node: Any, step: str | int, key: str) -> Any:
     if isinstance(step, int):
         raise BadInput(key, "name an entry of a list only where there is a list", f"[{step}] of {', '.join(node)}")
     return node.get(step)
-
-
-# Trials that are built again: each takes milliseconds.
-_MOST = 200
-
-
-class InvalidTrials(NamedTuple):
-    """Trials that are invalid for the same reason."""
-
-    why: str  # the error of the first of them
-    trials: int
-
-
-def reasons(several: Trials, rows: Sequence[int]) -> tuple[InvalidTrials, ...]:
-    """The reasons why trials are invalid, the most frequent first.
-
-    Args:
-        several: the trials.
-        rows: numbers of the invalid trials; only the first 200 are built again.
-    """
-    part_cache, found = PartCache(), dict[tuple[str, str], list[str]]()
-    for row in rows[:_MOST]:
-        try:
-            build_trial(several, part_cache, int(row))
-        except BadInput as error:
-            found.setdefault((error.name, error.must), []).append(str(error))
-    return tuple(InvalidTrials(each[0], len(each)) for each in sorted(found.values(), key=len, reverse=True))

@@ -10,7 +10,7 @@ from undertow.checks.controller_check import check_stability
 from undertow.checks.finding import Finding
 from undertow.checks.part_check import check_contract, of_plant
 from undertow.checks.plant_check import derived_of_plant
-from undertow.checks.thruster_check import derived_of_thruster, lint_thruster
+from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
 from undertow.checks.vehicle_findings import vehicle_facts
 from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint
 from undertow.core import catalogue

@@ -1,7 +1,6 @@
 """Checks of a thruster: its contract, and sign and gain of its thrust."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,8 +10,6 @@ from scipy.integrate import solve_ivp
 
 from undertow.checks.answers import alike, is_a, shaped
 from undertow.checks.finding import Finding, advice, error
-from undertow.checks.part_check import check_contract
-from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import AbstractThruster, Powers, PropellerReport
 
 _COUNT = 3  # thrusters at once: no other size that a part may happen to have
@@ -81,59 +78,3 @@ def _ways(thruster: AbstractThruster) -> Iterator[Finding]:
         got = f"{gain:.4g} N/{unit} where {full:.4g} {unit} give {forward:.4g} N"
         should = "be about the thrust per volt: it is the gain of the model that the controller inverts"
         yield advice("gain", "voltage_gain", should, got)
-
-
-def lint_thruster(thruster: AbstractThruster) -> tuple[Finding, ...]:
-    """All errors and advice on a thruster."""
-    broken = check_contract(thruster)
-    return broken if any(finding.level == "error" for finding in broken) else (*broken, *_findings(thruster))
-
-
-def _findings(thruster: AbstractThruster) -> Iterator[Finding]:
-    for sentence in thruster.advice():
-        yield Finding("advice", "motor", "thruster", sentence.rstrip("."))
-    gain = float(np.min(thruster.voltage_gain()))
-    if not gain > 0:
-        yield error("gain", "voltage_gain", "be positive", f"{gain:.4g} N/V")
-    at_rest = np.asarray(thruster.thrust(thruster.initial_state(1), jnp.zeros(1)))
-    if np.any(at_rest):
-        yield error("rest", "thrust", "be zero at rest without voltage", f"{at_rest.ravel()[0]:.4g} N")
-
-
-def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str], ...]:
-    """Rows (what, value, unit)."""
-    supply, limit, unit = float(thruster.supply), full_voltage(thruster), thruster.input_unit
-    rows = [
-        (
-            "supply, dead zone" if unit == "V" else "largest command, dead zone",
-            _row([supply, thruster.dead_zone]),
-            unit,
-        ),
-        ("gain of the linear model", f"{float(np.min(thruster.voltage_gain())):.4g}", f"N/{unit}"),
-    ]
-    motor = getattr(thruster, "motor", None)
-    if isinstance(motor, DCMotor):
-        rows += _of_motor(motor, limit, thruster.terminal(jnp.asarray([limit, -limit])))
-    else:
-        rows.append((f"steady thrust at +-{limit:g} {unit}", _row(settled_thrust(thruster, limit)), "N"))
-    return tuple(rows)
-
-
-def _of_motor(motor: DCMotor, limit: float, volts: Any) -> list[tuple[str, str, str]]:
-    speed = motor.steady_speed(volts)
-    powers = motor.powers(volts, motor.steady_current(speed), speed)
-    share = np.asarray((powers.water + powers.friction) / powers.source)
-    # R J / (k_t (k_2 + 2 k_3 c_q Om)): time constant of the speed near this speed.
-    slope = motor.k2 + 2 * motor.k3 * motor.torque_coefficient * speed[0]
-    return [
-        ("torque constant / back-EMF constant", f"{float(motor.torque_constant / motor.back_emf_constant):.4g}", ""),
-        (f"thrust at +-{limit:g} V", _row(motor.thrust(speed)), "N"),
-        (f"speed at +-{limit:g} V", _row(speed), "rad/s"),
-        (f"current at +-{limit:g} V", _row(motor.steady_current(jnp.abs(speed))), "A"),
-        ("shaft power / electrical power", _row(share), ""),
-        (f"time constant of the speed at {limit:g} V", f"{float(motor.k1 / slope):.3g}", "s"),
-    ]
-
-
-def _row(values) -> str:
-    return ", ".join(f"{value:.4g}" for value in np.asarray(values))

@@ -11,7 +11,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractNavigation, Measurement
 from undertow.core.param import param
 from undertow.numerics.randomness import numbered
-from undertow.sensors.sensor import Sampling, SensorState
+from undertow.sensors.sampling import Sampling, SensorState
 
 
 class DegradedState(NamedTuple):

@@ -13,7 +13,8 @@ from undertow.numerics.randomness import numbered
 from undertow.sensors.estimate import Estimate, estimate_of, motion_of
 from undertow.sensors.imu import IMU
 from undertow.sensors.propeller_speed import PropellerSpeed
-from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor, SensorState
+from undertow.sensors.sampling import SensorState
+from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor
 
 # (m/s)^2 s; smaller densities count as no noise.
 _NOISELESS = 1e-20

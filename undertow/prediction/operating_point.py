@@ -1,6 +1,6 @@
 """Operating point of a scenario under its mean load, and the metrics predicted from there."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -11,8 +11,7 @@ from undertow.analysis.linearization.closed_loop import LinearLoop
 from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile, disturbance_profile
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.response import from_start, metrics_of, signals_within
-from undertow.controllers.composite_law import RCAF
-from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.analysis.theory import theory_of
 from undertow.core.contracts import AbstractController
 from undertow.scenario.build import Built
 
@@ -56,7 +55,11 @@ def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
         return None, f"the loop has no equilibrium under the mean load: a state still changes by {rate}"
     if known.radius >= 1:
         pole = margins.poles(known.linear)[0]
-        moving = "; adapting weights may change that, which only a run shows" if has_weights(known.built) else ""
+        moving = (
+            "; adapting weights may change that, which only a run shows"
+            if theory_of(known.built.closed_loop.controller).adapts
+            else ""
+        )
         return (
             None,
             f"the loop linearised {_HELD} is unstable: rightmost pole {pole.real:+.3g} {_turning(pole)}1/s{moving}",
@@ -71,18 +74,9 @@ def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     return (None, forbidden) if forbidden else (metrics_of(signals, units), "")
 
 
-def has_weights(built: Built) -> bool:
-    """Whether the controller has several fuzzy weights per axis, which a linearisation holds constant."""
-    law = built.closed_loop.controller
-    return isinstance(law, RCAF) and law.fuzzy.rules > 1
-
-
 def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
     """A sentence where predicted signals exceed a bound of the controller; otherwise empty."""
-    bounds: dict[str, tuple[str, Any]] = {}
-    if isinstance(law, RCAF | RobustRCAF):
-        bounds = {"robust_term": ("robust term", law.robust_gain), "estimate": ("estimate", law.weights_bound)}
-    for name, (meaning, bound) in bounds.items():
+    for name, (meaning, bound) in theory_of(law).limits.items():
         share = np.abs(signals[name]) / np.maximum(np.asarray(bound, dtype=float), 1e-300)
         if share.max() > 1 and np.abs(signals[name]).max() > 0:
             row, axis = np.unravel_index(share.argmax(), share.shape)

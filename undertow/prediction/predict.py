@@ -7,15 +7,10 @@ import numpy as np
 
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.actuator_authority import ActuatorAuthority, actuator_authority
-from undertow.analysis.linearization.closed_forms import (
-    ClosedForm,
-    closed_form_poles,
-    drift_bound,
-    estimator,
-    ramp_error,
-)
+from undertow.analysis.linearization.closed_forms import ClosedForm, closed_form_poles
 from undertow.analysis.linearization.closed_loop import LinearLoop
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.analysis.theory import theory_of
 from undertow.plants.reachability import open_loop_advice
 from undertow.prediction.operating_point import OperatingPoint, operating_point, predicted
 from undertow.scenario.build import Built, in_its_precision
@@ -106,7 +101,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     error, estimation = _responses(known.linear, frequency)
     law, names = loop.controller, loop.plant.outputs
     metrics, why_not = predicted(known)
-    axes = range(len(names))
+    axes, theory = range(len(names)), theory_of(law)
     gains = np.asarray(law.model.dynamics.gain(loop.plant.output(0.0, worst.parts.states(worst.at)[0])))
     return Prediction(
         operating_point=known,
@@ -117,8 +112,8 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
         error=error,
         estimation=estimation,
         forms=closed_form_poles(law, margins.poles(known.linear), names),
-        estimators=[(names[i], *found, ramp_error(law, i)) for i in axes if (found := estimator(law, i))],
-        drift=max((found for i in axes if (found := drift_bound(law, i, settings.dt))), default=None),
+        estimators=[(names[i], *found, theory.ramp_error(i)) for i in axes if (found := theory.estimator(i))],
+        drift=max((found for i in axes if (found := theory.drift_bound(i, settings.dt))), default=None),
         authority=actuator_authority(loop, known.mean, known.around.load),
         lost=open_loop_advice("the gain matrix", gains, names),
         metrics=metrics,

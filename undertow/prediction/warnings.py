@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from undertow.controllers.composite_law import RCAF
-from undertow.prediction.operating_point import has_weights
+from undertow.analysis.theory import theory_of
 from undertow.prediction.predict import Prediction
 
 # Sampling dominates an estimator with a larger product of bandwidth and sampling time.
@@ -32,7 +31,7 @@ def _stability(prediction: Prediction) -> tuple[str, ...]:
     moving = (
         " This holds for fixed weights: drifting weights add damping, so that a run may still last. Simulate it to "
         "find out"
-        if has_weights(prediction.operating_point.built)
+        if theory_of(prediction.operating_point.built.closed_loop.controller).adapts
         else ""
     )
     return (
@@ -65,9 +64,8 @@ def _sampling(prediction: Prediction) -> tuple[str, ...]:
             f"the estimator is too fast for the sampling time: {fastest:.3g} rad/s times {1e3 * dt:g} ms is "
             f"{fastest * dt:.2g}, more than {_SAMPLED}. Use at most {_SAMPLED / dt:.3g} rad/s, or sample faster"
         )
-    if isinstance(law, RCAF):
-        least = np.max(np.asarray(law.robust_gain) * np.asarray(law.lyapunov())[..., 1, 1]) * dt
-        layer = float(np.min(np.asarray(law.layer)))
+    if (layers := theory_of(law).thinnest_layer) is not None:
+        least, layer = layers(dt)
         if layer < least:
             warnings.append(
                 f"the robust term chatters: its boundary layer of {layer:.3g} is thinner than w_bar p22 dt = "

@@ -6,6 +6,7 @@ from typing import Any, cast
 from undertow.analysis.small_signal import gains
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.presets.paper import paper
+from undertow.core.runtime import in_precision
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.reproduction.running import BatchResult
@@ -102,7 +103,9 @@ def same_loop_gain(fuzzy_input: str, sets: int) -> dict[str, Any]:
 
 def _basis_norm_squared(fuzzy_input: str, sets: int) -> float:
     """|xi|^2 at zero."""
-    return float(paper(double_integrator(1).model(), fuzzy_input=fuzzy_input, sets=sets).fuzzy.basis_norm_squared())
+    with in_precision("float64"):
+        law = paper(double_integrator(1).model(), fuzzy_input=fuzzy_input, sets=sets)
+        return float(law.fuzzy.basis_norm_squared())
 
 
 def law_of(run: Executed | BatchResult) -> RCAF:

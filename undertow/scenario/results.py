@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from undertow.analysis.certificate import certify
+from undertow.analysis.certify import certify
 from undertow.analysis.metrics import Gathered, meanings, measure, results
 from undertow.analysis.success import Success, judged
 from undertow.core.metric import AbstractMetric, Metric

@@ -3,7 +3,8 @@
 import jax.numpy as jnp
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractSensor, Sampling
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 
 class Compass(AbstractSensor):

@@ -1,7 +1,8 @@
 """Depth from pressure."""
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractSensor, Sampling
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 _DOWN = slice(2, 3)
 

@@ -4,7 +4,8 @@ import jax.numpy as jnp
 
 from undertow.numerics.linear_algebra import matvec
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractVelocitySensor, Sampling
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractVelocitySensor
 
 
 class DVL(AbstractVelocitySensor):

@@ -18,6 +18,7 @@ from undertow.numerics.rotations import (
     quaternion_rate,
     rotation_from_quaternion,
 )
+from undertow.sensors.sampling import Sampling
 
 
 def gravity() -> Vector3:
@@ -76,8 +77,8 @@ class Estimate(NamedTuple):
         """Body -> world."""
         return rotation_from_quaternion(self.attitude)
 
-    def fixed(self, axes: slice, reading: Float[Array, " k"], sampling, share) -> "Estimate":
-        """The estimate `moved` on some axes by a position that was read `sampling.delay` ago (a `Sampling`)."""
+    def fixed(self, axes: slice, reading: Float[Array, " k"], sampling: Sampling, share) -> "Estimate":
+        """The estimate `moved` on some axes by a position that was read `sampling.delay` ago."""
         then = self.position[axes] - sampling.delay * self.velocity[axes]
         return self.moved(jnp.zeros(3).at[axes].set(reading - then), share, sampling.period)
 

@@ -5,7 +5,8 @@ import numpy as np
 
 from undertow.numerics.linear_algebra import matvec
 from undertow.sensors.estimate import Estimate, Motion, gravity
-from undertow.sensors.sensor import AbstractVelocitySensor, Sampling
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractVelocitySensor
 
 
 class IMU(AbstractVelocitySensor):

@@ -1,7 +1,8 @@
 """Position fixes: acoustic positioning (USBL, LBL), or a satellite receiver at the surface."""
 
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractSensor, Sampling
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 _LEVEL = slice(0, 2)
 

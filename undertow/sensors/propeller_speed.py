@@ -2,7 +2,8 @@
 
 from undertow.core.errors import BadInput
 from undertow.sensors.estimate import Estimate, Motion
-from undertow.sensors.sensor import AbstractSensor, Sampling
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
 
 
 class PropellerSpeed(AbstractSensor):
