@@ -1,4 +1,4 @@
-"""`undertow tune` against Table 1 and against gains found by hand, on vehicles at sea: cost on held-out runs.
+"""`undertow tune` compared with Table 1 and with gains tuned by hand, on vehicles at sea: cost on held-out runs.
 
 python benchmarks/tuning.py [--budget 240] [--vehicles bluerov2_heavy,bluerov2,odin,rexrov]
 """
@@ -12,7 +12,7 @@ import undertow  # noqa: F401  (double precision)
 from undertow.scenario.reading import from_data
 from undertow.tuning.tune import compare_gains, tune
 
-# The paper's law by hand: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors that lag by 0.1 s.
+# The paper's law tuned by hand: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors with a lag of 0.1 s.
 BY_HAND = {
     "feedback": [[4.0, 7.0]] * 3 + [[20.0, 13.0]] * 3,
     "pole": [4.0] * 3 + [3.0] * 3,
@@ -44,11 +44,11 @@ THRUSTERS = {
     "rexrov": {"kind": "first_order", "thrust_per_volt": 60.0, "time_constant": 0.05, "supply": 24.0},
 }
 
-# Truths, where not all published sets are; the law is told of the first. Of BlueROV2's, two are left out that have the
-# damping and the inertia of other vehicles (`undertow describe bluerov2`): no gains suit them and the others.
+# Plant variants, where not all published sets; the first is nominal. Two sets of BlueROV2 are omitted that have damping
+# or inertia of other vehicles (`undertow describe bluerov2`): no gains suit both them and the others.
 SETS = {"bluerov2": ["li2020", "einarsson_lipenitis2020", "gazebo_box_drag"]}
 
-# Where the position is known to a centimetre: else the navigation decides, and no controller.
+# Position known to a centimetre: otherwise the error of navigation dominates that of the controller.
 SENSORS = [
     "imu",
     {"kind": "dvl", "period": 0.125, "noise": 0.003},
