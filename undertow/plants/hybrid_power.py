@@ -25,7 +25,7 @@ _ROUNDING = 1e-6  # relative rounding of a limited voltage in single precision
 class PowerState(NamedTuple):
     """State of the electrical side; None for an absent part."""
 
-    charge: Any = None  # drawn from the battery, C
+    charge: Any = None  # charge drawn from the battery, C
     ledger: Any = None  # J, a Ledger
 
 

@@ -1,4 +1,4 @@
-"""A lawn-mower pattern: parallel legs with half circles between them, as in surveys of the sea floor."""
+"""A lawn-mower pattern: parallel legs with half circles between them, as in surveys of the seabed."""
 
 import equinox as eqx
 import jax.numpy as jnp
