@@ -22,7 +22,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-import undertow  # noqa: F401  (double precision)
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.sampled import AbstractAccumulator
@@ -31,6 +30,8 @@ from undertow.scenario.reading import from_data
 from undertow.scenario.schema import TrainingRuns
 from undertow.tuning.training_runs import trials
 from undertow.tuning.tune import tune
+
+jax.config.update("jax_enable_x64", True)
 
 SETS = ["vonbenzon2022", "wu2018", "ng2024", "gazebo_box_drag", "px4"]
 DURATION, START = 60.0, 30.0  # s

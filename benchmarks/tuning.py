@@ -8,7 +8,6 @@ import tempfile
 import time
 from pathlib import Path
 
-import undertow  # noqa: F401  (double precision)
 from undertow.scenario.reading import from_data
 from undertow.tuning.tune import compare_gains, tune
 
