@@ -57,8 +57,8 @@ class Outcome(NamedTuple):
 def status_of(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
     """Status code of an instant; a status that the coordinates of the controller's model tolerate is no failure."""
     code = loop.plant.status(x)
-    for borne in loop.controller.model.coordinates.tolerated_status:
-        code = jnp.where(code == int(borne), int(Status.OK), code)
+    for tolerated in loop.controller.model.coordinates.tolerated_status:
+        code = jnp.where(code == int(tolerated), int(Status.OK), code)
     return jnp.where(all_finite((x, z)), code, int(Status.NOT_FINITE))
 
 

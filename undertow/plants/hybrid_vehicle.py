@@ -224,7 +224,7 @@ class HybridVehicle(AbstractPlant):
 
 @jax.jit
 def _static(inverse_mass, thruster_matrix, voltage_gain):
-    """What volts do to a body at rest, and the volts of least norm for a wrench; voltage gain of all or of each."""
+    """Acceleration per volt at rest, and minimum-norm voltages per wrench; one voltage gain for all or one each."""
     per_volt = thruster_matrix * voltage_gain
     return inverse_mass @ per_volt, jnp.linalg.pinv(per_volt)
 

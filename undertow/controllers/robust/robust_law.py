@@ -154,10 +154,10 @@ class RobustRCAF(AbstractInformedController):
 
     def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
         dynamics, coordinates, actuators = self.model
-        believed = actuators.update_from_report(z.actuators, y.actuator)
+        reported = actuators.update_from_report(z.actuators, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)
         off = tracking(coordinates, self.lyapunov(), y, target)
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
         seen = self.estimator.estimate(z.estimator, coordinates.velocity(y))
         demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - dynamics.drift(y)
-        return Plan(believed, seen, off, u_r, dynamics.invert(y, demand))
+        return Plan(reported, seen, off, u_r, dynamics.invert(y, demand))

@@ -292,8 +292,8 @@ def _thruster_loss(found: Found) -> Verdict:
     one = [found[f"{law}, one off"].metrics[_TRACKING] for law in _PRESETS]
     triple = all(not found[f"{law}, three off"].median(_TRACKING) < _LOST for law in _PRESETS)
     text = f"Median tracking rms: {_listed(_tracking(found), '.2g')}."
-    borne = all(each.median < _LOST for each in one)
-    return _verdict(borne and all(each.high < _LOST for each in one) and triple, text, partly=borne)
+    tolerated = all(each.median < _LOST for each in one)
+    return _verdict(tolerated and all(each.high < _LOST for each in one) and triple, text, partly=tolerated)
 
 
 @_ablation(
