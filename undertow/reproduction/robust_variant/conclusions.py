@@ -66,13 +66,13 @@ def _there(found: Any) -> Any:
 
 
 def _windup(n: Numbers) -> str:
-    own, commanded = n.median("A10", "RCAFC, 1.5 m/s^2"), n.median("A10", "RCAFC, command fed, 1.5 m/s^2")
+    own, fed = n.median("A10", "RCAFC, 1.5 m/s^2"), n.median("A10", "RCAFC, command fed, 1.5 m/s^2")
     without = n.median("A10", "RAFC, 1.5 m/s^2")
-    if not own < 0.01 * min(commanded, without):
+    if not own < 0.01 * min(fed, without):
         return ""
     return (
         f"The applied input in the identification model. After a step of 2 m with |u| <= 1.5 m/s^2 the error of RCAFC "
-        f"is {own:.2g} m; with its own command in the model it is {commanded:.3g} m, that of RAFC {without:.3g} m (A10)."
+        f"is {own:.2g} m; with its own command in the model it is {fed:.3g} m, that of RAFC {without:.3g} m (A10)."
     )
 
 
