@@ -1,11 +1,11 @@
-"""What a campaign costs: python benchmarks/campaign_scale.py [memory|dask|pieces] [--trials N]
+"""Cost of a campaign: python benchmarks/campaign_scale.py [memory|dask|pieces] [--trials N]
 
-memory: 100 000 trials of workload W1, 1 s each, in this process. Memory after the first tenth of the tasks and at the
-end, its peak, bytes of the store and time per trial.
+memory: 100 000 trials of workload W1, 1 s each, in this process: memory after a tenth of the tasks and at the end, its
+peak, bytes of the store and time per trial.
 dask: 1 000 trials of W1, 20 s each, by one worker and by two of a local cluster: the ratio of the times once the
 workers have compiled, the shortest of five each, and whether the stores are the same to the byte.
-pieces: milliseconds of building a trial where start and gain differ, or the mass of the vehicle; of writing a task of
-256 trials, or of 65 536; in one thread. And what memory a trial of a task takes while the task is flown.
+pieces: in one thread, milliseconds to build a trial with another start and gain or another mass of the vehicle, and to
+write a task of 256 or 65 536 trials; and the memory per trial while a task runs.
 
 Prints JSON.
 """
@@ -43,7 +43,7 @@ VARY = {
 }
 HEAVIER = {"plant.vehicle.mass": {"normal": [125.0, 3.0]}}
 
-_LARGE = 8192  # trials of a task whose memory is looked at
+_LARGE = 8192  # trials of the task whose memory is measured
 
 
 def prepared(folder: Path, trials: int, duration: float, chunk: int, vary: dict = VARY):
@@ -79,7 +79,7 @@ def memory(trials: int) -> dict:
 
 
 def pieces(trials: int) -> dict:
-    """One thread: building a trial, and writing a task of few or many; the shortest of three."""
+    """Building a trial, and writing a small or large task, in one thread; the shortest of three."""
     found = {}
     with tempfile.TemporaryDirectory() as name:
         for what, vary in (("build_start_and_gain_ms", VARY), ("build_mass_ms", HEAVIER)):
@@ -97,7 +97,7 @@ def pieces(trials: int) -> dict:
             named = labels(campaign.trials, campaign.first)
             where = Path(name) / f"{rows}.zarr"
             store = Store(where, Layout((), 4 * rows, (rows,)), Identity("", {}), named, {})
-            chance = np.random.default_rng(0)  # numbers that cannot be told shorter than they are
+            chance = np.random.default_rng(0)  # random numbers cannot be compressed
             many = {key: chance.normal(size=rows).astype(values.dtype) for key, values in columns.items()}
             found[f"write_{rows}_ms"] = 1e3 * _shortest(lambda i, s=store, m=many: s.write(i, m))
             store.close()
@@ -105,7 +105,7 @@ def pieces(trials: int) -> dict:
 
 
 def _shortest(work: Callable[[int], Any]) -> float:
-    """Seconds of the shortest of three, after one that does not count."""
+    """Seconds of the shortest of three runs after a warm-up."""
     times = []
     for i in range(4):
         start = time.perf_counter()
@@ -115,12 +115,12 @@ def _shortest(work: Callable[[int], Any]) -> float:
 
 
 def _peak() -> float:
-    """MiB."""
+    """Peak memory, MiB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _resident() -> float:
-    """MiB."""
+    """Resident memory, MiB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize() / 2**20
 
@@ -128,7 +128,7 @@ def _resident() -> float:
 def dask(trials: int) -> dict:
     """One worker and two, in turn; the shortest of five times each.
 
-    All run_trials some first: compiling is not counted.
+    Every worker runs some trials first, so that compilation is not counted.
     """
     times: dict[int, list[float]] = {1: [], 2: []}
     stores = []

@@ -183,5 +183,5 @@ def test_keys_by_name():
     assert len({tuple(np.asarray(one).tolist()) for one in (key, *more.values())}) == 4
     for name, own in few.items():
         np.testing.assert_array_equal(own, more[name])
-    with pytest.raises(ValueError, match="not all different: waves, waves"):
+    with pytest.raises(ValueError, match="must be different, but are: waves, waves"):
         keys_for(key, "waves", "waves")

@@ -92,7 +92,7 @@ def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     found = batch.run(many)
     backwards = batch.run(jax.tree.map(lambda leaf: leaf[::-1], many))
     general = simd_batch.BatchRunner(run, plan, [False] * len(leaves)).run(many)
-    alone = simd_batch.BatchRunner(run, plan, same, lanes=1)
+    alone = simd_batch.BatchRunner(run, plan, same, width=1)
     for i in range(11):
         single = alone.run(jax.tree.map(lambda leaf, i=i: leaf[i : i + 1], many))
         same = lambda a, b, i=i: np.testing.assert_array_equal(a[0], b[i])

@@ -236,7 +236,7 @@ def test_impossible_batteries_are_refused(wrong):
 def tight(plant, x, applied, slack):
     """Whether the largest voltage is that of the bus, or the power the most that the battery has, up to a share."""
     bus = float(plant.power.bus_voltage(plant.thruster, x.thrusters, x.power, applied))
-    emf = float(plant.power.battery.open_circuit_voltage(x.power.drawn))
+    emf = float(plant.power.battery.open_circuit_voltage(x.power.charge))
     power = float(plant.effort(x, applied).power.sum())
     most = emf**2 / (4 * float(plant.power.battery.resistance))
     return float(np.abs(applied).max()) >= bus * (1 - slack) or power >= most * (1 - 2 * slack)
@@ -249,7 +249,7 @@ def test_voltages_stay_within_what_the_battery_gives_and_reach_it(fidelity):
     asked = jnp.array([40.0, -40.0, 25.0, 3.0, -3.0, 0.5, 0.0, 16.0])
     x = plant.initial_state()
     for drawn in (0.0, 30_000.0, 64_800.0):
-        at = x._replace(power=x.power._replace(drawn=jnp.asarray(drawn)))
+        at = x._replace(power=x.power._replace(charge=jnp.asarray(drawn)))
         applied = plant.admissible(at, asked)
         bus = plant.power.bus_voltage(plant.thruster, at.thrusters, at.power, applied)
         assert np.abs(applied).max() <= bus * (1 + 1e-12)
@@ -299,7 +299,7 @@ def test_applied_voltages_are_whole_pulses_and_pass_unchanged_a_second_time():
 
 
 def test_speed_controllers_need_a_bus_voltage():
-    with pytest.raises(BadInput, match="`esc` must have a bus voltage"):
+    with pytest.raises(BadInput, match="`esc` must have a finite bus voltage"):
         hybrid_vehicle(odin(), paper_table3(), esc=esc())
     hybrid_vehicle(odin(), paper_table3(), esc=esc(), battery=battery())
 

@@ -216,7 +216,7 @@ def test_gains_that_make_laws_comparable():
     one_set = scenario("a18_drift", "one set")["controller"]["adaptation"]
     rho = lambda **options: float(paper(MODEL, **options).fuzzy.basis_norm_squared())
     assert one_set == pytest.approx(100 * rho(sets=3, reach=(0.1,)) / rho(sets=1), rel=1e-6)
-    slow = scenario("a11_motor", "30 rad/s, whole motor")["controller"]
+    slow = scenario("a11_motor", "30 rad/s, full motor model")["controller"]
     assert slow["adaptation"] * 500 * rho() == pytest.approx(30**2, rel=1e-3) and slow["pole"] == 2 * 30
 
 

@@ -54,7 +54,7 @@ def test_a_minute_with_a_box_and_without():
 
 @pytest.mark.slow
 def test_an_hour_at_sea():
-    """ODIN with its whole motors at 24 V, speeds not measured, in a swell: the first ten minutes and the last.
+    """ODIN with the full motor model at 24 V, speeds not measured, in a swell: the first ten minutes and the last.
 
     At the preset's own bandwidth this noise alone keeps the motors at their limits most of the time.
     """

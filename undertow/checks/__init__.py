@@ -1,1 +1,1 @@
-"""Checks: whether a vehicle, a thruster, another part or a whole scenario is possible and keeps its contract."""
+"""Checks of vehicles, thrusters, other parts and scenarios: plausible numbers, and contracts of parts."""

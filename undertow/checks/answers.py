@@ -1,4 +1,4 @@
-"""Whether answers of a part have the shape, the form and the values that they must have."""
+"""Checks of the shape, type and values of what the methods of a part return."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,7 +13,7 @@ _TOLERANCE = 1e-6
 
 
 def shaped(name: str, value: Any, *shapes: tuple[int, ...]) -> Iterator[Finding]:
-    """An array of one of these shapes, of finite numbers unless it is only traced."""
+    """Check for an array of one of these shapes, with finite numbers unless it is traced."""
     if not isinstance(value, jax.Array | jax.ShapeDtypeStruct | np.ndarray | np.generic | float | int):
         yield error("contract", name, f"give an array of shape {shapes[0]}", form(value))
     elif jnp.shape(value) not in shapes:
@@ -23,21 +23,21 @@ def shaped(name: str, value: Any, *shapes: tuple[int, ...]) -> Iterator[Finding]
 
 
 def is_a(name: str, value: Any, kind: type) -> Iterator[Finding]:
-    """Something of a class."""
+    """Check for an instance of a class."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIO" else "a"
         yield error("contract", name, f"give {article} {kind.__name__}", form(value))
 
 
 def two_values(name: str, value: Any, what: str) -> Iterator[Finding]:
-    """A tuple of two, no more and no less."""
+    """Check for a tuple of exactly two."""
     if type(value) is not tuple or len(value) != 2:
         says = f"`{name}` must return two values, {what}, but returns {form(value)}"
         yield Finding("error", "contract", name, says)
 
 
 def alike(name: str, value: Any, model: Any, must: str, types: bool = False) -> Iterator[Finding]:
-    """The same tree as `model`, with arrays of the same shapes; and of the same types of number, where asked for."""
+    """Check for the same tree as `model`, with arrays of the same shapes, and of the same types if `types`."""
     if type(value) is not type(model):
         yield error("contract", name, must, f"{_kind(value)}, not {_kind(model)}")
         return
@@ -54,7 +54,7 @@ def alike(name: str, value: Any, model: Any, must: str, types: bool = False) -> 
 
 
 def agree(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
-    """Equal values."""
+    """Check for equal values."""
     off = np.abs(np.asarray(value) - np.asarray(other))
     scale = max(1.0, float(np.abs(np.asarray(other)).max(initial=0.0)))
     if off.max(initial=0.0) > _TOLERANCE * scale:
@@ -68,7 +68,7 @@ def _kind(value: Any) -> str:
 
 
 def form(value: Any) -> str:
-    """What an answer is, in words."""
+    """Description of a returned value."""
     if value is None:
         return "nothing (no `return`?)"
     if isinstance(value, jax.Array | jax.ShapeDtypeStruct):

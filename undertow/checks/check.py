@@ -1,4 +1,4 @@
-"""`undertow check`: from what the user names to everything that can be said against it."""
+"""`undertow check`: from the name that the user gives to all findings."""
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
@@ -32,10 +32,10 @@ Rows = tuple[tuple[str, str, str], ...]
 
 
 class Report(NamedTuple):
-    """What a check found."""
+    """Result of a check."""
 
-    found: tuple[tuple[Finding, str], ...]  # with its place, when known
-    tables: tuple[tuple[str, Rows], ...]  # title, and what follows from the numbers
+    found: tuple[tuple[Finding, str], ...]  # with its location, when known
+    tables: tuple[tuple[str, Rows], ...]  # title, and numbers derived from the data
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -55,11 +55,11 @@ def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> R
 
     Args:
         thing: what to check.
-        options: of the part, or keys of the vehicle file to change.
-        allow_code: whether code that a result file names may run.
+        options: options of the part, or keys of the vehicle file to change.
+        allow_code: whether to run code that a result file names.
 
     Raises:
-        BadInput: it cannot be read or made at all.
+        BadInput: it cannot be read or made.
     """
     if Path(thing).suffix == ".nc" or is_vehicle_file(thing):
         return _check_file(Path(thing), options, allow_code)
@@ -73,7 +73,7 @@ def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> R
 def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Report:
     text = read(path, "THING", allow_code)
     if "scenario" in text.data:
-        hint = "`undertow campaign` checks one before it flies it; check its scenario in a file of its own"
+        hint = "`undertow campaign` checks a campaign before it runs; check its scenario in a file of its own"
         raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, a campaign", hint=hint)
     own, scenario = (sum(key in known for key in text.data) for known in (KEYS, Scenario.model_fields))
     if not own and not scenario:
@@ -90,7 +90,7 @@ def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
     found = read_vehicle(path, options, "THING")
     report = _of_vehicle(found.data.facts(), lambda key: found.text.where(key_path(key)))
     if not report.errors:
-        found.vehicle()  # whatever it refuses and no rule has seen
+        found.vehicle()  # raises errors that no rule covers
     return report
 
 
@@ -112,17 +112,17 @@ def _of_part(name: str, part: Any) -> Report:
 
 
 def _of_feedback(make: Callable[..., Any], axes: int) -> Report:
-    """A controller in a loop with the simplest plant of as many outputs as the vehicle that it was checked with."""
+    """A controller in a loop with a double integrator of as many outputs as the vehicle of its check."""
     plant = double_integrator(axes)
     try:
         law = make(plant.model())
         return _report(check_stability(law, plant), partial(_place, law))
-    except Exception:  # a law may be for vehicles only, or have no slope
+    except Exception:  # a law may be for vehicles only, or not differentiable
         return _report(())
 
 
 def _place(part: Any, key: str) -> str:
-    """Where in the user's own file a method is that a finding names."""
+    """Location in the user's own file of the method that a finding names."""
     thing, _, method = key.rpartition(".")
     part = part.model() if thing == "model" and isinstance(part, AbstractPlant) else part
     return place_of(part, method) if method else ""
@@ -136,7 +136,7 @@ def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
 
 @in_its_precision
 def _of_scenario(text: Text) -> list[Report]:
-    """The scenario itself, the vehicle and the thruster in it, and the plant and its references."""
+    """Reports on the scenario itself, its vehicle and thruster, and its plant and other parts."""
     built = build(text)
     loop = built.closed_loop
     said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
@@ -146,7 +146,7 @@ def _of_scenario(text: Text) -> list[Report]:
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
         reports.append(_of_thruster(thruster, "thruster"))
     if any(report.errors for report in reports):
-        return reports  # whatever contains these parts would only stumble over them
+        return reports  # their errors would cause others in what contains them
     reports.append(_report(check_contract(loop.plant), partial(_place, loop.plant)))
     if not reports[-1].errors:
         around = of_plant(loop.plant)
@@ -158,7 +158,7 @@ def _of_scenario(text: Text) -> list[Report]:
 
 
 def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[..., Any]]:
-    """Name and instance of a part, and what makes it, or another one for the model that it is given."""
+    """Name and instance of a part, and a function that makes another one, for a given model."""
     if ".py:" in thing:
         try:
             function = catalogue.find("", thing)
@@ -169,8 +169,8 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
         if not factory.is_part(part):
             raise _no_part(name, part)
         return name, part, make
-    wanted, _, short = thing.rpartition("/")
-    known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if wanted in ("", kind)}
+    prefix, _, short = thing.rpartition("/")
+    known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if prefix in ("", kind)}
     for kind, names in known.items():
         if short in names:
             make = lambda *given, kind=kind: factory.make(kind, {"kind": short, **options}, Path(), given)[0]
@@ -180,7 +180,7 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
 
 
 def _no_part(name: str, thing: Any) -> BadInput:
-    """What to say of something that a function returns instead of a part."""
+    """Error for what a function returns instead of a part."""
     contract, shared = factory.contract_like(thing)
     place, kind = place_of(thing), type(thing).__name__
     if not place:
@@ -192,7 +192,7 @@ def _no_part(name: str, thing: Any) -> BadInput:
 
 
 def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:
-    """The model that a controller starts from: that of the default vehicle."""
+    """First argument of a controller: the model of the default vehicle."""
     if next(iter(inspect.signature(function).parameters), "") != "model":
         return ()
     return (factory.make("plants", "hybrid_vehicle", Path())[0].model(),)
@@ -206,6 +206,6 @@ def _report(
 
 
 def _joined(reports: list[Report]) -> Report:
-    """All of them; what two say in the same words is said once, by the later one, which knows the place."""
+    """All reports as one; of equal findings the later one is kept, which has the location."""
     found = {finding.says: (finding, where) for report in reports for finding, where in report.found}
     return Report(tuple(found.values()), tuple(table for report in reports for table in report.tables))

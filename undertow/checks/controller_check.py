@@ -1,4 +1,4 @@
-"""Does a controller keep its contract, and does it bring a simple plant back to the origin?"""
+"""Checks of a controller: its contract, and stability with a double integrator."""
 
 from collections.abc import Iterator
 
@@ -23,7 +23,7 @@ _DEFAULT = "Tried with the default vehicle; for another plant, check a scenario"
 
 
 def check_controller(controller: AbstractController) -> Iterator[Finding]:
-    """Every method once, traced as a loop traces it, near the origin; then with numbers."""
+    """Findings from every method, traced as in a loop, near the origin; then with numbers."""
     n = len(controller.model.coordinates.angles)
     y = controller.model.coordinates.measurement(0.1 * jnp.ones(n), jnp.zeros(n))
     r, dt = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n)), jnp.asarray(1e-3)
@@ -41,7 +41,7 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
     check_declared(controller, signals)
     sizes = {"axis": n, "actuator": inputs}
     for name, signal in controller.signals().items():
-        found = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # of dimensions of the law's own
+        found = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # sizes of the law's own dimensions
         due = tuple(sizes.get(dimension, found.get(dimension, 1)) for dimension in signal.dimensions)
         yield from shaped(f"command, signal {name}", signals[name], due)
     after = jax.eval_shape(controller.advance, z, y, r, u, dt)
@@ -55,8 +55,8 @@ def check_stability(controller: AbstractController, plant: DoubleIntegrator, dt:
     """Advice where the loop of a controller with x_ddot = u, linearised at the origin, is unstable.
 
     Args:
-        controller: made with the model of this plant.
-        plant: on which it is tried.
+        controller: controller made with the model of this plant.
+        plant: plant of the test.
         dt: sampling time, s.
     """
     still = np.zeros(len(plant.outputs))

@@ -1,4 +1,4 @@
-"""Does a part keep its contract? It is used once, as the loop would use it, and its answers are compared."""
+"""Checks of the contract of a part: it is used once as in the loop, and its results are compared."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -28,11 +28,11 @@ from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 
-_TIMES = (0.37, 1.93, 7.1)  # s; away from round numbers, where references may turn
+_TIMES = (0.37, 1.93, 7.1)  # s; no round numbers, at which references may have corners
 
 
 class DisturbanceProfile(NamedTuple):
-    """Where a part is used."""
+    """Plant around a part."""
 
     truth: Measurement
     pose: Pose | None
@@ -45,17 +45,17 @@ _BODY = DisturbanceProfile(
 
 
 def of_plant(plant: AbstractPlant) -> DisturbanceProfile:
-    """With this plant, as it starts."""
+    """Profile of a plant in its initial state."""
     x = plant.initial_state()
     return DisturbanceProfile(plant.output(jnp.zeros(()), x), plant.pose(x))
 
 
 def check_contract(part: Any, around: DisturbanceProfile = _BODY) -> tuple[Finding, ...]:
-    """What a part does that its contract does not allow; nothing for kinds whose contract is their data.
+    """Violations of the contract of a part; none for kinds that are data only.
 
     Args:
-        part: to be checked.
-        around: where it is used; a body in water unless said.
+        part: part to check.
+        around: plant around it; by default a body in water.
     """
     for kind, use in _USES.items():
         if isinstance(part, kind):
@@ -67,7 +67,7 @@ def check_contract(part: Any, around: DisturbanceProfile = _BODY) -> tuple[Findi
 
 
 def _failed(part: Any, complaint: Exception) -> Finding:
-    """What an exception in a part, or in the use of it, says."""
+    """Finding for an exception in a part or in its use."""
     says, hint = fault_of(complaint)
     if says.startswith("cannot"):
         return Finding("error", "contract", "", says[:1].upper() + says[1:], hint)
@@ -114,7 +114,7 @@ def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> I
 
 
 def _sensor(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
-    """Tried on a body at rest, so that a delay makes no difference."""
+    """Check of a sensor on a body at rest, so that a delay has no effect."""
     report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
     truth = measurement_of_outputs(around.truth.position, jnp.zeros(6), report)
     motion, right = motion_of(truth, jnp.zeros(3), jnp.asarray(0.01)), estimate_of(truth)

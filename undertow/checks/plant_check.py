@@ -1,4 +1,4 @@
-"""Does a plant keep its contract, and does its model tell the same story?"""
+"""Checks of a plant: its contract, and agreement with its model."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -18,7 +18,7 @@ _GRIP = 1e-9  # of the largest entry: below it an input does not act at once
 
 
 def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
-    """Every method once, near the origin; and each answer against another way to the same number."""
+    """Findings from every method near the origin, each result against another way to the same number."""
     wrong = [*_forms(plant), *is_a("advice", plant.advice(), tuple)]
     wrong = wrong or list(_forms_of_model(plant))
     if wrong:
@@ -42,33 +42,33 @@ def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
 
 
 def derived_of_plant(plant: AbstractPlant) -> tuple[tuple[str, str, str], ...]:
-    """(what, value, unit), a row each: at the point where `check_plant` tries it."""
-    n, m, t, calm = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
+    """Rows (what, value, unit) at the point of `check_plant`."""
+    n, m, t, no_load = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
     x, dynamics = _trial(plant), plant.model().dynamics
     y, u = plant.output(t, x), plant.admissible(x, jnp.zeros(m))
     gain = np.asarray(dynamics.gain(y))
-    true = np.asarray(plant.acceleration(t, x, u, calm))
+    true = np.asarray(plant.acceleration(t, x, u, no_load))
     rows = [("outputs, inputs, rank of G", f"{n}, {m}, {np.linalg.matrix_rank(gain, tol=1e-9)}", "")]
-    for i, (name, unit, told) in enumerate(zip(plant.outputs, plant.output_units, dynamics.drift(y), strict=True)):
+    for i, (name, unit, nominal) in enumerate(zip(plant.outputs, plant.output_units, dynamics.drift(y), strict=True)):
         at = f"{name} {float(y.position[i]):.3g} {unit}, {float(y.velocity[i]):.3g} {unit}/s"
-        rows.append((f"{at}: x_ddot without input, F of the model", f"{true[i]:.4g}, {told:.4g}", f"{unit}/s^2"))
+        rows.append((f"{at}: x_ddot without input, F of the model", f"{true[i]:.4g}, {nominal:.4g}", f"{unit}/s^2"))
     return tuple(rows)
 
 
 def _trial(plant: AbstractPlant):
-    """A state near the origin, at rest in nothing."""
+    """A state near the origin with motion in every output."""
     n = len(plant.outputs)
     return plant.initial_state(jnp.linspace(0.1, 0.5, n), jnp.linspace(0.2, -0.1, n))
 
 
 def _extra(plant: AbstractPlant):
-    """A lumped acceleration to try."""
+    """A lumped acceleration for the test."""
     return jnp.linspace(1.0, 2.0, len(plant.outputs))
 
 
 def _forms(plant: AbstractPlant) -> Iterator[Finding]:
-    """Types and shapes; traced, so that nothing is computed, and what does not compile complains."""
-    n, m, t, calm = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
+    """Types and shapes, by tracing, which also raises the errors of compilation."""
+    n, m, t, no_load = len(plant.outputs), plant.inputs(), jnp.zeros(()), plant.no_load()
     if len(plant.output_units) != n:
         yield error("contract", "output_units", f"have {n} entries, one per output", f"{len(plant.output_units)} long")
     x = _trial(plant)
@@ -93,8 +93,8 @@ def _forms(plant: AbstractPlant) -> Iterator[Finding]:
         if set(signal.dimensions) <= set(sizes):
             form = tuple(sizes[dimension] for dimension in signal.dimensions)
             yield from shaped(f"diagnostics, signal {name}", recorded[name], form)
-    yield from alike("dynamics", jax.eval_shape(plant.dynamics, t, x, u, calm), x, "have the form of the state")
-    yield from shaped("acceleration", jax.eval_shape(plant.acceleration, t, x, u, calm), (n,))
+    yield from alike("dynamics", jax.eval_shape(plant.dynamics, t, x, u, no_load), x, "have the form of the state")
+    yield from shaped("acceleration", jax.eval_shape(plant.acceleration, t, x, u, no_load), (n,))
     yield from shaped("status", jax.eval_shape(plant.status, x), ())
 
 
@@ -111,7 +111,7 @@ def _forms_of_model(plant: AbstractPlant) -> Iterator[Finding]:
 
 
 class _Numbers(NamedTuple):
-    """What the plant answers, in two ways each."""
+    """Results of the plant, each in two ways."""
 
     velocity: Array
     position_rate: Array
@@ -126,11 +126,11 @@ class _Numbers(NamedTuple):
 
 
 def _numbers(plant: AbstractPlant, x: PyTree) -> _Numbers:
-    m, t, calm = plant.inputs(), jnp.zeros(()), plant.no_load()
+    m, t, no_load = plant.inputs(), jnp.zeros(()), plant.no_load()
     u = plant.admissible(x, jnp.full(m, 0.1))
-    y, rate = jax.jvp(lambda x: plant.output(t, x)[:2], (x,), (plant.dynamics(t, x, u, calm),))
+    y, rate = jax.jvp(lambda x: plant.output(t, x)[:2], (x,), (plant.dynamics(t, x, u, no_load),))
     moved = lambda u, load: plant.acceleration(t, x, u, load)
-    at_rest = moved(u, calm)
+    at_rest = moved(u, no_load)
     model, measured = plant.model(), plant.output(t, x)
     gain = model.dynamics.gain(measured)
     reachable = gain @ jnp.linspace(1.0, 2.0, m)
@@ -139,10 +139,10 @@ def _numbers(plant: AbstractPlant, x: PyTree) -> _Numbers:
         position_rate=rate[0],
         acceleration=at_rest,
         velocity_rate=rate[1],
-        gained=moved(u, calm._replace(acceleration=_extra(plant))) - at_rest,
-        held=jnp.diagonal(jax.jacfwd(lambda w: moved(u, calm._replace(wrench=w)))(calm.wrench)),
+        gained=moved(u, no_load._replace(acceleration=_extra(plant))) - at_rest,
+        held=jnp.diagonal(jax.jacfwd(lambda w: moved(u, no_load._replace(wrench=w)))(no_load.wrench)),
         gain=gain,
-        true_gain=jax.jacfwd(lambda u: moved(u, calm))(u),
+        true_gain=jax.jacfwd(lambda u: moved(u, no_load))(u),
         reachable=reachable,
         reached=gain @ model.dynamics.invert(measured, reachable),
     )

@@ -1,4 +1,4 @@
-"""Does a thruster keep its contract, and does it push the way it says?"""
+"""Checks of a thruster: its contract, and sign and gain of its thrust."""
 
 from collections.abc import Iterator
 
@@ -19,10 +19,10 @@ _FACTOR = 3.0  # between the gain the model takes and that at full voltage
 
 
 def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
-    """Every method once, for three thrusters at different voltages."""
+    """Findings from every method, for three thrusters at different voltages."""
     volts = full_voltage(thruster) * jnp.array([0.4, -0.7, 1.0])
     state = thruster.initial_state(_COUNT)
-    jax.eval_shape(thruster.dynamics, state, volts)  # whether it compiles
+    jax.eval_shape(thruster.dynamics, state, volts)  # raises if it does not compile
     jax.eval_shape(thruster.thrust, state, volts)
     each, once = (_COUNT,), ()
     powers, report = thruster.powers(state, volts), thruster.report(state)
@@ -46,13 +46,13 @@ def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
 
 
 def full_voltage(thruster: AbstractThruster) -> float:
-    """Full voltage, V, or full command of one that is commanded otherwise; a moderate one where there is no limit."""
+    """Full voltage, V, or full command in another unit; a moderate one where there is no limit."""
     supply = float(np.min(thruster.supply))
     return supply if np.isfinite(supply) else _VOLTAGE
 
 
 def settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, float]:
-    """Thrust, N, long after a voltage within the limits, and after its opposite, was applied to thrusters at rest."""
+    """Steady thrust, N, of a voltage within the limits, and of its opposite."""
     volts = jnp.clip(jnp.array([voltage, -voltage]), *thruster.limits())
     start = thruster.initial_state(2)
     flat, tree = ravel_pytree(start)
@@ -65,7 +65,7 @@ def settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, f
 
 
 def _ways(thruster: AbstractThruster) -> Iterator[Finding]:
-    """Positive voltage pushes forward, and about as much as the controller's model is told."""
+    """Positive voltage gives positive thrust, about that of the nominal gain."""
     full, gain = full_voltage(thruster), float(np.min(thruster.voltage_gain()))
     forward, reverse = settled_thrust(thruster, full)
     for thrust, volts, word in ((forward, full, "positive"), (-reverse, -full, "negative")):

@@ -1,4 +1,4 @@
-"""Is this thruster possible? Its motor's constants, and what it makes of its supply."""
+"""Linter of thrusters: constants of the motor, and thrust at full voltage."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,7 +14,7 @@ from undertow.thrusters.thruster import AbstractThruster
 
 
 def lint_thruster(thruster: AbstractThruster) -> tuple[Finding, ...]:
-    """Everything that is wrong or odd about a thruster."""
+    """All errors and advice on a thruster."""
     broken = check_contract(thruster)
     return broken if any(finding.level == "error" for finding in broken) else (*broken, *_findings(thruster))
 
@@ -31,7 +31,7 @@ def _findings(thruster: AbstractThruster) -> Iterator[Finding]:
 
 
 def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str], ...]:
-    """(what, value, unit), a row each."""
+    """Rows (what, value, unit)."""
     supply, limit, unit = float(thruster.supply), full_voltage(thruster), thruster.input_unit
     rows = [
         (
@@ -53,7 +53,7 @@ def _of_motor(motor: DCMotor, limit: float, volts: Any) -> list[tuple[str, str, 
     speed = motor.steady_speed(volts)
     powers = motor.powers(volts, motor.steady_current(speed), speed)
     share = np.asarray((powers.water + powers.friction) / powers.source)
-    # R J / (k_t (k_2 + 2 k_3 c_q Om)): how fast the speed settles near this speed.
+    # R J / (k_t (k_2 + 2 k_3 c_q Om)): time constant of the speed near this speed.
     slope = motor.k2 + 2 * motor.k3 * motor.torque_coefficient * speed[0]
     return [
         ("torque constant / back-EMF constant", f"{float(motor.torque_constant / motor.back_emf_constant):.4g}", ""),

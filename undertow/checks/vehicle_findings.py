@@ -1,4 +1,4 @@
-"""What is wrong with the vehicle of a scenario, though it can be run."""
+"""Warnings about the vehicle of a scenario that can be run."""
 
 from undertow.checks.vehicle_lint import Facts, facts_of, lint
 from undertow.scenario.build import Built
@@ -7,7 +7,7 @@ from undertow.vehicles.vehicle import Vehicle
 
 
 def vehicle_facts(built: Built) -> Facts | None:
-    """What is known of the vehicle of a scenario; None where its plant is no vehicle."""
+    """Facts of the vehicle of a scenario; None where its plant is not a vehicle."""
     vehicle = getattr(built.closed_loop.plant, "vehicle", None)
     if not isinstance(vehicle, Vehicle):
         return None
@@ -16,9 +16,9 @@ def vehicle_facts(built: Built) -> Facts | None:
 
 
 def vehicle_warnings(built: Built) -> tuple[str, ...]:
-    """A sentence for each thing that no vehicle can be, and for a weight that is not that of its mass.
+    """A sentence for each impossible property, and for a weight that is not that of the mass.
 
-    The latter is what comes of changing the mass alone, in a scenario or from trial to trial.
+    The latter results from changing the mass only, in a scenario or from trial to trial.
     """
     facts = vehicle_facts(built)
     findings = () if facts is None else lint(facts)

@@ -1,4 +1,4 @@
-"""Controllers: they know a model, never the plant."""
+"""Controllers. They use a nominal model, never the plant."""
 
 from undertow.controllers.composite_law import RCAF as RCAF
 from undertow.core.catalogue import publish

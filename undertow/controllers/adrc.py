@@ -1,4 +1,4 @@
-"""Active disturbance rejection: a linear extended-state observer and state feedback, the standard linear rival."""
+"""Active disturbance rejection: a linear extended-state observer and state feedback."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ PerAxis = Float[Array, " n"]
 
 
 class ObserverState(NamedTuple):
-    """State z: what the observer believes."""
+    """State z: the estimates of the observer."""
 
     rates: PerAxis  # m/s, rad/s
     estimate: PerAxis  # d_hat, m/s^2, rad/s^2
@@ -26,8 +26,8 @@ class ObserverState(NamedTuple):
 class ADRC(AbstractInformedController):
     """v_hat_dot = F + G u + d_hat - 2 zeta w_o eps and d_hat_dot = -w_o^2 eps, with eps = v_hat - v, by Euler's method.
 
-    The input gives x_ddot_d + k_1 e + k_2 e_dot - d_hat. With the input that was applied in the observer, limits cause
-    no windup.
+    The input gives x_ddot_d + k_1 e + k_2 e_dot - d_hat. The observer uses the applied input, so limits cause no
+    windup.
 
     Raises:
         BadInput: bandwidth or damping not positive, or feedback not Hurwitz.
@@ -35,7 +35,7 @@ class ADRC(AbstractInformedController):
 
     model: Model
     bandwidth: Float[Array, "..."] = param("rad/s", "natural frequency of the observer", symbol="w_o")
-    damping: Float[Array, "..."] = param("", "its damping ratio", symbol="zeta")
+    damping: Float[Array, "..."] = param("", "damping ratio of the observer", symbol="zeta")
     feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
 
     def __check_init__(self):
@@ -56,7 +56,7 @@ class ADRC(AbstractInformedController):
         return input_for(model.actuators, forces), signals
 
     def known_acceleration(self, z, y: Measurement, u_applied) -> PerAxis:
-        """F + G f, with actuators that follow at once."""
+        """F + G f, with actuators without lag."""
         dynamics, _, actuators = self.model
         return dynamics.drift(y) + matvec(dynamics.gain(y), force_of(actuators, u_applied))
 
@@ -76,9 +76,9 @@ def adrc(model: Model, *, bandwidth=20.0, damping=1.0, feedback=(1.0, 2.0)) -> A
     """Active disturbance rejection control (ADRC): Han (2009), with the bandwidths of Gao (2003). Body axes.
 
     Args:
-        model: what the controller may know, from `plant.model()`.
+        model: nominal model, from `plant.model()`.
         bandwidth: natural frequency of the extended-state observer, rad/s; one number or one per axis. Below half of
-            the sampling rate, and slower than the actuators.
+            the sampling rate and the bandwidth of the actuators.
         damping: its damping ratio; one number or one per axis.
         feedback: K = (k1, k2), 1/s^2 and 1/s; one pair or one per axis.
 

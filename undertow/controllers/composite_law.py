@@ -1,4 +1,4 @@
-"""The law: robust composite adaptive fuzzy control (RCAFC), and RAFC as its case gamma_eps = 0.
+"""The paper's law: robust composite adaptive fuzzy control (RCAFC), and RAFC as its case gamma_eps = 0.
 
 Eqs. (18)-(29), (39)-(44) and (61).
 """
@@ -27,10 +27,10 @@ from undertow.numerics.smoothing import SWITCHES, switch
 def projected_rate(
     value: Float[Array, "..."], rate: Float[Array, "..."], bound: Float[Array, "..."]
 ) -> Float[Array, "..."]:
-    """`rate`, but zero where `value` stands at +-bound and would leave.
+    """`rate`, but zero where `value` is at +-bound and would leave.
 
-    What is left out never points towards a point inside the box, so the distance to any such point falls at
-    least as fast as without.
+    The removed part never points into the box, so the distance to any point inside falls at least as fast as without
+    projection.
     """
     leaving = (jnp.abs(value) >= bound) & (value * rate > 0)
     return jnp.where(leaving, 0.0, rate)
@@ -60,7 +60,7 @@ class RCAFState(NamedTuple):
 
 
 class RCAF(AbstractContinuousController):
-    """The law. Gains are one number for all axes or one per axis; `feedback` (2,) or (n, 2), `weight` likewise.
+    """The paper's law. Gains are one number for all axes or one per axis; `feedback` (2,) or (n, 2), `weight` likewise.
 
     Raises:
         BadInput: a gain of the wrong sign, feedback not Hurwitz, weight not positive definite, or a fuzzy
@@ -125,15 +125,15 @@ class RCAF(AbstractContinuousController):
         eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
         u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
-        wanted = -dynamics.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
-        u = dynamics.invert(y, wanted)
+        desired = -dynamics.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
+        u = dynamics.invert(y, desired)
         signals = {
             "estimate": d_hat,
             "robust_term": u_r,
             "modelling_error": eps,
             "predicted_position": z.predicted_position,
             "predicted_velocity": z.predicted_velocity,
-            "attained_share": share_given(wanted, matvec(dynamics.gain(y), u)),
+            "attained_share": share_given(desired, matvec(dynamics.gain(y), u)),
         }
         signals |= lyapunov_signals(off, self.lyapunov(), self.weight)
         return u, signals | weight_signals(z.weights, self.weights_bound)
@@ -157,7 +157,7 @@ class RCAF(AbstractContinuousController):
         )
 
     def project(self, z: RCAFState) -> RCAFState:
-        """Weights back inside their box: |d_hat| stays below `weights_bound`, and no weight drifts away."""
+        """Weights projected into their box: |d_hat| stays below `weights_bound`, and weights cannot drift away."""
         return z._replace(weights=jnp.clip(z.weights, -self._box(), self._box()))
 
     def signals(self):
@@ -168,13 +168,13 @@ class RCAF(AbstractContinuousController):
         return companion_lyapunov(self.feedback, self.weight)
 
     def _box(self) -> Float[Array, "..."]:
-        """theta_max, shaped to stand beside theta."""
+        """theta_max, shaped to broadcast with theta."""
         return self.weights_bound[..., None]
 
     def _tracking(self, y: Measurement, r: Target) -> Tracking:
         return tracking(self.model.coordinates, self.lyapunov(), y, r)
 
     def _basis(self, eps: PerAxis, y: Measurement) -> Float[Array, "n rules"]:
-        """xi of the chosen input: eps (the paper's), or (x_i, x_i_dot) (what Table 2 compares it with)."""
+        """xi of the chosen input: eps (the paper's), or (x_i, x_i_dot) (for the comparison of Table 2)."""
         inputs = eps[:, None] if self.fuzzy_input == "error" else jnp.stack([y.position, y.velocity], -1)
         return self.fuzzy.basis(inputs)

@@ -1,4 +1,4 @@
-"""Incremental nonlinear dynamic inversion (INDI): the input changes by what the acceleration lacks."""
+"""Incremental nonlinear dynamic inversion (INDI): the input changes by the error of the acceleration."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ PerAxis = Float[Array, " n"]
 
 
 class FilterState(NamedTuple):
-    """State z: the filter H of the velocity, and of what was known of the acceleration; SI units."""
+    """State z: the filters H of the velocity and of the modelled acceleration; SI units."""
 
     velocity: PerAxis
     acceleration: PerAxis  # its derivative
@@ -37,7 +37,7 @@ class INDI(AbstractInformedController):
 
     model: Model
     bandwidth: Float[Array, "..."] = param("rad/s", "natural frequency of the filter", symbol="w")
-    damping: Float[Array, "..."] = param("", "its damping ratio", symbol="zeta")
+    damping: Float[Array, "..."] = param("", "damping ratio of the filter", symbol="zeta")
     feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
 
     def __check_init__(self):
@@ -59,7 +59,7 @@ class INDI(AbstractInformedController):
         return input_for(model.actuators, forces), signals
 
     def known_acceleration(self, z, y: Measurement, u_applied) -> PerAxis:
-        """F + G f, with actuators that follow at once."""
+        """F + G f, with actuators without lag."""
         dynamics, _, actuators = self.model
         return dynamics.drift(y) + matvec(dynamics.gain(y), force_of(actuators, u_applied))
 
@@ -81,9 +81,9 @@ def indi(model: Model, *, bandwidth=20.0, damping=1.0, feedback=(1.0, 2.0)) -> I
     """Incremental nonlinear dynamic inversion: Sieberling, Chu and Mulder (2010), Smeur et al. (2016). Body axes.
 
     Args:
-        model: what the controller may know, from `plant.model()`.
+        model: nominal model, from `plant.model()`.
         bandwidth: natural frequency of the filter of velocity and input, rad/s; one number or one per axis. Below half
-            of the sampling rate, and slower than the actuators.
+            of the sampling rate and the bandwidth of the actuators.
         damping: its damping ratio; one number or one per axis.
         feedback: K = (k1, k2), 1/s^2 and 1/s; one pair or one per axis.
 

@@ -1,4 +1,4 @@
-"""PID control as a marine engineer would set it up: the baseline that other laws have to beat."""
+"""PID control as marine engineers design it: the baseline of comparisons."""
 
 from typing import Any, NamedTuple
 
@@ -27,17 +27,17 @@ MOTORS = ("steady", "computed")
 class PIDState(NamedTuple):
     """State z of the law."""
 
-    integral: PerAxis  # what the integral asks for, m/s^2, rad/s^2
-    actuators: Any  # what is believed of the actuators
+    integral: PerAxis  # acceleration of the integral, m/s^2, rad/s^2
+    actuators: Any  # estimated state of the actuators
     filter: FilterState | None
 
 
 class Plan(NamedTuple):
-    """All that is decided at one instant."""
+    """Decisions of one instant."""
 
     actuators: Any
     error: PerAxis  # m, rad
-    forces: Float[Array, " m"]  # that would give what is wanted
+    forces: Float[Array, " m"]  # for the desired acceleration, without limits
 
 
 class PID(AbstractInformedController):
@@ -50,10 +50,10 @@ class PID(AbstractInformedController):
     model: Model
     filter: ReferenceFilter | None
     proportional: Float[Array, "..."] = param("1/s^2", "acceleration per error", symbol="k_p")
-    integral: Float[Array, "..."] = param("1/s^3", "its rate per error", symbol="k_i")
+    integral: Float[Array, "..."] = param("1/s^3", "rate of the acceleration per error", symbol="k_i")
     derivative: Float[Array, "..."] = param("1/s", "acceleration per error of the rates", symbol="k_d")
-    actuator_rate: Float[Array, ""] = param("1/s", "how fast actuators are made to follow", symbol="lambda")
-    direction: Float[Array, ""] = param("", "what departing from the wanted direction costs beside losing size")
+    actuator_rate: Float[Array, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda")
+    direction: Float[Array, ""] = param("", "cost of a departure from the desired direction relative to a loss of size")
     feedforward: bool = eqx.field(static=True, default=True)
     motor: str = eqx.field(static=True, default="steady")
 
@@ -80,7 +80,7 @@ class PID(AbstractInformedController):
         return actuators.command(plan.actuators, forces, self.actuator_rate), signals
 
     def advance(self, z: PIDState, y: Measurement, r: Target, u_applied, dt) -> PIDState:
-        """What limits take away is taken from the integral, too: back-calculation, Astrom and Murray (2008), 10.4.
+        """Anti-windup of the integral by back-calculation, Astrom and Murray (2008), 10.4.
 
         Its time constant is the geometric mean of those of integral and derivative, or one step where that is longer.
         """
@@ -135,27 +135,26 @@ def pid(
     actuator_rate=None,
     direction=1.0,
 ) -> PID:
-    """PID with acceleration as its output: pole placement, Fossen (2021), ch. 15. Body axes and quaternions.
+    """PID with acceleration as output, by pole placement, Fossen (2021), ch. 15. Body axes and quaternions.
 
     Args:
-        model: what the controller may know, from `plant.model()`.
-        sampling_time: of the loop, s; a scenario gives it.
+        model: nominal model, from `plant.model()`.
+        sampling_time: that of the loop, s; a scenario sets it.
         velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario's sensor gives it.
-        load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s); counts where there is noise only.
-        delay: of measurement and input together, s.
+            or one per axis; a scenario sets it from its navigation.
+        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
+        delay: that of measurement and input together, s.
         frequency: natural frequency w of the closed loop without its integral, rad/s; one number or one per axis. None:
-            by the rule of preset `robust`, the one of least predicted cost that keeps the margins of
-            `controllers/bandwidths.py`.
-        damping: its damping ratio.
+            as in preset `robust`, the one of least predicted cost that keeps the margins of `bandwidths.py`.
+        damping: damping ratio of the closed loop without its integral.
         integral_share: k_i = share w k_p with k_p = w^2; a tenth is Fossen's. 0 for PD.
         gains: (k_p, k_i, k_d) instead of these three, 1/s^2, 1/s^3 and 1/s; one triple or one per axis.
-        feedforward: whether weight, buoyancy, drag and whatever else the model knows are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is made up for.
-        reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of the natural
-            frequency, 2 at most; 0 for no filter.
-        actuator_rate: with motor = computed, how fast it is made to follow, 1/s; None: 0.15 per sampling time.
-        direction: what departing from the wanted direction costs, where limits bind, beside losing size.
+        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
+        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: half of the natural frequency, 2 at
+            most; 0 for no filter.
+        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
+        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.

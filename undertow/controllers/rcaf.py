@@ -1,4 +1,4 @@
-"""The controller, ready to use: a preset of the robust composite adaptive fuzzy law, and what is chosen differently."""
+"""The robust composite adaptive fuzzy controller: a preset and changed options."""
 
 from typing import Any
 
@@ -15,9 +15,9 @@ def rcaf(model: Model, *, preset: str = "paper", **options: Any) -> AbstractCont
     """Robust composite adaptive fuzzy controller.
 
     Args:
-        model: what the controller may know, from `plant.model()`.
-        preset: `paper`, every default of which is Table 1, or `robust`, the sound version for real vehicles.
-        options: of the preset; see `undertow.controllers.presets`.
+        model: nominal model, from `plant.model()`.
+        preset: `paper`, with the defaults of Table 1, or `robust`, the robust variant for real vehicles.
+        options: those of the preset; see `undertow.controllers.presets`.
 
     Raises:
         BadInput: no such preset, or a value is out of its range.

@@ -22,8 +22,8 @@ class RobustModification(eqx.Module):
     """
 
     leakage: Float[Array, "..."] = param("", "of the sigma-modification", symbol="kappa")
-    e_modification: Float[Array, "..."] = param("s/m, s/rad", "factor of |eps| beside it", symbol="nu")
-    dead_zone: Float[Array, "..."] = param("m/s, rad/s", "largest |eps| that is taken for noise")
+    e_modification: Float[Array, "..."] = param("s/m, s/rad", "factor of |eps|", symbol="nu")
+    dead_zone: Float[Array, "..."] = param("m/s, rad/s", "largest |eps| that is treated as noise")
 
     def __check_init__(self):
         for name in ("leakage", "e_modification", "dead_zone"):
@@ -46,7 +46,7 @@ class RobustModification(eqx.Module):
 
 
 def modification_of(leakage, e_modification, dead_zone) -> RobustModification | None:
-    """One with these values; None, which costs nothing, where all of them are zero."""
+    """Modification with these values; None, which costs nothing, where all of them are zero."""
     values = (leakage, e_modification, dead_zone)
     if not any(isinstance(value, Tracer) or np.any(np.asarray(value) != 0) for value in values):
         return None

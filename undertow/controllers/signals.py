@@ -1,4 +1,4 @@
-"""Signals that several laws have, and how a law computes those of its own Lyapunov function."""
+"""Signals of several laws, and those of the Lyapunov function."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -17,11 +17,11 @@ WEIGHTS = {
     "weights": Signal(("axis", "rule"), "[axis]/s^2", "weights theta of the fuzzy rules"),
     "weights_peak": Signal((), "[axis]/s^2", "largest |theta|"),
     "weights_at_bound": Signal((), "1", "share of the weights at +-theta_max: projection active"),
-    "weights_spread": Signal((), "[axis]/s^2", "largest difference between weights of one axis: drift shows here"),
+    "weights_spread": Signal((), "[axis]/s^2", "largest difference between weights of one axis, a measure of drift"),
 }
 LYAPUNOV = {
     "lyapunov_tracking": Signal((), "[axis]^2/s^2", "tracking part of the Lyapunov function, 1/2 E^T P E"),
-    "lyapunov_decay": Signal((), "[axis]^2/s^3", "rate at which feedback takes from it, 1/2 E^T Q E"),
+    "lyapunov_decay": Signal((), "[axis]^2/s^3", "decay of the Lyapunov function by feedback, 1/2 E^T Q E"),
 }
 ATTAINED_SHARE = {"attained_share": Signal((), "1", "share of the desired acceleration that the command can give")}
 ADAPTIVE_LAW = ESTIMATE | ROBUST_TERM | MODELLING_ERROR | WEIGHTS | LYAPUNOV | ATTAINED_SHARE
@@ -30,12 +30,12 @@ ADAPTIVE_LAW = ESTIMATE | ROBUST_TERM | MODELLING_ERROR | WEIGHTS | LYAPUNOV | A
 def lyapunov_signals(
     off: Tracking, lyapunov: Float[Array, "*n 2 2"], weight: Float[Array, "*n 2 2"]
 ) -> dict[str, Scalar]:
-    """1/2 E^T P E of Eq. (46) and 1/2 E^T Q E of Eq. (58), E as the law sees it, summed over axes."""
+    """1/2 E^T P E of Eq. (46) and 1/2 E^T Q E of Eq. (58), with the law's own E, summed over axes."""
     return {"lyapunov_tracking": _half(off, lyapunov), "lyapunov_decay": _half(off, weight)}
 
 
 def weight_signals(weights: Float[Array, "n rules"], bound: Float[Array, "..."]) -> dict[str, Array]:
-    """Weights theta, their largest size, the share at +-bound (one number or one per axis), how far they are apart."""
+    """Weights theta, their largest size, their share at +-bound (one number or one per axis) and their spread."""
     at_bound = jnp.abs(weights) >= jnp.broadcast_to(bound, weights.shape[:1])[:, None]
     return {
         "weights": weights,
@@ -45,10 +45,10 @@ def weight_signals(weights: Float[Array, "n rules"], bound: Float[Array, "..."])
     }
 
 
-def share_given(wanted: PerAxis, given: PerAxis) -> Scalar:
-    """Share of a wanted acceleration that another one gives, along its direction, 0 to 1; 1 where nothing is wanted."""
-    size = (wanted**2).sum()
-    share = (wanted * given).sum() / jnp.where(size > 0, size, 1.0)
+def share_given(desired: PerAxis, given: PerAxis) -> Scalar:
+    """Share of a desired acceleration that another one gives, along its direction, 0 to 1; 1 where none is desired."""
+    size = (desired**2).sum()
+    share = (desired * given).sum() / jnp.where(size > 0, size, 1.0)
     return jnp.where(size > 0, jnp.clip(share, 0.0, 1.0), 1.0)
 
 

@@ -1,4 +1,4 @@
-"""How far the plant is from its target, in the coordinates of the law, and the filtered error s."""
+"""Tracking error in the coordinates of the law, and the filtered error s."""
 
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ Matrices = Float[Array, "*n 2 2"]
 
 
 class Tracking(NamedTuple):
-    """E of Eq. (19), and what follows from it."""
+    """E of Eq. (19), the filtered error and the acceleration of the target."""
 
     error: PerAxis  # e, m, rad
     rate: PerAxis  # m/s, rad/s
@@ -32,13 +32,13 @@ def tracking(coordinates: AbstractCoordinates, lyapunov: Matrices, y: Measuremen
 
 
 def demanded_acceleration(coordinates: AbstractCoordinates, gains: Feedback, y: Measurement, r: Target) -> PerAxis:
-    """x_ddot_d + K^T E, m/s^2 and rad/s^2: what state feedback asks for."""
+    """x_ddot_d + K^T E, m/s^2 and rad/s^2: the acceleration that state feedback demands."""
     error, rate, acceleration = coordinates.tracking_error(y, r)
     return acceleration + gains[..., 0] * error + gains[..., 1] * rate
 
 
 def check_gains(feedback: Feedback, weight: Matrices, per_axis: dict[str, Any], axes: int) -> None:
-    """Whether K, Q and other gains fit the axes, and K and Q what Eq. (21) asks of them.
+    """Check that K, Q and other gains fit the axes, and that K and Q satisfy Eq. (21).
 
     Raises:
         BadInput: one of them does not.

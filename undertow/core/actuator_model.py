@@ -1,4 +1,4 @@
-"""What a controller knows of what stands between its input and the force that moves the plant."""
+"""The controller's model of the actuators, which turn its input into the force that moves the plant."""
 
 import abc
 
@@ -11,15 +11,15 @@ Forces = Float[Array, " m"]
 
 
 class AbstractActuatorModel(eqx.Module):
-    """From input to force and back, with what the controller remembers of it (propeller speeds, for instance)."""
+    """Map from input to force and back, with a state of its own (propeller speeds, for instance)."""
 
     @abc.abstractmethod
     def max_bandwidth(self, sampled: Float[Array, ""]) -> Float[Array, ""]:
-        """Rate, 1/s, at which it can be made to follow where sampling allows `sampled` (1/s)."""
+        """Largest bandwidth of the actuator loop, 1/s, where the sampling time allows `sampled` (1/s)."""
 
     @abc.abstractmethod
     def time_constant(self) -> Float[Array, "..."] | None:
-        """Nominal lag of the force behind the input, s: 0 where it follows at once, None where nobody knows."""
+        """Nominal time constant of the force, s: 0 where it follows the input at once, None where it is unknown."""
 
     @abc.abstractmethod
     def init(self) -> PyTree:
@@ -27,11 +27,11 @@ class AbstractActuatorModel(eqx.Module):
 
     @abc.abstractmethod
     def update_from_report(self, state: PyTree, report: PyTree) -> PyTree:
-        """State with what the actuators report of themselves put into it."""
+        """State corrected by the report of the actuators."""
 
     @abc.abstractmethod
     def range(self, state: PyTree, rate: Float[Array, ""]) -> tuple[Forces, Forces]:
-        """Smallest and largest force that may be asked for without asking for more input than there is."""
+        """Smallest and largest force that can be commanded within the limits of the input."""
 
     @abc.abstractmethod
     def force(self, state: PyTree, u: Inputs) -> Forces:
@@ -39,19 +39,19 @@ class AbstractActuatorModel(eqx.Module):
 
     @abc.abstractmethod
     def command(self, state: PyTree, force: Forces, rate: Float[Array, ""]) -> Inputs:
-        """Input that brings the force to a wanted one, as fast as `rate` (1/s) where it cannot be at once."""
+        """Input that brings the force to a desired one, at `rate` (1/s) where it cannot follow at once."""
 
     @abc.abstractmethod
     def target_of(self, state: PyTree, u: Inputs, rate: Float[Array, ""]) -> Forces:
-        """Force that an input is on its way to: `command` solved."""
+        """Force towards which an input drives the actuators: the inverse of `command`."""
 
     @abc.abstractmethod
     def advance(self, state: PyTree, u: Inputs, dt: Float[Array, ""]) -> PyTree:
-        """State after a sampling time with an input held."""
+        """State one sampling time later, with the input held."""
 
     @abc.abstractmethod
     def quasi_static(self) -> "AbstractActuatorModel":
-        """The same actuators taken for ones that follow at once."""
+        """The same actuators without their dynamics: the force follows the input at once."""
 
 
 class DirectActuator(AbstractActuatorModel):
@@ -94,9 +94,9 @@ class DirectActuator(AbstractActuatorModel):
 
 
 class LaggedActuator(AbstractActuatorModel):
-    """Actuators whose force follows that of a steady curve with a first-order lag: tau f_dot + f = f_steady(u).
+    """Actuators whose force follows a steady curve with a first-order lag: tau f_dot + f = f_steady(u).
 
-    The force is that of the same equation, driven by the input that was applied.
+    The force in the state is the solution of this equation for the input that was applied.
     """
 
     curve: AbstractActuatorModel  # without memory
@@ -104,7 +104,7 @@ class LaggedActuator(AbstractActuatorModel):
     count: int = eqx.field(static=True)
 
     def max_bandwidth(self, sampled):
-        return jnp.maximum(sampled, 1 / self.tau)  # no faster than it is by itself costs nothing
+        return jnp.maximum(sampled, 1 / self.tau)  # its own bandwidth costs no extra input
 
     def time_constant(self):
         return self.tau
@@ -116,7 +116,7 @@ class LaggedActuator(AbstractActuatorModel):
         return state
 
     def range(self, state, rate):
-        """Forces towards which the limits of the input drive the force within 1 / rate."""
+        """Forces that the limits of the input allow at `rate`."""
         low, high = (jnp.broadcast_to(limit, (self.count,)) for limit in self.curve.range((), rate))
         lead = self.tau * rate
         limited = jnp.isfinite(low) & jnp.isfinite(high)
@@ -133,7 +133,7 @@ class LaggedActuator(AbstractActuatorModel):
         return state + (self.curve.force((), u) - state) / (self.tau * rate)
 
     def advance(self, state, u, dt):
-        """Exactly, for an input that is held."""
+        """Exact for an input that is held."""
         return state + (self.curve.force((), u) - state) * -jnp.expm1(-dt / self.tau)
 
     def quasi_static(self) -> AbstractActuatorModel:
@@ -141,12 +141,12 @@ class LaggedActuator(AbstractActuatorModel):
 
 
 def input_for(actuators: AbstractActuatorModel, force: Forces) -> Inputs:
-    """Input that holds a force, as if the actuators followed at once."""
+    """Input that holds a force in steady state."""
     held = actuators.quasi_static()
     return held.command(held.init(), force, jnp.ones(()))
 
 
 def force_of(actuators: AbstractActuatorModel, u: Inputs) -> Forces:
-    """Force that an input holds, as if the actuators followed at once."""
+    """Force that an input gives in steady state."""
     held = actuators.quasi_static()
     return held.force(held.init(), u)

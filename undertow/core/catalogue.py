@@ -1,8 +1,8 @@
-"""Finding parts: a vehicle, thruster, plant, controller, ... is one file, and no list names it.
+"""Catalogue of parts: each vehicle, thruster, plant, controller, ... is one file, and there is no list of them.
 
-A module of a part folder whose name is also the name of a callable inside it *is* a part: `vehicles/odin.py`
-with `def odin()`. Parts from elsewhere are named `./my_rov.py:my_rov`, or come as Python entry points of the
-group `undertow.<kind>`.
+A module of a part folder whose name is also the name of a callable inside it is a part: `vehicles/odin.py`
+with `def odin()`. Other parts are named `./my_rov.py:my_rov`, or come as Python entry points of the group
+`undertow.<kind>`.
 """
 
 import functools
@@ -41,7 +41,7 @@ Part = Callable[..., Any]
 
 @functools.cache
 def collect(package: ModuleType) -> dict[str, Part]:
-    """Parts that the modules of a package define, by name; outside of runs they make double precision of numbers."""
+    """Parts that the modules of a package define, by name; outside of a run they are made in double precision."""
     parts = {}
     for info in pkgutil.iter_modules(package.__path__):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
@@ -72,7 +72,7 @@ def names(kind: str) -> dict[str, Part]:
 
 @functools.cache
 def _entry_points(group: str) -> tuple[importlib.metadata.EntryPoint, ...]:
-    # Reads a file of every installed package: too slow to be done for each trial of a campaign.
+    # Cached, because it reads a file of every installed package: too slow for each trial of a campaign.
     return tuple(importlib.metadata.entry_points(group=group))
 
 
@@ -93,7 +93,7 @@ def find(kind: str, name: str, folder: Path | None = None) -> Part:
 
 @functools.lru_cache
 def _module(path: Path, contents: bytes) -> ModuleType:
-    """A file as a module: once for the same contents, as two parts from it must be of the same class."""
+    """A file as a module, loaded once per content, so that two parts from it have the same class."""
     spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
     if spec is None or spec.loader is None:
         raise ImportError("not a Python file")

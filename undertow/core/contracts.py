@@ -32,20 +32,20 @@ class BodyMotion(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """What is measured of a plant: y; the state X of Eq. (18).
+    """Measured outputs y of a plant: the state X of Eq. (18).
 
-    The outputs of a body hold its attitude as Euler angles, a view for people and for the paper's law; `body` is the
-    same pose and velocity without them. `undertow.core.measurement` makes both from either.
+    The outputs of a body hold its attitude as Euler angles, as people and the paper's law use it; `body` holds the
+    same pose and velocity without them. `undertow.core.measurement` converts each into the other.
     """
 
     position: Outputs  # m, rad
     velocity: Outputs  # m/s, rad/s
-    actuator: Any = None  # whatever else the actuators report; None when nothing
+    actuator: Any = None  # report of the actuators; None where there is none
     body: BodyMotion | None = None  # None for a plant that is not a body in space
 
 
 class Target(NamedTuple):
-    """What is wanted of a plant: r (position, velocity, acceleration)."""
+    """Reference r of a plant: desired position, velocity and acceleration."""
 
     position: Outputs
     velocity: Outputs
@@ -53,7 +53,7 @@ class Target(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """Where a body is and how it moves, for loads that depend on it. World axes north, east, down."""
+    """Position, attitude and velocity of a body, for loads that depend on them. World axes north, east, down."""
 
     position: Float[Array, "3"]  # m
     rotation: Float[Array, "3 3"]  # body -> world
@@ -61,23 +61,23 @@ class Pose(NamedTuple):
 
 
 class Water(NamedTuple):
-    """How the water moves where the body is, as if the body were not there. World axes."""
+    """Undisturbed motion of the water at the position of the body. World axes."""
 
     velocity: Float[Array, "3"]  # m/s
     acceleration: Float[Array, "3"]  # m/s^2
 
 
 class ModelScaling(NamedTuple):
-    """By how much the true body differs from the one the controller was told: factors, 1 for not at all."""
+    """Factors of the true body relative to the nominal model; 1 for no mismatch."""
 
     mass: Float[Array, ""]  # on M, and with it on C
     damping: Float[Array, ""]  # on D
     restoring: Float[Array, ""]  # on g
-    thrust: Float[Array, ""]  # on what every thruster gives
+    thrust: Float[Array, ""]  # on the thrust of every thruster
 
 
 class Payload(NamedTuple):
-    """A point mass carried along."""
+    """A point mass that the body carries."""
 
     mass: Float[Array, ""]  # kg
     weight: Float[Array, ""]  # N, in water
@@ -85,7 +85,7 @@ class Payload(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What the surroundings do to a plant. Loads add; None and () stand for nothing and cost nothing."""
+    """Effect of the environment on a plant. Loads add; None and () stand for no load and cost no computation."""
 
     acceleration: Outputs  # lumped, added to x_ddot; m/s^2, rad/s^2
     wrench: Outputs  # w_d of Eq. (2), on the left side: it opposes; N, N m (body axes for a vehicle)
@@ -95,16 +95,16 @@ class Load(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """What driving the actuators costs."""
+    """Cost of driving the actuators."""
 
-    power: Inputs  # electrical power drawn, W
+    power: Inputs  # electrical power, W
     saturated: Inputs  # 1 where an input is at its limit, else 0
 
 
 class AbstractDynamics(eqx.Module):
-    """What a controller may know of how a plant moves: F and G of x_ddot = F + G f + d. Eq. (17).
+    """Nominal dynamics of a plant: F and G of x_ddot = F + G f + d. Eq. (17).
 
-    x_ddot stands for the rate of the velocity of the coordinates, and f for what the actuators give; where these are
+    x_ddot is the rate of the velocity in the coordinates, and f the force of the actuators; where these are
     a `DirectActuator` of gain 1, f is the input u.
     """
 
@@ -118,11 +118,11 @@ class AbstractDynamics(eqx.Module):
 
     @abc.abstractmethod
     def invert(self, y: Measurement, acceleration: Outputs) -> Forces:
-        """Smallest f with G f = acceleration as nearly as the plant allows: G# of Eqs. (22)-(27)."""
+        """Smallest f that gives the acceleration, or the nearest to it: G# of Eqs. (22)-(27)."""
 
 
 class TrackingError(NamedTuple):
-    """How far a plant is from its target, in the coordinates of a law: E of Eq. (19), and what the target does."""
+    """Tracking error in the coordinates of a law, E of Eq. (19), and the acceleration of the target."""
 
     error: Outputs  # e, m, rad
     rate: Outputs  # velocity of the target less that of the plant, m/s, rad/s
@@ -130,10 +130,10 @@ class TrackingError(NamedTuple):
 
 
 class AbstractCoordinates(eqx.Module):
-    """In what a law compares a plant with its target: the outputs themselves, or axes that turn with a body."""
+    """Coordinates in which a law computes the tracking error: the outputs themselves, or body axes."""
 
-    angles: eqx.AbstractVar[tuple[bool, ...]]  # which outputs are angles, to be compared modulo 2 pi
-    tolerated_status: eqx.AbstractVar[tuple[Status, ...]]  # of the plant, under which a run goes on
+    angles: eqx.AbstractVar[tuple[bool, ...]]  # which outputs are angles, compared modulo 2 pi
+    tolerated_status: eqx.AbstractVar[tuple[Status, ...]]  # of the plant, with which a run continues
 
     @abc.abstractmethod
     def measurement(self, position: Outputs, velocity: Outputs, actuator: Any = None) -> Measurement:
@@ -141,7 +141,7 @@ class AbstractCoordinates(eqx.Module):
 
     @abc.abstractmethod
     def tracking_error(self, y: Measurement, r: Target) -> TrackingError:
-        """Errors, the short way round where they are angles."""
+        """Tracking errors; those of angles in [-pi, pi)."""
 
     @abc.abstractmethod
     def velocity(self, y: Measurement) -> Outputs:
@@ -149,32 +149,32 @@ class AbstractCoordinates(eqx.Module):
 
     @abc.abstractmethod
     def acceleration(self, y: Measurement, acceleration: Outputs) -> Outputs:
-        """Rate of `velocity` for a second derivative of the outputs."""
+        """Rate of `velocity` that belongs to a second derivative of the outputs."""
 
     @abc.abstractmethod
     def output_velocity(self, y: Measurement, velocity: Outputs) -> Outputs:
-        """Velocity of the outputs for one in these coordinates, or any small motion likewise."""
+        """Velocity of the outputs that belongs to a velocity, or any small motion, in these coordinates."""
 
     @abc.abstractmethod
     def in_body_axes(self, dynamics: Any) -> "Model | None":
-        """What is known as `dynamics` in body axes; None where there are no better coordinates than these."""
+        """Model with `dynamics` expressed in body axes; None for a plant that has none."""
 
     def difference(self, target: Outputs, actual: Outputs) -> Outputs:
-        """target - actual of outputs, angles the short way round."""
+        """target - actual of outputs; differences of angles in [-pi, pi)."""
         turn = 2 * jnp.pi * jnp.asarray(self.angles, dtype=float)
         raw = target - actual
         return raw - turn * jnp.round(raw / (2 * jnp.pi))
 
 
 class Model(NamedTuple):
-    """What a controller is told of a plant: how it moves, in which coordinates, and what moves it."""
+    """Nominal model of a plant, as the controller uses it: dynamics, coordinates and actuators."""
 
     dynamics: AbstractDynamics
     coordinates: AbstractCoordinates
     actuators: AbstractActuatorModel
 
     def in_body_axes(self) -> "Model":
-        """The same knowledge in the coordinates that suit the plant best; itself where there are no better ones."""
+        """The same model in body axes; itself where the plant has none."""
         return self.coordinates.in_body_axes(self.dynamics) or self
 
 
@@ -187,7 +187,7 @@ class AbstractPlant(eqx.Module):
 
     def __init_subclass__(cls, **options: Any):
         super().__init_subclass__(**options)
-        if "model" in vars(cls):  # its numbers are made where a plant's own are, before any run
+        if "model" in vars(cls):  # its numbers are made before any run, as those of the plant are
             cls.model = double_outside_runs(cls.model)
 
     @abc.abstractmethod
@@ -200,7 +200,7 @@ class AbstractPlant(eqx.Module):
 
     @abc.abstractmethod
     def output(self, t: Time, x: PyTree) -> Measurement:
-        """y, without error."""
+        """y without measurement error."""
 
     @abc.abstractmethod
     def acceleration(self, t: Time, x: PyTree, u: Inputs, d: Load) -> Outputs:
@@ -208,15 +208,15 @@ class AbstractPlant(eqx.Module):
 
     @abc.abstractmethod
     def pose(self, x: PyTree) -> Pose | None:
-        """Where the body is; None for plants that are not bodies in water."""
+        """Pose of the body; None for plants that are not bodies in water."""
 
     @abc.abstractmethod
     def admissible(self, x: PyTree, u: Inputs) -> Inputs:
-        """What reaches the actuators when u is commanded in state x (limits)."""
+        """Input that is applied when u is commanded in state x (limits)."""
 
     @abc.abstractmethod
     def effort(self, x: PyTree, u: Inputs) -> Effort:
-        """What applying u costs."""
+        """Cost of applying u."""
 
     @abc.abstractmethod
     def inputs(self) -> int:
@@ -224,15 +224,15 @@ class AbstractPlant(eqx.Module):
 
     @abc.abstractmethod
     def status(self, x: PyTree) -> Array:
-        """Status code of a state; `Status.OK` as long as it means anything."""
+        """Status code of a state; `Status.OK` while the state is valid."""
 
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:
-        """What a user should know before running this plant; each with the numbers that caused it."""
+        """Advice before this plant is run, each sentence with the numbers that caused it."""
 
     @abc.abstractmethod
     def model(self) -> Model:
-        """What a controller is told of this plant; keyword arguments with defaults are the scenario's `model`."""
+        """Nominal model for the controller; keyword arguments with defaults are the scenario's `model`."""
 
     @abc.abstractmethod
     def diagnostics(self, x: PyTree, u: Inputs) -> dict[str, Array]:
@@ -240,16 +240,16 @@ class AbstractPlant(eqx.Module):
 
     @abc.abstractmethod
     def signals(self) -> dict[str, Signal]:
-        """What is recorded of this plant alone, by name: each entry of `diagnostics`; {} for nothing."""
+        """Declarations of the signals of `diagnostics`, by name; {} for none."""
 
     def no_load(self) -> Load:
-        """Load of load surroundings."""
+        """Load where the environment does not act."""
         zero = jnp.zeros(len(self.outputs))
         return Load(zero, zero)
 
 
 class AbstractController(eqx.Module):
-    """A law. `command` before `advance`: the input leaves first, and adaptation sees what was applied."""
+    """A control law. `command` comes before `advance`, so that adaptation uses the input that was applied."""
 
     model: eqx.AbstractVar[Model]
 
@@ -259,9 +259,9 @@ class AbstractController(eqx.Module):
 
     @abc.abstractmethod
     def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
-        """Input u, and the values of the declared signals by name. Nothing of them is carried.
+        """Input u, and the values of the declared signals by name, which are recorded only.
 
-        A signal `estimate` is what the law believes of d; it is used where a reading is no number.
+        A signal `estimate` is the law's estimate of d; it is used where a reading is not finite.
         """
 
     @abc.abstractmethod
@@ -270,26 +270,26 @@ class AbstractController(eqx.Module):
 
     @abc.abstractmethod
     def signals(self) -> dict[str, Signal]:
-        """What `command` lets one look at, by name; {} for nothing."""
+        """Declarations of the signals of `command`, by name; {} for none."""
 
 
 class AbstractInformedController(AbstractController):
-    """A law that knows more of the acceleration than F + G u, such as what its motors do."""
+    """A law that models more of the acceleration than F + G u, such as the dynamics of its motors."""
 
     @abc.abstractmethod
     def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
-        """What the law takes for granted of the acceleration; d is all the rest."""
+        """The acceleration that the law models; d is the rest."""
 
 
 def known_acceleration(law: AbstractController, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
-    """What a law takes for granted of the acceleration: F + G u, unless it says otherwise."""
+    """The acceleration that a law models: F + G u unless it defines its own."""
     if isinstance(law, AbstractInformedController):
         return law.known_acceleration(z, y, u_applied)
     return law.model.dynamics.drift(y) + matvec(law.model.dynamics.gain(y), u_applied)
 
 
 class AbstractDisturbance(eqx.Module):
-    """A load drawn once from a key; afterwards a function of time."""
+    """A load that is sampled once from a key and is a function of time afterwards."""
 
     @abc.abstractmethod
     def realize(self, key: PRNGKeyArray) -> PyTree:
@@ -297,23 +297,23 @@ class AbstractDisturbance(eqx.Module):
 
     @abc.abstractmethod
     def at(self, realization: PyTree, t: Time, pose: Pose | None, load: Load) -> Load:
-        """`load`, which is what the surroundings do without this disturbance, with it added, at time t."""
+        """The load with this disturbance added to `load`, that of the others, at time t."""
 
     @abc.abstractmethod
     def jumps(self, duration: float) -> tuple[float, ...]:
-        """Times in (0, duration) at which the load is not smooth."""
+        """Times in (0, duration), s, at which the load is not smooth."""
 
 
 class AbstractReference(eqx.Module):
-    """What to follow."""
+    """Desired motion as a function of time."""
 
     @abc.abstractmethod
     def at(self, t: Time) -> Target:
-        """Wanted position, velocity and acceleration at time t."""
+        """Desired position, velocity and acceleration at time t."""
 
 
 class AbstractOpenReference(AbstractReference):
-    """A reference that leaves open where it begins."""
+    """A reference whose start is not given."""
 
     @abc.abstractmethod
     def starting_at(self, position: Outputs) -> AbstractReference:
@@ -321,14 +321,14 @@ class AbstractOpenReference(AbstractReference):
 
 
 def starting_at(reference: AbstractReference, position: Outputs) -> AbstractReference:
-    """A reference for a plant that starts at a position; itself unless it leaves open where it begins."""
+    """A reference for a plant that starts at a position; itself unless its start is not given."""
     return reference.starting_at(position) if isinstance(reference, AbstractOpenReference) else reference
 
 
 class AbstractNavigation(eqx.Module):
-    """What stands between the truth and the measurement."""
+    """Navigation filter: it makes the measurement from the true state."""
 
-    smooth: eqx.AbstractVar[bool]  # whether it has no memory and changes smoothly with the truth, as one ODE needs
+    smooth: eqx.AbstractVar[bool]  # no memory, and smooth in the true state, as one ODE needs
 
     @abc.abstractmethod
     def realize(self, key: PRNGKeyArray) -> PyTree:
@@ -336,23 +336,23 @@ class AbstractNavigation(eqx.Module):
 
     @abc.abstractmethod
     def init(self, realization: PyTree, truth: Measurement) -> PyTree:
-        """State at t = 0: what it remembers; () for nothing."""
+        """State at t = 0; () for a filter without memory."""
 
     @abc.abstractmethod
     def measure(self, realization: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
-        """Measurement at time t, and the state after it."""
+        """Measurement at time t and the state after it."""
 
 
 class AbstractInformedNavigation(AbstractNavigation):
-    """A navigation filter that knows how noisy it is, and which readings it left out."""
+    """A navigation filter that reports its noise and the readings that it ignored."""
 
     @abc.abstractmethod
     def velocity_noise(self, dt: float) -> Array:
-        """What a law is told of it: standard deviation of white noise, new at every step of dt (s), on velocities.
+        """Nominal standard deviation of white noise on the velocities, new at every step of dt (s).
 
-        One number or one per output, m/s and rad/s; zero where nothing is known.
+        One number or one per output, m/s and rad/s; zero where it is unknown.
         """
 
     @abc.abstractmethod
     def ignored(self, state: PyTree) -> Int[Array, ""]:
-        """Readings so far that were no numbers, and that it has left out."""
+        """Number of readings so far that were ignored because they were not finite."""

@@ -1,4 +1,4 @@
-"""Coordinates of laws: the outputs of a plant as they are, whether or not some of them are the angles of a body."""
+"""Coordinates of laws that are the outputs of a plant themselves, Euler angles of a body included."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ class AbstractOutputCoordinates(AbstractCoordinates):
 
 
 class OutputCoordinates(AbstractOutputCoordinates):
-    """Of a plant that is not a body in space; there are no better ones."""
+    """Outputs of a plant that is not a body in space; there are no body axes."""
 
     angles: tuple[bool, ...] = eqx.field(static=True)
     tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=())

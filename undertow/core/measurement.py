@@ -1,4 +1,4 @@
-"""Measurements of a body, from its pose or from its outputs; either way outputs and pose say the same."""
+"""Measurements of a body, made from its pose or from its outputs; both are consistent."""
 
 from typing import Any
 
@@ -20,14 +20,14 @@ Vector6 = Float[Array, "6"]
 def measurement_of_pose(
     position: Float[Array, "3"], attitude: Float[Array, "4"], nu: Vector6, actuator: Any = None
 ) -> Measurement:
-    """Of a body from its position (m), unit quaternion (body -> world) and velocity in body axes (m/s, rad/s)."""
+    """Measurement of a body from position (m), unit quaternion (body -> world) and velocity (body axes, m/s, rad/s)."""
     rotation = rotation_from_quaternion(attitude)
     outputs = jnp.concatenate([position, euler_from_rotation(rotation)])
     return Measurement(outputs, Kinematics(rotation).to_world(nu), actuator, BodyMotion(attitude, rotation, nu))
 
 
 def measurement_of_outputs(position: Vector6, velocity: Vector6, actuator: Any = None) -> Measurement:
-    """Of a body from its outputs: north, east, down (m), Euler angles (rad), and their rates."""
+    """Measurement of a body from its outputs: north, east, down (m), Euler angles (rad), and their rates."""
     attitude = quaternion_from_euler(position[3:])
     rotation = rotation_from_quaternion(attitude)
     return Measurement(
@@ -48,14 +48,14 @@ def body_of(y: Measurement) -> BodyMotion:
 
 
 def completed(y: Measurement, truth: Measurement) -> Measurement:
-    """What a navigation filter made of the truth, with a pose that fits the outputs where it changed these alone."""
+    """Measurement of a navigation filter, with the pose recomputed where the filter changed the outputs alone."""
     if truth.body is None or (y.position is truth.position and y.velocity is truth.velocity):
         return y
     return measurement_of_outputs(*y[:3]) if y.body is None or y.body is truth.body else y
 
 
 def with_outputs(y: Measurement, position: Array, velocity: Array) -> Measurement:
-    """The measurement with other outputs (m, rad) and rates, as noise on them makes it; of any plant."""
+    """The measurement of any plant with other outputs (m, rad) and rates, such as noisy ones."""
     if y.body is None:
         return Measurement(position, velocity, y.actuator)
     return measurement_of_outputs(position, velocity, y.actuator)

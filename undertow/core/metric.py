@@ -1,4 +1,4 @@
-"""The contract of a metric: a figure about a run, gathered step by step."""
+"""The contract of a metric: a figure of a run, accumulated step by step."""
 
 import abc
 from typing import Any, NamedTuple
@@ -15,9 +15,9 @@ class Metric(NamedTuple):
 
 
 class AbstractMetric(eqx.Module):
-    """A figure, or several, about a window of a run. A metric of your own is one file: `metrics: ["./mine.py:mine"]`.
+    """One or several figures of a window of a run. A metric of your own is one file: `metrics: ["./mine.py:mine"]`.
 
-    `init` and `update` are compiled with the loop; only instants of the window are shown to `update`.
+    `init` and `update` are compiled with the loop; `update` gets the instants of the window only.
     """
 
     @abc.abstractmethod
@@ -30,8 +30,8 @@ class AbstractMetric(eqx.Module):
 
     @abc.abstractmethod
     def update(self, state: PyTree, t: Float[Array, ""], signals: dict[str, Array]) -> PyTree:
-        """State with the signals of one more instant, t in s."""
+        """State after the signals of one more instant, t in s."""
 
     @abc.abstractmethod
     def values(self, state: Any) -> dict[str, Any]:
-        """The figures by name, from the last state as NumPy arrays; NaN for what is not defined in this run."""
+        """The figures by name, from the last state as NumPy arrays; NaN for a figure that is undefined in this run."""

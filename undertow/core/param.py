@@ -1,4 +1,4 @@
-"""Parameters that know their unit, symbol, meaning and source; declared once, used everywhere."""
+"""Declaration of a parameter with its unit, symbol, meaning and source."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -40,7 +40,7 @@ def param(
         symbol: letter in the literature.
         source: where the default comes from; a part's own `sources` takes precedence.
         default: value when none is given.
-        range: between which bounds `undertow tune` looks for it, on a logarithmic scale; None for not at all.
+        range: bounds between which `undertow tune` searches, on a logarithmic scale; None if it is not tuned.
     """
     metadata = {"unit": unit, "meaning": meaning, "symbol": symbol, "source": source, "range": range}
     extra = {} if default is dataclasses.MISSING else {"default": default}

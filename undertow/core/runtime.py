@@ -1,7 +1,7 @@
-"""Precision and device of a run: set for its length, in the thread that computes it, and nowhere else.
+"""Precision and device of a run: set while it runs, in the thread that computes it only.
 
-Importing undertow changes no setting of JAX. A part that is made outside of any run holds double precision, whatever
-`jax_enable_x64` is; a run converts its parts to the precision that it names.
+Importing undertow changes no setting of JAX. A part that is made outside of a run holds double precision, whatever
+`jax_enable_x64` is; a run converts its parts to its own precision.
 """
 
 import functools
@@ -16,13 +16,13 @@ import jax
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
-# Precision of the run that this thread computes; None outside of any.
+# Precision of the run that this thread computes; None outside of a run.
 _stated: ContextVar[str | None] = ContextVar("undertow_precision", default=None)
 
 
 @contextmanager
 def in_precision(precision: str) -> Iterator[None]:
-    """What JAX makes inside, in this thread, is float64 or float32; other threads, and what comes after, are not."""
+    """Context in which JAX uses float64 or float32, in this thread only."""
     outside = _stated.set(precision)
     try:
         with jax.enable_x64(precision == "float64"):
@@ -32,7 +32,7 @@ def in_precision(precision: str) -> Iterator[None]:
 
 
 def double_outside_runs(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """A function that makes parts: in double precision outside of any run, in that of the run inside."""
+    """Wrap a function that makes parts: double precision outside of a run, the precision of the run inside."""
 
     @functools.wraps(function)
     def made(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
@@ -45,15 +45,15 @@ def double_outside_runs(function: Callable[Arguments, Result]) -> Callable[Argum
 
 
 def workers(count: int) -> ThreadPoolExecutor:
-    """Threads that compute in the precision of the one that asks for them."""
+    """Threads that compute in the precision of the calling thread."""
     double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
     precision = "float64" if double else "float32"
     return ThreadPoolExecutor(count, initializer=lambda: in_precision(precision).__enter__())
 
 
 def on_processor() -> AbstractContextManager[Any]:
-    """What JAX does inside, it does on this machine's processor: thousands of small things, slow on a GPU."""
+    """Context in which JAX uses the CPU: thousands of small operations are slow on a GPU."""
     try:
         return jax.default_device(jax.devices("cpu")[0])
-    except RuntimeError:  # JAX_PLATFORMS leaves it out
+    except RuntimeError:  # JAX_PLATFORMS excludes it
         return nullcontext()

@@ -1,4 +1,4 @@
-"""Signals: what a part lets one look at, declared by the part that has it."""
+"""Signals that a part declares for recording."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
@@ -27,10 +27,10 @@ class Signal(NamedTuple):
 
 
 def check_declared(part: Any, values: Mapping[str, Any]) -> None:
-    """That a part gives the signals that it declares; names only, so that it costs nothing in compiled code.
+    """Check that a part gives the signals that it declares; names only, so it costs nothing in compiled code.
 
     Raises:
-        BadInput: it gives others, or not all.
+        BadInput: a signal is undeclared, or a declared one is missing.
     """
     declared, who = part.signals(), type(part).__name__
     for name in values:

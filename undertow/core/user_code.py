@@ -1,4 +1,4 @@
-"""What a part that somebody else wrote did wrong: a sentence, with the method and the line of their file."""
+"""Errors of parts that users wrote, as a sentence with the method and the line of their file."""
 
 import inspect
 import re
@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 from jax import errors
 
-MODULE_PREFIX = "undertow_part_"  # of the modules that files of the user's own become
+MODULE_PREFIX = "undertow_part_"  # of the modules that users' files become
 
 _ABSTRACT = re.compile(r"Can't instantiate abstract class (\w+).* abstract (method|attribute)s? (.+)")
 _ASSIGNED = re.compile(r"cannot assign to field '(\w+)'")
-_LONGEST = 110  # characters of what Python says
+_LONGEST = 110  # characters of Python's message
 
-# What JAX refuses, why, and what to write instead; the first that fits.
+# JAX's error, its cause and the remedy; the first that applies.
 _REFUSED: tuple[tuple[type[Exception], str, str], ...] = (
     (
         errors.TracerBoolConversionError,
@@ -34,14 +34,14 @@ _REFUSED: tuple[tuple[type[Exception], str, str], ...] = (
 
 
 class Fault(NamedTuple):
-    """What failed and why, with its place in the user's file; and the remedy, "" where none is known."""
+    """What failed and why, with its location in the user's file; and the remedy, "" where none is known."""
 
     says: str
     hint: str
 
 
 def fault_of(error: BaseException) -> Fault:
-    """What an exception in a part means: `cannot run `Mine.command`: NumPy needs ... (mine.py, line 7)`."""
+    """The cause of an exception in a part: `cannot run `Mine.command`: NumPy needs ... (mine.py, line 7)`."""
     if isinstance(error, SyntaxError):
         return Fault(f"{type(error).__name__}: {error.msg}, line {error.lineno}", "")
     text = " ".join(str(error).split())
@@ -57,7 +57,7 @@ def fault_of(error: BaseException) -> Fault:
 
 
 def python_says(error: BaseException) -> str:
-    """The same in one line."""
+    """Cause and remedy in one line."""
     says, hint = fault_of(error)
     return f"{says}. {hint}" if hint else says
 
@@ -81,7 +81,7 @@ def _is_own(module: str | None) -> bool:
 
 
 def _reason(error: BaseException, text: str) -> tuple[str, str]:
-    """Why, and the remedy."""
+    """Cause and remedy."""
     for kind, why, hint in _REFUSED:
         if isinstance(error, kind):
             return why, hint
@@ -93,7 +93,7 @@ def _reason(error: BaseException, text: str) -> tuple[str, str]:
 
 
 def _abstract(found: re.Match[str], frames: list[tuple[FrameType, int]]) -> Fault:
-    """A class with methods or attributes that its contract asks for and that it lacks."""
+    """A class that lacks methods or attributes of its contract."""
     name, what, lacking = found.groups()
     names = re.findall(r"\w+", lacking)
     listed = " and ".join(f"`{one}`" for one in names)

@@ -1,4 +1,4 @@
-"""How loads add up."""
+"""Sum of loads."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ Vector3 = Float[Array, "3"]
 
 
 class Together(AbstractDisturbance):
-    """Several disturbances at once, each with randomness of its own."""
+    """Several disturbances at once, each with a random key of its own."""
 
     members: tuple[AbstractDisturbance, ...]
 
@@ -36,7 +36,7 @@ def body_of(pose: Pose | None) -> Pose:
     """The pose of a body in water.
 
     Raises:
-        BadInput: the plant is none.
+        BadInput: the plant is not one.
     """
     if pose is None:
         raise BadInput("disturbance", "act on a body in water", "used with another plant", hint="Use kind: sinusoid")
@@ -44,20 +44,20 @@ def body_of(pose: Pose | None) -> Pose:
 
 
 def with_water(load: Load, pose: Pose | None, velocity: Vector3, acceleration: Vector3) -> Load:
-    """Water that also moves with a velocity (m/s) and accelerates (m/s^2), world axes."""
+    """Load with an added velocity (m/s) and acceleration (m/s^2) of the water, world axes."""
     body_of(pose)
     before = load.water or Water(jnp.zeros(3), jnp.zeros(3))
     return load._replace(water=Water(before.velocity + velocity, before.acceleration + acceleration))
 
 
 def with_force(load: Load, pose: Pose | None, force: Vector3, point: Vector3) -> Load:
-    """A force (N, world axes) that also pulls at a point of the body (m, body axes)."""
+    """Load with an added force (N, world axes) at a point of the body (m, body axes)."""
     pull = matvec(body_of(pose).rotation.T, force)
     return load._replace(wrench=load.wrench - jnp.concatenate([pull, cross(point, pull)]))
 
 
 def with_scaling(load: Load, pose: Pose | None, scaling: ModelScaling) -> Load:
-    """A body that also differs by these scaling."""
+    """Load with the factors of the body multiplied by these."""
     body_of(pose)
     product = (
         scaling if load.scaling is None else ModelScaling(*(a * b for a, b in zip(load.scaling, scaling, strict=True)))
@@ -66,6 +66,6 @@ def with_scaling(load: Load, pose: Pose | None, scaling: ModelScaling) -> Load:
 
 
 def with_payload(load: Load, pose: Pose | None, payload: Payload) -> Load:
-    """A body that also carries this."""
+    """Load with an added payload of the body."""
     body_of(pose)
     return load._replace(payloads=(*load.payloads, payload))

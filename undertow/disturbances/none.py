@@ -1,10 +1,10 @@
-"""Calm water."""
+"""No disturbance."""
 
 from undertow.core.contracts import AbstractDisturbance, Load
 
 
 class NoDisturbance(AbstractDisturbance):
-    """Nothing at all."""
+    """Still water and no load."""
 
     def realize(self, key) -> tuple[()]:
         return ()

@@ -1,4 +1,4 @@
-"""A vehicle that is not quite what its data sheet says."""
+"""Parameter errors of the nominal model: the true vehicle differs from it."""
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,7 @@ _RANGES = ("mass", "damping", "restoring", "thrust")
 
 
 class ParameterError(AbstractDisturbance):
-    """Factors on M, D, g and thrust of the true vehicle, each drawn uniformly from a range; the model keeps 1.
+    """Factors on M, D, g and thrust of the true vehicle, each uniformly distributed in a range; the model keeps 1.
 
     Raises:
         BadInput: a range that is not low <= high, or a mass not positive.
@@ -49,12 +49,12 @@ class ParameterError(AbstractDisturbance):
 
 
 def parameter_error(mass=(0.9, 1.1), damping=(0.7, 1.3), restoring=(0.9, 1.1), thrust=(0.9, 1.1)) -> ParameterError:
-    """True vehicle that differs from the one the controller was told; another one for every seed.
+    """True vehicle that differs from the nominal model; different for every seed.
 
     Args:
         mass: lowest and highest factor on M (and C); equal for a fixed error.
         damping: likewise on D.
         restoring: likewise on g.
-        thrust: likewise on what every thruster gives.
+        thrust: likewise on the thrust of every thruster.
     """
     return ParameterError(mass, damping, restoring, thrust)

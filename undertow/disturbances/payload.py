@@ -15,7 +15,7 @@ from undertow.disturbances.adding import with_payload
 class PickedUp(AbstractDisturbance):
     """A point mass that is part of the vehicle from `start` to `stop`: its weight, its inertia, its moments.
 
-    It is taken up and left at the vehicle's velocity: no impulse.
+    It has the vehicle's velocity when it is picked up and put down, so there is no impulse.
 
     Raises:
         BadInput: mass negative, heavier in water than in air, or stop not after start.

@@ -1,4 +1,4 @@
-"""Sinusoids and steps that are other ones for every seed: suite U1 by chance."""
+"""Random sinusoids and steps, different for every seed: a random counterpart of suite U1."""
 
 import equinox as eqx
 import jax
@@ -16,10 +16,10 @@ _SINUSOIDS = 3  # per axis
 
 
 class RandomSuite(AbstractDisturbance):
-    """On each axis three sinusoids of random frequency and phase, and levels of random size, each held for a while.
+    """On each axis three sinusoids of random frequency and phase, and random levels, each held for a time.
 
     Raises:
-        BadInput: a size negative, a frequency or `hold` not positive, or frequencies the wrong way round.
+        BadInput: a size negative, a frequency or `hold` not positive, or `fastest` below `slowest`.
     """
 
     amplitude: Float[Array, "..."] = param("m/s^2, rad/s^2", "rms of the sinusoids together")
@@ -68,15 +68,15 @@ def random_suite(
     span: float = 60.0,
     axes: int = 6,
 ) -> RandomSuite:
-    """Lumped accelerations that are large, sudden and fast, as suite U1, but other ones for every seed.
+    """Lumped accelerations that are large, sudden and fast, as suite U1, but different for every seed.
 
     Args:
         amplitude: rms of the three sinusoids of an axis together, m/s^2 and rad/s^2; one number or one per axis.
-        slowest: lowest frequency, rad/s; frequencies are drawn logarithmically uniform.
+        slowest: lowest frequency, rad/s; the logarithm of the frequency is uniformly distributed.
         fastest: highest frequency, rad/s.
         step: standard deviation of the levels, m/s^2 and rad/s^2; one number or one per axis.
         hold: time for which a level is held, s.
-        span: time after which the level stays, s.
+        span: time after which the level is constant, s.
         axes: number of outputs of the plant.
     """
     checks.positive("hold", hold, "s")

@@ -14,12 +14,12 @@ from undertow.disturbances.adding import body_of, with_water
 
 
 class ShearedCurrent(AbstractDisturbance):
-    """Horizontal velocities at some depths, linear in between, held above and below.
+    """Horizontal velocities at given depths, linear in between, constant above and below.
 
-    The water is taken as uniform over the vehicle, with the velocity at its origin.
+    The water is assumed uniform over the vehicle, with the velocity at its origin.
 
     Raises:
-        BadInput: depths that do not increase, or velocities that do not belong to them.
+        BadInput: depths that do not increase, or another number of velocities.
     """
 
     depths: Float[Array, " k"] = param("m", "depths, increasing")

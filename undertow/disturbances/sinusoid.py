@@ -1,4 +1,4 @@
-"""A constant plus a sinusoid on every axis: the probe for frequency and amplitude."""
+"""A constant plus a sinusoid on every axis, to test frequency and amplitude."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float

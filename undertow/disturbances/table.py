@@ -13,7 +13,7 @@ from undertow.core.param import param
 
 
 class Table(AbstractDisturbance):
-    """Samples of the lumped acceleration, linear in between, held before the first and after the last.
+    """Samples of the lumped acceleration, linear in between, constant before the first and after the last.
 
     Raises:
         BadInput: fewer than two samples, not finite, or times that do not increase.

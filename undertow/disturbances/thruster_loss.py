@@ -1,4 +1,4 @@
-"""Undetected thruster failures: given thrusters, or others for every seed."""
+"""Undetected thruster failures: given thrusters, or different ones for every seed."""
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +13,7 @@ from undertow.disturbances.adding import with_scaling
 
 
 class ThrusterLoss(AbstractDisturbance):
-    """From `start` on some thrusters give `remaining` times their thrust; neither model nor allocation knows.
+    """From `start` on some thrusters give `remaining` times their thrust, unknown to model and allocation.
 
     Raises:
         BadInput: `start` or `number` negative.
@@ -21,7 +21,7 @@ class ThrusterLoss(AbstractDisturbance):
 
     remaining: Float[Array, ""] = param("", "share of the thrust that remains; 0 for off, -1 for reversed")
     start: Float[Array, ""] = param("s", "when they fail")
-    number: Float[Array, ""] = param("", "how many are drawn that fail")
+    number: Float[Array, ""] = param("", "number of randomly chosen thrusters that fail")
     failing: Float[Array, " N"] = param("", "1 for a thruster that fails in any case, else 0")
 
     def __check_init__(self):
@@ -29,7 +29,7 @@ class ThrusterLoss(AbstractDisturbance):
         checks.not_negative("number", self.number)
 
     def realize(self, key) -> Float[Array, " N"]:
-        """Share of the thrust that remains of each."""
+        """Remaining share of each thruster's thrust."""
         chance = jax.random.uniform(key, self.failing.shape, dtype=self.remaining.dtype)
         rank = (chance[:, None] > chance).sum(1)
         return jnp.where((rank < self.number.astype(int)) | (self.failing > 0), self.remaining, 1.0)
@@ -54,9 +54,9 @@ def thruster_loss(
     Args:
         remaining: share of the thrust that remains; 0 for off, -1 for reversed.
         start: when they fail, s.
-        number: how many fail, other ones for every seed.
+        number: how many fail, different ones for every seed.
         failing: numbers, from 1, of the thrusters that fail, instead of `number`.
-        thrusters: how many the vehicle has.
+        thrusters: number of thrusters of the vehicle.
 
     Raises:
         BadInput: there are no such thrusters.

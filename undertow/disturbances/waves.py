@@ -1,4 +1,4 @@
-"""Waves: what a JONSWAP sea does to the water at depth."""
+"""Waves: motion of the water at depth under a JONSWAP sea state."""
 
 import math
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from undertow.core.param import param
 from undertow.disturbances.adding import body_of, with_water
 from undertow.numerics.randomness import keys_for
 
-# Frequencies in units of the peak, wide enough for all but 1e-4 of the energy.
+# Frequencies in units of the peak frequency; the range holds all but 1e-4 of the energy.
 _LOWEST, _HIGHEST, _POINTS = 0.4, 8.0, 4000
 
 
@@ -36,7 +36,7 @@ def spectrum(frequency: Float[Array, "..."], period: Float[Array, ""], peakednes
 def frequencies_of_shares(
     share: Float[Array, " k"], period: Float[Array, ""], peakedness: Float[Array, ""]
 ) -> Float[Array, " k"]:
-    """Frequencies (rad/s) below which these shares of the energy lie."""
+    """Frequencies (rad/s) below which these shares of the energy are."""
     grid = jnp.linspace(_LOWEST, _HIGHEST, _POINTS) * 2 * jnp.pi / period
     density = spectrum(grid, period, peakedness)
     below = jnp.concatenate([jnp.zeros(1), jnp.cumsum((density[1:] + density[:-1]) / 2)])
@@ -51,14 +51,14 @@ class Sea(NamedTuple):
 
     frequency: Float[Array, " k"]  # rad/s
     phase: Float[Array, " k"]  # rad
-    heading: Float[Array, " k"]  # where each runs to, rad from north
+    heading: Float[Array, " k"]  # direction of propagation, rad from north
 
 
 class Waves(AbstractDisturbance):
     """Linear (Airy) waves in deep water, as a sum of components that carry equal shares of the energy.
 
-    Orbital velocity and acceleration decay as e^(-k depth). The water is taken as uniform over the vehicle, which
-    holds for waves much longer than it is.
+    Orbital velocity and acceleration decay as e^(-k depth). The water is assumed uniform over the vehicle, which is
+    valid for waves much longer than the vehicle.
 
     Raises:
         BadInput: height or period not positive, peakedness below 1, spreading negative.
@@ -66,7 +66,7 @@ class Waves(AbstractDisturbance):
 
     height: Float[Array, ""] = param("m", "significant wave height", symbol="H_s")
     period: Float[Array, ""] = param("s", "peak period", symbol="T_p")
-    heading: Float[Array, ""] = param("rad", "where the waves run to, from north")
+    heading: Float[Array, ""] = param("rad", "direction of propagation, from north")
     spreading: Float[Array, ""] = param("rad", "standard deviation of the heading")
     peakedness: Float[Array, ""] = param("", "peak enhancement", symbol="gamma")
     depth: Float[Array, ""] = param("m", "depth of the world's origin")
@@ -81,7 +81,7 @@ class Waves(AbstractDisturbance):
         checks.positive("peakedness", self.peakedness)
 
     def realize(self, key) -> Sea:
-        """Frequencies anywhere in their share of the energy, phases anywhere, headings about the mean one."""
+        """Random frequencies, each within its share of the energy, random phases, and headings about the mean."""
         keys = keys_for(key, "shares", "phases", "headings")
         kind = self.height.dtype
         uniform = jax.random.uniform(keys["shares"], (self.components,), dtype=kind)
@@ -115,7 +115,7 @@ def waves(height=0.5, period=5.0, heading=0.0, spreading=0.0, peakedness=3.3, de
     Args:
         height: significant wave height, m.
         period: peak period, s.
-        heading: where the waves run to, rad from north.
+        heading: direction of propagation, rad from north.
         spreading: standard deviation of the heading, rad.
         peakedness: 3.3 for a young sea, 1 for a fully developed one (Pierson-Moskowitz).
         depth: of the world's origin below the surface, m.

@@ -10,7 +10,7 @@ from undertow.core.param import param
 
 
 class ConstantWrench(AbstractDisturbance):
-    """On the left side of Eq. (2), so a positive force opposes motion ahead."""
+    """w_d is on the left side of Eq. (2), so a positive surge force opposes forward motion."""
 
     value: Float[Array, " n"] = param("N, N m", "force and moment", symbol="w_d")
 

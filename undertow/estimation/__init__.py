@@ -1,4 +1,4 @@
-"""Estimation of the lumped uncertainty: the fuzzy system, and the identification model whose error drives it."""
+"""Estimation of the lumped uncertainty: the fuzzy system and the identification model whose error is its input."""
 
 from undertow.estimation.series_parallel import SeriesParallel as SeriesParallel
 from undertow.estimation.tsk import FuzzySystem as FuzzySystem

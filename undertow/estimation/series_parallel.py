@@ -11,7 +11,7 @@ PerAxis = Float[Array, " n"]
 
 
 class SeriesParallel(eqx.Module):
-    """A copy of the plant driven by the same input; how far it departs is the modelling error eps.
+    """A model of the plant driven by the same input; its velocity less that of the plant is the modelling error eps.
 
     Raises:
         BadInput: a gain negative, the pole or layer not positive.

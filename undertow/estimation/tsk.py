@@ -10,7 +10,7 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 
-# Largest exponent that the quick way may meet inside the grid; exp overflows at 709.
+# Largest exponent that `even_memberships` may meet inside the grid; exp overflows at 709.
 _LARGEST_EXPONENT = 600.0
 
 
@@ -22,7 +22,7 @@ def memberships(x: Float[Array, "*n"], centres: Float[Array, " M"], widths: Floa
 def even_memberships(
     x: Float[Array, "*n"], centres: Float[Array, " M"], widths: Float[Array, " M"]
 ) -> Float[Array, "*n M"]:
-    """Same for equal spacing h and width sigma, with one exponential instead of M.
+    """`memberships` for equal spacing h and width sigma, with one exponential instead of M.
 
     Relative to the outermost set on the side of x, the set j steps further in weighs
     r^j exp(-(j h / sigma)^2) with r = exp(-2 h (distance beyond the outermost centre) / sigma^2).
@@ -55,7 +55,7 @@ class FuzzySystem(eqx.Module):
     """Rule base over p inputs with M Gaussian sets each: one rule per combination, M^p rules.
 
     The same sets serve every axis. Set l of input j is exp(-((x_j - centre_jl) / width_jl)^2). `evenly_spaced`
-    promises equal spacing and widths on every input; it only makes the evaluation quicker.
+    asserts equal spacing and widths on every input, which makes the evaluation faster.
 
     Raises:
         BadInput: widths not positive, or shapes that do not match.
@@ -100,7 +100,7 @@ class FuzzySystem(eqx.Module):
         return (weights * basis).sum(-1)
 
     def basis_norm_squared(self) -> Float[Array, ""]:
-        """|xi(0)|^2: all that is left of the fuzzy design in small signal; between 1/rules and 1."""
+        """|xi(0)|^2: the only figure of the fuzzy design that matters for small signals; between 1/rules and 1."""
         return (self.basis(jnp.zeros((1, self.inputs))) ** 2).sum()
 
 

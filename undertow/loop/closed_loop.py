@@ -1,4 +1,4 @@
-"""The five roles around one loop, and the signals of an instant."""
+"""The closed loop of plant, controller, reference, disturbance and navigation, and its signals at an instant."""
 
 from typing import Any, NamedTuple
 
@@ -30,43 +30,43 @@ from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
 from undertow.numerics.randomness import keys_for
 
-# Values of one instant by name: what every loop records, and what plant and controller declare.
+# Values of one instant by name: those of every loop, and those that plant and controller declare.
 Signals = dict[str, Array]
 
-# What every loop records, as `Realization.signals` computes it. `Signal` says what units stand for.
+# Signals of every loop, computed by `Realization.signals`. `Signal` explains the units.
 RECORDED = {
     "position": Signal(("axis",), "[axis]", "position"),
     "velocity": Signal(("axis",), "[axis]/s", "velocity"),
-    "measured_position": Signal(("axis",), "[axis]", "position that the controller is given"),
-    "measured_velocity": Signal(("axis",), "[axis]/s", "velocity that the controller is given"),
+    "measured_position": Signal(("axis",), "[axis]", "position that the controller receives"),
+    "measured_velocity": Signal(("axis",), "[axis]/s", "velocity that the controller receives"),
     "reference": Signal(("axis",), "[axis]", "desired position x_d"),
     "error": Signal(("axis",), "[axis]", "tracking error x_d - x"),
-    # Measured, never assumed; holds Delta of Eq. (3) and all else.
+    # Computed from the true acceleration; includes Delta of Eq. (3).
     "uncertainty": Signal(("axis",), "[axis]/s^2", "lumped uncertainty d = x_ddot - F - G u, measured"),
     "input": Signal(("actuator",), "[input]", "input applied"),
     "commanded_input": Signal(("actuator",), "[input]", "input commanded"),
-    "power": Signal(("actuator",), "W", "electrical power drawn"),
+    "power": Signal(("actuator",), "W", "electrical power"),
     "saturated": Signal(("actuator",), "1", "1 where the input is at its limit"),
-    "bad_readings": Signal((), "1", "readings so far that were no numbers: left out, or replaced by what is expected"),
+    "bad_readings": Signal((), "1", "readings so far that were not finite: ignored, or replaced by expected values"),
 }
 
 
 class MeasurementState(NamedTuple):
-    """What is remembered of measurements."""
+    """State of measuring."""
 
     navigation: PyTree  # its state
-    expected: Expected | None  # None for a smooth sensor, whose readings are numbers wherever the truth is
+    expected: Expected | None  # None for smooth navigation, whose readings are finite where the truth is
 
 
 class Decision(NamedTuple):
-    """What the controller makes of an instant."""
+    """Measurement, target and input of the controller at an instant."""
 
     y: Measurement
     r: Target
     command: Inputs
     applied: Inputs
     signals: Signals  # that the controller declares
-    measuring: Any  # MeasurementState afterwards; () where nothing is remembered
+    measuring: Any  # MeasurementState afterwards; () where there is none
 
 
 class ClosedLoop(eqx.Module):
@@ -105,14 +105,14 @@ class ClosedLoop(eqx.Module):
         return found
 
     def realize(self, key: PRNGKeyArray) -> "Realization":
-        """Draw everything random once."""
+        """Sample everything random once."""
         keys = keys_for(key, "disturbance", "navigation")
         disturbance = self.disturbance.realize(keys["disturbance"])
         return Realization(self, disturbance, self.navigation.realize(keys["navigation"]))
 
 
 class Realization(NamedTuple):
-    """A closed loop whose random parts have been realization: from here on everything is a function of time."""
+    """A closed loop whose random parts have been sampled: everything else is a function of time."""
 
     loop: ClosedLoop
     disturbance_realization: PyTree
@@ -126,29 +126,29 @@ class Realization(NamedTuple):
         return x, self.loop.controller.init(y, self.loop.reference.at(zero))
 
     def initial_measuring(self, x: PyTree) -> MeasurementState:
-        """What is remembered of measurements at t = 0."""
+        """State of measuring at t = 0."""
         zero, navigation = jnp.zeros(()), self.loop.navigation
         truth = self.loop.plant.output(zero, x)
         state = navigation.init(self.navigation_realization, truth)
-        if navigation.smooth is True:  # traced in a part whose field is not static; guarded then
+        if navigation.smooth is True:  # where the field is not static it is traced, and treated as False
             return MeasurementState(state, None)
         y, _ = navigation.measure(self.navigation_realization, state, zero, truth)
         return MeasurementState(state, at_start(self.loop.controller.model.coordinates, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
-        """What the surroundings do to the plant at time t."""
+        """Load of the environment on the plant at time t."""
         plant = self.loop.plant
         return self.loop.disturbance.at(self.disturbance_realization, t, plant.pose(x), plant.no_load())
 
     def decide(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Decision:
-        """Measure, compare, command, limit; `measuring` as after the step before."""
+        """Measure, compute the command and limit it; `measuring` is that of the previous step."""
         y, measuring = self._read(t, self.loop.plant.output(t, x), measuring)
         r = self.loop.reference.at(t)
         command, signals = self.loop.controller.command(z, y, r)
         return Decision(y, r, command, self.loop.plant.admissible(x, command), signals, measuring)
 
     def _read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
-        """What the law is given, and what is remembered afterwards."""
+        """Measurement for the law, and the state of measuring afterwards."""
 
         def measure(realization, state, t, truth):
             y, state = self.loop.navigation.measure(realization, state, t, truth)
@@ -163,7 +163,7 @@ class Realization(NamedTuple):
         return y, MeasurementState(state, expected)
 
     def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
-        """Everything that is recorded of time t. Errors are those of the truth, not of the measurement."""
+        """All recorded signals of time t. Errors are those of the true state, not of the measurement."""
         plant, controller = self.loop.plant, self.loop.controller
         truth = plant.output(t, x)
         y, r, command, applied, of_controller, measuring = decision
@@ -190,7 +190,7 @@ class Realization(NamedTuple):
         return recorded | of_plant | of_controller
 
     def _bad_readings(self, measuring: Any) -> Int[Array, ""]:
-        """Readings so far that were no numbers: left out by the sensor, or replaced for the law."""
+        """Number of readings so far that were not finite: ignored by the navigation, or replaced for the law."""
         if not isinstance(measuring, MeasurementState) or measuring.expected is None:
             return jnp.zeros((), dtype=int)
         navigation, replaced = self.loop.navigation, measuring.expected.replaced

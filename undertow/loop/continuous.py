@@ -1,4 +1,4 @@
-"""The continuous loop: plant and law as one ODE, the paper's own setting."""
+"""The continuous loop: plant and law as one ODE, as in the paper."""
 
 import math
 from typing import Any, cast
@@ -23,12 +23,12 @@ from undertow.numerics.integrators import rk4_compact
 
 @jax.jit  # traced once, although an integrator calls it in several places
 def flow(t: Float[Array, ""], state: tuple[PyTree, PyTree], realization: Realization) -> tuple[PyTree, PyTree]:
-    """Rates of plant state x and controller state z at time t; undefined where a command is."""
+    """Rates of plant state x and controller state z at time t; NaN where the command is not finite."""
     x, z = state
     controller = cast(AbstractContinuousController, realization.loop.controller)
     decision = realization.decide(t, x, z)
     x_rate = realization.loop.plant.dynamics(t, x, decision.applied, realization.load(t, x))
-    commanded = jnp.isfinite(decision.command).all()  # limits and dead zones make numbers of what is none
+    commanded = jnp.isfinite(decision.command).all()  # limits and dead zones would hide a NaN
     x_rate = jax.tree.map(lambda rate: jnp.where(commanded, rate, jnp.nan), x_rate)
     return x_rate, controller.flow(z, decision.y, decision.r, decision.applied)
 
@@ -36,10 +36,9 @@ def flow(t: Float[Array, ""], state: tuple[PyTree, PyTree], realization: Realiza
 def blamed(
     ending: Ending, realization: Realization, t: Float[Array, ""], state: tuple[PyTree, PyTree], dt: Any
 ) -> Ending:
-    """The ending of a run that got no further than some states at `t` (s), its cause named if it is a command.
+    """The ending of a run that stopped with some states at `t` (s); it names a command that is its cause.
 
-    The command is looked at where Runge and Kutta's method did during the step of dt (s) that failed: at its start, in
-    the middle, at the end.
+    The command is evaluated at the stages of the Runge-Kutta step of dt (s) that failed: start, middle and end.
     """
     rate = flow(t, state, realization)
     for share in (0.0, 0.5, 1.0):
@@ -47,7 +46,7 @@ def blamed(
         ahead = jax.tree.map(lambda now, change, share=share: now + share * dt * change, state, rate)
         at = ahead if share else state
         blame = ending.blamed(realization.decide(there, *at).command, there)
-        # Of a state that is itself no number, which a load can make, every command is none.
+        # A state that a load made non-finite makes every command non-finite.
         ending = Ending(*(jnp.where(all_finite(at), new, old) for new, old in zip(blame, ending, strict=True)))
     return ending
 
@@ -66,7 +65,7 @@ def simulate(
     """Integrate plant and law together.
 
     Args:
-        loop: the five roles; the controller must be written in continuous time.
+        loop: closed loop; the controller must be written in continuous time.
         duration: s; with fixed steps rounded to whole ones.
         record_step: time between records, s; with fixed steps a multiple of dt.
         key: for everything random; None for key 0.
@@ -75,14 +74,14 @@ def simulate(
         tolerances: relative and absolute, for adaptive steps that meet every jump, instead of fixed ones.
 
     Returns:
-        Outcome; records after a failure repeat the last sound state.
+        Outcome; records after a failure repeat the last valid state.
 
     Raises:
         BadInput: duration, record_step or dt not positive, or as `check`.
     """
     check(loop)
     loop = loop.starting_at(position)
-    # As many records as fit; what a division of whole multiples leaves over does not count.
+    # As many records as fit; the rounding error of dividing whole multiples does not count.
     records = math.floor(duration / record_step * (1 + 1e-9)) if 0 < duration < math.inf and record_step > 0 else 0
     if records < 1:
         raise BadInput("duration", f"be at least one record ({record_step:g} s)", f"{duration:g} s")
@@ -103,10 +102,10 @@ def simulate(
 
 
 def check(loop: ClosedLoop) -> None:
-    """Whether a closed loop can be one ODE.
+    """Check that a closed loop can be one ODE.
 
     Raises:
-        BadInput: a law that exists only sampled, or a sensor that is not smooth.
+        BadInput: the law exists only sampled, or the navigation is not smooth.
     """
     for obstacle, what in (
         (not isinstance(loop.controller, AbstractContinuousController), "controller, which exists only sampled"),
@@ -130,19 +129,19 @@ def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, in
     (final, ending), (time, samples) = record(
         realization, control_step, (realization.start(*start), going()), dt, steps, every
     )
-    ending = blamed(ending, realization, ending.time - dt, final, dt)  # where the step that failed began
+    ending = blamed(ending, realization, ending.time - dt, final, dt)  # start of the step that failed
     return Outcome(time, samples, (), final, *ending.until(instant(steps, dt)))
 
 
 _MAX_STEPS = 2**20
-_FIRST_STEP = 1e-4  # s; the integrator finds its own from there
+_FIRST_STEP = 1e-4  # s; the integrator adapts it
 
 
 @eqx.filter_jit
 def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
     """Integrate from `start` to `until` (s) with records at `times` (s); arguments as in `continuous.simulate`."""
     realization = loop.realize(key)
-    # One flat vector: the integrator's own arithmetic is then compiled once, not once per piece of state.
+    # One flat vector, so that the integrator's arithmetic is compiled once, not once per leaf of the state.
     flat, unravel = ravel_pytree(realization.start(*start))
 
     def flat_flow(t, flat, realization):
@@ -169,11 +168,11 @@ def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
     code = status_of(loop, *unravel(final[0]))
     out_of_steps = (solution.result != diffrax.RESULTS.successful) & (code == int(Status.OK))
     status = jnp.where(out_of_steps, int(Status.STEPS_EXHAUSTED), code)
-    last = jnp.maximum(jnp.isfinite(states).all(axis=1).sum() - 1, 0)  # what was never saved is infinite
+    last = jnp.maximum(jnp.isfinite(states).all(axis=1).sum() - 1, 0)  # unsaved records are infinite
     index = jnp.minimum(jnp.arange(times.shape[0]), last)
     samples = jax.lax.map(lambda at: realization.record(at[0], *unravel(at[1])), (times[index], states[index]))
-    sound = jnp.where(status == int(Status.OK), final[0], states[last])
+    valid = jnp.where(status == int(Status.OK), final[0], states[last])
     ending = blamed(
         going()._replace(status=status, time=ended[0]), realization, ended[0], unravel(final[0]), _FIRST_STEP
     )
-    return Outcome(times, samples, (), unravel(sound), *ending)
+    return Outcome(times, samples, (), unravel(valid), *ending)

@@ -1,4 +1,4 @@
-"""Recording: the steps that the fixed-step loops have in common, and a run as a labelled dataset."""
+"""Recording of the fixed-step loops, and a run as a labelled dataset."""
 
 from collections.abc import Callable
 from typing import Any
@@ -24,19 +24,19 @@ def record(
     steps: int,
     every: int,
 ) -> tuple[Any, tuple[Float[Array, " records"], Signals]]:
-    """Run `steps` steps and look at every `every`-th instant, the first included.
+    """Run `steps` steps and record every `every`-th instant, the first included.
 
     Args:
-        realization: what is run.
-        control_step: carry and number of the control_step -> carry one control_step later.
-        carry: what goes from control_step to control_step; the states (x, z, ...) first.
+        realization: closed loop to run.
+        control_step: carry and number k of the control step -> carry one step later.
+        carry: carried between control steps; the states (x, z, ...) first.
         dt: time between steps, s.
         steps: how many.
         every: steps per record.
     """
 
     def block(carry, first):
-        """Record, then run to the next record, or to the end."""
+        """Record, then run to the next record or to the end."""
         t, until = instant(first, dt), jnp.minimum(first + every, steps)
         sample = realization.record(t, *carry[0])
         return jax.lax.fori_loop(first, until, lambda k, c: control_step(c, k), carry), (t, sample)
@@ -53,14 +53,14 @@ def freeze_on_failure(
     dt: Float[Array, ""],
     command: Inputs | None = None,
 ) -> tuple[Any, Ending]:
-    """States (x, z, ...) at t + dt: the new ones, or the last valid ones for good once something is wrong.
+    """States (x, z, ...) at t + dt: the new ones, or the last valid ones after a failure.
 
     Args:
-        loop: the five roles.
+        loop: closed loop.
         old, new: states before and after.
         ending: of the run so far.
         t, dt: s.
-        command: of the control_step, where a command that is no number ends the run.
+        command: of the control step, where a command that is not finite ends the run.
     """
     code, time, wrong = status_of(loop, *new[:2]), t + dt, jnp.zeros((), dtype=int)
     if command is not None:
@@ -69,12 +69,12 @@ def freeze_on_failure(
         time = jnp.where(wrong > 0, t, time)
     failing = (ending.status == int(Status.OK)) & (code != int(Status.OK))
     ending = Ending(*(jnp.where(failing, now, was) for now, was in zip((code, time, wrong), ending, strict=True)))
-    sound = ending.status == int(Status.OK)
-    return jax.tree.map(lambda n, o: jnp.where(sound, n, o), new, old), ending
+    valid = ending.status == int(Status.OK)
+    return jax.tree.map(lambda n, o: jnp.where(valid, n, o), new, old), ending
 
 
 def instant(control_step: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:
-    """Time of a control_step, s."""
+    """Time of a control step, s."""
     return jnp.asarray(control_step, dtype=float) * dt
 
 
@@ -93,7 +93,7 @@ def to_dataset(outcome: Outcome, loop: ClosedLoop) -> xr.Dataset:
 
 
 def coordinates(time: np.ndarray, plant: AbstractPlant) -> dict[str, xr.Variable]:
-    """What stands along the dimensions `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1)."""
+    """Coordinates of the dimensions `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1)."""
     axis = series(("axis",), np.array(plant.outputs), "output")
     axis.attrs["unit_of_each"] = ", ".join(plant.output_units)
     return {
@@ -109,11 +109,11 @@ def dimensions(signal: Signal) -> tuple[str, ...]:
 
 
 def meaning(signal: Signal, plant: AbstractPlant) -> tuple[str, str]:
-    """What a signal is, and its unit; the units of all axes where they differ."""
+    """Meaning of a signal and its unit; the units of all axes where they differ."""
     return signal.meaning, signal.unit_for(plant.output_units, plant.input_unit)
 
 
 def series(dims: tuple[str, ...], values: np.ndarray, meaning: str, unit: str | None = None) -> xr.Variable:
-    """One variable of a dataset; as a plain array, without xarray asking (and importing) dask whether it is one."""
+    """One variable of a dataset; as a plain array, for which xarray does not import dask."""
     units = {} if unit is None else {"units": unit}
     return xr.Variable(dims, values, {"long_name": meaning, **units}, fastpath=True)

@@ -1,4 +1,4 @@
-"""The sampled loop: the controller at its own rate, the plant in between, compiled as one scan."""
+"""The sampled loop: controller steps with the plant integrated between them, compiled as one scan."""
 
 import abc
 from functools import partial
@@ -18,7 +18,7 @@ from undertow.numerics.integrators import METHODS
 
 
 class AbstractAccumulator(eqx.Module):
-    """Statistics gathered inside the loop, so that a long run need not keep its series."""
+    """Statistics accumulated inside the loop, so that a long run need not keep its series."""
 
     @abc.abstractmethod
     def init(self, signals: Signals) -> PyTree:
@@ -45,17 +45,17 @@ def simulate(
     """Run a closed loop with the input held over each sampling time.
 
     Args:
-        loop: the five roles.
+        loop: closed loop.
         duration: s; rounded to whole steps.
         dt: sampling time of the controller, s.
         key: for everything random; None for key 0.
         position, velocity: outputs at t = 0; None for zero.
-        record_every: steps per record; 0 keeps no series, only what is accumulated.
-        accumulators: statistics over every control_step.
-        method, substeps: integration of the plant within one control_step, rk4 or euler.
+        record_every: steps per record; 0 keeps only accumulated statistics, no series.
+        accumulators: statistics over every control step.
+        method, substeps: integration of the plant within one control step, rk4 or euler.
 
     Returns:
-        Outcome. A failed run keeps its last sound state; nothing is raised.
+        Outcome. A failed run keeps its last valid state; nothing is raised.
 
     Raises:
         BadInput: duration or dt not positive, or duration shorter than one record.
@@ -68,7 +68,7 @@ def simulate(
 
 
 def steps_of(duration: float, dt: float, record_every: int) -> int:
-    """Ticks of a run; for arguments and errors see `simulate`."""
+    """Number of control steps of a run; for arguments and errors see `simulate`."""
     if not (0 < dt < float("inf")):
         raise BadInput("dt", "be positive", f"{dt:g} s")
     steps = round(duration / dt) if 0 < duration < float("inf") else 0
@@ -94,7 +94,7 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
 
 
 def begin(realization: Realization, start: tuple[Outputs, Outputs], accumulators) -> PyTree:
-    """What goes from control_step to control_step, as it is before the first one."""
+    """Carry before the first control step."""
     x, z = realization.start(*start)
     states = (x, z, realization.initial_measuring(x))
     blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(realization.record, jnp.zeros(()), *states))
@@ -103,7 +103,7 @@ def begin(realization: Realization, start: tuple[Outputs, Outputs], accumulators
 
 
 def control_step(realization: Realization, accumulators, dt, integrate, substeps: int, carry, k):
-    """Command, move the plant with the input held, then let the controller learn from what was applied."""
+    """Command, integrate the plant with the input held, then advance the controller with the applied input."""
     (x, z, measuring), gathered, ending = carry
     loop, t = realization.loop, instant(k, dt)
     decision = realization.decide(t, x, z, measuring)

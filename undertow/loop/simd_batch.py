@@ -1,9 +1,9 @@
-"""The sampled loop as SIMD batches: any number of runs of one kind at once, by the batch compiler.
+"""The sampled loop as SIMD batches: many runs of one kind at once, by the batch compiler.
 
-Same figures as `sampled.simulate` to rounding; their bits depend neither on the machine nor on the other runs.
+Results equal those of `sampled.simulate` to rounding; their bits depend neither on the machine nor on the other runs.
 
-The only module that knows `simdjit`, which is optional: without it every program is `Unsupported`, and `unavailable`
-says why.
+This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
+`unavailable` says why.
 """
 
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -34,14 +34,14 @@ else:
         )
 
         class Unsupported(Exception):
-            """A program that the batch compiler cannot make; says why."""
+            """The batch compiler cannot make a program; the message says why."""
 
     else:
         _REASON = ""
 
 
 def unavailable() -> str:
-    """Why no run can be a SIMD batch on this machine; empty where they can."""
+    """Why no run can be a SIMD batch on this machine; empty where runs can."""
     return "" if TYPE_CHECKING else _REASON
 
 
@@ -55,7 +55,7 @@ def gpu() -> "Driver | None":
 
 
 def simd_width(bits: int) -> int:
-    """Numbers of so many bits in one vector register of this processor; 1 without the batch compiler."""
+    """How many numbers of `bits` bits fit a vector register of this processor; 1 without the batch compiler."""
     if unavailable():
         return 1
     import simdjit
@@ -64,7 +64,7 @@ def simd_width(bits: int) -> int:
 
 
 class Run(NamedTuple):
-    """Everything that may differ between runs of one kind: trees of arrays, and what is no array is the same."""
+    """What may differ between runs of one kind: the arrays of these trees; the rest is the same for all."""
 
     loop: ClosedLoop
     accumulators: tuple[sampled.AbstractAccumulator, ...]
@@ -73,14 +73,14 @@ class Run(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """How a run is run.
+    """Time grid, recording and integration of a run.
 
     Attributes:
         steps: how many.
         dt: sampling time, s.
         every: steps per record; 0 for none.
         signals: names of those that are recorded.
-        method, substeps: integration of the plant within one control_step.
+        method, substeps: integration of the plant within one control step.
     """
 
     steps: int
@@ -91,7 +91,7 @@ class Plan(NamedTuple):
     substeps: int
 
     def times(self) -> Float[np.ndarray, " records"]:
-        """Of the records, s."""
+        """Times of the records, s."""
         return np.arange(0, self.steps + 1, self.every) * self.dt
 
 
@@ -113,16 +113,16 @@ class BatchRunner:
     Args:
         run: one of them.
         plan: how they are run.
-        constant: which arrays of `run` are the same for all, in the order of its leaves; they make the program short.
-        lanes: runs at once; as many as fit a register unless given.
-        driver: of the GPU that runs them; None for this processor.
+        constant: which arrays of `run` are equal in all runs, in the order of its leaves; they shorten the program.
+        width: runs at once; as many as fit a register unless given.
+        driver: that of the GPU; None for this processor.
 
     Raises:
-        Unsupported: a part needs something that the batch compiler cannot do, or there is none.
-        OSError: the GPU's driver fails.
+        Unsupported: a part uses an operation that the batch compiler lacks, or there is no batch compiler.
+        OSError: the driver of the GPU fails.
     """
 
-    def __init__(self, run: Run, plan: Plan, constant: list[bool], lanes: int = 0, driver: "Driver | None" = None):
+    def __init__(self, run: Run, plan: Plan, constant: list[bool], width: int = 0, driver: "Driver | None" = None):
         if unavailable():
             raise Unsupported(unavailable())
         from simdjit import Loop
@@ -149,15 +149,15 @@ class BatchRunner:
             return t, {name: signals[name] for name in plan.signals}
 
         cache = cache_folder() / "native"
-        self._program = Loop(realize, start, control_step, record, numbers, constant, lanes, driver, cache)
+        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache)
 
     @property
     def operations(self) -> int:
-        """Arithmetic operations of one step of one run: law, plant and its integration, what is accumulated."""
+        """Arithmetic operations of one step of one run: law, integration of the plant, accumulators."""
         return self._program.operations
 
     def run(self, numbers: Any, steps: int | None = None) -> Ended:
-        """Run them.
+        """Run a batch.
 
         Args:
             numbers: arrays of the runs, as in `run`, with a leading axis over runs.
@@ -186,7 +186,7 @@ def simulate(
     """One run; arguments, result and errors of `sampled.simulate`.
 
     Raises:
-        Unsupported: a part needs something that the batch compiler cannot do, or there is none.
+        Unsupported: a part uses an operation that the batch compiler lacks, or there is no batch compiler.
     """
     steps, loop = sampled.steps_of(duration, dt, record_every), loop.starting_at(position)
     start = loop.outputs_at_start(position, velocity)
@@ -194,7 +194,7 @@ def simulate(
     arrays = eqx.filter(run, eqx.is_array)
     constant = [True] * len(jax.tree.leaves(arrays))
     plan = Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps)
-    batch = BatchRunner(run, plan, constant, lanes=1)
-    flown = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
-    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, flown)
+    batch = BatchRunner(run, plan, constant, width=1)
+    ended = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
+    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, ended)
     return Outcome(one.time, one.series, one.accumulated, one.final, one.status, one.ended, one.input)

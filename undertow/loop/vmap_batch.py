@@ -1,4 +1,4 @@
-"""The sampled loop for many runs by `jax.vmap`: for what `simd_batch` cannot do."""
+"""The sampled loop for many runs by `jax.vmap`, for runs that `simd_batch` does not support."""
 
 from collections.abc import Callable
 from functools import partial
@@ -11,18 +11,18 @@ import numpy as np
 from undertow.loop import sampled
 from undertow.loop.simd_batch import Ended, Plan, Run
 
-# The width of a program decides about the last bits of a result, what the other places hold does not: every program
-# has this width, however few runs there are, so that no result depends on how they are cut into tasks.
+# The last bits of a result depend on the width of the program, but not on the other runs in it: every program has
+# this width, however few runs there are, so that no result depends on how they are divided into tasks.
 _WIDTH = 64
 
 
 class BatchRunner:
-    """Runs of one kind, compiled once; `run` runs them, given their arrays with a leading axis over runs.
+    """Runs of one kind, compiled once; `run` takes their arrays with a leading axis over runs.
 
     Args:
         run: one of them.
         plan: how they are run.
-        width: at once; the usual number unless given.
+        width: runs at once; the usual number unless given.
     """
 
     def __init__(self, run: Run, plan: Plan, width: int = 0):

@@ -1,4 +1,4 @@
-"""Navigation: what makes the state that a controller gets out of readings. One file each."""
+"""Navigation filters, which estimate the state for the controller from readings. One file each."""
 
 from undertow.core.catalogue import publish
 

@@ -1,4 +1,4 @@
-"""Position and velocity as a poor navigation system gives them: noisy, biased, coarse, late and slow."""
+"""Position and velocity of a poor navigation system: noise, bias, quantisation, delay and a low rate."""
 
 from typing import Any, NamedTuple
 
@@ -15,17 +15,17 @@ from undertow.sensors.sampling import Sampling, SensorState
 
 
 class DegradedState(NamedTuple):
-    """What it remembers."""
+    """Samplers of position and velocity, and the last readings."""
 
     position: SensorState
     velocity: SensorState
-    held: tuple[Array, Array]  # the last position (m, rad) and velocity (m/s, rad/s) that were delivered
+    held: tuple[Array, Array]  # last delivered position (m, rad) and velocity (m/s, rad/s)
 
 
 class Degraded(AbstractNavigation):
-    """Every output read by a device of its own, all of the same period and delay; between readings the last one holds.
+    """Every output has a sensor of its own, all of the same period and delay; the last reading holds until the next.
 
-    Before the first delivery the position and velocity of the start are held.
+    Before the first delivery the initial position and velocity are held.
     """
 
     position: Sampling
@@ -38,7 +38,7 @@ class Degraded(AbstractNavigation):
         return key
 
     def velocity_noise(self, dt):
-        """As if the readings of a second came evenly at every step."""
+        """The same noise density, spread over every control step."""
         return self.velocity.noise * jnp.sqrt(self.velocity.period / dt)
 
     def init(self, realization, truth: Measurement) -> DegradedState:
@@ -47,7 +47,7 @@ class Degraded(AbstractNavigation):
         return DegradedState(self.position.init(none, none), self.velocity.init(none, none), held)
 
     def measure(self, realization, state: DegradedState, t, truth: Measurement):
-        shape = (2, truth.position.shape[0] + 1)  # one number more decides whether a reading is lost: none is
+        shape = (2, truth.position.shape[0] + 1)  # the last number decides whether a reading is lost: none is
         key = numbered(realization, self.velocity.number(t))
         chances = jax.random.normal(key, shape, dtype=truth.position.dtype)
         first, position = self.position.deliver(state.position, t, truth.position + self.position_bias, chances[0])
@@ -69,7 +69,7 @@ def degraded(
     delay: float = 0.0,
     sampling_time: float = 1e-3,
 ) -> Degraded:
-    """Measurements with everything that may be wrong with them. For the sampled loop.
+    """Measurements with noise, bias, quantisation and delay. For the sampled loop.
 
     Args:
         position_noise: standard deviation, new for every reading, m and rad; one number or one per output.
@@ -80,7 +80,7 @@ def degraded(
         velocity_resolution: likewise of velocity, m/s and rad/s.
         period: between readings, s; None: one at every control step.
         delay: from reading to delivery, s.
-        sampling_time: of the loop, s; a scenario gives it.
+        sampling_time: that of the loop, s; a scenario sets it.
 
     Raises:
         BadInput: a value is out of its range.

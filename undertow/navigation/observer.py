@@ -1,4 +1,4 @@
-"""Sensors and a plain observer, which gives the controller x and x_dot at the controller's own rate."""
+"""Sensors and an observer with constant gains, which estimates x and x_dot at every control step."""
 
 from typing import NamedTuple
 
@@ -16,27 +16,27 @@ from undertow.sensors.propeller_speed import PropellerSpeed
 from undertow.sensors.sampling import SensorState
 from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor
 
-# (m/s)^2 s; less counts as none.
+# (m/s)^2 s; smaller densities count as no noise.
 _NOISELESS = 1e-20
 
 
 class NavigationState(NamedTuple):
-    """What it remembers."""
+    """State of the observer and its sensors."""
 
     time: Float[Array, ""]  # of the last step, s
-    velocity: Float[Array, "3"]  # the true one then, m/s: accelerometers feel its change
+    velocity: Float[Array, "3"]  # true velocity then, m/s; accelerometers measure its change
     states: tuple[SensorState, ...]  # one per sensor
     estimate: Estimate
-    ignored: Int[Array, ""]  # readings so far that were no numbers
+    ignored: Int[Array, ""]  # readings so far that were not finite
 
 
 class Navigation(AbstractInformedNavigation):
-    """Strapdown inertial navigation, corrected by whatever else arrives, each by its own constant share.
+    """Strapdown inertial navigation, corrected by every other sensor with a constant gain.
 
-    Between readings the estimate moves on by rates and acceleration of the IMU. A late reading is compared with what
-    the estimate was when it was taken. There is no Kalman filter and no estimate of a bias: an offset of the
-    accelerometers, or of roll or pitch (times gravity), shows in the velocity, as large as it grows to until the next
-    reading of the DVL over the share that is given to it. A reading that is no number counts as lost.
+    Between readings the estimate is integrated from rates and acceleration of the IMU. A delayed reading is compared
+    with the estimate of the time at which it was taken. There is no Kalman filter and no estimate of a bias: an offset
+    of the accelerometers, or of roll or pitch (times gravity), causes an error of the velocity: its growth between two
+    readings of the DVL, divided by their `blend`. A reading that is not finite counts as lost.
 
     Raises:
         BadInput: no sensor, or no IMU.
@@ -48,19 +48,19 @@ class Navigation(AbstractInformedNavigation):
     def __check_init__(self):
         for i, sensor in enumerate(self.sensors):
             if not isinstance(sensor, AbstractSensor):
-                raise BadInput(f"sensors[{i}]", "be an sensor", type(sensor).__name__)
+                raise BadInput(f"sensors[{i}]", "be a sensor", type(sensor).__name__)
         if not any(isinstance(sensor, IMU) for sensor in self.sensors):
-            hint = "Add `imu`: nothing else tells roll, pitch and angular rates"
+            hint = "Add `imu`: no other sensor gives roll, pitch and angular rates"
             raise BadInput("sensors", "have an IMU among them", f"{len(self.sensors)} without", hint=hint)
 
     def realize(self, key):
         return jax.random.split(key, len(self.sensors))
 
     def velocity_noise(self, dt):
-        """That of all readings of a second, as if they came evenly at every step; the filters' memory is left out."""
+        """Noise density of all sensors, spread over every control step; the memory of the filters is neglected."""
         sensors = [one for one in self.sensors if isinstance(one, AbstractVelocitySensor)]
-        told = [one.velocity_noise() ** 2 * one.sampling.period for one in sensors]
-        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in told)
+        densities = [one.velocity_noise() ** 2 * one.sampling.period for one in sensors]
+        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in densities)
         return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
 
     def init(self, realization, truth: Measurement) -> NavigationState:
@@ -84,13 +84,13 @@ class Navigation(AbstractInformedNavigation):
         motion = motion_of(truth, state.velocity, elapsed)
         readings = [sensor.reading(motion) for sensor in self.sensors]
         numbers = jnp.stack([sensor.sampling.number(t) for sensor in self.sensors])
-        heard = [
+        deliveries = [
             sensor.sampling.deliver(states, t, reading, chance)
             for sensor, states, reading, chance in zip(
                 self.sensors, state.states, readings, _chances(realization, numbers, readings), strict=True
             )
         ]
-        arrivals = [arrival for arrival, _ in heard]
+        arrivals = [arrival for arrival, _ in deliveries]
         finite = [jnp.isfinite(reading).all() for reading, _ in arrivals]
         ignored = state.ignored + sum(
             jnp.where(fresh & ~good, 1, 0) for (_, fresh), good in zip(arrivals, finite, strict=True)
@@ -106,7 +106,7 @@ class Navigation(AbstractInformedNavigation):
         estimate = estimate.predicted(elapsed)
         for sensor, (reading, fresh) in news:
             estimate = _either(fresh, sensor.correct(estimate, reading), estimate)
-        states = tuple(states for _, states in heard)
+        states = tuple(states for _, states in deliveries)
         return estimate.measurement(), NavigationState(t, motion.velocity, states, estimate, ignored)
 
     def ignored(self, state: NavigationState):
@@ -114,10 +114,10 @@ class Navigation(AbstractInformedNavigation):
 
 
 def _chances(keys, numbers, readings) -> list:
-    """Standard normal numbers, one per entry of each reading and one more; drawn together, which compiles faster."""
+    """Standard normal numbers, one per entry of each reading and one more, in one call, which compiles faster."""
     most = max(reading.size for reading in readings) + 1
-    draw = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
-    together = jax.vmap(draw)(keys, numbers)
+    normal = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
+    together = jax.vmap(normal)(keys, numbers)
     return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]
 
 
@@ -126,7 +126,7 @@ def _either(fresh, new: Estimate, old: Estimate) -> Estimate:
 
 
 def observer(sensors) -> Navigation:
-    """A vehicle that knows where it is from its sensors only. For the sampled loop.
+    """Navigation of a vehicle from its sensors only. For the sampled loop.
 
     Args:
         sensors: any of imu, dvl, depth, position_fix, compass, propeller_speed; an IMU must be among them.

@@ -1,4 +1,4 @@
-"""The truth."""
+"""Measurement of the true state."""
 
 import equinox as eqx
 

@@ -13,7 +13,7 @@ from undertow.numerics.randomness import numbered
 
 
 class WhiteNoise(AbstractInformedNavigation):
-    """Independent Gaussian errors, new at every sample of the control loop; the number of the sample picks them.
+    """Independent Gaussian errors, new at every sample of the control loop; their key comes from the sample's number.
 
     Raises:
         BadInput: a standard deviation negative.

@@ -1,8 +1,8 @@
 """Small dense products, systems and inverses: gain matrices G (n x m), square or not, Eqs. (21)-(27), Definition 2.
 
-The paper splits cases by the number of inputs m; what matters is the rank. For m < n the product G G+ is an
-orthogonal projector of rank < n, so [G G+]^-1 in Eq. (24) never exists; what remains uncontrolled is the
-residual sigma of Eq. (28). See docs/known-limits.md.
+The paper distinguishes cases by the number of inputs m, but the rank decides. For m < n the product G G+ is an
+orthogonal projector of rank < n, so [G G+]^-1 in Eq. (24) never exists; the uncontrolled part is the residual
+sigma of Eq. (28). See docs/known-limits.md.
 """
 
 import jax
@@ -13,9 +13,9 @@ from jaxtyping import Array, Float
 def matvec(matrix: Float[Array, "m n"], vector: Float[Array, " n"]) -> Float[Array, " m"]:
     """Product of a small matrix and a vector.
 
-    A multiply and a sum instead of a `dot`: XLA turns every `dot` into a call of its own, which for a
-    6 x 8 matrix costs more than the arithmetic. Written this way the product melts into the elementwise
-    code around it, and one closed-loop step becomes one compiled function.
+    A multiplication and a sum instead of a `dot`: XLA turns every `dot` into a call of its own, which for a 6 x 8
+    matrix costs more than the arithmetic. XLA fuses this form with the elementwise code around it, so that one
+    closed-loop step becomes one compiled function.
     """
     return (matrix * vector).sum(-1)
 
@@ -39,19 +39,20 @@ def printed_inverse(gain: Gain) -> Inverse:
 
 
 def pseudo_inverse(gain: Gain) -> Inverse:
-    """Moore-Penrose G+ of any rank; equals Eq. (22) wherever that exists."""
+    """Moore-Penrose inverse G+ for any rank; it equals Eq. (22) where that exists."""
     return jnp.linalg.pinv(gain)
 
 
 def partial_inverse(gain: Gain, scale: Float[Array, " n"], rank: int) -> Inverse:
-    """Smallest inverse that serves as many rows of G as its rank allows exactly, and asks nothing for the others.
+    """Minimum-norm inverse that satisfies as many rows of G exactly as its rank allows, and ignores the others.
 
-    G+ spreads what cannot be had over all rows instead: a vehicle that cannot pitch would surge because pitch is asked
-    for. Given up are the rows that the lost directions mostly consist of (Cholesky of their projector, pivoted).
+    G+ spreads the unreachable part over all rows instead: a vehicle that cannot pitch would surge when pitch is
+    commanded. The ignored rows are those with the largest share in the unreachable directions (pivoted Cholesky
+    factorisation of their projector).
 
     Args:
         gain: G (n x m).
-        scale: what counts as much in each row, m/s^2 and rad/s^2.
+        scale: accelerations of equal weight, one per row, m/s^2 and rad/s^2.
         rank: of G; n for G+ itself.
     """
     inverse = pseudo_inverse(gain)
@@ -77,7 +78,7 @@ def regularised_inverse(square: Square, delta: Float[Array, ""]) -> Square:
 def regularised_sharp(gain: Gain, delta: Float[Array, ""]) -> Inverse:
     """reg G# of Eq. (27), in its three cases.
 
-    Loses the share delta / (delta + sigma^4) of the demand along a singular value sigma of G (m > n); for
+    It loses the share delta / (delta + sigma^4) of the demand along a singular value sigma of G (m > n); for
     m < n and full column rank it is nearly G+ / (1 + delta).
     """
     n, m = gain.shape
@@ -112,7 +113,7 @@ def solve_symmetric(matrix: Symmetric, right: Float[Array, " n"]) -> Float[Array
 
 
 def inverse_symmetric(matrix: Symmetric) -> Symmetric:
-    """Inverse of a symmetric positive definite matrix; it needs no pivots."""
+    """Inverse of a symmetric positive definite matrix, without pivoting."""
     return _eliminated(matrix, jnp.eye(matrix.shape[0]))
 
 

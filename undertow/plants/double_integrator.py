@@ -1,4 +1,4 @@
-"""n independent axes x_ddot = u + d: the plant on which the theory of the law can be read off."""
+"""n independent axes x_ddot = u + d: the simplest plant, on which the theory of the law is exact."""
 
 from typing import NamedTuple
 
@@ -38,7 +38,7 @@ class UnitMasses(AbstractDynamics):
 
 
 class DoubleIntegrator(AbstractMechanism):
-    """Unit masses on rails, pushed by accelerations; optionally limited to +-limit m/s^2."""
+    """Unit masses on independent axes; inputs are accelerations, optionally limited to +-limit m/s^2."""
 
     limit: Float[Array, ""] = param("m/s^2", "largest input")
     outputs: tuple[str, ...] = eqx.field(static=True)

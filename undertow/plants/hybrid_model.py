@@ -1,4 +1,4 @@
-"""What a controller may know of a vehicle with thrusters: F and G of Eq. (17), and how to invert G."""
+"""Nominal model of a vehicle with thrusters: F, G and the inverse of G, Eq. (17)."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ class BodyDynamics(AbstractDynamics):
 
     body: Body
     acceleration_per_thrust: Float[Array, "6 N"]  # M^-1 B
-    allocation: Float[Array, "N 6"]  # inverse of M^-1 B; what no thruster can give is not asked for
+    allocation: Float[Array, "N 6"]  # inverse of M^-1 B; accelerations that the thrusters cannot give are ignored
 
     def drift(self, y: Measurement) -> Vector6:
         own = body_of(y)
@@ -46,7 +46,7 @@ class BodyDynamics(AbstractDynamics):
 
 
 class BodyCoordinates(AbstractCoordinates):
-    """Errors in body axes: position (m), and attitude as a rotation vector (rad), the short way round; velocity nu."""
+    """Errors in body axes: position (m), attitude as a rotation vector (rad) of at most half a turn; velocity nu."""
 
     angles: tuple[bool, ...] = eqx.field(static=True, default=EULER_ANGLES)
     tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=(Status.PITCH_SINGULAR,))
@@ -55,7 +55,7 @@ class BodyCoordinates(AbstractCoordinates):
         return measurement_of_outputs(position, velocity, actuator)
 
     def tracking_error(self, y: Measurement, r: Target) -> TrackingError:
-        """The target as the vehicle sees it in its own axes: where, how fast, and the time derivative of that."""
+        """Target relative to the vehicle in body axes: error, velocity and the time derivative of the velocity."""
         own = body_of(y)
         to_body = own.rotation.T
         attitude, rate, turning = turning_from_euler(r.position[3:], r.velocity[3:], r.acceleration[3:])
@@ -74,7 +74,7 @@ class BodyCoordinates(AbstractCoordinates):
         return body_of(y).nu
 
     def acceleration(self, y: Measurement, acceleration: Vector6) -> Vector6:
-        """nu_dot of an acceleration of the outputs."""
+        """nu_dot that belongs to an acceleration of the outputs."""
         own = body_of(y)
         kinematics = Kinematics(own.rotation)
         return kinematics.to_body(acceleration - kinematics.rate_term(own.nu))
@@ -87,7 +87,7 @@ class BodyCoordinates(AbstractCoordinates):
 
 
 class HybridDynamics(AbstractDynamics):
-    """x_ddot = F + G V + d, Eq. (17), in Euler angles; valid for |pitch| < 90 deg. Voltages stand for the forces."""
+    """x_ddot = F + G V + d, Eq. (17), in Euler angles; valid for |pitch| < 90 deg. The forces f are voltages."""
 
     body: Body
     thruster: AbstractThruster
@@ -118,8 +118,8 @@ class HybridDynamics(AbstractDynamics):
     def invert(self, y: Measurement, acceleration: Float[Array, "6"]) -> Float[Array, " N"]:
         """V = G# acceleration, Eq. (23).
 
-        At rank 6 the inverse has a closed form, G+ = (B alpha)+ M J^-1 with a constant first factor: nothing
-        is factorised in the loop. Below rank 6 it is the Moore-Penrose inverse, and with a regularisation Eq. (27).
+        At rank 6 the inverse has a closed form, G+ = (B alpha)+ M J^-1 with a constant first factor, so that the loop
+        factorises nothing. Below rank 6 it is the Moore-Penrose inverse, and with a regularisation Eq. (27).
         """
         if self.regularisation is not None:
             return matvec(regularised_sharp(self.gain(y), self.regularisation), acceleration)
@@ -130,7 +130,7 @@ class HybridDynamics(AbstractDynamics):
 
 
 class EulerCoordinates(AbstractOutputCoordinates):
-    """North, east, down and Euler angles, as the paper has them."""
+    """North, east, down and Euler angles, as in the paper."""
 
     angles: tuple[bool, ...] = eqx.field(static=True, default=EULER_ANGLES)
     tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=())
@@ -139,10 +139,10 @@ class EulerCoordinates(AbstractOutputCoordinates):
         return measurement_of_outputs(position, velocity, actuator)
 
     def in_body_axes(self, dynamics: HybridDynamics) -> Model:
-        """The same knowledge in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
+        """The same model in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
         body, matrix = dynamics.body, dynamics.thruster_matrix
         effect = body.inverse_mass_matrix @ matrix
-        alike = 1 / jnp.sqrt(jnp.diagonal(body.mass_matrix))  # accelerations of the same kinetic energy
+        alike = 1 / jnp.sqrt(jnp.diagonal(body.mass_matrix))  # accelerations of equal kinetic energy
         return Model(
             BodyDynamics(body, effect, partial_inverse(effect, alike, dynamics.rank)),
             BodyCoordinates(),

@@ -1,4 +1,4 @@
-"""The vehicle together with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
+"""The vehicle with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
 
 from typing import Any, NamedTuple
 
@@ -27,7 +27,7 @@ from undertow.vehicles.alteration import altered
 from undertow.vehicles.body import Body, seen_from_water
 from undertow.vehicles.vehicle import Vehicle
 
-_ENVELOPE = 1e3  # m, m/s, rad/s; far beyond any vehicle
+_ENVELOPE = 1e3  # m, m/s, rad/s; far above the values of any vehicle
 
 
 class VehicleState(NamedTuple):
@@ -40,12 +40,12 @@ class VehicleState(NamedTuple):
     power: PowerState = PowerState()  # battery and ledger
 
     def pose(self) -> Pose:
-        """Where the body is and how it moves."""
+        """Pose and velocity of the body."""
         rotation = rotation_from_quaternion(self.attitude)
         return Pose(self.position, rotation, matvec(rotation, self.nu[:3]))
 
     def status(self) -> Array:
-        """Status code: Euler angles exist, and nothing is far beyond any vehicle."""
+        """Status code: OK if Euler angles are defined and all values are within the plausible range."""
         third_row = rotation_from_quaternion(self.attitude)[2]
         near_vertical = third_row[1] ** 2 + third_row[2] ** 2 < 1e-6
         far = (jnp.abs(self.position) > _ENVELOPE).any() | (jnp.abs(self.nu) > _ENVELOPE).any()
@@ -62,21 +62,21 @@ def state_at(position: Any, velocity: Any, thrusters: Any, power: PowerState) ->
     return VehicleState(position[:3], attitude, nu, thrusters, power)
 
 
-_FREEDOMS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+_DOF_NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 class HybridVehicle(AbstractPlant):
     """x = (north, east, down, roll, pitch, yaw) driven by thruster voltages.
 
-    On the fidelities `ideal` and `static` a prescribed acceleration load is the whole of d, J_dot nu included
-    (Remark 2); on the others the body moves as it does and the load is added to x_ddot.
+    At the fidelities `ideal` and `static` a prescribed acceleration load is all of d, J_dot nu included (Remark 2); at
+    the others J_dot nu is part of the dynamics, and the load is added to x_ddot.
 
     Args:
         vehicle: hull and thruster layout.
-        thruster: what turns volts into thrust.
-        battery: what feeds the thrusters; None for the thruster's supply.
-        esc: speed controllers before them; None for none.
-        ledger: whether to keep account of the thrusters' energy along the run; None wherever there is a motor.
+        thruster: model of every thruster.
+        battery: power supply of the thrusters; None for the thruster's own supply.
+        esc: electronic speed controllers; None for none.
+        ledger: whether to integrate the energies of the thrusters; None for yes where there is a motor.
     """
 
     vehicle: Vehicle
@@ -129,7 +129,7 @@ class HybridVehicle(AbstractPlant):
         return kinematics.to_world(nu_rate) + kinematics.rate_term(x.nu)
 
     def _body_acceleration(self, kinematics: Kinematics, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
-        """nu_dot of Eq. (2): thrust (6), the body's own motion, and the loads."""
+        """nu_dot of Eq. (2): thrust of Eq. (6), dynamics of the body, and the loads."""
         body = altered(self.body, d.scaling, d.payloads)
         thrust = self.thruster.thrust(x.thrusters, u)
         if d.scaling is not None:
@@ -167,10 +167,10 @@ class HybridVehicle(AbstractPlant):
         return x.status()
 
     def advice(self) -> tuple[str, ...]:
-        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _FREEDOMS)
+        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _DOF_NAMES)
 
     def rank(self) -> int:
-        """Rank of the thruster matrix; that of G too, wherever J is regular."""
+        """Rank of the thruster matrix, which is that of G where J is regular."""
         if isinstance(self.thruster_matrix, Tracer):
             return min(6, self.inputs())
         return int(np.linalg.matrix_rank(np.asarray(self.thruster_matrix), tol=1e-9))
@@ -184,7 +184,7 @@ class HybridVehicle(AbstractPlant):
         vehicle: Vehicle | None = None,
         thruster: AbstractThruster | None = None,
     ) -> Model:
-        """What a controller may know of this plant.
+        """Nominal model of this plant for the controller.
 
         Args:
             speed_sensor: whether phi of Eq. (15) is known from propeller-speed sensors (Example 1) or left in d.
@@ -198,23 +198,23 @@ class HybridVehicle(AbstractPlant):
                 vehicle with another number of thrusters.
         """
         nominal = self.thruster if thruster is None else thruster
-        told = self if vehicle is None else HybridVehicle(vehicle, nominal)
-        if told.inputs() != self.inputs():
-            raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{told.inputs()}")
+        known = self if vehicle is None else HybridVehicle(vehicle, nominal)
+        if known.inputs() != self.inputs():
+            raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{known.inputs()}")
         if regularisation is not None:
             checks.positive("regularisation", regularisation)
         if speed_sensor:
             still = nominal.report(nominal.initial_state(self.inputs()))
             if still is None:  # thrusters without a speed to measure complain here, not in the loop
                 nominal.speed_term(still)
-        gain, allocation = _static(told.body.inverse_mass_matrix, told.thruster_matrix, nominal.voltage_gain())
+        gain, allocation = _static(known.body.inverse_mass_matrix, known.thruster_matrix, nominal.voltage_gain())
         dynamics = HybridDynamics(
-            body=told.body,
+            body=known.body,
             thruster=nominal,
-            thruster_matrix=told.thruster_matrix,
+            thruster_matrix=known.thruster_matrix,
             body_gain=gain,
             allocation=allocation,
-            rank=told.rank(),
+            rank=known.rank(),
             regularisation=regularisation,
             speed_sensor=speed_sensor,
             rate_term=rate_term,
@@ -224,7 +224,7 @@ class HybridVehicle(AbstractPlant):
 
 @jax.jit
 def _static(inverse_mass, thruster_matrix, voltage_gain):
-    """What volts do to a body at rest, and the volts of least norm for a wrench; voltage gain of all or of each."""
+    """Acceleration per volt at rest, and minimum-norm voltages per wrench; one voltage gain for all or one each."""
     per_volt = thruster_matrix * voltage_gain
     return inverse_mass @ per_volt, jnp.linalg.pinv(per_volt)
 

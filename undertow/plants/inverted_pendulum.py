@@ -14,13 +14,13 @@ from undertow.core.param import param
 from undertow.core.status import Status
 from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
 
-_FLAT = 0.01  # rad short of 90 deg, where the force has all but lost its grip: G is 1 % of what it is upright
+_FLAT = 0.01  # rad short of 90 deg, where the force has nearly no effect: G is 1 % of its upright value
 
 _WANG = "Wang 1993, as in the codes that go with Liu's textbooks"
 
 
 class CartPole(AbstractDynamics):
-    """Cart and uniform pole: angle_ddot = f + b u, the cart's own motion eliminated. Wang 1993.
+    """Cart and uniform pole: angle_ddot = f + b u, with the motion of the cart eliminated. Wang 1993.
 
     Raises:
         BadInput: a constant is not positive.
@@ -36,7 +36,7 @@ class CartPole(AbstractDynamics):
             checks.positive(name, getattr(self, name))
 
     def inertia(self, angle):
-        """Torque on the pole per angular acceleration while the cart gives way, kg m^2."""
+        """Torque on the pole per angular acceleration with a free cart, kg m^2."""
         share = self.pole_mass / (self.cart_mass + self.pole_mass)
         return self.pole_mass * self.half_length**2 * (4 / 3 - share * jnp.cos(angle) ** 2)
 
@@ -46,7 +46,7 @@ class CartPole(AbstractDynamics):
         return arm / (self.cart_mass + self.pole_mass) / self.inertia(angle)
 
     def drift(self, y: Measurement):
-        """f, rad/s^2: weight, less what swinging pushes the cart away."""
+        """f, rad/s^2: weight, less the effect of the pole's swing on the cart."""
         angle = y.position
         weight = self.pole_mass * self.gravity * self.half_length * jnp.sin(angle) / self.inertia(angle)
         return weight - self.lever(angle) * self.swing(angle, y.velocity)
@@ -58,7 +58,7 @@ class CartPole(AbstractDynamics):
         return acceleration / self.lever(y.position)
 
     def swing(self, angle, rate):
-        """Horizontal force that the swinging pole takes from the cart, N."""
+        """Horizontal force of the swinging pole on the cart, N."""
         return self.pole_mass * self.half_length * rate**2 * jnp.sin(angle)
 
     def cart_acceleration(self, angle, rate, angle_acceleration, force):
@@ -68,7 +68,7 @@ class CartPole(AbstractDynamics):
 
 
 class PendulumState(NamedTuple):
-    """Angle from upright (rad), its rate (rad/s), and the speed of the cart (m/s), which nobody controls."""
+    """Angle from upright (rad), its rate (rad/s), and the speed of the cart (m/s), which is not controlled."""
 
     angle: Float[Array, "1"]
     rate: Float[Array, "1"]
@@ -76,7 +76,7 @@ class PendulumState(NamedTuple):
 
 
 class InvertedPendulum(AbstractMechanism):
-    """The angle of a pole, moved by a force on its cart; the force turns the pole towards positive angles."""
+    """Angle of a pole on a cart; a positive force on the cart turns the pole towards positive angles."""
 
     cart_pole: CartPole
     limit: Float[Array, ""] = param("N", "largest force")
@@ -111,15 +111,15 @@ class InvertedPendulum(AbstractMechanism):
     def model(
         self, *, cart_mass: float | None = None, pole_mass: float | None = None, half_length: float | None = None
     ) -> Model:
-        """What a controller is told of this plant; what is not given is the truth.
+        """Nominal model for the controller; parameters that are not given have their true values.
 
         Args:
             cart_mass: kg.
             pole_mass: kg.
             half_length: half the length of the pole, m.
         """
-        told = nominal(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
-        return Model(told, OutputCoordinates(angles=(True,)), DirectActuator(1.0, *self.limits()))
+        cart_pole = nominal(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
+        return Model(cart_pole, OutputCoordinates(angles=(True,)), DirectActuator(1.0, *self.limits()))
 
 
 def inverted_pendulum(
@@ -129,7 +129,7 @@ def inverted_pendulum(
     gravity: float = 9.8,
     limit: float = float("inf"),
 ) -> InvertedPendulum:
-    """Pole on a cart, angle 0 upright, force in. Defaults are Wang's; a run ends where the pole lies flat.
+    """Pole on a cart, angle 0 upright, driven by a force. Defaults are Wang's; a run ends when the pole lies flat.
 
     Args:
         cart_mass: kg.

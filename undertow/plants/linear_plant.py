@@ -24,7 +24,7 @@ class LinearSystem(eqx.Module):
     """The three matrices.
 
     Raises:
-        BadInput: shapes that do not go together, or entries that are not finite.
+        BadInput: shapes that do not match, or entries that are not finite.
     """
 
     gain: Float[Array, "n m"] = param("m/s^2", "acceleration per input", symbol="G")
@@ -54,7 +54,7 @@ class LinearState(NamedTuple):
 
 
 class LinearDynamics(AbstractDynamics):
-    """The matrices that the controller was told of; G# is the Moore-Penrose inverse, whatever the rank."""
+    """Dynamics with nominal matrices; G# is the Moore-Penrose inverse for any rank."""
 
     system: LinearSystem
     allocation: Float[Array, "m n"]  # G+; constant, so nothing is factorised in the loop
@@ -70,7 +70,7 @@ class LinearDynamics(AbstractDynamics):
 
 
 class LinearPlant(AbstractMechanism):
-    """Coupled axes pushed by inputs of no unit; what lies outside the range of G stays in open loop."""
+    """Coupled axes with inputs without unit; directions outside the range of G stay in open loop."""
 
     system: LinearSystem
     limit: Float[Array, ""] = param("1", "largest input")
@@ -99,7 +99,7 @@ class LinearPlant(AbstractMechanism):
         return both_ways(self.limit, self.system.gain.shape[1])
 
     def power(self, x: LinearState, u):
-        """What is given to unit masses: u_j times the velocity that it works along."""
+        """Power given to unit masses: u_j times the velocity along column j of G."""
         return u * matvec(self.system.gain.T, x.velocity)
 
     def status(self, x: LinearState) -> Array:
@@ -107,7 +107,7 @@ class LinearPlant(AbstractMechanism):
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
     def model(self, *, gain=None, position_term=None, velocity_term=None) -> Model:
-        """What a controller is told of this plant; what is not given is the truth.
+        """Nominal model for the controller; parameters that are not given have their true values.
 
         Args:
             gain: G, as many rows and columns as the true one.
@@ -115,13 +115,13 @@ class LinearPlant(AbstractMechanism):
             velocity_term: H, 1/s.
 
         Raises:
-            BadInput: another shape than the truth.
+            BadInput: a shape differs from the true one.
         """
-        told = nominal(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
-        if told.gain.shape != self.system.gain.shape:
-            raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{told.gain.shape}")
+        system = nominal(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
+        if system.gain.shape != self.system.gain.shape:
+            raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{system.gain.shape}")
         coordinates = OutputCoordinates(angles=(False,) * len(self.outputs))
-        dynamics = LinearDynamics(told, pseudo_inverse(told.gain))
+        dynamics = LinearDynamics(system, pseudo_inverse(system.gain))
         return Model(dynamics, coordinates, DirectActuator(1.0, *self.limits()))
 
 
@@ -132,8 +132,8 @@ def linear_plant(
 
     Args:
         gain: G, one row per output, m/s^2 per unit of input.
-        position_term: F, 1/s^2, negative where it pulls back; None for zero.
-        velocity_term: H, 1/s, negative where it brakes; None for zero.
+        position_term: F, 1/s^2, negative for a restoring term; None for zero.
+        velocity_term: H, 1/s, negative for damping; None for zero.
         limit: largest |u|.
     """
     n = len(gain) if np.ndim(gain) else 0

@@ -1,4 +1,4 @@
-"""Magnetic levitation of a ball between two coils: n = 1, m = 2, each coil pulls one way only."""
+"""Magnetic levitation of a ball between two coils: n = 1, m = 2; each coil pulls in one direction only."""
 
 from typing import NamedTuple
 
@@ -39,23 +39,23 @@ class LevitationRig(eqx.Module):
 
     mass: Float[Array, ""] = param("kg", "mass of the ball", symbol="m")
     diameter: Float[Array, ""] = param("m", "diameter of the ball", symbol="2 r")
-    magnet_distance: Float[Array, ""] = param("m", "between the magnets", symbol="H")
+    magnet_distance: Float[Array, ""] = param("m", "distance between the magnets", symbol="H")
     force_factor: Float[Array, ""] = param("", "1/2 of F = 1/2 dL/dz I^2; the manual omits it", symbol="k_f")
     current_gain: Float[Array, ""] = param("A", "current per duty cycle", symbol="k_i")
-    current_offset: Float[Array, ""] = param("A", "current at no duty cycle, extrapolated", symbol="c_i")
-    smallest_current: Float[Array, ""] = param("A", "what flows at rest", symbol="I_min")
-    largest_current: Float[Array, ""] = param("A", "what the drive can give", symbol="I_max")
+    current_offset: Float[Array, ""] = param("A", "current at zero duty cycle, extrapolated", symbol="c_i")
+    smallest_current: Float[Array, ""] = param("A", "smallest current", symbol="I_min")
+    largest_current: Float[Array, ""] = param("A", "largest current of the drive", symbol="I_max")
     inductance: Float[Array, ""] = param(
-        "H", "gained by a coil that the ball touches", symbol="FemP1", default=1.7521e-2
+        "H", "inductance gained by a coil in contact with the ball", symbol="FemP1", default=1.7521e-2
     )
     inductance_reach: Float[Array, ""] = param(
-        "m", "gap over which it falls e times", symbol="FemP2", default=5.8231e-3
+        "m", "gap over which it falls by the factor e", symbol="FemP2", default=5.8231e-3
     )
     lag_slope: Float[Array, ""] = param(
         "m s", "time constant at contact times `lag_reach`", symbol="fiP1", default=1.4142e-4
     )
-    lag_reach: Float[Array, ""] = param("m", "gap over which the lag falls e times", symbol="fiP2", default=4.5626e-3)
-    lag_range: Float[Array, ""] = param("m", "largest gap at which the lag is known; held beyond", default=0.016)
+    lag_reach: Float[Array, ""] = param("m", "gap for a fall by the factor e", symbol="fiP2", default=4.5626e-3)
+    lag_range: Float[Array, ""] = param("m", "largest gap at which the lag is known; constant beyond", default=0.016)
     resistance: Float[Array, ""] = param("ohm", "of a coil", symbol="R", default=4.17, source=_MILAN)
     gravity: Float[Array, ""] = param("m/s^2", "gravity", symbol="g", default=9.81)
     sources: tuple = sources_field()
@@ -69,23 +69,23 @@ class LevitationRig(eqx.Module):
 
     @property
     def travel(self) -> Float[Array, ""]:
-        """Largest z, m: there the ball touches the lower magnet."""
+        """Largest z, m, at which the ball touches the lower magnet."""
         return self.magnet_distance - self.diameter
 
     def gaps(self, z: Float[Array, "1"]) -> PerCoil:
-        """From each magnet to the ball, m."""
+        """Gap from each magnet to the ball, m."""
         return jnp.concatenate([z, self.travel - z])
 
     def pull(self, z: Float[Array, "1"]) -> PerCoil:
-        """Acceleration of the ball per squared current, m/(s^2 A^2): up, so negative, by coil 1, down by coil 2."""
+        """Acceleration of the ball per squared current, m/(s^2 A^2): negative (up) by coil 1, positive by coil 2."""
         slope = self.inductance / self.inductance_reach * jnp.exp(-self.gaps(z) / self.inductance_reach)
         return jnp.array([-1.0, 1.0]) * self.force_factor * slope / self.mass
 
     def lag(self, z: Float[Array, "1"]) -> PerCoil:
-        """Time constants of the currents, s: longer the nearer the ball.
+        """Time constants of the currents, s; they grow as the ball comes nearer.
 
-        The published exponential goes to nothing (12 us for coil 2 with the ball at 10 mm), which no coil does: beyond
-        the 16 mm in which the rig can measure z, and so was identified, it is held.
+        The published exponential tends to zero (12 us for coil 2 with the ball at 10 mm), which is impossible for a
+        coil: beyond the 16 mm in which the rig measures z and was identified, it is constant.
         """
         return self.lag_slope / self.lag_reach * jnp.exp(-jnp.minimum(self.gaps(z), self.lag_range) / self.lag_reach)
 
@@ -95,7 +95,7 @@ class LevitationRig(eqx.Module):
         return jnp.clip(current, self.smallest_current, self.largest_current) ** 2
 
     def duty(self, demand: PerCoil) -> PerCoil:
-        """Duty cycles that give a squared current in the long run: what leaves for the drive."""
+        """Duty cycles that give a squared current in steady state: the command of the drive."""
         return (jnp.sqrt(demand) - self.current_offset) / self.current_gain
 
 
@@ -124,7 +124,7 @@ class LevitationState(NamedTuple):
 
 
 class SteadyCoils(AbstractDynamics):
-    """F = g, G = the pull of each coil per squared current: the rig once its currents are where they should be."""
+    """F = g, G = the pull of each coil per squared current: the rig without the lag of its currents."""
 
     rig: LevitationRig
 
@@ -135,20 +135,20 @@ class SteadyCoils(AbstractDynamics):
         return self.rig.pull(y.position)[None, :]
 
     def invert(self, y: Measurement, acceleration):
-        """The coil that pulls the wanted way, alone: the smallest squared currents that are not negative."""
+        """Smallest nonnegative squared currents: only the coil that pulls in the desired direction."""
         return jnp.maximum(acceleration / self.rig.pull(y.position), 0.0)
 
 
 class MagneticLevitation(AbstractMechanism):
-    """z_ddot = g + pull(z) . I^2. The input is w, the squared current that each coil is asked for.
+    """z_ddot = g + pull(z) . I^2. The input w is the commanded squared current of each coil.
 
     A duty cycle U reaches the ball through I = k_i U + c_i, a lag, and I^2: neither affine nor of relative degree
-    two. In w = (k_i U + c_i)^2 the steady plant is affine exactly, and the lag is all that the law does not know. The
-    plant turns w into U and lets the current follow; w is limited to what U in [0, 1] gives.
+    two. In w = (k_i U + c_i)^2 the steady plant is exactly affine, and only the lag is unknown to the law. The plant
+    computes U from w and lets the current follow; w is limited to the range that belongs to U in [0, 1].
 
     Args:
         rig: ball and coils.
-        fidelity: `ideal`, currents follow at once, or `coil`, with the time constants of the coils.
+        fidelity: `ideal`, currents without lag, or `coil`, with the time constants of the coils.
     """
 
     rig: LevitationRig
@@ -199,26 +199,26 @@ class MagneticLevitation(AbstractMechanism):
         inductance: float | None = None,
         inductance_reach: float | None = None,
     ) -> Model:
-        """What a controller is told of this plant; what is not given is the truth. The lag it is never told of.
+        """Nominal model for the controller, without lag; parameters that are not given have their true values.
 
         Args:
             mass: of the ball, kg.
-            force_factor: 1/2 as physics has it, or 1 as the manual of the rig has it.
-            inductance: gained by a coil that the ball touches, H.
-            inductance_reach: gap over which it falls e times, m.
+            force_factor: 1/2 from physics, or 1 as in the manual of the rig.
+            inductance: that gained by a coil in contact with the ball, H.
+            inductance_reach: gap over which it falls by the factor e, m.
         """
         changed = {"inductance": inductance, "inductance_reach": inductance_reach}
-        told = nominal(self.rig, mass=mass, force_factor=force_factor, **changed)
-        return Model(SteadyCoils(told), OutputCoordinates((False,)), DirectActuator(1.0, *self.limits(), at_once=False))
+        rig = nominal(self.rig, mass=mass, force_factor=force_factor, **changed)
+        return Model(SteadyCoils(rig), OutputCoordinates((False,)), DirectActuator(1.0, *self.limits(), at_once=False))
 
 
 def magnetic_levitation(rig: str = "balko_rosinova", fidelity: str = "coil") -> MagneticLevitation:
-    """Ball between two electromagnets (INTECO MLS2EM), squared currents in; a run ends where it touches one.
+    """Ball between two electromagnets (INTECO MLS2EM), with squared currents as inputs; a run ends when it touches one.
 
     Args:
         rig: a published set of constants: balko_rosinova (ball of 39 g), balko_rosinova_23g, balko_rosinova_16g, or
             inteco_polimi (60.5 g).
-        fidelity: ideal (currents follow at once) or coil (they lag by 31 ms at the magnet, 3.5 ms at 10 mm).
+        fidelity: ideal (currents without lag) or coil (a lag of 31 ms at the magnet, 3.5 ms at 10 mm).
 
     Raises:
         BadInput: no such rig or fidelity.

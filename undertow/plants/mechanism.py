@@ -1,4 +1,4 @@
-"""What plants that are no bodies in water have in common: inputs within limits, and nothing that water could push."""
+"""Base class of plants that are not bodies in water: an equation of motion and limits of the inputs."""
 
 import abc
 from dataclasses import replace
@@ -15,9 +15,9 @@ from undertow.plants.reachability import open_loop_advice
 Part = TypeVar("Part", bound=eqx.Module)
 
 
-def nominal(truth: Part, **told: Any) -> Part:
+def nominal(truth: Part, **given: Any) -> Part:
     """The same part with other values of the named parameters; None leaves the true one."""
-    return replace(truth, **{name: value for name, value in told.items() if value is not None})
+    return replace(truth, **{name: value for name, value in given.items() if value is not None})
 
 
 class AbstractMechanism(AbstractPlant):
@@ -29,7 +29,7 @@ class AbstractMechanism(AbstractPlant):
 
     @abc.abstractmethod
     def power(self, x: PyTree, u: Inputs) -> Inputs:
-        """What each input costs, W."""
+        """Power of each input, W."""
 
     def inputs(self) -> int:
         return self.limits()[0].shape[0]
@@ -38,7 +38,7 @@ class AbstractMechanism(AbstractPlant):
         return jnp.clip(u, *self.limits())
 
     def effort(self, x: PyTree, u: Inputs) -> Effort:
-        """An input that cannot be negative rests at its smallest value, and is not counted as limited there."""
+        """Power and saturation; an input that cannot be negative is not saturated at its smallest value."""
         low, high = self.limits()
         limited = (u >= high) | ((u <= low) & (low < 0))
         return Effort(self.power(x, u), limited.astype(u.dtype))
@@ -59,11 +59,11 @@ class AbstractMechanism(AbstractPlant):
 
 
 def both_ways(limit: Float[Array, "..."], inputs: int) -> tuple[Inputs, Inputs]:
-    """Limits of inputs that are allowed as much one way as the other."""
+    """Symmetric limits of the inputs."""
     high = jnp.broadcast_to(limit, (inputs,))
     return -high, high
 
 
 def given_or_zero(outputs: Outputs | None, count: int) -> Outputs:
-    """Outputs to start from, or zeros."""
+    """Initial outputs, or zeros."""
     return jnp.zeros(count) if outputs is None else outputs

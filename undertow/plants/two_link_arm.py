@@ -22,7 +22,7 @@ _BOOK = "Slotine and Li 1991, Example 9.1"
 class Links(AbstractDynamics):
     """Rigid links: mass matrix, Coriolis matrix, weight and energy. Slotine and Li 1991, section 9.1.
 
-    The outer link carries its load: its centre of mass need not lie on the line through its joint.
+    The outer link carries a load: its centre of mass need not lie on the line through its joint.
 
     Raises:
         BadInput: a mass, length or inertia is not positive, or the offset or gravity is not finite.
@@ -35,7 +35,7 @@ class Links(AbstractDynamics):
     outer_mass: Float[Array, ""] = param("kg", "mass of outer link and load", symbol="m_e", source=_BOOK)
     outer_centre: Float[Array, ""] = param("m", "elbow to their centre of mass", symbol="l_ce", source=_BOOK)
     outer_inertia: Float[Array, ""] = param("kg m^2", "about their centre of mass", symbol="I_e", source=_BOOK)
-    outer_offset: Float[Array, ""] = param("rad", "by how far it lags behind the link", symbol="delta_e", source=_BOOK)
+    outer_offset: Float[Array, ""] = param("rad", "its lag behind the link", symbol="delta_e", source=_BOOK)
     gravity: Float[Array, ""] = param("m/s^2", "gravity in the plane of motion; 0 for a horizontal arm", symbol="g")
 
     def __check_init__(self):
@@ -62,7 +62,7 @@ class Links(AbstractDynamics):
         return jnp.array([[c, -b], [-b, a]]) / (a * c - b * b)
 
     def coriolis_matrix(self, q: Float[Array, "2"], rate: Float[Array, "2"]) -> Float[Array, "2 2"]:
-        """C(q, q_dot), N m s, the choice that makes M_dot - 2 C skew."""
+        """C(q, q_dot), N m s, chosen so that M_dot - 2 C is skew-symmetric."""
         h = self._coupling() * jnp.sin(q[1] - self.outer_offset)
         return jnp.array([[-h * rate[1], -h * (rate[0] + rate[1])], [h * rate[0], 0.0]])
 
@@ -101,7 +101,7 @@ class ArmState(NamedTuple):
 
 
 class TwoLinkArm(AbstractMechanism):
-    """Shoulder and elbow, turned by torques; the elbow is measured from the inner link."""
+    """Shoulder and elbow driven by torques; the elbow angle is relative to the inner link."""
 
     links: Links
     limit: Float[Array, ""] = param("N m", "largest torque")
@@ -135,15 +135,15 @@ class TwoLinkArm(AbstractMechanism):
     def model(
         self, *, outer_mass: float | None = None, outer_centre: float | None = None, outer_offset: float | None = None
     ) -> Model:
-        """What a controller is told of this plant; what is not given is the truth.
+        """Nominal model for the controller; parameters that are not given have their true values.
 
         Args:
             outer_mass: of outer link and load, kg.
             outer_centre: from the elbow to their centre of mass, m.
-            outer_offset: by how far that centre lags behind the link, rad.
+            outer_offset: angle by which that centre lags behind the link, rad.
         """
-        told = nominal(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
-        return Model(told, OutputCoordinates(angles=(True, True)), DirectActuator(1.0, *self.limits()))
+        links = nominal(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
+        return Model(links, OutputCoordinates(angles=(True, True)), DirectActuator(1.0, *self.limits()))
 
 
 def two_link_arm(
@@ -158,7 +158,7 @@ def two_link_arm(
     gravity: float = 9.81,
     limit: float = math.inf,
 ) -> TwoLinkArm:
-    """Planar arm with two joints, angles from the horizontal, torques in. Defaults are those of Slotine and Li 1991.
+    """Planar arm with two joints, angles from the horizontal, driven by torques. Defaults: Slotine and Li 1991.
 
     Args:
         inner_mass: kg.

@@ -1,1 +1,1 @@
-"""The paper: its examples, figures, tables and claims, as runs and numbers."""
+"""Reproduction of the paper: its examples, figures, tables and claims."""

@@ -1,4 +1,4 @@
-"""The paper's own figure: one number over six outputs, metres and radians together."""
+"""The paper's error metrics: one number over six outputs, metres and radians together."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,7 +13,7 @@ RMS, PEAK = "tracking_rms", "tracking_max"
 def with_all_outputs(metrics: Mapping[str, Any] | None) -> Any:
     """Metrics of a run with the rms and the largest of the error over all outputs, m and rad; None stays None.
 
-    The tables of Section 5 compare laws by one figure; nothing outside the reproduction does.
+    The tables of Section 5 compare laws by one figure; it is used in the reproduction only.
     """
     if metrics is None or "error_rms_axes" not in metrics:
         return metrics

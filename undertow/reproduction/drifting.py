@@ -1,6 +1,6 @@
-"""Why Table 1 holds behind a lag that its linearised loop does not bear: weights that drift are damping.
+"""Why Table 1 is stable with a lag that its linearised loop does not tolerate: weights that drift add damping.
 
-Thrust follows the voltage with a lag of 50 ms, under one sinusoid per axis. Once with the weights free, once with them
+Thrust follows the voltage with a lag of 50 ms, under one sinusoid per axis: once with free weights, once with weights
 projected into a box that is too small for the drift.
 """
 
@@ -26,7 +26,7 @@ STATIONARY = {
     "frequency": [0.5, 1.0, 2.0, 3.0, 4.0, 5.0],
 }
 
-_BIN = 200  # samples of 1 ms over which chattering is taken
+_BIN = 200  # samples of 1 ms over which chattering is computed
 
 
 def scenarios() -> dict[str, dict[str, Any]]:
@@ -38,14 +38,14 @@ def scenarios() -> dict[str, dict[str, Any]]:
 
 
 def shown(folder: Path) -> dict[str, Any]:
-    """Gain c of every axis, largest weight and chattering against time, and the c that the linearised loop asks for.
+    """Gain c of every axis, largest weight and chattering against time, and the c that the linearised loop needs.
 
     Args:
-        folder: where `scenarios/` is written.
+        folder: folder in which `scenarios/` is written.
     """
-    wanted = scenarios()
-    write_all(wanted, folder)
-    found = run_batches(wanted, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"))
+    named = scenarios()
+    write_all(named, folder)
+    found = run_batches(named, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"))
     law = law_of(found["drifting_free"])
     between = stable_gains(lambda gain: lag_matrix(law, LAG, drifted=gain), 6000.0)
     runs = {name.removeprefix("drifting_"): _curves(run) for name, run in found.items()}
@@ -73,7 +73,7 @@ def _curves(run: BatchResult) -> dict[str, Any]:
 
 def _scenario(words: str, bound: float) -> dict[str, Any]:
     one = scenario(
-        f"Table 1 behind a lag of {1e3 * LAG:g} ms, {words}: one sinusoid per axis",
+        f"Table 1 with a lag of {1e3 * LAG:g} ms, {words}: one sinusoid per axis",
         fidelity="electromechanical",
         controller={"weights_bound": bound},
         disturbance=STATIONARY,

@@ -1,4 +1,4 @@
-"""The paper's two examples, Table 2 in numbers, and every fidelity: what is run, and what is reported."""
+"""The paper's two examples, Table 2 in numbers, and every fidelity level: scenarios and reported numbers."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +10,7 @@ from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import CONTROLLERS, FIDELITIES, law_of, motor_of, scenario
 from undertow.scenario.execute import Executed
 
-# Propeller speeds at which the linearised loop is looked at, rad/s: Section 3.9 of the theory, 6 to 90 N of thrust.
+# Propeller speeds at which the loop is linearised, rad/s: Section 3.9 of the theory, 6 to 90 N of thrust.
 _SPEEDS = (2.0, 10.0, 20.0, 40.0, 60.0)
 
 
@@ -20,7 +20,7 @@ def scenarios() -> dict[str, dict[str, Any]]:
     for fidelity in FIDELITIES:
         for name, composite in CONTROLLERS.items():
             runs[_with_fidelity(fidelity, name)] = scenario(
-                f"{name.upper()} on fidelity {fidelity}", fidelity=fidelity, composite=composite
+                f"{name.upper()} at fidelity {fidelity}", fidelity=fidelity, composite=composite
             )
     for name, composite in CONTROLLERS.items():
         runs[f"table2_{name}_state"] = scenario(
@@ -45,7 +45,7 @@ def table2(runs: Mapping[str, Executed]) -> dict[str, Any]:
 
 
 def fidelity(runs: Mapping[str, Executed]) -> dict[str, Any]:
-    """Both controllers at Table 1 gains on every fidelity: how it ended, when, and why."""
+    """Both controllers at Table 1 gains at every fidelity level: how each run ended, when and why."""
     return {
         fidelity: {
             name: _metrics(runs[_with_fidelity(fidelity, name)]) | {"why": _why(runs, fidelity, name)}
@@ -73,29 +73,29 @@ def _metrics(run: Executed) -> dict[str, Any]:
 def _why(runs: Mapping[str, Executed], fidelity: str, controller: str) -> str:
     run = runs[_with_fidelity(fidelity, controller)]
     if fidelity == "ideal":
-        return "Thrust follows voltage at once: what the theory assumes."
+        return "Thrust follows voltage without lag, as the theory assumes."
     if fidelity == "static":
-        return "The motor's curve is part of d, but without lag: the estimator sees it as one more disturbance."
+        return "The motor's curve is part of d, but without lag: the estimator treats it as a further disturbance."
     law, motor = law_of(run), motor_of(run)
     winding = fidelity == "electromechanical"
     modes = [rightmost(motor_matrix(law, motor, speed, winding)) for speed in _SPEEDS]
     growth = [mode.real for mode in modes]
-    # Both are statements about small motion at the weights of the start; weights that drift add damping.
+    # Both are statements about small motion at the initial weights; weights that drift add damping.
     worst = max(range(len(_SPEEDS)), key=growth.__getitem__)
     at = f"at a propeller speed of {_SPEEDS[worst]:g} rad/s"
     if growth[worst] < 0:
         return (
             f"At fixed weights the linearised loop is stable from 2 to 60 rad/s: rightmost eigenvalue "
-            f"{growth[worst]:+.2f} 1/s {at}. That says nothing of weights that drift: see the long runs."
+            f"{growth[worst]:+.2f} 1/s {at}. This does not cover weights that drift: see the long runs."
         )
     number = sum(value > 0 for value in growth)
     rate = f"{growth[worst]:+.1f} 1/s, {abs(modes[worst].imag):.0f} rad/s, {at}"
     ended = run.status is not Status.OK
     tail = (
-        "The oscillation grows until something gives."
+        "The oscillation grows until the run fails."
         if ended
         else f"The oscillation makes the weights drift apart, which adds damping (d_hat = z - c eps, c up to "
-        f"{_damping(run):.0f} 1/s at the end), until it is held: see below."
+        f"{_damping(run):.0f} 1/s at the end), until the oscillation stops growing: see below."
     )
     return (
         f"At fixed weights the linearised loop is unstable at {number} of {len(_SPEEDS)} speeds (worst {rate}). {tail}"

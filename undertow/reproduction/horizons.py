@@ -1,4 +1,4 @@
-"""the second horizon of the fidelities: 2,000 s of suite U2, because 20 s show nothing of weights that drift.
+"""The second horizon of the fidelity levels: 2,000 s of suite U2, because 20 s are too short for weights that drift.
 
 All runs are sampled at 1 kHz, for the paper's laws as they are and with their weights projected into a box.
 """
@@ -14,13 +14,13 @@ from undertow.reproduction.setup import FIDELITIES, RAFC, RCAFC, equal_gain, sce
 
 LONG, QUICK = 2000.0, 200.0  # s
 
-# Over which metrics are taken, s; the first is the `steady` one of the runs of 20 s, whose load U2 repeats.
+# Windows of the metrics, s; the first is the `steady` one of the runs of 20 s, whose load U2 repeats.
 WINDOWS = ((10.0, 20.0), (100.0, 200.0), (1000.0, 2000.0))
 
 WHOLE = FIDELITIES[-1]
 BOUND = 20.0  # m/s^2, rad/s^2; of workload W1
 
-# gamma_eps of workload W1, and others that were tried on the whole motor.
+# gamma_eps of workload W1, and others tried with the full motor model.
 _W1 = 20.0
 _SWEEP = (30.0, 10.0, 5.0)
 
@@ -35,7 +35,7 @@ def duration(quick: bool) -> float:
 
 
 def windows(quick: bool) -> tuple[tuple[float, float], ...]:
-    """Those of the horizon."""
+    """Windows of the horizon, s."""
     return tuple(window for window in WINDOWS if window[1] <= duration(quick))
 
 
@@ -50,12 +50,12 @@ def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
 
 
 def table(long: Long, quick: bool) -> list[dict[str, Any]]:
-    """One row per run: how long it lasted; tracking, chattering and weights in every window that it lived to see."""
+    """One row per run: its duration; tracking, chattering and weights in every window that it reached."""
     return [described(name, facts, long[name]) for name, (facts, _) in _runs(quick).items()]
 
 
 def described(name: str, facts: dict[str, Any], run: BatchResult) -> dict[str, Any]:
-    """A row of results.json: what is said of a run, how it ended, metrics by window, growth of its weights."""
+    """A row of results.json: description of a run, its ending, metrics by window, growth of its weights."""
     over = lambda metric: [None if found is None else found[metric] for found in run.windows]
     peaks = run.series["weights_peak"]
     kept = np.unique(np.geomspace(1, max(len(peaks) - 1, 1), _KEPT).round().astype(int)) if len(peaks) > 1 else [0]
@@ -73,7 +73,7 @@ def described(name: str, facts: dict[str, Any], run: BatchResult) -> dict[str, A
 
 
 def name_of(level: str, law: str, bounded: bool = False) -> str:
-    """Of a long run."""
+    """Name of a long run."""
     return f"long_{level}_{law}{'_bounded' if bounded else ''}"
 
 
@@ -106,7 +106,7 @@ def _runs(quick: bool) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
 
 def _scenario(words: str, level: str, quick: bool, composite: float, gains: dict, bounded: bool) -> dict[str, Any]:
     return scenario(
-        f"{words} on {level}, suite U2 for {duration(quick):g} s, 1 kHz",
+        f"{words} at fidelity {level}, suite U2 for {duration(quick):g} s, 1 kHz",
         fidelity=level,
         composite=composite,
         controller=gains | {"weights_bound": BOUND if bounded else math.inf},

@@ -1,4 +1,4 @@
-"""What a motor does to the law of Table 1: a map over first-order lag, inductance of the winding, and horizon."""
+"""Effect of a motor on the law of Table 1: a map over first-order lag, inductance of the winding, and horizon."""
 
 from typing import Any
 
@@ -18,10 +18,10 @@ _LAWS: dict[str, tuple[str, dict[str, Any]]] = {
     "one": ("one rule", same_loop_gain("error", 1)),
 }
 
-# One rule has no weights that can drift: it is where it stays after a second, and need not be run for long.
+# One rule has no weights that can drift: it is stationary after a second, and a short run is enough.
 _SHORT = 200.0  # s
 
-# A propeller speed about which the loop is linearised, rad/s: 15 N of thrust.
+# Propeller speed at which the loop is linearised, rad/s: 15 N of thrust.
 _SPEED = 20.0
 _LARGEST = 6000.0  # c, 1/s
 
@@ -50,7 +50,7 @@ def table(long: Long, quick: bool) -> list[dict[str, Any]]:
 
 
 def windings(long: Long) -> dict[float, BatchResult]:
-    """Runs of the law of Table 1 with five sets, by inductance of the winding, H, where they were run."""
+    """Available runs of the law of Table 1 with five sets, by inductance of the winding, H."""
     named = {value: _name("winding", value, "five") for value in _WINDINGS}
     return {value: long[name] for value, name in named.items() if name in long}
 
@@ -65,7 +65,7 @@ def damping(kind: str, value: float, long: Long) -> tuple[float, float] | None:
 
 
 def lag_thruster(lag: float) -> dict[str, Any]:
-    """A thruster whose thrust is alpha V behind a first-order lag, s."""
+    """A thruster whose thrust is alpha V with a first-order lag, s."""
     return {"kind": "first_order", "thrust_per_volt": _THRUST_PER_VOLT, "time_constant": lag}
 
 
@@ -86,7 +86,7 @@ def _scenario(kind: str, value: float, law: str, quick: bool) -> dict[str, Any]:
     seconds = duration(quick) if law == "five" else min(duration(quick), _SHORT)
     behind = f"a lag of {1e3 * value:g} ms" if kind == "lag" else f"a winding of {1e3 * value:g} mH"
     one = scenario(
-        f"Table 1 with {words} behind {behind}, suite U2 for {seconds:g} s",
+        f"Table 1 with {words} and {behind}, suite U2 for {seconds:g} s",
         fidelity="electromechanical",
         controller=options,
         disturbance={"kind": "u2"},

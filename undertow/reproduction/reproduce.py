@@ -18,22 +18,22 @@ from undertow.scenario.results import to_json
 
 Progress = Callable[[str, float], None]
 
-# Share of the work that the paper's runs take, with the long horizon, and with the last chapter; the rest is drawing.
-# Long runs beside the others: both leave Python's lock alone most of the time.
+# Share of the work that the paper's runs take, with the long horizon, and with the last chapter; the rest is plotting.
+# Long runs run in parallel with the others: both release Python's lock most of the time.
 _AT_ONCE = 2
 
 _PAPER, _LONG, _RUNNING = 0.25, 0.35, 0.9
 
 
 class Reproduction(NamedTuple):
-    """Everything `undertow reproduce` finds out, before it is drawn."""
+    """Results of `undertow reproduce` before they are plotted."""
 
-    results: dict[str, Any]  # what stands in results.json
+    results: dict[str, Any]  # contents of results.json
     runs: dict[str, Executed]
     response: ThrusterResponse
 
     def datasets(self, fidelity: str) -> dict[str, xr.Dataset]:
-        """Recorded series on a fidelity, by controller. Examples 1 and 2 are `ideal` and `static`."""
+        """Recorded series at a fidelity level, by controller. Examples 1 and 2 are `ideal` and `static`."""
         return {name: self.runs[f"{fidelity}_{name}"].dataset for name in CONTROLLERS}
 
 
@@ -43,24 +43,24 @@ def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: boo
     Args:
         folder: an existing, empty folder.
         quick: fewer points in the sweeps and a long horizon of 200 s, not 2,000 s; the same accuracy.
-        progress: told a message and the share done.
-        robust_variant: whether to run the last chapter, the robust variant beside the paper's.
+        progress: called with a message and the share done.
+        robust_variant: whether to run the last chapter, which compares the robust variant with the paper's law.
     """
-    wanted = examples.scenarios() | claims.scenarios(quick)
+    named = examples.scenarios() | claims.scenarios(quick)
     batched = horizons.scenarios(quick) | lag_map.scenarios(quick) | claims.batched(quick)
     write_all(batched, folder)
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         try:
             running_batches = start(batched, horizons.windows(quick), 1.0, ("weights_peak",), pool)
-            runs = run_all(wanted, folder, lambda message, share: progress(message, _PAPER * share))
-            progress(f"{horizons.duration(quick):g} s on every fidelity", _PAPER)
+            runs = run_all(named, folder, lambda message, share: progress(message, _PAPER * share))
+            progress(f"{horizons.duration(quick):g} s at every fidelity level", _PAPER)
             long = running_batches()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    progress("judging the claims", _LONG)
+    progress("evaluating the claims", _LONG)
     results = {
-        "provenance": {"quick": quick, "scenarios": sorted(wanted | batched), **versions()},
+        "provenance": {"quick": quick, "scenarios": sorted(named | batched), **versions()},
         "example1": examples.example(runs, 1),
         "example2": examples.example(runs, 2),
         "table2": examples.table2(runs),

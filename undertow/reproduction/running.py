@@ -1,4 +1,4 @@
-"""Running named scenarios: one by one, each saved so that it can be run again, or many of one program in batches."""
+"""Running named scenarios: one by one, each saved for repetition, or in batches of one program."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -30,8 +30,8 @@ def run_all(scenarios: Scenarios, folder: Path, progress: Callable[[str, float],
 
     Args:
         scenarios: name -> scenario.
-        folder: where the results go.
-        progress: told a message and the share done.
+        folder: folder of the results.
+        progress: called with a message and the share done.
     """
     write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)
@@ -44,21 +44,21 @@ def run_all(scenarios: Scenarios, folder: Path, progress: Callable[[str, float],
 
 
 def write_all(scenarios: Scenarios, folder: Path) -> None:
-    """Write `scenarios/<name>.yaml`, for those who want to run them again."""
+    """Write `scenarios/<name>.yaml`, so that each can be run again."""
     (folder / "scenarios").mkdir(parents=True, exist_ok=True)
     for name, scenario in scenarios.items():
         (folder / "scenarios" / f"{name}.yaml").write_text(dump(scenario), encoding="utf-8")
 
 
 class BatchResult(NamedTuple):
-    """One run."""
+    """One run of a batch."""
 
     built: Built
     status: Status
     ended: float  # s
-    windows: list[dict[str, Any] | None]  # metrics over each window; None where the run was over before its end
-    series: dict[str, np.ndarray]  # (records, ...), of the run as long as it lasted
-    time: np.ndarray  # s, of the records
+    windows: list[dict[str, Any] | None]  # metrics over each window; None where the run ended earlier
+    series: dict[str, np.ndarray]  # (records, ...), up to the end of the run
+    time: np.ndarray  # of the records, s
 
     @property
     def lasted(self) -> bool:
@@ -69,7 +69,7 @@ class BatchResult(NamedTuple):
 def run_batches(
     scenarios: Mapping[str, dict[str, Any]], windows: Sequence[Window], every: float, signals: Sequence[str]
 ) -> dict[str, BatchResult]:
-    """Run sampled scenarios, those whose programs are equal side by side; arguments and errors of `start`."""
+    """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `start`."""
     with ThreadPoolExecutor(1) as pool:
         return start(scenarios, windows, every, signals, pool)()
 
@@ -81,17 +81,17 @@ def start(
     signals: Sequence[str],
     pool: Executor,
 ) -> Callable[[], dict[str, BatchResult]]:
-    """Start to run sampled scenarios, one piece of work for each program.
+    """Start to run sampled scenarios, one task for each program.
 
     Args:
         scenarios: by name; all of them scenarios of the sampled loop.
-        windows: over which metrics are taken at every sample, s.
+        windows: windows of the metrics, s.
         every: time between records, s.
-        signals: that are recorded.
-        pool: what the work is given to.
+        signals: recorded signals.
+        pool: executor of the tasks.
 
     Returns:
-        What waits for all of it; it raises Unsupported where a part needs something that the batch compiler cannot do.
+        Function that waits for the results; it raises Unsupported where the batch compiler lacks an operation.
     """
     part_cache = PartCache()
     built = {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
@@ -115,14 +115,14 @@ def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
 
 @double_outside_runs
 def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ended]:
-    """Runs of one program, by name with their numbers of steps; those of one length side by side."""
+    """Runs of one program, by name with their numbers of steps; those of one length in one batch."""
     first = next(iter(runs.values()))[0]
     numbers = {name: leaves(run) for name, (run, _) in runs.items()}
     constant = [
         all(np.array_equal(column[0], other) for other in column[1:]) for column in zip(*numbers.values(), strict=True)
     ]
     lengths = {steps: [name for name in runs if runs[name][1] == steps] for _, steps in runs.values()}
-    # A program for one run is faster than one for eight that runs one.
+    # For one run a program of width one is faster than one of width eight.
     width = min(simd_width(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
     batch = BatchRunner(first, plan, constant, width)
     tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}

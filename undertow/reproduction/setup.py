@@ -1,4 +1,4 @@
-"""The paper's set-up with its gaps filled, as scenario data: every number of the study can be run again from a file."""
+"""The paper's set-up as scenario data, with its gaps filled, so that every number can be reproduced from a file."""
 
 import math
 from typing import Any, cast
@@ -22,7 +22,7 @@ CONTROLLERS = {"rcafc": RCAFC, "rafc": RAFC}
 
 FIDELITIES = ("ideal", "static", "shaft", "electromechanical")
 
-# Once the loop with the whole motor is unstable, the drag of its propellers is too stiff for fixed steps of 1 ms.
+# When the loop with the full motor model is unstable, propeller drag is too stiff for fixed steps of 1 ms.
 _METHODS = {"electromechanical": "adaptive"}
 
 
@@ -38,7 +38,7 @@ def scenario(
 
     Args:
         description: what the scenario shows.
-        fidelity: of the thrusters. On `ideal` the speed sensor is perfect (Example 1), elsewhere there is none.
+        fidelity: that of the thrusters. At `ideal` the speed sensor is perfect (Example 1), elsewhere there is none.
         composite: gamma_eps; 0 is RAFC.
         controller: further options of the law.
         changes: other keys of the scenario, replacing the paper's.
@@ -56,7 +56,7 @@ def scenario(
     } | changes
 
 
-# The paper's law as fast as a T200 allows: gains for BlueROV2 Heavy, found by hand.
+# The paper's law as fast as a T200 allows: gains for BlueROV2 Heavy, tuned by hand.
 HAND_TUNED: dict[str, Any] = {
     "feedback": [[4, 7], [4, 7], [4, 7], [20, 13], [20, 13], [20, 13]],
     "pole": [4, 4, 4, 3, 3, 3],
@@ -67,7 +67,7 @@ HAND_TUNED: dict[str, Any] = {
     "weights_bound": 40,
 }
 
-# Six independent axes x_ddot = u + d: what fidelity `ideal` amounts to for a law whose model is exact.
+# Six independent axes x_ddot = u + d: equivalent to fidelity `ideal` for a law with an exact model.
 SIX_AXES = {
     "plant": {"kind": "double_integrator", "axes": 6},
     "model": {},
@@ -75,7 +75,7 @@ SIX_AXES = {
 }
 
 
-# Gains that make two laws comparable: what differs is then the law, not how hard it was tuned.
+# Gains that make two laws comparable, so that the law differs and not the effort of tuning.
 _GAMMA = 100.0  # Table 1
 
 
@@ -89,7 +89,7 @@ def equal_gain() -> dict[str, Any]:
 
 
 def equal_gain_ratio() -> float:
-    """How much larger the low-frequency loop gain of RCAFC is than that of RAFC, at Table 1: about 68."""
+    """Ratio of the low-frequency loop gains of RCAFC and RAFC at Table 1: about 68."""
     g = gains(paper(double_integrator(1).model()))
     tracking_branch = g.p12 / g.stiffness
     return (tracking_branch + g.composite / g.pole) / tracking_branch

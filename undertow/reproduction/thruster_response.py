@@ -1,4 +1,4 @@
-"""Fig. 2: what the paper's motor does with a slow and a fast voltage, and how well static laws describe it."""
+"""Fig. 2: response of the paper's motor to a slow and a fast voltage, and errors of static thruster models."""
 
 import functools
 from typing import NamedTuple
@@ -24,7 +24,7 @@ Series = Float[np.ndarray, " samples"]
 
 
 class Period(NamedTuple):
-    """One period of the motor after its start-up has died out."""
+    """One period of the motor after its transient has decayed."""
 
     frequency: float  # rad/s
     time: Series  # s, from the start of the period
@@ -39,7 +39,7 @@ class Law(NamedTuple):
     text: str  # as the paper writes it
     coefficient: float
     unit: str
-    error_long: float  # rms error in % of the rms of what it predicts
+    error_long: float  # rms error in % of the rms of the modelled signal
     error_short: float
 
 
@@ -51,7 +51,7 @@ class ThrusterResponse(NamedTuple):
     laws: tuple[Law, Law, Law]
 
 
-@functools.cache  # a figure and a claim ask for the same
+@functools.cache  # used by a figure and a claim
 def thruster_response(fidelity: str = "electromechanical") -> ThrusterResponse:
     """Drive the motor of Table 3 with the two voltages of Fig. 2 and fit the static laws. Eqs. (8)-(11).
 
@@ -92,11 +92,11 @@ def _actuators(thruster: AbstractThruster, frequency: Float[Array, ""]):
 
 def _law(text: str, unit: str, pick, long: Period, short: Period) -> Law:
     """Least squares through the origin on the long period: output = coefficient * input."""
-    given, wanted = pick(long)
-    coefficient = float(given @ wanted / (given @ given))
+    given, measured = pick(long)
+    coefficient = float(given @ measured / (given @ given))
 
     def error(period: Period) -> float:
-        given, wanted = pick(period)
-        return float(100 * np.sqrt(np.mean((wanted - coefficient * given) ** 2) / np.mean(wanted**2)))
+        given, measured = pick(period)
+        return float(100 * np.sqrt(np.mean((measured - coefficient * given) ** 2) / np.mean(measured**2)))
 
     return Law(text, coefficient, unit, error(long), error(short))

@@ -1,4 +1,4 @@
-"""Sensors that a vehicle carries. One file each; `navigation/observer.py` makes a state of their readings."""
+"""Sensors of a vehicle, one file each. `navigation/observer.py` estimates the state from their readings."""
 
 from undertow.core.catalogue import publish
 

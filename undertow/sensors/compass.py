@@ -32,7 +32,7 @@ def compass(
     Args:
         period: between samples, s.
         noise: standard deviation, rad.
-        bias: standard deviation of a constant offset, drawn once per run, rad.
+        bias: standard deviation of a constant offset, sampled once per run, rad.
         resolution: step of the reading, rad; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.

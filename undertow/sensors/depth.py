@@ -8,7 +8,7 @@ _DOWN = slice(2, 3)
 
 
 class Depth(AbstractSensor):
-    """Down, m. The sensor is at the body origin, and waves do not press on it."""
+    """Down, m. The sensor is at the body origin, and the pressure of waves is neglected."""
 
     def reading(self, motion: Motion):
         return motion.position[_DOWN]
@@ -31,10 +31,10 @@ def depth(
     Args:
         period: between samples, s.
         noise: standard deviation, m.
-        bias: standard deviation of a constant offset, drawn once per run, m.
+        bias: standard deviation of a constant offset, sampled once per run, m.
         resolution: step of the reading, m; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.
-        blend: alpha of the alpha-beta filter that takes it in.
+        blend: alpha of the alpha-beta filter of the estimate.
     """
     return Depth(Sampling(period, noise, bias, resolution, delay, dropout), blend)

@@ -18,7 +18,7 @@ class DVL(AbstractVelocitySensor):
         return jnp.full(6, jnp.inf).at[:3].set(self.sampling.noise)
 
     def correct(self, estimate: Estimate, reading) -> Estimate:
-        """What it was then, by the acceleration since, is compared."""
+        """Compare the reading with the velocity at its time, from the acceleration since."""
         then = estimate.velocity - self.sampling.delay * estimate.acceleration
         error = matvec(estimate.rotation(), reading) - then
         return estimate._replace(velocity=estimate.velocity + self.blend * error)
@@ -33,15 +33,15 @@ def dvl(
     dropout: float = 0.0,
     blend: float = 0.3,
 ) -> DVL:
-    """Velocity over the ground from four acoustic beams. Defaults are those of a small one near the bottom.
+    """Velocity over the ground from four acoustic beams. Defaults are those of a small device near the bottom.
 
     Args:
         period: between pings, s; it grows with the distance to the bottom.
         noise: standard deviation of each component, m/s.
-        bias: standard deviation of a constant offset, drawn once per run, m/s.
+        bias: standard deviation of a constant offset, sampled once per run, m/s.
         resolution: step of the reading, m/s; 0 for none.
         delay: until a sample is delivered, s.
-        dropout: probability that the bottom is lost.
+        dropout: probability that a ping finds no bottom.
         blend: share of each new velocity in the estimated one; the rest comes from the accelerometers.
     """
     return DVL(Sampling(period, noise, bias, resolution, delay, dropout), blend)

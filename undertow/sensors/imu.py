@@ -38,14 +38,14 @@ def imu(
     dropout: float = 0.0,
     blend: float = 0.05,
 ) -> IMU:
-    """Gyroscopes, accelerometers and the inclination that they are fused to. Defaults are of the cheap kind (MEMS).
+    """Gyroscopes, accelerometers and the inclination fused from them. Defaults are those of cheap MEMS devices.
 
     Args:
         period: between samples, s.
         angle_noise: standard deviation of roll and pitch, rad.
         rate_noise: of p, q and r, rad/s.
         force_noise: of the specific force, m/s^2.
-        angle_bias: standard deviation of a constant offset of roll and pitch, drawn once per run, rad.
+        angle_bias: standard deviation of a constant offset of roll and pitch, sampled once per run, rad.
         rate_bias: likewise of p, q and r, rad/s.
         force_bias: likewise of the specific force, m/s^2; an error of roll of 0.01 rad acts like 0.1 m/s^2.
         delay: until a sample is delivered, s.

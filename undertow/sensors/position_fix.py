@@ -31,10 +31,10 @@ def position_fix(
     Args:
         period: between fixes, s.
         noise: standard deviation of each, m.
-        bias: standard deviation of a constant offset, drawn once per run, m.
+        bias: standard deviation of a constant offset, sampled once per run, m.
         resolution: step of the reading, m; 0 for none.
         delay: until a fix is delivered, s.
         dropout: probability that a fix is lost.
-        blend: alpha of the alpha-beta filter that takes it in.
+        blend: alpha of the alpha-beta filter of the estimate.
     """
     return PositionFix(Sampling(period, noise, bias, resolution, delay, dropout), blend)

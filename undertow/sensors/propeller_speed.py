@@ -1,4 +1,4 @@
-"""Propeller speeds, as sensorless drives or encoders report them."""
+"""Propeller speeds, reported by sensorless drives or encoders."""
 
 from undertow.core.errors import BadInput
 from undertow.sensors.estimate import Estimate, Motion
@@ -7,7 +7,7 @@ from undertow.sensors.sensor import AbstractSensor
 
 
 class PropellerSpeed(AbstractSensor):
-    """Speed of every propeller, rad/s; its rate of change is told from successive readings.
+    """Speed of every propeller, rad/s; its rate of change is the difference of successive readings.
 
     Raises:
         BadInput: the thrusters have no speed that could be measured.
@@ -22,10 +22,10 @@ class PropellerSpeed(AbstractSensor):
     def correct(self, estimate: Estimate, reading) -> Estimate:
         before = estimate.actuator.speed
         speed = before + self.blend * (reading - before)
-        told = estimate.actuator._replace(speed=speed)
-        if told.acceleration is not None:
-            told = told._replace(acceleration=(speed - before) / self.sampling.period)
-        return estimate._replace(actuator=told)
+        report = estimate.actuator._replace(speed=speed)
+        if report.acceleration is not None:
+            report = report._replace(acceleration=(speed - before) / self.sampling.period)
+        return estimate._replace(actuator=report)
 
 
 def propeller_speed(
@@ -42,7 +42,7 @@ def propeller_speed(
     Args:
         period: between samples, s; not shorter than the sampling time of the loop.
         noise: standard deviation, rad/s.
-        bias: standard deviation of a constant offset, drawn once per run, rad/s.
+        bias: standard deviation of a constant offset, sampled once per run, rad/s.
         resolution: step of the reading, rad/s; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.

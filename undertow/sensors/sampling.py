@@ -1,4 +1,4 @@
-"""When an sensor speaks, and how wrong it is: rate, noise, bias, resolution, delay, dropout."""
+"""Sampling of a sensor: when it gives a reading, and its errors: noise, bias, resolution, delay, dropout."""
 
 import math
 from typing import NamedTuple
@@ -16,12 +16,12 @@ from undertow.core.param import param
 
 Reading = Float[Array, " width"]
 
-# Of a sampling period: instants of the loop are products of a step, and no product is exact.
+# Share of a sampling period: times of the loop are multiples of a step, which are rounded.
 _EARLY = 1e-6
 
 
 class SensorState(NamedTuple):
-    """What is under way from the sensor to its listener."""
+    """Samples that are taken but not yet delivered."""
 
     taken: Int[Array, ""]  # number of the last sample taken, from 0
     arrived: Int[Array, ""]  # number of the last sample delivered
@@ -31,7 +31,7 @@ class SensorState(NamedTuple):
 
 
 class Delivery(NamedTuple):
-    """What the listener gets at one instant."""
+    """Reading that is delivered at one instant."""
 
     reading: Reading
     fresh: Bool[Array, ""]  # whether it is new
@@ -41,8 +41,8 @@ class Sampling(eqx.Module):
     """Sample k is taken at k period, or at the first step of the loop after it, and delivered a delay later.
 
     reading = resolution round((truth + bias + noise) / resolution). The noise is new for every sample and depends on
-    its number only, not on the rate of the loop; the bias is drawn once for a run. Where several samples fall between
-    two steps, the newest is delivered. In single precision more than 2^24 samples are too many to be told apart.
+    its number only, not on the rate of the loop; the bias is sampled once per run. Where several samples fall between
+    two steps, the newest is delivered. Single precision cannot count more than 2^24 samples.
 
     Raises:
         BadInput: a period not positive, a probability of one or more, anything else negative.
@@ -50,11 +50,11 @@ class Sampling(eqx.Module):
 
     period: Float[Array, ""] = param("s", "between two samples")
     noise: Float[Array, "..."] = param("as read", "standard deviation, new for every sample", default=0.0)
-    bias: Float[Array, "..."] = param("as read", "standard deviation of an offset, drawn once per run", default=0.0)
+    bias: Float[Array, "..."] = param("as read", "standard deviation of an offset, sampled once per run", default=0.0)
     resolution: Float[Array, "..."] = param("as read", "step of the reading; 0 for none", default=0.0)
     delay: Float[Array, ""] = param("s", "from taking a sample to delivering it", default=0.0)
     dropout: Float[Array, ""] = param("", "probability that a sample is lost", default=0.0)
-    slots: int = eqx.field(static=True, default=0)  # samples that can be under way; found from delay and period
+    slots: int = eqx.field(static=True, default=0)  # undelivered samples at most; from delay and period
 
     def __post_init__(self):
         checks.positive("period", self.period, "s")
@@ -66,11 +66,11 @@ class Sampling(eqx.Module):
             self.slots = math.ceil(float(np.asarray(self.delay) / np.asarray(self.period)) - _EARLY) + 1
 
     def init(self, reading: Reading, chance: Reading) -> SensorState:
-        """Nothing taken yet.
+        """State before the first sample.
 
         Args:
             reading: any, for its shape.
-            chance: one standard normal number per entry, for the offset.
+            chance: one standard normal number per entry, for the bias.
         """
         nothing = jnp.asarray(-1, dtype=int)
         readings = jnp.zeros((self.slots, *reading.shape), reading.dtype)
@@ -83,16 +83,16 @@ class Sampling(eqx.Module):
     def deliver(
         self, state: SensorState, t, truth: Reading, chance: Float[Array, " width+1"]
     ) -> tuple[Delivery, SensorState]:
-        """What is delivered at time t, and the state afterwards.
+        """Delivery at time t, and the state afterwards.
 
         Args:
-            state: after the instant before.
+            state: that after the previous instant.
             t: s.
-            truth: what a perfect sensor would read now.
+            truth: exact reading at time t.
             chance: standard normal numbers of sample `number(t)`: one per entry, one for being lost.
         """
         newest, due = self.number(t), self.number(t - self.delay)
-        # Numbers that passed between two steps are all answered with the present truth.
+        # Samples between two steps are all taken of the present true state.
         numbers = newest - (newest - jnp.arange(self.slots)) % self.slots
         new = numbers > state.taken
         readings = jnp.where(

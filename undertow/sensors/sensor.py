@@ -1,4 +1,4 @@
-"""The contract of an sensor."""
+"""The contract of a sensor."""
 
 import abc
 
@@ -13,7 +13,7 @@ from undertow.sensors.sampling import Reading, Sampling
 
 
 class AbstractSensor(eqx.Module):
-    """Reads something of the motion, and knows how a reading corrects what the observer believes.
+    """A sensor: its reading of the motion, and how a reading corrects the estimate.
 
     Raises:
         BadInput: a blend outside (0, 1].
@@ -29,11 +29,11 @@ class AbstractSensor(eqx.Module):
 
     @abc.abstractmethod
     def reading(self, motion: Motion) -> Reading:
-        """What it would read without any error."""
+        """Reading without error."""
 
     @abc.abstractmethod
     def correct(self, estimate: Estimate, reading: Reading) -> Estimate:
-        """Estimate after a reading that was taken `sampling.delay` ago; after the prediction."""
+        """Estimate corrected by a reading that was taken `sampling.delay` ago; called after the prediction."""
 
 
 class AbstractVelocitySensor(AbstractSensor):
@@ -41,4 +41,4 @@ class AbstractVelocitySensor(AbstractSensor):
 
     @abc.abstractmethod
     def velocity_noise(self) -> Float[Array, "6"]:
-        """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for what it does not read."""
+        """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for entries that it lacks."""

@@ -1,4 +1,4 @@
-"""Rung `electromechanical`: the whole of Eqs. (8)-(11)."""
+"""Fidelity level `electromechanical`: the full motor model, Eqs. (8)-(11)."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class ElectromechanicalThruster(AbstractThruster):
 
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 

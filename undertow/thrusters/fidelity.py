@@ -1,4 +1,4 @@
-"""The fidelity ladder: one motor, four degrees of truth."""
+"""Fidelity levels of a DC-motor thruster."""
 
 import jax.numpy as jnp
 
@@ -25,17 +25,17 @@ def with_fidelity(
     dead_zone: float = 0.0,
     dead_zone_kind: str = "pass",
 ) -> AbstractThruster:
-    """The motor on a fidelity of the ladder.
+    """Thruster with a DC motor at a fidelity level.
 
     Args:
         motor: constants.
         fidelity: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; infinite by default.
-        dead_zone: voltage below which nothing turns, V.
-        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        dead_zone: voltage below which the thrust is zero, V.
+        dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
 
     Raises:
-        BadInput: unknown fidelity or kind, supply not positive, dead zone negative, or no inductance on
+        BadInput: unknown fidelity or kind, supply not positive, dead zone negative, or no inductance at
             `electromechanical`.
     """
     checks.choice("fidelity", fidelity, tuple(FIDELITIES))

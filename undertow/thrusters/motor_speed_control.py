@@ -1,4 +1,4 @@
-"""Speed control of motors by computed voltage: what makes a thruster obey a thrust."""
+"""Speed control of motors by computed voltage, so that a thruster follows a commanded thrust."""
 
 from typing import NamedTuple, Protocol
 
@@ -12,22 +12,22 @@ from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.static import StaticThruster
 from undertow.thrusters.thruster import PerThruster
 
-# How much faster the current is made to follow than the speed that it drives.
+# Bandwidth of the current loop relative to that of the speed loop.
 _CURRENT_FASTER = 3.0
 
-# Where the winding is slow, the current has to be driven, and that is sampled, too: so much of the rate is left.
+# Where the winding is slow, the current needs a sampled loop of its own, which leaves this share of the rate.
 _DRIVEN = 0.43
 
 
 class MotorState(NamedTuple):
-    """What the controller believes of its motors."""
+    """Estimate of the motors' state by the controller."""
 
     speed: PerThruster  # rad/s
     current: PerThruster  # A
 
 
 class WithMotor(Protocol):
-    """A thruster with a motor behind it."""
+    """A thruster with a motor model."""
 
     motor: DCMotor
     supply: PerThruster
@@ -39,15 +39,15 @@ class WithMotor(Protocol):
         ...
 
     def commanded(self, terminal: PerThruster) -> PerThruster:
-        """`terminal` solved."""
+        """Inverse of `terminal`."""
         ...
 
 
 class SpeedControlledMotor(AbstractActuatorModel):
-    """The current for a wanted torque, Eq. (8), and the voltage for that current, Eq. (9). Section X9 of the theory.
+    """Current for a required torque, Eq. (8), and voltage for that current, Eq. (9). Section X9 of the theory.
 
-    Speeds are the reported ones where they are measured, else those that the same equations predict from the voltages
-    that were applied; currents are predicted.
+    Speeds are those reported where they are measured, else predicted by the same equations from the applied voltages;
+    currents are predicted.
     """
 
     thruster: WithMotor
@@ -58,7 +58,7 @@ class SpeedControlledMotor(AbstractActuatorModel):
         motor = self.thruster.motor
         winding = jnp.min(motor.resistance / jnp.maximum(motor.inductance, 1e-12))
         driven = jnp.where(winding > _CURRENT_FASTER * sampled, 1.0, _DRIVEN) * sampled
-        return jnp.maximum(driven, 1 / jnp.max(self.time_constant()))  # what it does by itself costs nothing
+        return jnp.maximum(driven, 1 / jnp.max(self.time_constant()))  # its own bandwidth costs no extra voltage
 
     def time_constant(self):
         """k_1 / (k_2 + 2 k_3 c_q |Om|) at half of the largest speed; at rest, where it is largest, without a limit."""
@@ -74,13 +74,13 @@ class SpeedControlledMotor(AbstractActuatorModel):
         return state._replace(speed=report.speed) if self.measured else state
 
     def range(self, state: MotorState, rate) -> tuple[PerThruster, PerThruster]:
-        """Thrusts at the speeds towards which -supply and supply turn the motor within 1 / rate, N."""
+        """Thrusts, N, that -supply and supply allow at `rate`."""
         motor = self.thruster.motor
         resisted = motor.steady_voltage(state.speed)
         limited = jnp.isfinite(self.thruster.supply)
         volts = self.thruster.terminal(
             jnp.where(limited, self.thruster.supply, 0.0)
-        )  # so that what is unlimited has gradients, too
+        )  # so that an infinite supply has gradients, too
         low, high = (state.speed + (side * volts - resisted) / (motor.k1 * rate) for side in (-1, 1))
         return jnp.where(limited, motor.thrust(low), -jnp.inf), jnp.where(limited, motor.thrust(high), jnp.inf)
 
@@ -90,9 +90,9 @@ class SpeedControlledMotor(AbstractActuatorModel):
     def command(self, state: MotorState, force, rate) -> PerThruster:
         motor = self.thruster.motor
         pull = motor.rotor_inertia * rate * (motor.speed_at(force) - state.speed)
-        wanted = motor.steady_current(state.speed) + pull / motor.torque_constant
-        held = motor.resistance * wanted + motor.back_emf_constant * state.speed
-        return self.thruster.commanded(held + self._boost(rate) * (wanted - state.current))
+        current = motor.steady_current(state.speed) + pull / motor.torque_constant
+        held = motor.resistance * current + motor.back_emf_constant * state.speed
+        return self.thruster.commanded(held + self._boost(rate) * (current - state.current))
 
     def target_of(self, state: MotorState, u, rate) -> PerThruster:
         motor, boost = self.thruster.motor, self._boost(rate)
@@ -101,7 +101,7 @@ class SpeedControlledMotor(AbstractActuatorModel):
         return motor.thrust(state.speed + pull / (motor.rotor_inertia * rate))
 
     def advance(self, state: MotorState, u, dt) -> MotorState:
-        """The current exactly for a held back-EMF, however fast the winding; the speed under its mean."""
+        """Exact current for a constant back-EMF at any winding time constant; speed from the mean current."""
         motor = self.thruster.motor
         settled = (self.thruster.terminal(u) - motor.back_emf_constant * state.speed) / motor.resistance
         fading = motor.resistance * dt / jnp.maximum(motor.inductance, 1e-12)
@@ -116,7 +116,7 @@ class SpeedControlledMotor(AbstractActuatorModel):
         return QuasiStaticActuator(StaticThruster(**{name: getattr(self.thruster, name) for name in names}))
 
     def _boost(self, rate) -> PerThruster:
-        """By itself the current comes at R / L; where that is too slow, more voltage makes it faster, ohm."""
+        """Gain of the current loop, ohm: positive where the winding's own rate R / L is too slow."""
         return jnp.maximum(
             self.thruster.motor.inductance * _CURRENT_FASTER * rate - self.thruster.motor.resistance, 0.0
         )

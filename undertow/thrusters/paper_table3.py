@@ -14,15 +14,15 @@ def paper_table3(
     dead_zone_kind: str = "pass",
     inductance: float = 0.01,
 ) -> AbstractThruster:
-    """Thruster of Table 3, as printed, on a fidelity of the fidelity ladder.
+    """Thruster of Table 3, as printed, at a fidelity level.
 
-    An impossible motor: k_t / k_e is 117, so the shaft gives several times the power the supply puts in.
+    The motor is physically impossible: k_t / k_e is 117, so the shaft gives several times the power of the supply.
 
     Args:
         fidelity: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; infinite by default.
-        dead_zone: voltage below which nothing turns, V.
-        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        dead_zone: voltage below which the thrust is zero, V.
+        dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
         inductance: of the winding, H; Table 3 prints 0.01. It decides whether Table 1 is stable.
     """
     motor = DCMotor(

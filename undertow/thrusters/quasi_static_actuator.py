@@ -1,4 +1,4 @@
-"""Thrusters without a state of their own: the voltage for a thrust is the inverse of a curve."""
+"""Thrusters without dynamics: the voltage for a thrust is the inverse of the steady curve."""
 
 from typing import Protocol, runtime_checkable
 
@@ -24,7 +24,7 @@ class Invertible(Protocol):
 
 
 class QuasiStaticActuator(AbstractActuatorModel):
-    """Thrust at once, by the curve that the thruster itself has."""
+    """Thrust without lag, by the thruster's own curve."""
 
     thruster: Invertible
 

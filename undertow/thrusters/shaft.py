@@ -1,4 +1,4 @@
-"""Rung `shaft`: the rotor has inertia, the winding no inductance."""
+"""Fidelity level `shaft`: the rotor has inertia, the winding no inductance."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class ShaftThruster(AbstractThruster):
 
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
@@ -49,7 +49,7 @@ class ShaftThruster(AbstractThruster):
         return self.motor.rotor_energy(state.speed)
 
     def report(self, state) -> PropellerReport:
-        """Speed alone: its rate follows from the voltage that the answer to this is used to find."""
+        """Speed only: its rate depends on the voltage that the controller computes from this report."""
         return PropellerReport(state.speed, None)
 
     def voltage_gain(self):

@@ -1,4 +1,4 @@
-"""Rung `static`: the motor is in its steady state at every instant."""
+"""Fidelity level `static`: the quasi-static motor, in its steady state at every instant."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -16,7 +16,7 @@ class StaticThruster(AbstractThruster):
 
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 

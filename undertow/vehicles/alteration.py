@@ -1,4 +1,4 @@
-"""A body that is not what the controller was told: coefficients off by scaling, or a load carried along."""
+"""A body that differs from the nominal model: scaled coefficients, or attached payloads."""
 
 import functools
 
@@ -12,7 +12,7 @@ from undertow.vehicles.body import Body, rigid_body_mass
 
 
 def altered(body: Body, scaling: ModelScaling | None, payloads: tuple[Payload, ...]) -> Body:
-    """The body with its coefficients scaled, and then with payloads attached; None and () leave it as it is."""
+    """The body with its coefficients scaled, and then with payloads attached; None and () leave it unchanged."""
     if scaling is not None:
         body = _scaled(body, scaling)
     return functools.reduce(_carrying, payloads, body)

@@ -18,7 +18,7 @@ Matrix6 = Float[Array, "6 6"]
 
 
 class Body(eqx.Module):
-    """Coefficients of the equation of motion about the body origin, ready for use.
+    """Coefficients of the equation of motion about the body origin.
 
     Body axes forward, starboard, down. Added mass is part of `mass_matrix`; damping matrices are positive.
     """
@@ -34,7 +34,7 @@ class Body(eqx.Module):
     gravity: Float[Array, ""] = param("m/s^2", "gravity, weight per dry mass", symbol="g", default=9.81)
 
     def coriolis(self, nu: Vector6) -> Vector6:
-        """C(nu) nu, N and N m; does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, multiplied out."""
+        """C(nu) nu, N and N m, which does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, expanded."""
         momentum = matvec(self.mass_matrix, nu)
         linear, angular = momentum[:3], momentum[3:]
         return jnp.concatenate([cross(nu[3:], linear), cross(nu[:3], linear) + cross(nu[3:], angular)])
@@ -47,7 +47,7 @@ class Body(eqx.Module):
         """g, N and N m, on the left side of Eq. (2).
 
         Args:
-            down: direction of gravity seen from the body: third row of R in water that does not accelerate.
+            down: direction of gravity in body axes: third row of R in water that does not accelerate.
         """
         force = (self.weight - self.buoyancy) * down
         moment = cross(self.weight * self.r_g - self.buoyancy * self.r_b, down)
@@ -66,7 +66,7 @@ class Body(eqx.Module):
         return 0.5 * (nu * matvec(self.mass_matrix, nu)).sum()
 
     def potential_energy(self, position: Vector3, down: Vector3) -> Float[Array, ""]:
-        """Of weight and buoyancy, J; zero with the body upright at the world origin and r_g = r_b = 0."""
+        """Energy of weight and buoyancy, J; zero with the body upright at the world origin and r_g = r_b = 0."""
         lever = self.weight * self.r_g - self.buoyancy * self.r_b
         return -(self.weight - self.buoyancy) * position[2] - (lever * down).sum()
 
@@ -85,7 +85,7 @@ def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> 
 
 
 def shift_matrix(r: Vector3) -> Matrix6:
-    """H(r): the same motion seen from a point r away is H nu; M_b = H^T M H. Fossen (2021), Eq. (C.5)."""
+    """H(r): the velocity at a point at r is H nu; M_b = H^T M H. Fossen (2021), Eq. (C.5)."""
     return jnp.block([[jnp.eye(3), skew(r).T], [jnp.zeros((3, 3)), jnp.eye(3)]])
 
 
@@ -98,23 +98,23 @@ def coriolis_matrix(mass_matrix: Matrix6, nu: Vector6) -> Matrix6:
 
 
 class SeenFromWater(NamedTuple):
-    """What the equation of motion is evaluated with, body axes."""
+    """Arguments of the equation of motion relative to the water, body axes."""
 
     nu: Vector6  # velocity through the water, m/s, rad/s
-    down: Vector3  # direction of what is felt as gravity, in units of gravity
+    down: Vector3  # apparent gravity, in units of gravity
     rate: Vector6 | Float[Array, ""]  # nu_dot less that of the velocity through the water, m/s^2
 
 
 def seen_from_water(
     water: Water | None, rotation: Float[Array, "3 3"], nu: Vector6, gravity: Float[Array, ""]
 ) -> SeenFromWater:
-    """The body as seen from the water around it, Fossen (2021), ch. 10.3.
+    """Motion of the body relative to the water around it, Fossen (2021), ch. 10.3.
 
-    Where the water is uniform over the body, the world seen from the moving water is still water. If the water
-    accelerates as well, everything in it, the body's own mass and the water it displaces, feels that as gravity.
+    Where the water is uniform over the body, it is at rest in axes that move with it. An acceleration of the water
+    acts in these axes as a change of gravity on the mass of the body and on the displaced water.
 
     Args:
-        water: how the water moves, world axes; None for water at rest.
+        water: motion of the water, world axes; None for water at rest.
         rotation: body -> world.
         nu: body velocity over ground, m/s and rad/s.
         gravity: m/s^2.

@@ -1,4 +1,4 @@
-"""A vehicle as the linter sees it: the numbers as given, before anything refuses them."""
+"""A vehicle for the linter: the numbers as given, before they are validated."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from jaxtyping import Float
 from undertow.vehicles.published import inertia_about_origin
 from undertow.vehicles.vehicle import Vehicle
 
-FREEDOMS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+DOF_NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 FRESH_WATER = 1000.0  # kg/m^3
 
 
@@ -33,13 +33,13 @@ class Facts(NamedTuple):
 
     @property
     def displaced_mass(self) -> float:
-        """Mass of the displaced water, kg; by the vehicle's own gravity, if that can be the earth's."""
+        """Mass of the displaced water, kg; with the vehicle's own gravity where it is plausible."""
         gravity = self.weight / self.mass
         return self.buoyancy / (gravity if 9 < gravity < 11 else 9.81)
 
     @property
     def scale(self) -> float:
-        """How large the vehicle is at least, m: its longest thruster arm, or the side of a cube of its volume."""
+        """Least size of the vehicle, m: its longest thruster arm, or the side of a cube of its volume."""
         side = np.cbrt(self.displaced_mass / (self.water_density or FRESH_WATER))
         return float(max(self.lever, side))
 
@@ -58,7 +58,7 @@ class Facts(NamedTuple):
 
     @property
     def thruster_matrix(self) -> Float[np.ndarray, "6 N"]:
-        """B from the poses, directions made of length 1."""
+        """B from the poses, with directions normalised to length 1."""
         lengths = np.linalg.norm(self.directions, axis=1, keepdims=True)
         unit = self.directions / np.where(lengths > 0, lengths, 1.0)
         return np.concatenate([unit, np.cross(self.positions, unit)], axis=1).T
@@ -70,7 +70,7 @@ class Facts(NamedTuple):
 
 
 def facts_of(vehicle: Vehicle) -> Facts:
-    """What a vehicle made in Python or from the catalogue shows of itself."""
+    """Facts of a vehicle made in Python or from the catalogue."""
     numbers = {
         name: np.asarray(getattr(vehicle, name), dtype=float)
         for name in ("r_g", "r_b", "added_mass", "linear_damping", "quadratic_damping")
@@ -81,7 +81,7 @@ def facts_of(vehicle: Vehicle) -> Facts:
         mass=mass,
         weight=float(vehicle.weight),
         buoyancy=float(vehicle.buoyancy),
-        inertia=inertia_about_origin(np.asarray(vehicle.inertia), -mass, numbers["r_g"]),  # back from the origin
+        inertia=inertia_about_origin(np.asarray(vehicle.inertia), -mass, numbers["r_g"]),  # shift back from origin
         positions=np.asarray(vehicle.thruster_positions, dtype=float),
         directions=np.asarray(vehicle.thruster_directions, dtype=float),
         **numbers,

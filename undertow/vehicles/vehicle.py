@@ -1,4 +1,4 @@
-"""A vehicle as data: published numbers with their sources, and what follows from them."""
+"""A vehicle as data: published numbers with their sources, and derived matrices."""
 
 import equinox as eqx
 import jax
@@ -34,7 +34,7 @@ class Vehicle(eqx.Module):
     quadratic_damping: Float[Array, "6 6"] = param(
         "N s^2/m^2, N s^2, N m s^2", "quadratic damping, positive", symbol="D_q"
     )
-    thruster_positions: Float[Array, "N 3"] = param("m", "where each thruster acts", symbol="r_j")
+    thruster_positions: Float[Array, "N 3"] = param("m", "position of each thruster", symbol="r_j")
     thruster_directions: Float[Array, "N 3"] = param("", "unit vector of positive thrust", symbol="e_j")
     sources: tuple = sources_field()
 
@@ -99,10 +99,10 @@ class Vehicle(eqx.Module):
 
     @double_outside_runs
     def with_thrusters(self, numbers) -> "Vehicle":
-        """Same hull with only some of its thrusters, numbered from 1.
+        """The same hull with some of its thrusters only, numbered from 1.
 
         Raises:
-            BadInput: a number that is not one of the vehicle's thrusters, one given twice, or none at all.
+            BadInput: a number that is not one of the vehicle's thrusters, a repeated one, or none.
         """
         for number in numbers:
             if number not in range(1, self.thrusters + 1):

@@ -1,10 +1,10 @@
-"""Is this vehicle possible, and is it likely? Each rule looks at one thing and says what caused its finding.
+"""Linter of vehicles: whether the parameters are possible and plausible. Each rule checks one property.
 
-A linter sees numbers, not code. Of the defects found in published models it cannot see: wrong integration and time
+A linter checks numbers, not code. Of the defects found in published models it cannot find: wrong integration and time
 steps (tests/loop/test_sampled_to_continuous.py: answers converge as the step is halved; tests/numerics/
 test_integrators.py), wrong kinematics (tests/numerics/test_rotations.py, tests/physics/test_output_rates.py), Coriolis
-terms left out or doing work (tests/physics/test_inertia_forces.py), forces that change when motion is reversed or
-mirrored (tests/physics/test_mirror.py), energy out of nothing (tests/physics/test_energy_balance.py), state that
+terms missing or doing work (tests/physics/test_inertia_forces.py), forces that change when motion is reversed or
+mirrored (tests/physics/test_mirror.py), creation of energy (tests/physics/test_energy_balance.py), state that
 leaks between runs (tests/loop/test_sampled_to_continuous.py: run twice, same bits).
 """
 
@@ -25,6 +25,6 @@ _RULES = (
 
 
 def lint(facts: Facts) -> tuple[Finding, ...]:
-    """Everything that is wrong or odd about a vehicle, errors first."""
+    """All errors and advice on a vehicle, errors first."""
     findings = [finding for rule in _RULES for finding in rule(facts)]
     return tuple(sorted(findings, key=lambda finding: finding.level != "error"))

@@ -1,4 +1,4 @@
-"""Inertia that is another vehicle's: the same digits, perhaps with the decimal point moved."""
+"""Inertia copied from another vehicle: the same digits, perhaps with a shifted decimal point."""
 
 import functools
 from collections.abc import Iterator
@@ -11,11 +11,11 @@ from undertow.vehicles.facts import Facts, facts_of
 from undertow.vehicles.published import inertia_about_origin
 
 _DIGITS = 1e-3  # of the largest entry
-_OTHER_MASS = 0.1  # relative; a vehicle that weighs the same may well have the same inertia
+_OTHER_MASS = 0.1  # relative; a vehicle of the same mass may have the same inertia
 
 
 def copied(facts: Facts) -> Iterator[Finding]:
-    """Against every vehicle of the catalogue, about the centre of gravity and about the origin."""
+    """Compare with every vehicle of the catalogue, about the centre of gravity and about the origin."""
     for other in _known():
         if abs(facts.mass / other.mass - 1) < _OTHER_MASS:
             continue
@@ -28,12 +28,12 @@ def copied(facts: Facts) -> Iterator[Finding]:
 
 
 def _moved(mine: np.ndarray, theirs: np.ndarray) -> tuple[int, ...]:
-    """The power of ten between two matrices, if that is all there is between them."""
+    """The power of ten between two matrices, if they differ by nothing else."""
     if not np.any(mine):
         return ()
     power = int(np.round(np.log10(np.abs(mine).max() / np.abs(theirs).max())))
     same = np.abs(mine - 10.0**power * theirs).max() < _DIGITS * np.abs(mine).max()
-    plain = np.ptp(np.diag(theirs)) < 0.05 * np.abs(theirs).max()  # three times 8 may be chance, if moved
+    plain = np.ptp(np.diag(theirs)) < 0.05 * np.abs(theirs).max()  # equal entries may agree by chance, if shifted
     return (power,) if same and not (plain and power) else ()
 
 

@@ -1,4 +1,4 @@
-"""Numbers that follow from a vehicle's data, for a quick look by someone who knows it."""
+"""Numbers derived from a vehicle's data, for inspection."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from undertow.vehicles.facts import Facts
 
 
 def derived(facts: Facts) -> tuple[tuple[str, str, str], ...]:
-    """(what, value, unit), a row each."""
+    """Rows (what, value, unit)."""
     eigenvalues = np.linalg.eigvalsh(0.5 * (facts.mass_matrix + facts.mass_matrix.T))
     sizes = np.linalg.svd(facts.thruster_matrix, compute_uv=False)
     even = np.linalg.svd(scaled(facts.thruster_matrix), compute_uv=False)

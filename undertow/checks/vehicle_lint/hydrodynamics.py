@@ -1,19 +1,19 @@
-"""Added mass and damping: signs, zeros, and power that only flows into the water."""
+"""Added mass and damping: signs, zeros, and dissipation."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
-from undertow.vehicles.facts import FREEDOMS, FRESH_WATER, Facts
+from undertow.vehicles.facts import DOF_NAMES, FRESH_WATER, Facts
 
 _SAMPLES = 4000
 _SPHERE = 0.5  # added mass of a sphere per displaced mass
-_MOST_ADDED = 5.0  # added per displaced mass; a flat plate broadside has more, a vehicle hardly
+_MOST_ADDED = 5.0  # added per displaced mass; only a flat plate broadside has more
 
 
 def added_mass(facts: Facts) -> Iterator[Finding]:
-    """Water must be pushed aside along every axis, in positive numbers here."""
+    """Added mass is positive along every axis."""
     diagonal = np.diag(facts.added_mass)
     if np.any(diagonal < 0):
         hint = "Published derivatives such as X_udot are negative; undertow wants M_A = -X_udot: reverse the signs"
@@ -36,7 +36,7 @@ def added_mass(facts: Facts) -> Iterator[Finding]:
 
 
 def damping_sign(facts: Facts) -> Iterator[Finding]:
-    """Damping is given in positive numbers."""
+    """Damping is positive."""
     for key in ("linear_damping", "quadratic_damping"):
         diagonal = np.diag(getattr(facts, key))
         if np.any(diagonal < 0):
@@ -45,10 +45,10 @@ def damping_sign(facts: Facts) -> Iterator[Finding]:
 
 
 def dissipation(facts: Facts) -> Iterator[Finding]:
-    """nu . D(nu) nu must not be negative for any motion, at a crawl or fast; sampled over directions and speeds."""
+    """nu . D(nu) nu is not negative for any motion; sampled over directions and speeds."""
     linear, quadratic = facts.linear_damping, facts.quadratic_damping
     if np.any(np.diag(linear) < 0) or np.any(np.diag(quadratic) < 0):
-        return  # said already
+        return  # reported already
     rng = np.random.default_rng(0)
     nu = rng.normal(size=(_SAMPLES, 6)) * np.where(rng.random((_SAMPLES, 6)) < 0.5, 0.0, 1.0)
     nu *= np.array([1, 1, 1, *np.full(3, 1 / facts.scale)])
@@ -66,7 +66,7 @@ def dissipation(facts: Facts) -> Iterator[Finding]:
 
 
 def undamped(facts: Facts) -> Iterator[Finding]:
-    """Nothing moves in water for ever."""
+    """Every motion is damped."""
     free = (np.diag(facts.linear_damping) == 0) & (np.diag(facts.quadratic_damping) == 0)
     if np.any(free):
         got = f"zero, like the linear one, in {_names(free)}"
@@ -80,7 +80,7 @@ def _is_of_sphere(facts: Facts) -> bool:
 
 
 def _sphere(facts: Facts) -> Iterator[Finding]:
-    """Equal along all axes and none in turning is a sphere's: then the rest must be one's too."""
+    """Equal added mass along all axes and none in rotation is that of a sphere: then size and mass must fit one."""
     mass, half = facts.added_mass[0, 0], _SPHERE * facts.displaced_mass
     if abs(mass / half - 1) > 0.05:
         got = f"{mass:.4g} kg, where half the displaced mass is {half:.4g} kg"
@@ -95,11 +95,11 @@ def _sphere(facts: Facts) -> Iterator[Finding]:
 def _shown(values: np.ndarray, which: np.ndarray) -> str:
     if not np.any(values[which]):
         return f"zero in {_names(which)}"
-    return ", ".join(f"{values[i]:.4g} in {FREEDOMS[i]}" for i in np.flatnonzero(which))
+    return ", ".join(f"{values[i]:.4g} in {DOF_NAMES[i]}" for i in np.flatnonzero(which))
 
 
 def _names(which: np.ndarray) -> str:
-    return ", ".join(FREEDOMS[i] for i in np.flatnonzero(which))
+    return ", ".join(DOF_NAMES[i] for i in np.flatnonzero(which))
 
 
 def _metres(size: np.ndarray) -> str:

@@ -1,4 +1,4 @@
-"""Where the thrusters are and what they can do together."""
+"""Positions of the thrusters, and their joint authority."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
 from undertow.plants.reachability import open_loop_advice
-from undertow.vehicles.facts import FREEDOMS, Facts
+from undertow.vehicles.facts import DOF_NAMES, Facts
 
 _ROUNDING = 5e-3
 _WORST_CONDITION = 10.0
@@ -22,7 +22,7 @@ def unit_directions(facts: Facts) -> Iterator[Finding]:
 
 
 def arms(facts: Facts) -> Iterator[Finding]:
-    """Thrusters sit on the vehicle."""
+    """Thrusters are on the vehicle."""
     if facts.size is None:
         side = np.cbrt(facts.displaced_mass / (facts.water_density or 1000.0))
         share = facts.lever / side
@@ -44,19 +44,19 @@ def arms(facts: Facts) -> Iterator[Finding]:
 
 
 def rank(facts: Facts) -> Iterator[Finding]:
-    """Which directions no thruster pushes, and how unevenly the others are pushed; moments per longest arm."""
-    for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, FREEDOMS):
+    """Directions without thrust, and the condition of the others; moments per longest arm."""
+    for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, DOF_NAMES):
         yield Finding("advice", "rank", "thrusters", sentence)
         return
     left, sizes, _ = np.linalg.svd(scaled(facts.thruster_matrix))
     if sizes[0] > _WORST_CONDITION * sizes[5]:
-        weakest = FREEDOMS[int(np.argmax(np.abs(left[:, 5])))]
+        weakest = DOF_NAMES[int(np.argmax(np.abs(left[:, 5])))]
         got = f"such that the best is pushed {sizes[0] / sizes[5]:.3g} times harder than the worst, {weakest}"
         yield advice("condition", "thrusters", "push all directions alike", got)
 
 
 def same_line(facts: Facts) -> Iterator[Finding]:
-    """Two thrusters on one line of action do the work of one: often a sign has been lost."""
+    """Two thrusters on one line of action act as one: often a sign has been lost."""
     columns = scaled(facts.thruster_matrix).T
     for j in range(len(columns)):
         for i in range(j):
@@ -68,7 +68,7 @@ def same_line(facts: Facts) -> Iterator[Finding]:
 
 
 def mirror(facts: Facts) -> Iterator[Finding]:
-    """Left and right: where most thrusters have a mirror image, one that has none is suspect."""
+    """Symmetry: where most thrusters have a mirror image, one without is suspect."""
     columns = scaled(facts.thruster_matrix).T
     images = columns * np.array([1, -1, 1, -1, 1, -1])
     distance = np.minimum(*(np.abs(images[:, None] - sign * columns).max(axis=2) for sign in (1, -1)))

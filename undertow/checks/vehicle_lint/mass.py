@@ -1,4 +1,4 @@
-"""Mass and inertia: what a rigid body can have, and what one of this size can have."""
+"""Mass and inertia that are possible for a rigid body, and for one of this size."""
 
 from collections.abc import Iterator
 
@@ -12,12 +12,12 @@ _AXES = ("roll", "pitch", "yaw")
 _USUAL = (0.25, 0.8)
 # Without a size: of the longest thruster arm or the cube root of the volume, whichever is larger.
 _USUAL_OF_SCALE = (0.05, 0.9)
-# Units by which an inertia may be off: how many of them make one kg m^2.
+# Units in which an inertia may be given by mistake, per kg m^2.
 _UNITS = {1e3: "g m^2", 1e4: "kg cm^2", 1e6: "kg mm^2", 1e7: "g cm^2", 1e9: "g mm^2"}
 
 
 def mass_matrix(facts: Facts) -> Iterator[Finding]:
-    """M must be symmetric and positive definite: otherwise some push accelerates the vehicle backwards."""
+    """M must be symmetric and positive definite: otherwise some force accelerates the vehicle backwards."""
     for key in ("inertia", "added_mass"):
         matrix = getattr(facts, key)
         skew = np.abs(matrix - matrix.T).max()
@@ -45,7 +45,7 @@ def triangle(facts: Facts) -> Iterator[Finding]:
 
 
 def gyration(facts: Facts) -> Iterator[Finding]:
-    """The radius of gyration must fit into the hull. Catches grams, centimetres and other vehicles' inertia."""
+    """The radius of gyration must fit the hull. Finds grams, centimetres and other vehicles' inertia."""
     radii = facts.radii_of_gyration
     if facts.size is None:
         limits, usual, basis = np.full(3, facts.scale), _USUAL_OF_SCALE, "Thruster arms and volume make the vehicle"

@@ -1,17 +1,17 @@
-"""A thruster matrix as printed, against the poses of the thrusters."""
+"""Comparison of a printed thruster matrix with the poses of the thrusters."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from undertow.checks.finding import Finding, error
-from undertow.vehicles.facts import FREEDOMS, Facts
+from undertow.vehicles.facts import DOF_NAMES, Facts
 
 _ROUNDING = 0.02  # of the largest entry of a row: printed matrices have two or three digits
 
 
 def printed_matrix(facts: Facts) -> Iterator[Finding]:
-    """Each row against the poses; one finding per row that is off."""
+    """Compare each row with the poses; one finding per wrong row."""
     if facts.printed_matrix is None:
         return
     expected = facts.thruster_matrix + 0.0  # no minus zeros
@@ -20,7 +20,7 @@ def printed_matrix(facts: Facts) -> Iterator[Finding]:
         off = np.flatnonzero(np.abs(printed - computed) > _ROUNDING * largest)
         if len(off):
             j = int(off[np.argmax(np.abs(printed - computed)[off])])
-            must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {FREEDOMS[row]}"
+            must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {DOF_NAMES[row]}"
             got = f"{printed[j]:.4g}{_others(off)}"
             yield error("printed_matrix", f"thruster_matrix[{row}]", must, got, _likely(printed[off], computed[off]))
 
@@ -30,7 +30,7 @@ def _others(off: np.ndarray) -> str:
 
 
 def _likely(printed: np.ndarray, computed: np.ndarray) -> str:
-    """What the mistake looks like."""
+    """Likely mistake."""
     if np.allclose(printed, -computed, rtol=_ROUNDING):
         return "Opposite sign" if len(printed) == 1 else "They have the opposite sign: another frame, or a wrong one"
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""At rest in the water: weight, buoyancy and where they act."""
+"""Statics: weight, buoyancy and their centres."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ _MOST_TRIM = 10.0  # degrees
 
 
 def gravity(facts: Facts) -> Iterator[Finding]:
-    """W = m g on this planet."""
+    """W = m g with the gravity of the earth."""
     g = facts.weight / facts.mass
     expected = facts.mass * 9.81
     got = f"{facts.weight:.5g} N, {g:.4g} m/s^2 times {facts.mass:.4g} kg"
@@ -31,7 +31,7 @@ def gravity(facts: Facts) -> Iterator[Finding]:
 
 
 def balance(facts: Facts) -> Iterator[Finding]:
-    """Buoyancy near weight, and rather above than below."""
+    """Buoyancy is near the weight, preferably above it."""
     net = facts.buoyancy - facts.weight
     share = net / facts.weight
     got = (
@@ -52,7 +52,7 @@ def balance(facts: Facts) -> Iterator[Finding]:
 
 
 def volume(facts: Facts) -> Iterator[Finding]:
-    """What is displaced must fit into the hull, and fill some of it."""
+    """The displaced volume must fit the hull, and fill a part of it."""
     if facts.size is None:
         return
     box = float(np.prod(facts.size))
@@ -65,7 +65,7 @@ def volume(facts: Facts) -> Iterator[Finding]:
 
 
 def uprightness(facts: Facts) -> Iterator[Finding]:
-    """Centre of buoyancy above the centre of gravity, by less than the hull is high."""
+    """The centre of buoyancy is above the centre of gravity, by less than the height of the hull."""
     above = float(facts.r_g[2] - facts.r_b[2])
     height = facts.scale if facts.size is None else float(facts.size[2])
     of = "size from thruster arms and volume" if facts.size is None else "height of the hull"
@@ -90,7 +90,7 @@ def uprightness(facts: Facts) -> Iterator[Finding]:
 
 
 def trim(facts: Facts) -> Iterator[Finding]:
-    """It should float level."""
+    """The vehicle should float level."""
     moment = facts.weight * facts.r_g - facts.buoyancy * facts.r_b
     angle = np.degrees(np.arctan2(np.hypot(moment[0], moment[1]), abs(moment[2])))
     if angle > _MOST_TRIM:

@@ -1,4 +1,4 @@
-"""A reference that may jump, made smooth: three equal poles, no lag behind what is smooth already."""
+"""Filter of reference jumps: three equal poles, and no lag behind a smooth reference."""
 
 from typing import NamedTuple
 
@@ -12,50 +12,50 @@ from undertow.core.param import param
 
 
 class FilterState(NamedTuple):
-    """What is left of earlier jumps, and what the reference should be by now if it has not jumped again."""
+    """Remainder of earlier jumps, and the expected reference if it does not jump again."""
 
     offset: Target
-    expected: Target  # its acceleration is the last one that was seen
+    expected: Target  # its acceleration is the last one
     elapsed: Float[Array, ""]  # s, since then
 
 
 class Room(NamedTuple):
-    """What the actuators can do, and by how much a vehicle that was carried away is out of their reach."""
+    """Limits of the actuators, and by how much the error of a vehicle that drifted away exceeds them."""
 
     most: Outputs | float  # acceleration, m/s^2, rad/s^2
-    excess: Outputs | float  # of the target's lead, m, rad: the target gives way by it
-    pace: Outputs | float  # of the target's velocity where it gives way: it starts from that of the vehicle
+    excess: Outputs | float  # of the error, m, rad: the target is moved by it
+    pace: Outputs | float  # change of the target's velocity where it is moved: it starts from that of the vehicle
 
 
 UNLIMITED = Room(1e12, 0.0, 0.0)  # infinity has no gradient
 
-# Largest acceleration of (p + w)^3 = 0 from rest, as a share of w^2 times the way: (sqrt(2) - 1) / exp(2 - sqrt(2)).
+# Largest acceleration of (p + w)^3 = 0 from rest, as a share of w^2 times the step: (sqrt(2) - 1) / exp(2 - sqrt(2)).
 _PEAK = 0.2306
 _NEAR, _LEAST = 1e-9, 1e-9  # m, rad; m/s^2, rad/s^2: a root has no gradient at zero
 
 
 class ReferenceFilter(eqx.Module):
-    """Jumps of position and velocity die out like (p + w)^3 = 0, in closed form, at whatever sampling time.
+    """Jumps of position and velocity decay by (p + w)^3 = 0, in closed form, at any sampling time.
 
-    What is a jump is told from the derivatives that come with a reference: a smooth one departs from what they lead
-    to by the third power of the sampling time, and passes as it is. Jumps of the acceleration pass, too.
+    A jump is a difference from the extrapolation of the reference's derivatives: a smooth reference differs from it by
+    the third power of the sampling time, and passes unchanged. Jumps of the acceleration pass, too.
 
     Raises:
         BadInput: frequency not positive.
     """
 
-    frequency: Float[Array, "..."] = param("rad/s", "of the three poles", symbol="w_r")
+    frequency: Float[Array, "..."] = param("rad/s", "frequency of the three poles", symbol="w_r")
 
     def __check_init__(self):
         checks.positive("frequency", self.frequency, "rad/s")
 
     def init(self, position: Outputs) -> FilterState:
-        """At rest at a position: the first reference is a jump from there."""
+        """State at rest at a position: the first reference is a jump from there."""
         still = jnp.zeros_like(position)
         return FilterState(Target(still, still, still), Target(position, still, still), jnp.zeros(()))
 
     def smoothed(self, state: FilterState, r: Target, coordinates: AbstractCoordinates) -> Target:
-        """The reference with what is left of its jumps."""
+        """The reference with the remainder of its jumps."""
         offset = self._offset(state, r, coordinates)
         return Target(*(own + left for own, left in zip(r, offset, strict=True)))
 
@@ -67,13 +67,13 @@ class ReferenceFilter(eqx.Module):
         Args:
             state: now.
             r: reference now.
-            coordinates: know which outputs are angles.
-            share: of the wanted acceleration that the actuators give; with less than 1 the filter waits.
+            coordinates: say which outputs are angles.
+            share: share of the desired acceleration that the actuators give; below 1 the filter waits.
             dt: sampling time, s.
-            room: what the actuators can do.
+            room: limits of the actuators.
         """
         away, rate, bend = self._offset(state, r, coordinates)
-        # From far away it comes more slowly, so that the way home takes half of what the actuators can do.
+        # From far away it is slower, so that the return takes half of the authority of the actuators.
         far = jnp.maximum(jnp.abs(away), _NEAR)
         w, t = jnp.minimum(self.frequency, jnp.sqrt(jnp.maximum(room.most, _LEAST) / (2 * _PEAK * far))), share * dt
         # exp(A t) = exp(-w t) (1 + N t + N^2 t^2 / 2) with N = A + w nilpotent.
@@ -93,7 +93,7 @@ class ReferenceFilter(eqx.Module):
         return FilterState(offset, expected, dt)
 
     def _offset(self, state: FilterState, r: Target, coordinates: AbstractCoordinates) -> Target:
-        """What is left of earlier jumps, and the one that has just been seen; the acceleration rose evenly."""
+        """Remainder of earlier jumps and of a new one; the acceleration is taken as linear in between."""
         risen = r.acceleration - state.expected.acceleration
         jump = coordinates.difference(r.position, state.expected.position) - state.elapsed**2 / 6 * risen
         kick = r.velocity - state.expected.velocity - state.elapsed / 2 * risen

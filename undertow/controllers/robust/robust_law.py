@@ -1,4 +1,4 @@
-"""The sound law: Eqs. (18)-(44) with what makes them hold on a real vehicle. Sections 3.12, 6 and 7 of the theory."""
+"""The robust law: Eqs. (18)-(44) modified for real vehicles. Sections 3.12, 6 and 7 of the theory."""
 
 from typing import Any, NamedTuple
 
@@ -20,11 +20,11 @@ from undertow.numerics.linear_algebra import companion_lyapunov, matvec
 
 PerAxis = Float[Array, " n"]
 
-# A smaller share than this of what is wanted says that limits bind, not that numbers are rounded.
+# An attained share below this means that limits bind; above it the difference from 1 is rounding.
 _WHOLE = 0.999
 
-# Times what the actuators can do for an axis over its position gain: from up to 16 of these, full force on both sides
-# of the way home does not overshoot. From further away the target comes to meet the vehicle.
+# Times the authority of the actuators for an axis over its position gain: from up to 16 of these, full force in both
+# directions does not overshoot. From further away the target is moved towards the vehicle.
 _FAR = 4.0
 
 
@@ -32,22 +32,22 @@ class RobustState(NamedTuple):
     """State z of the law."""
 
     estimator: EstimatorState
-    actuators: Any  # what is believed of the actuators
+    actuators: Any  # estimated state of the actuators
     filter: FilterState | None
 
 
 class Plan(NamedTuple):
-    """All that is decided at one instant."""
+    """Decisions of one instant."""
 
     actuators: Any
     seen: Estimate
-    off: Tracking  # from the target, smoothed if there is a filter
+    off: Tracking  # error from the target, filtered if there is a filter
     robust: PerAxis  # u_r
-    forces: Float[Array, " m"]  # that would give what is wanted
+    forces: Float[Array, " m"]  # for the desired acceleration, without limits
 
 
 class RobustRCAF(AbstractInformedController):
-    """The paper's structure, in the model's own axes, fed with what was applied, within the actuators' limits.
+    """The paper's structure in body axes, with the applied input in the estimator and actuator limits.
 
     Gains are one number for all axes or one per axis. With `tracking_share` 0 the estimator is a pure observer: it
     depends on neither the controller nor its limits.
@@ -68,12 +68,10 @@ class RobustRCAF(AbstractInformedController):
         "m/s^2, rad/s^2", "amplitude of the robust term", symbol="w_bar", default=0.0
     )
     layer: Float[Array, "..."] = param("unit of s", "boundary layer of the robust term", symbol="phi", default=0.5)
-    actuator_rate: Float[Array, ""] = param(
-        "1/s", "how fast actuators are made to follow", symbol="lambda", default=100.0
-    )
+    actuator_rate: Float[Array, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda", default=100.0)
 
     direction: Float[Array, ""] = param(
-        "", "what departing from the wanted direction costs, where limits bind, beside losing size", default=1.0
+        "", "cost of a departure from the desired direction, where limits bind, relative to a loss of size", default=1.0
     )
 
     def __check_init__(self):
@@ -87,7 +85,7 @@ class RobustRCAF(AbstractInformedController):
 
     @property
     def fuzzy(self) -> FuzzySystem:
-        """That of the estimator."""
+        """Fuzzy system of the estimator."""
         return self.estimator.fuzzy
 
     @property
@@ -115,7 +113,7 @@ class RobustRCAF(AbstractInformedController):
 
     def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
         plan, actuators, effect = self._plan(z, y, r), self.model.actuators, self.model.dynamics.gain(y)
-        # While limits bind, the reference waits, and the tracking error says nothing about d.
+        # While limits bind, the reference waits, and the tracking error is not caused by d.
         going = actuators.target_of(plan.actuators, u_applied, self.actuator_rate)
         share = attained(effect, plan.forces, going)
         learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
@@ -128,7 +126,7 @@ class RobustRCAF(AbstractInformedController):
         )
 
     def _room(self, y: Measurement, off: Tracking) -> Room:
-        """What the actuators can do for each output, and what of the error is out of their reach."""
+        """Authority of the actuators for each output, and the part of the error that exceeds it."""
         dynamics, coordinates, actuators = self.model
         force, effect = largest_forces(actuators), dynamics.gain(y)
         reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
@@ -156,10 +154,10 @@ class RobustRCAF(AbstractInformedController):
 
     def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
         dynamics, coordinates, actuators = self.model
-        believed = actuators.update_from_report(z.actuators, y.actuator)
+        reported = actuators.update_from_report(z.actuators, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)
         off = tracking(coordinates, self.lyapunov(), y, target)
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
         seen = self.estimator.estimate(z.estimator, coordinates.velocity(y))
         demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - dynamics.drift(y)
-        return Plan(believed, seen, off, u_r, dynamics.invert(y, demand))
+        return Plan(reported, seen, off, u_r, dynamics.invert(y, demand))

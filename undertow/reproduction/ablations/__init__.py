@@ -1,4 +1,4 @@
-"""The ablations A1 to A21 of the theory page: campaign files, a verdict on each, and what they add up to.
+"""The ablations A1 to A21 of the theory page: campaign files, and a verdict on each.
 
 `undertow campaign undertow/reproduction/ablations/a08_sampling.yaml` runs one of them alone.
 """

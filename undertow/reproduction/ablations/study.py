@@ -1,4 +1,4 @@
-"""Running the ablations by the campaign engine, and what stands of them in results.json."""
+"""Running the ablations by the campaign engine, and their rows in results.json."""
 
 import itertools
 from collections.abc import Iterator, Mapping
@@ -26,8 +26,8 @@ class Spread(NamedTuple):
     """One metric over the seeds; a run that ended early counts as infinite."""
 
     median: float
-    low: float  # 5 % of the seeds lie below
-    high: float  # 5 % lie above
+    low: float  # 5 % of the seeds are below
+    high: float  # 5 % are above
     median_low: float  # 95 % confidence interval of the median
     median_high: float
 
@@ -40,20 +40,20 @@ class Summary(NamedTuple):
     metrics: Mapping[str, Spread]
 
     def median(self, metric: str) -> float:
-        """Of a metric."""
+        """Median of a metric."""
         return self.metrics[metric].median
 
 
 def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str, Any]:
-    """One ablation as it stands in results.json.
+    """One ablation as in results.json.
 
     Args:
         ablation: which one.
-        quick: whether with fewer seeds.
-        folder: where `campaigns/` is, for those who want to run it again; None to write nothing.
+        quick: whether to run fewer seeds.
+        folder: folder of `campaigns/`, from which it can be run again; None to write nothing.
 
     Raises:
-        KeyError: the verdict asks for a variant that the campaign does not have.
+        KeyError: the verdict needs a variant that the campaign does not have.
     """
     found: dict[str, tuple[str, Summary]] = {}
     for name in ablation.campaigns:
@@ -93,7 +93,7 @@ def summaries(
         (folder / "campaigns" / path.name).write_text(asked, encoding="utf-8")
     columns = task.run_trials(asked, str(several.scenario.folder), range(several.number))
     if (columns["status"] == task.INVALID).any():
-        task.build_trial(several, PartCache(), int(np.argmax(columns["status"] == task.INVALID)))  # says what is wrong
+        task.build_trial(several, PartCache(), int(np.argmax(columns["status"] == task.INVALID)))  # raises the error
     names = list(itertools.product(*campaign.axes.values()))
     for i, name in enumerate(names):
         own = {key: values[i :: len(names)] for key, values in columns.items()}
@@ -107,7 +107,7 @@ def summaries(
 
 
 def _over_all_outputs(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The paper's one figure over six outputs, of groups of equally many: m and, for a vehicle, rad."""
+    """The paper's figure over six outputs, from groups of equal size: m and, for a vehicle, rad."""
     groups = [columns[name] for name in ("position_rms", "attitude_rms") if name in columns]
     defined = [group for group in groups if not np.isnan(group).all()] or groups
     return np.sqrt(np.mean(np.square(defined), axis=0))

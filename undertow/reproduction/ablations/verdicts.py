@@ -1,4 +1,4 @@
-"""What the numbers of each ablation say about the theory's prediction; a variant that is not there is an error."""
+"""Verdict of each ablation on the theory's prediction; a missing variant is an error."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -7,22 +7,22 @@ Found = Mapping[str, Any]  # variant -> its summary: `median(metric)`, `failures
 
 
 class Verdict(NamedTuple):
-    """What the numbers say about the theory's prediction."""
+    """Verdict on the theory's prediction."""
 
     agrees: str  # yes, partly or no
     text: str
 
 
 class Ablation(NamedTuple):
-    """One question: the campaigns that answer it, and what is made of their numbers.
+    """One question: the campaigns that answer it, and the function that judges their numbers.
 
     Attributes:
         id: A1 to A21, as on the theory page.
         campaigns: names of the files; the description of the first one is the question.
-        metrics: that are reported, the one of the figure first.
-        prediction: of the theory.
-        left_out: what of the question is not looked at.
-        long: whether a quick look leaves it out.
+        metrics: reported metrics, that of the figure first.
+        prediction: prediction of the theory.
+        left_out: part of the question that is not examined.
+        long: whether a quick reproduction omits it.
         judge: verdict from the summaries of all variants.
     """
 
@@ -79,8 +79,8 @@ def _lost_by_most(one: Any) -> bool:
 @_ablation(
     "a01_fuzzy_input",
     "estimation_rms tracking_rms",
-    "At equal gamma the state is worse by the ratio of |xi|^2; at equal gamma |xi|^2 they are the same.",
-    "loads that repeat with position, which only the state could learn",
+    "At equal gamma the state is worse by the ratio of |xi|^2; at equal gamma |xi|^2 both are equal.",
+    "loads that depend on position, which only the state could learn",
 )
 def _fuzzy_input(found: Found) -> Verdict:
     own, more, same = (found[name].median("estimation_rms") for name in ("error", "state", "state, matched"))
@@ -89,7 +89,7 @@ def _fuzzy_input(found: Found) -> Verdict:
     return _verdict(alike and more / own > 1.2, text, partly=alike)
 
 
-@_ablation("a02_sets", "estimation_rms tracking_rms weights_peak", "The same once gamma |xi|^2 is the same.")
+@_ablation("a02_sets", "estimation_rms tracking_rms weights_peak", "Equal results at equal gamma |xi|^2.")
 def _sets(found: Found) -> Verdict:
     ratio = {
         name: one.median("estimation_rms") / found["5 sets"].median("estimation_rms") for name, one in found.items()
@@ -102,8 +102,8 @@ def _sets(found: Found) -> Verdict:
 @_ablation(
     "a03_linear_equivalents",
     "tracking_rms estimation_rms input_variation",
-    "Linear observer (ESO, ADRC, PI observer) and INDI do the same within 1 %, beside RCAFC at Table 1 and beside "
-    "preset `robust`; RAFC at Table 1 does not.",
+    "Linear observer (ESO, ADRC, PI observer) and INDI agree within 1 % with RCAFC at Table 1 and with preset "
+    "`robust`; RAFC at Table 1 does not.",
     long=False,
 )
 def _linear_equivalents(found: Found) -> Verdict:
@@ -121,7 +121,7 @@ def _linear_equivalents(found: Found) -> Verdict:
 @_ablation(
     "a04_robust_term",
     "tracking_rms input_rms input_variation",
-    "It is a PD of gain 100: without it the error is 19 times larger and the noise in u 2.6 times smaller.",
+    "It acts as a PD of gain 100: without it the error is 19 times larger and the noise in u 2.6 times smaller.",
     long=False,
 )
 def _robust_term(found: Found) -> Verdict:
@@ -138,7 +138,7 @@ def _robust_term(found: Found) -> Verdict:
 @_ablation(
     "a05_switching",
     "tracking_rms input_rms input_variation",
-    "Only the slope w_bar/phi counts, as a PD gain; sign chatters at half the sampling rate.",
+    "Only the slope w_bar/phi matters, as a PD gain; sign chatters at half the sampling rate.",
 )
 def _switching(found: Found) -> Verdict:
     error, variation = _tracking(found), found["sign"].median("input_variation")
@@ -155,7 +155,7 @@ def _switching(found: Found) -> Verdict:
 @_ablation(
     "a06_composite",
     "tracking_rms estimation_rms input_variation",
-    "Not in accuracy, and a linear observer does as well; the composite law survives limits, RAFC does not.",
+    "Not in accuracy, and a linear observer is as good; the composite law survives limits, RAFC does not.",
     "other costs than tracking rms / 1 mm + variation of the input / 1000 per s; 16 trials on 4 other seeds each, "
     "1 mm/s of velocity noise",
 )
@@ -176,14 +176,14 @@ def _composite(found: Found) -> Verdict:
 @_ablation(
     "a07_frequency",
     "share tracking_rms",
-    "Below 50 rad/s the estimate helps, above 103 rad/s it adds error, whatever the size.",
+    "Below 50 rad/s the estimate helps, above 103 rad/s it adds error, at any amplitude.",
     "chirps (Fig. 7 has one)",
 )
 def _frequency(found: Found) -> Verdict:
     of = lambda load: found[f"RCAFC, {load}"].median("share")
     share = {rate: of(f"{rate} rad/s") for rate in (1, 10, 50, 150)}
     small, large = of("0.1 m/s^2"), of("50 m/s^2")
-    text = "The estimate misses " + ", ".join(f"{100 * value:.3g} % at {rate} rad/s" for rate, value in share.items())
+    text = "The estimate's error: " + ", ".join(f"{100 * value:.3g} % at {rate} rad/s" for rate, value in share.items())
     text += f"; {100 * small:.2g} % of 0.1 m/s^2 and {100 * large:.2g} % of 50 m/s^2 at 5 rad/s."
     return _verdict(share[50] < 1 < share[150] and abs(large / small - 1) < 0.2, text, partly=share[150] > 1)
 
@@ -191,7 +191,7 @@ def _frequency(found: Found) -> Verdict:
 @_ablation(
     "a08_sampling",
     "tracking_rms estimation_rms weights_peak",
-    "Table 1 is lost below 141 Hz and beyond 4.75 ms of delay; `robust` at every rate.",
+    "Table 1 is unstable below 141 Hz and beyond 4.75 ms of delay; `robust` is stable at every rate.",
     "jitter: the loop has one sampling time",
 )
 def _sampling(found: Found) -> Verdict:
@@ -204,7 +204,7 @@ def _sampling(found: Found) -> Verdict:
     if "Table 1, 100 Hz" not in ended:
         peak = {rate: found[f"Table 1, {rate}"].median("weights_peak") for rate in rates[:2]}
         text += (
-            " At 100 Hz the linearised loop is unstable, but the weights drift until the loop is damped again: "
+            " At 100 Hz the linearised loop is unstable, but the weights drift until they damp the loop: "
             f"|theta| {peak['100 Hz']:.0f} instead of {peak['1000 Hz']:.0f} m/s^2."
         )
     predicted = {f"Table 1, {how}" for how in ("100 Hz", "50 Hz", "6 ms", "15 ms")}
@@ -214,8 +214,8 @@ def _sampling(found: Found) -> Verdict:
 @_ablation(
     "a09_noise",
     "tracking_rms input_rms input_variation weights_peak",
-    "Table 1 multiplies noise by 110 into the input and cannot use a 5 Hz DVL; the fewer rad/s, the better.",
-    "drift to divergence, which takes longer: see A18 and A21",
+    "Table 1 amplifies noise by 110 in the input and cannot use a 5 Hz DVL; a lower bandwidth is better.",
+    "drift until divergence, which takes longer: see A18 and A21",
 )
 def _noise(found: Found) -> Verdict:
     laws = (*_PRESETS, "robust 10 rad/s")
@@ -232,8 +232,8 @@ def _noise(found: Found) -> Verdict:
 @_ablation(
     "a10_limits a10_limits_odin",
     "tracking_rms estimation_rms weights_peak saturated_fraction",
-    "RCAFC fed with the applied input survives a step; fed with its own command it winds up and is lost at 3 m/s^2 "
-    "and below; RAFC is lost at 5 m/s^2 already.",
+    "RCAFC with the applied input in its model survives a step; with its own command it winds up and diverges at "
+    "3 m/s^2 and below; RAFC diverges even at 5 m/s^2.",
     "slew rate; dead band (the static motor has one, see the fidelity comparison)",
     long=False,
 )
@@ -252,7 +252,7 @@ def _limits(found: Found) -> Verdict:
 @_ablation(
     "a11_motor",
     "tracking_rms estimation_rms input_variation",
-    "Table 1 is fine without and unstable with them; a slow observer or an inner speed loop is stable.",
+    "Table 1 is stable without and unstable with them; a slow observer or an inner speed loop is stable.",
 )
 def _motor(found: Found) -> Verdict:
     said = lambda one: (
@@ -260,14 +260,14 @@ def _motor(found: Found) -> Verdict:
     )
     text = "Tracking rms: " + ", ".join(f"{name} {said(one)}" for name, one in found.items()) + "."
     error = _tracking(found)
-    kept = all(error[name] < 0.05 for name in ("30 rad/s, whole motor", "robust, whole motor"))
-    return _verdict(not error["Table 1, whole motor"] < 0.02 and kept, text, partly=kept)
+    kept = all(error[name] < 0.05 for name in ("30 rad/s, full motor model", "robust, full motor model"))
+    return _verdict(not error["Table 1, full motor model"] < 0.02 and kept, text, partly=kept)
 
 
 @_ablation(
     "a12_model_errors",
     "tracking_rms estimation_rms uncertainty_rms",
-    "Very: every true gain of the right sign is stable in continuous time.",
+    "Very wrong: every true gain of the right sign is stable in continuous time.",
     "shift of the centre of gravity, single entries of B",
 )
 def _model_errors(found: Found) -> Verdict:
@@ -285,22 +285,22 @@ def _model_errors(found: Found) -> Verdict:
 @_ablation(
     "a13_thruster_loss",
     "tracking_rms estimation_rms input_rms",
-    "Any loss that keeps rank 6 is borne (one always, two in 16 of 28 pairs, three never); a reversed one not.",
+    "Any loss that keeps rank 6 is tolerated (one always, two in 16 of 28 pairs, three never); a reversed one is not.",
     "thrusters that are stuck at a thrust",
 )
 def _thruster_loss(found: Found) -> Verdict:
     one = [found[f"{law}, one off"].metrics[_TRACKING] for law in _PRESETS]
     triple = all(not found[f"{law}, three off"].median(_TRACKING) < _LOST for law in _PRESETS)
     text = f"Median tracking rms: {_listed(_tracking(found), '.2g')}."
-    borne = all(each.median < _LOST for each in one)
-    return _verdict(borne and all(each.high < _LOST for each in one) and triple, text, partly=borne)
+    tolerated = all(each.median < _LOST for each in one)
+    return _verdict(tolerated and all(each.high < _LOST for each in one) and triple, text, partly=tolerated)
 
 
 @_ablation(
     "a14_water",
     "tracking_rms estimation_rms input_rms saturated_fraction",
-    "No: all of it is slower than 10 rad/s.",
-    "payload pick-up, whose mass matrix is inverted at every step",
+    "No: all of them are slower than 10 rad/s.",
+    "payload pick-up, which needs the inverse of the mass matrix at every step",
 )
 def _water(found: Found) -> Verdict:
     text = f"Tracking rms: {_listed(_tracking(found), '.2g')}."
@@ -323,7 +323,7 @@ def _references(found: Found) -> Verdict:
 @_ablation(
     "a16_rate_term",
     "tracking_rms uncertainty_rms estimation_rms",
-    "Left in d it is up to 2.8 m/s^2 at 1 m/s: it must be in the model.",
+    "In d it is up to 2.8 m/s^2 at 1 m/s: it must be in the model.",
 )
 def _rate_term(found: Found) -> Verdict:
     error, size = _tracking(found), {name: one.median("uncertainty_rms") for name, one in found.items()}
@@ -339,7 +339,7 @@ def _rate_term(found: Found) -> Verdict:
 @_ablation(
     "a17_thrusters",
     "tracking_rms input_rms",
-    "Six independent ones do; below rank 6 there are directions in open loop.",
+    "Six independent ones are enough; below rank 6 there are directions in open loop.",
 )
 def _thrusters(found: Found) -> Verdict:
     error = {count: found[f"N = {count}"].median(_TRACKING) for count in (8, 6, 5, 4)}
@@ -351,7 +351,8 @@ def _thrusters(found: Found) -> Verdict:
 @_ablation(
     "a18_drift",
     "tracking_rms input_rms weights_peak",
-    "Nothing: lost in 7.5 s; leakage 1e-3 or a dead zone of 3 sigma: lost; projection, leakage 1e-2, one set: kept.",
+    "Projection, leakage 1e-2 or one set; leakage 1e-3 and a dead zone of 3 sigma do not. Without any of them the run "
+    "fails after 7.5 s.",
     long=False,
 )
 def _drift(found: Found) -> Verdict:
@@ -380,7 +381,7 @@ def _speed_sensor(found: Found) -> Verdict:
 @_ablation(
     "a20_tuning",
     "tracking_rms input_rms input_variation",
-    "An estimator of 20 to 50 rad/s and hardly a robust term, instead of 142 rad/s and 10 m/s^2.",
+    "An estimator of 20 to 50 rad/s and almost no robust term, instead of 142 rad/s and 10 m/s^2.",
     "other costs than tracking rms / 1 mm + variation of the input / 1000 per s; 12 trials on 4 other seeds per law",
 )
 def _tuning(found: Found) -> Verdict:
@@ -392,7 +393,7 @@ def _tuning(found: Found) -> Verdict:
 @_ablation(
     "a21_long_run",
     "tracking_rms input_rms weights_peak",
-    "Only projected and linear laws; without projection three sets spaced 0.2 are lost after 21 s.",
+    "Only projected and linear laws; without projection three sets spaced 0.2 diverge after 21 s.",
     "24 h: here 60 s with narrow sets, for which the drift is 25 times as fast as for sets spaced 1",
 )
 def _long_run(found: Found) -> Verdict:

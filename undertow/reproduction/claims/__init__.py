@@ -1,8 +1,8 @@
-"""The audit: one file per claim of the paper, C1 to C14.
+"""Audit of the paper's claims C1 to C14, one file each.
 
-Each says what the claim is (`CLAIM`), what has to be run (`scenarios(quick)`, and `batched(quick)` for runs of which
-metrics are enough), and what the numbers say (`judge(runs, long)`). A verdict is `holds`, `holds if ...`, `fails` or
-`open`; every one says on which levels and for how long was simulated.
+Each file has the claim (`CLAIM`), its runs (`scenarios(quick)`, and `batched(quick)` for runs of which metrics are
+enough), and the verdict (`judge(runs, long)`): `holds`, `holds if ...`, `fails` or `open`, with the simulated fidelity
+levels and duration.
 """
 
 import importlib
@@ -21,22 +21,22 @@ _MODULES = [
 
 
 def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
-    """Every run the audit needs beyond the examples, by name; fewer points of the sweeps when quick."""
+    """Runs of the audit besides the examples, by name; fewer points of the sweeps when quick."""
     return {name: one for module in _MODULES for name, one in module.scenarios(quick).items()}
 
 
 def batched(quick: bool) -> dict[str, dict[str, Any]]:
-    """Every run of which metrics are enough, by name: sampled scenarios."""
+    """Sampled scenarios of which metrics are enough, by name."""
     found = [module.batched(quick) for module in _MODULES if hasattr(module, "batched")]
     return {name: one for scenarios in found for name, one in scenarios.items()}
 
 
 def audit(runs: Mapping[str, Executed], long: Mapping[str, BatchResult]) -> list[dict[str, Any]]:
-    """Verdicts with evidence, as they stand in results.json.
+    """Verdicts with evidence, as in results.json.
 
     Args:
-        runs: those of `scenarios`, and of the examples.
-        long: those of `batched`, of the long runs and of the map of lags.
+        runs: runs of `scenarios` and of the examples.
+        long: runs of `batched`, of the long horizon and of the map of lags.
     """
     found = []
     for module in _MODULES:

@@ -11,12 +11,12 @@ _SMALL = 1e-3  # m, rad; rms
 
 
 def scenarios(quick: bool) -> dict:
-    """Nothing beyond the fidelity comparison, the long runs and the map of lags."""
+    """No runs besides the fidelity comparison, the long runs and the map of lags."""
     return {}
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """on every fidelity, for 20 s and for the long horizon; and against the inductance of the winding."""
+    """At every fidelity level, for 20 s and for the long horizon; and against the inductance of the winding."""
     lasting = {level: long[name] for level in FIDELITIES if (name := name_of(level, "rcafc")) in long}
     short = {level: one.windows[0] for level, one in lasting.items()}
     horizon = max(one.built.scenario.loop.duration for one in lasting.values())
@@ -26,17 +26,17 @@ def judge(runs: Runs, long: Long) -> Finding:
         if found is None:
             said.append(f"{level}: ends at {run.ended:.2f} s")
             continue
-        lives = "lasts" if run.lasted else f"ends at {run.ended:.0f} s"
+        ending = "lasts" if run.lasted else f"ends at {run.ended:.0f} s"
         late = f", {last['tracking_rms']:.2g} at its end" if last else ""
         said.append(
             f"{level}: {found['tracking_rms']:.2g} m and rad rms at 10 to 20 s with {found['input_variation']:.0f} "
-            f"V/s of chattering, {lives}{late}"
+            f"V/s of chattering, {ending}{late}"
         )
     kept = {value: run for value, run in windings(long).items() if run.windows[0] is not None}
     lost = {value: run for value, run in windings(long).items() if run.windows[0] is None}
     text = f"RCAFC at Table 1, 1 kHz, U2 for {horizon:g} s. " + "; ".join(said) + ". Inductance of the winding: "
-    text += ", ".join(f"{1e3 * value:g} mH {_lived(run)}" for value, run in windings(long).items())
-    text += " (Table 3: 10 mH). Behind a lag alone weights that drift apart are damping that the theorem does not know."
+    text += ", ".join(f"{1e3 * value:g} mH {_ending(run)}" for value, run in windings(long).items())
+    text += " (Table 3: 10 mH). With a lag only, weights that drift apart add damping, unknown to the theorem."
     numbers = {
         "tracking_rms_short": {level: found and found["tracking_rms"] for level, found in short.items()},
         "ended": {level: None if run.lasted else run.ended for level, run in lasting.items()},
@@ -50,11 +50,11 @@ def judge(runs: Runs, long: Long) -> Finding:
         return Finding("fails", text, "electromechanical_rcafc", simulated, numbers)
     verdict = f"holds if the winding has at most {1e3 * max(kept, default=0):g} mH and 20 s are enough"
     early = [f"{level} ends at {run.ended:.0f} s" for level, run in lasting.items() if level in good and not run.lasted]
-    lives = [level for level in good if lasting[level].lasted]
-    verdict += f"; for {horizon:g} s, of {', '.join(lasting)}, on {' and '.join(lives)} only" if lives else ""
+    completed = [level for level in good if lasting[level].lasted]
+    verdict += f"; for {horizon:g} s, of {', '.join(lasting)}, at {' and '.join(completed)} only" if completed else ""
     verdict += f" ({', '.join(early)})" if early else ""
     return Finding(verdict, text, "electromechanical_rcafc", simulated, numbers)
 
 
-def _lived(run) -> str:
+def _ending(run) -> str:
     return "lasts" if run.lasted else f"ends at {run.ended:.3g} s"

@@ -16,7 +16,7 @@ def scenarios(quick: bool) -> dict:
 
 
 def batched(quick: bool) -> dict:
-    """The same with limits and with noise, which C3 judges by, too."""
+    """The same with limits and with noise, also used by C3."""
     return conditions.scenarios()
 
 

@@ -8,10 +8,10 @@ CLAIM = "RCAFC needs a smaller robust control signal than RAFC."
 
 
 def scenarios(quick: bool) -> dict:
-    """Nothing beyond C2."""
+    """No runs besides those of C2."""
     return {}
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """As C2, which comes to the same: in small signal u_r is the filtered estimation error."""
+    """As C2, since for small signals u_r is the filtered estimation error."""
     return compared(runs, long, "robust_rms", "rms robust term", "m/s^2")

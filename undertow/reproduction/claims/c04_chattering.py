@@ -12,12 +12,12 @@ CLAIM = "RCAFC reduces chattering considerably."
 
 
 def scenarios(quick: bool) -> dict:
-    """Nothing beyond C2."""
+    """No runs besides those of C2."""
     return {}
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """Total variation of the voltages beyond that of a law that knows d: the load itself must be followed."""
+    """Total variation of the voltages above that of a law that knows d, which must follow the load, too."""
     text, numbers = at_table_1(runs, "input_variation", "total variation of the voltages", "V/s")
     needed = perfect_variation(runs["ideal_rcafc"])
     excess = {law: value - needed for law, value in numbers.items()}
@@ -44,7 +44,7 @@ def perfect_variation(run: Executed) -> float:
         load = loop.disturbance.at(path, t, loop.plant.pose(x), loop.plant.no_load())
         return model.dynamics.invert(y, -model.dynamics.drift(y) - load.acceleration)
 
-    # Between the records: a jump of d at a record is followed by the law after it, and several at once are one.
+    # Between the records: the law follows a jump of d after its record, and simultaneous jumps count as one.
     time = late["time"].values - run.built.scenario.loop.record / 2
     volts = np.asarray(cancelling(time, late.values))
     return float(np.abs(np.diff(volts, axis=0)).mean(1).sum() / (time[-1] - time[0]))

@@ -20,15 +20,15 @@ _AS_GOOD = 1.05  # times the estimation error
 
 
 def scenarios(quick: bool) -> dict:
-    """Nothing beyond Table 2, which has the state as input at the same gamma."""
+    """No runs besides Table 2, which has the state as input at the same gamma."""
     return {}
 
 
 def batched(quick: bool) -> dict:
-    """The state, one rule and five on every fidelity, at the same loop gain."""
+    """The state, one rule and five rules at every fidelity level, at the same loop gain."""
     return {
         _name(level, law): scenario(
-            f"Table 1 on {level}, fuzzy input: {words}, the same gamma |xi|^2",
+            f"Table 1 at fidelity {level}, fuzzy input: {words}, the same gamma |xi|^2",
             fidelity=level,
             controller=options | {"weights_bound": float("inf")},
             disturbance={"kind": "u2"},  # which is U1 for 20 s
@@ -40,7 +40,7 @@ def batched(quick: bool) -> dict:
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """Estimation error and chattering on every level; at the printed gamma on `ideal`."""
+    """Estimation error and chattering at every fidelity level; at the printed gamma at `ideal`."""
     same_gamma = steady(runs["table2_rcafc_state"])["estimation_rms"], steady(runs["ideal_rcafc"])["estimation_rms"]
     levels = [level for level in FIDELITIES if _name(level, "error_5") in long]
     found = {level: {law: _metrics(long[_name(level, law)]) for law in _LAWS} for level in levels}
@@ -49,9 +49,9 @@ def judge(runs: Runs, long: Long) -> Finding:
         for level in levels
     ]
     text = (
-        f"At the same gamma the state estimates {same_gamma[0] / same_gamma[1]:.2g} times as badly on ideal, because "
-        "its loop gain is smaller. At the same loop gain, rms estimation error in m/s^2 and chattering from 10 s to "
-        f"20 s of U1, 1 kHz: {'. '.join(said)}."
+        f"At the same gamma the state has {same_gamma[0] / same_gamma[1]:.2g} times the estimation error at ideal, "
+        "since its loop gain is smaller. At the same loop gain, rms estimation error in m/s^2 and chattering "
+        f"from 10 s to 20 s of U1, 1 kHz: {'. '.join(said)}."
     )
     numbers = {"same_gamma": list(same_gamma), "levels": found}
     simulated = f"levels {', '.join(levels)}, U1 at 1 kHz, 20 s"
@@ -66,8 +66,8 @@ def judge(runs: Runs, long: Long) -> Finding:
             better.append(level)
     if not better:
         return Finding("fails", text, _name(levels[0], "state_25"), simulated, numbers)
-    verdict = f"holds if the thruster lags (level {' and '.join(better)}) and five sets are meant, not one"
-    verdict += f"; at the same loop gain it makes no difference on {' and '.join(alike)}" if alike else ""
+    verdict = f"holds if the thruster lags (level {' and '.join(better)}) and with five sets, not one"
+    verdict += f"; at the same loop gain it makes no difference at {' and '.join(alike)}" if alike else ""
     return Finding(verdict, text, _name(better[0], "error_1"), simulated, numbers)
 
 

@@ -1,4 +1,4 @@
-"""C6: the scheme copes with uncertainty of high frequency. Up to which?"""
+"""C6: the scheme estimates uncertainty of high frequency, and up to which frequency."""
 
 import itertools
 import math
@@ -39,8 +39,8 @@ def judge(runs: Runs, long: Long) -> Finding:
     crossing, predicted = _crossing(points), crossing_frequency(law_of(runs["ideal_rcafc"]))
     below, above = points[0], points[-1]
     text = (
-        f"The estimate is off by {100 * below[1]:.2g} % of d at {below[0]:g} rad/s and by {100 * above[1]:.0f} % at "
-        f"{above[0]:g} rad/s. From {crossing:.0f} rad/s on (in small signal {predicted:.0f}) it is worse than none."
+        f"The error of the estimate is {100 * below[1]:.2g} % of d at {below[0]:g} rad/s and {100 * above[1]:.0f} % at "
+        f"{above[0]:g} rad/s. From {crossing:.0f} rad/s on (theory: {predicted:.0f}) it is worse than no estimate."
     )
     numbers = {"sweep": sweep, "crossing_measured": crossing, "crossing_predicted": predicted}
     verdict = f"holds if d stays well below {crossing:.0f} rad/s"
@@ -71,7 +71,7 @@ def _sweep(runs: Runs, controller: str) -> dict[str, Any]:
 
 
 def _crossing(points: list[tuple[float, float]]) -> float:
-    """Frequency at which the measured ratio passes 1, interpolated on logarithmic axes; infinite if nowhere."""
+    """Frequency at which the measured ratio passes 1, interpolated on logarithmic axes; infinite if it never does."""
     for (w0, r0), (w1, r1) in itertools.pairwise(points):
         if r0 < 1 <= r1:
             share = -math.log(r0) / (math.log(r1) - math.log(r0))

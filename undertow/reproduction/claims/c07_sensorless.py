@@ -11,10 +11,10 @@ _SENSOR = "c07_speed_sensor"
 
 
 def scenarios(quick: bool) -> dict:
-    """The whole motor with measured propeller speeds, sampled at 1 kHz as any real sensor is."""
+    """The full motor model with measured propeller speeds, sampled at 1 kHz like a real sensor."""
     return {
         _SENSOR: scenario(
-            "RCAFC with measured propeller speeds on the whole motor, 1 kHz",
+            "RCAFC with measured propeller speeds, full motor model, 1 kHz",
             fidelity="electromechanical",
             model={"speed_sensor": True},
             loop={"kind": "sampled", "duration": 20.0},
@@ -23,7 +23,7 @@ def scenarios(quick: bool) -> dict:
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """Perfect sensor (ideal) against none (static, shaft), and both on the whole motor."""
+    """Perfect sensor (ideal) against none (static, shaft), and both with the full motor model."""
     with_sensor, without = (steady(runs[name])["tracking_rms"] for name in ("ideal_rcafc", "static_rcafc"))
     full = {"sensor": runs[_SENSOR], "sensorless": runs["electromechanical_rcafc"]}
     numbers = {"tracking_rms_sensor": with_sensor, "tracking_rms_sensorless": without}
@@ -37,16 +37,16 @@ def judge(runs: Runs, long: Long) -> Finding:
         text += (
             f"Without, and with a rotor that has inertia (shaft): {found['tracking_rms']:.3g}, but with "
             f"{found['input_variation']:.0f} V/s of chattering and weights up to {found['weights_peak']:.0f}; there "
-            "the sensor is no use, since Eq. (23) becomes an algebraic loop of gain 1. "
+            "the sensor is useless, since Eq. (23) becomes an algebraic loop of gain 1. "
         )
     for name, run in full.items():
         if run.status is Status.OK:
-            text += f"On the whole motor the {name} variant tracks to {steady(run)['tracking_rms']:.3g}. "
+            text += f"With the full motor model the {name} variant tracks to {steady(run)['tracking_rms']:.3g}. "
         else:
             numbers[f"ended_{name}"] = float(run.outcome.ended)
-            text += f"On the whole motor the {name} variant is unstable (ends at {float(run.outcome.ended):.2f} s). "
-    verdict = "holds if the winding has next to no inductance (C1) and the chattering is borne, for 20 s"
+            text += f"With the full motor model the {name} variant fails (ends at {float(run.outcome.ended):.2f} s). "
+    verdict = "holds if the winding has almost no inductance (C1) and the chattering is acceptable, for 20 s"
     if all(run.status is not Status.OK for run in full.values()):
-        verdict += "; on the whole motor both end within seconds"
+        verdict += "; with the full motor model both end within seconds"
     simulated = "levels ideal, static and electromechanical, U1, 20 s; shaft at 1 kHz"
     return Finding(verdict, text.strip(), _SENSOR, simulated, numbers)

@@ -10,12 +10,12 @@ CLAIM = "With voltage as the control input no step from thrust to voltage is nee
 
 
 def scenarios(quick: bool) -> dict:
-    """Nothing beyond Example 2."""
+    """No runs besides Example 2."""
     return {}
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """How far thrust is from the alpha V that G takes for granted, in Example 2."""
+    """Difference of the thrust from alpha V, which G assumes, in Example 2."""
     run = runs["static_rcafc"]
     thruster = plant_of(run).thruster
     late = run.dataset.sel(time=slice(run.built.window()[0], None))
@@ -24,9 +24,9 @@ def judge(runs: Runs, long: Long) -> Finding:
     assumed = float(thruster.voltage_gain()) * voltage
     share = float(np.sqrt(((thrust - assumed) ** 2).mean() / (thrust**2).mean()))
     text = (
-        f"The step is inside G: thrust is taken to be alpha V with alpha = {float(thruster.voltage_gain()):.2f} N/V. "
-        f"In Example 2 what is left over, T - alpha V, is {100 * share:.0f} % of the thrust (rms), and the estimator "
-        "has to make up for it."
+        f"The step is inside G, which assumes a thrust alpha V with alpha = {float(thruster.voltage_gain()):.2f} N/V. "
+        f"In Example 2 the remainder T - alpha V is {100 * share:.0f} % of the thrust (rms), and the estimator has to "
+        "compensate it."
     )
     verdict = "holds if the fixed ratio alpha inside G is not counted as such a step"
     return Finding(verdict, text, "static_rcafc", "level static, U1, 20 s", {"thrust_not_alpha_v": share})

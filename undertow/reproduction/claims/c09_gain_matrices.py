@@ -21,7 +21,7 @@ _SIMULATED = "level ideal, U1, 20 s"
 
 
 def scenarios(quick: bool) -> dict:
-    """Example 1 with some of the thrusters only."""
+    """Example 1 with subsets of the thrusters."""
     return {
         _name(key): scenario(
             f"RCAFC on ODIN with thrusters {', '.join(map(str, numbers))} only",
@@ -61,7 +61,7 @@ def judge(runs: Runs, long: Long) -> Finding:
         return Finding("fails", text, "ideal_rcafc", _SIMULATED, numbers)
     if not failed:
         return Finding("holds", text, "ideal_rcafc", _SIMULATED, numbers)
-    text += " Below rank 6 the directions outside the range of G are in open loop, whatever w_bar is."
+    text += " Below rank 6 the directions outside the range of G are in open loop for any w_bar."
     return Finding("holds if rank G = 6, so not for N < 6", text, _name("n4_rank3"), _SIMULATED, numbers)
 
 

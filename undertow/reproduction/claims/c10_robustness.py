@@ -31,14 +31,14 @@ def scenarios(quick: bool) -> dict:
         for name, value in _TABLE1.items()
         for factor in (0.5, 2.0)
     }
-    draws = np.random.default_rng(1).uniform(-1, 1, (_STARTS, 2, 6))
+    samples = np.random.default_rng(1).uniform(-1, 1, (_STARTS, 2, 6))
     reach = np.array([3.0, 3.0, 3.0, 1.0, 0.7, 3.0])
     starts = {
         f"c10_start_{i + 1}": scenario(
             f"RCAFC from random start {i + 1}",
-            initial={"position": (draw[0] * reach).round(3).tolist(), "velocity": (0.5 * draw[1]).round(3).tolist()},
+            initial={"position": (one[0] * reach).round(3).tolist(), "velocity": (0.5 * one[1]).round(3).tolist()},
         )
-        for i, draw in enumerate(draws)
+        for i, one in enumerate(samples)
     }
     if quick:
         gains = dict(list(gains.items())[:2])
@@ -47,7 +47,7 @@ def scenarios(quick: bool) -> dict:
 
 
 def batched(quick: bool) -> dict:
-    """1 cm/s of velocity noise, with the fuzzy sets of the benchmark as they are."""
+    """1 cm/s of velocity noise, with the unchanged fuzzy sets of the benchmark."""
     return {
         f"{_NOISE}_{seed}": scenario(
             "RCAFC with velocity noise of 1 cm/s, 1 kHz: the weights drift until it diverges",
@@ -62,7 +62,7 @@ def batched(quick: bool) -> dict:
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """Spread of the tracking error, and the case that breaks it."""
+    """Spread of the tracking error, and the counterexample."""
     nominal = steady(runs["ideal_rcafc"])["tracking_rms"]
     swept = {n: r for n, r in runs.items() if n.startswith("c10_")}
     failed = sorted(name for name, run in swept.items() if run.status is not Status.OK)
@@ -88,7 +88,7 @@ def judge(runs: Runs, long: Long) -> Finding:
         return Finding("holds" if not failed else "fails", text, f"{_NOISE}_0", simulated, numbers)
     ends = sorted(run.ended for run in noisy)
     text += (
-        f"With 1 cm/s of velocity noise at 1 kHz and the benchmark's own sets (width 0.5) the weights drift and the "
+        f"With 1 cm/s of velocity noise at 1 kHz and the sets of the benchmark (width 0.5) the weights drift and the "
         f"run ends after {ends[0]:.0f} to {ends[-1]:.0f} s ({_SEEDS} seeds; theory of section 3.8: {expected:.0f} s)."
     )
     verdict = "holds if there is neither noise nor sampling, for 20 s"

@@ -13,10 +13,10 @@ _CONSTANT = [5.0, -3.0, 2.0, 1.0, -1.0, 0.5]  # m/s^2, rad/s^2
 
 
 def scenarios(quick: bool) -> dict:
-    """A constant d, where the proof applies word for word."""
+    """A constant d, to which the proof applies exactly."""
     return {
         "c12_constant": scenario(
-            "RCAFC under constant uncertainty: the Lyapunov function only falls",
+            "RCAFC under constant uncertainty: the Lyapunov function never increases",
             disturbance={"kind": "sinusoid", "amplitude": 0.0, "frequency": [1.0] * 6, "offset": _CONSTANT},
             **(SIX_AXES | {"reference": {"kind": "setpoint", "position": GOAL}}),
         )
@@ -33,7 +33,7 @@ def judge(runs: Runs, long: Long) -> Finding:
     }
     text = (
         f"Constant d: V_f grows at {100 * steps['constant']:.2g} % of the 10 ms steps. Suite U1, with the best "
-        f"constant theta* there is: at {100 * steps['u1']:.0f} %. The bound needs omega_bar > |omega|, half the "
+        f"constant theta*: at {100 * steps['u1']:.0f} %. The bound needs omega_bar > |omega|, half the "
         "range of d, which Table 1 (0.1) does not give."
     )
     if steps["constant"] > 0:

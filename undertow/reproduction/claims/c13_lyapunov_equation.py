@@ -10,12 +10,12 @@ CLAIM = "A positive definite P solves Eq. (21) for the gains of Table 1."
 
 
 def scenarios(quick: bool) -> dict:
-    """Nothing beyond Example 1."""
+    """No runs besides Example 1."""
     return {}
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """Residual and eigenvalues."""
+    """Residual of Eq. (21) and eigenvalues of P."""
     law = law_of(runs["ideal_rcafc"])
     p, (k1, k2), q = np.asarray(law.lyapunov()), np.asarray(law.feedback), np.asarray(law.weight)
     a = np.array([[0.0, 1.0], [-k1, -k2]])

@@ -19,15 +19,15 @@ _SIMULATED = "pendulum 10 s, ball 5 s"
 _PENDULUM = "c14_pendulum"
 _IDEAL = "c14_levitation_ideal"
 
-# Gaps, mm, about which the ball swings by 1 mm: the nearer the magnet, the longer the lag of its coil.
+# Gaps, mm, about which the ball oscillates by 1 mm: the lag of the coil grows as the gap shrinks.
 _GAPS = (5, 6, 7, 8, 10, 12, 14)
 _QUICK = (6, 10)
 
 
 def scenarios(quick: bool) -> dict:
-    """Table 1 on Wang's pendulum, wrongly told, and on a levitated ball at several gaps."""
+    """Table 1 on Wang's pendulum with a wrong nominal model, and on a levitated ball at several gaps."""
     pendulum = scenario(
-        "Table 1 on an inverted pendulum that is told to be lighter and shorter than it is",
+        "Table 1 on an inverted pendulum whose nominal model is too light and too short",
         plant={"kind": "inverted_pendulum"},
         model={"cart_mass": 0.8, "pole_mass": 0.05, "half_length": 0.35},
         reference={"kind": "sine", "amplitude": 0.1, "frequency": 1.0},
@@ -41,20 +41,20 @@ def scenarios(quick: bool) -> dict:
 
 
 def judge(runs: Runs, long: Long) -> Finding:
-    """Tracking on both plants, and the lag of the coil at which it is lost."""
+    """Tracking on both plants, and the lag of the coil at which it fails."""
     coils = sorted((_lag(runs[_at(gap)]), gap) for gap in _GAPS if _at(gap) in runs)
     numbers = {
         "pendulum": _error(runs[_PENDULUM]),
         "levitation": [{"gap": gap / 1e3, "lag": lag, "tracking_rms": _error(runs[_at(gap)])} for lag, gap in coils],
     }
     text = (
-        f"Table 1 unchanged. Pendulum told a mass and length up to 50 % too small, load of 1 rad/s^2: "
-        f"tracking rms {_shown(runs[_PENDULUM], 'rad')}. Ball about a gap, with the lag of its coil there: "
+        f"Table 1 unchanged. Pendulum with nominal mass and length up to 50 % too small, load of 1 rad/s^2: "
+        f"tracking rms {_shown(runs[_PENDULUM], 'rad')}. Ball about a gap, with the lag of its coil at this gap: "
     )
     text += "; ".join(f"{gap} mm ({1e3 * lag:.1f} ms) {_shown(runs[_at(gap)], 'm')}" for lag, gap in coils) + "."
     if _IDEAL in runs:
         numbers["levitation_ideal"] = _error(runs[_IDEAL])
-        text += f" With coils that do not lag, {min(_GAPS)} mm: {_shown(runs[_IDEAL], 'm')}."
+        text += f" With coils without lag, {min(_GAPS)} mm: {_shown(runs[_IDEAL], 'm')}."
     lost = [lag for lag, gap in coils if runs[_at(gap)].status is not Status.OK]
     kept = [lag for lag, _ in coils if not lost or lag < lost[0]]
     if runs[_PENDULUM].status is not Status.OK or not kept:

@@ -1,4 +1,4 @@
-"""Where RAFC tuned as hard as RCAFC is better, and where it is not: voltage limits and velocity noise."""
+"""Comparison of RCAFC and RAFC at equal tuning effort under voltage limits and velocity noise."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ _LAWS: dict[str, tuple[str, float, dict[str, Any]]] = {
 
 def scenarios() -> dict[str, dict[str, Any]]:
     """Example 1 at 1 kHz with limited voltages, and with noise of 1 cm/s on the velocities."""
-    found, load = {}, {"kind": "u2"}  # which is U1 for 20 s: as the long runs, so that they share a program
+    found, load = {}, {"kind": "u2"}  # U1 for 20 s, as in the long runs, so that they share a program
     for law, (words, composite, gains) in _LAWS.items():
         common = {
             "composite": composite,
@@ -43,16 +43,16 @@ def sentences(long: Long, metric: str, unit: str) -> tuple[str, dict[str, Any]]:
     noisy = {law: _steady(long[_noisy(law)], metric) for law in _LAWS}
     volts = ", ".join(f"{one:g}" for one in LIMITS)
     text = (
-        f"That is so while voltages are unlimited and velocities exact. With limits of {volts} V (1 kHz) RCAFC tracks "
+        f"This is so with unlimited voltages and exact velocities. With limits of {volts} V (1 kHz) RCAFC tracks "
         f"to {_listed(tracking['rcafc'])} m and rad, RAFC with gamma raised to {_listed(tracking['rafc'])}, because "
-        f"its weights wind up (within {BOUND:g} they cannot: {_listed(tracking['rafc_bounded'])}). With 1 cm/s of "
+        f"its weights wind up (with weights within {BOUND:g}: {_listed(tracking['rafc_bounded'])}). With 1 cm/s of "
         f"velocity noise: RCAFC {noisy['rcafc']:.3g} {unit}, RAFC with gamma raised {noisy['rafc']:.3g}."
     )
     return text, {"limits": list(LIMITS), "limited": limited, "noisy": noisy}
 
 
 def lost_by_limits(long: Long) -> bool:
-    """Whether RAFC with gamma raised is worse off than RCAFC at every limit."""
+    """Whether RAFC with gamma raised is worse than RCAFC at every limit."""
     worse = lambda volts: (
         (_steady(long[_limited("rafc", volts)], "tracking_rms") or float("inf"))
         > 10 * (_steady(long[_limited("rcafc", volts)], "tracking_rms") or float("inf"))
@@ -61,7 +61,7 @@ def lost_by_limits(long: Long) -> bool:
 
 
 def worse_by_noise(long: Long, metric: str) -> bool:
-    """Whether the metric of RAFC with gamma raised is the larger one under noise."""
+    """Whether the metric of RAFC with gamma raised is larger than that of RCAFC under noise."""
     return (_steady(long[_noisy("rafc")], metric) or float("inf")) > (_steady(long[_noisy("rcafc")], metric) or 0.0)
 
 

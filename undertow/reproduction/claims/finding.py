@@ -1,4 +1,4 @@
-"""What judging a claim yields, and the comparisons that several claims share."""
+"""Verdict on a claim, and comparisons that several claims share."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -16,12 +16,12 @@ class Finding(NamedTuple):
 
     verdict: str
     evidence: str
-    shown_by: str | None  # name of the scenario that shows it
-    simulated: str  # on which fidelity levels, under what, and for how long
+    shown_by: str | None  # name of the scenario of the evidence
+    simulated: str  # fidelity levels, conditions and duration
     numbers: Mapping[str, Any] = MappingProxyType({})
 
 
-# RAFC with gamma raised until its loop gain at low frequency is RCAFC's: the fair opponent.
+# RAFC with gamma raised until its low-frequency loop gain equals that of RCAFC, for a fair comparison.
 EQUAL_GAIN = "rafc_equal_gain"
 
 
@@ -32,7 +32,7 @@ def pair(runs: Runs, metric: str) -> tuple[float, float, float]:
 
 
 def steady(run: Executed) -> dict[str, Any]:
-    """Steady metrics of a run that lasted.
+    """Steady metrics of a run that reached its end.
 
     Raises:
         RuntimeError: it did not.

@@ -1,1 +1,1 @@
-"""The robust variant beside the paper's law: every fidelity once more, the ablations, and what follows from them."""
+"""Comparison of the robust variant with the paper's law: every fidelity level, the ablations, and conclusions."""

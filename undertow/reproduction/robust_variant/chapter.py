@@ -1,4 +1,4 @@
-"""Everything of the chapter `The robust variant`: every fidelity again, the ablations, the conclusions."""
+"""The chapter `The robust variant`: every fidelity level, the ablations, the conclusions."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -14,34 +14,34 @@ from undertow.scenario.execute import Executed
 
 Progress = Callable[[str, float], None]
 
-# Compiling and running leave Python's lock alone most of the time: two at once use two cores.
+# Compiling and running release Python's lock most of the time: two at once use two cores.
 _AT_ONCE = 2
 
 
 class Chapter(NamedTuple):
-    """What stands in results.json, and the runs of the fidelity."""
+    """Entries of results.json, and the runs of the fidelity comparison."""
 
     results: dict[str, Any]
     runs: dict[str, Executed]
 
 
 def chapter(folder: Path, quick: bool, progress: Progress) -> Chapter:
-    """Run it; scenarios and campaigns are saved as everything else that `reproduce` runs.
+    """Run the chapter; scenarios and campaigns are saved as all others of `reproduce`.
 
     Args:
-        folder: where `scenarios/` and `runs/` are.
-        quick: fewer fidelities, ablations and seeds.
-        progress: told a message and the share done.
+        folder: folder of `scenarios/` and `runs/`.
+        quick: fewer fidelity levels, ablations and seeds.
+        progress: called with a message and the share done.
     """
-    wanted = [one for one in ABLATIONS if not (quick and one.long)]
+    selected = [one for one in ABLATIONS if not (quick and one.long)]
     silent = lambda message, share: None
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         runs_later = pool.submit(run_all, fidelity.scenarios(quick), folder, silent)
-        later = {pool.submit(study.run, one, quick, folder): one for one in wanted}
+        later = {pool.submit(study.run, one, quick, folder): one for one in selected}
         try:
             for count, done in enumerate(as_completed([runs_later, *later])):
                 done.result()
-                what = "every fidelity again" if done is runs_later else f"ablation {later[done].id}"
+                what = "every fidelity level, sampled" if done is runs_later else f"ablation {later[done].id}"
                 progress(what, (count + 1) / (len(later) + 1))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -51,7 +51,7 @@ def chapter(folder: Path, quick: bool, progress: Progress) -> Chapter:
     results = {
         "quick": quick,
         "seeds": found[0]["variants"][0]["seeds"],
-        "left_out": [one.id for one in ABLATIONS if one not in wanted],
+        "left_out": [one.id for one in ABLATIONS if one not in selected],
         "fidelity": rows,
         "ablations": found,
         "conclusions": conclusions(rows, found),

@@ -1,4 +1,4 @@
-"""Preset `robust` beside the paper's laws on every fidelity level, and at sea beside a PID too; all sampled."""
+"""Preset `robust` and the paper's laws at every fidelity level, and with a PID at sea; all sampled."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -23,13 +23,13 @@ LAWS = {
 WHOLE = FIDELITIES[-1]
 _SAMPLED = {"kind": "sampled", "duration": 20.0}
 
-# What the thrusters get, and what they have to bear: name -> words, supply in V, factor on suite U1.
+# Supply and load of the thrusters: name -> words, supply in V, factor on suite U1.
 _SUPPLIES = {
-    "24V_03": ("whole motor, 24 V, U1 x 0.3", 24.0, 0.3),
-    "24V": ("whole motor, 24 V, U1: beyond the motors", 24.0, 1.0),
+    "24V_03": ("full motor model, 24 V, U1 x 0.3", 24.0, 0.3),
+    "24V": ("full motor model, 24 V, U1: beyond the motors", 24.0, 1.0),
 }
 
-# Suite U1 at 0.3 of its size, and for 1.5 s a push that 24 V cannot hold: t, then m/s^2 and rad/s^2.
+# Suite U1 at 0.3 of its size, and for 1.5 s an overload that 24 V cannot hold: t, then m/s^2 and rad/s^2.
 _PUSHED, _LET_GO, _JUDGED = 8.0, 9.5, 17.0  # s
 _PUSH, _REST = [4.0, 4.0, -4.0, 2.0, 2.0, 2.0], [0.0] * 6
 _SAMPLES = [(0.0, _REST), (_PUSHED, _REST), (_PUSHED + 0.01, _PUSH), (_LET_GO, _PUSH), (_LET_GO + 0.01, _REST)]
@@ -38,7 +38,7 @@ _OVERLOAD = [
     {"kind": "table", "samples": [[t, *size] for t, size in _SAMPLES]},
 ]
 
-# All of it with one number per axis, so that the two sets of gains are one program.
+# One number per axis for all gains, so that both sets of gains share one program.
 _TABLE1: dict[str, Any] = {
     "feedback": [[1, 2]] * 6,
     "pole": [150] * 6,
@@ -51,27 +51,27 @@ _TABLE1: dict[str, Any] = {
 _AT_SEA: dict[str, tuple[str, dict[str, Any]]] = {
     "table1": ("Table 1", {"kind": "rcaf", **_TABLE1}),
     "hand_tuned": ("paper's law, tuned by hand", {"kind": "rcaf", **HAND_TUNED}),
-    "robust": ("robust, no gain given", {"kind": "rcaf", "preset": "robust"}),
+    "robust": ("robust, no given gain", {"kind": "rcaf", "preset": "robust"}),
 }
 
 
 class Place(NamedTuple):
-    """Where laws are compared."""
+    """Setting of a comparison."""
 
     words: str
     runs: dict[str, tuple[str, dict[str, Any]]]  # law -> its name, and the scenario
 
 
 def places(quick: bool) -> dict[str, Place]:
-    """Every place, from the easiest to the most real; quick: the whole motor only."""
+    """Every setting, from the simplest to the most realistic; quick: the full motor model only."""
     found = {}
     for fidelity in (WHOLE,) if quick else FIDELITIES:
-        words = "whole motor, no limit" if fidelity == WHOLE else fidelity
+        words = "full motor model, no limit" if fidelity == WHOLE else fidelity
         found[fidelity] = Place(words, _laws(words, fidelity, {"kind": "u1"}, quick=quick))
     for name, (words, volts, scale) in _SUPPLIES.items():
         found[name] = Place(words, _laws(words, WHOLE, {"kind": "u1", "scale": scale}, volts, quick))
     if not quick:
-        words = "whole motor, 24 V, U1 x 0.3, 1.5 s of too much"
+        words = "full motor model, 24 V, U1 x 0.3, overload of 1.5 s"
         two = {key: one for key, one in _laws(words, WHOLE, _OVERLOAD, 24.0).items() if key in ("rcafc", "robust")}
         two = {key: (name, one | {"steady": {"start": _JUDGED}}) for key, (name, one) in two.items()}
         found["overload"] = Place(words, two)
@@ -95,7 +95,7 @@ def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
 
 
 def table(runs: Mapping[str, Executed], quick: bool) -> list[dict[str, Any]]:
-    """One row per place and law: how it ended, and the steady metrics."""
+    """One row per setting and law: ending and steady metrics."""
     return [
         {
             "place": place,
@@ -131,7 +131,7 @@ def _laws(
 
 
 def at_sea(description: str, law: dict[str, Any]) -> dict[str, Any]:
-    """As examples/bluerov2_heavy.yaml, with a law to be compared."""
+    """The scenario of examples/bluerov2_heavy.yaml with another law."""
     return W2 | {"description": description, "controller": law}
 
 
@@ -147,12 +147,12 @@ def _row(run: Executed) -> dict[str, Any]:
 
 
 def _late_rms(run: Executed, series: xr.DataArray) -> float | None:
-    """Of the first three outputs over the steady window, m for a vehicle."""
+    """Rms of the first three outputs over the steady window, m for a vehicle."""
     late = series.sel(time=slice(*run.built.window())).values[:, :3]
     return float(np.sqrt((late**2).mean())) if run.steady else None
 
 
 def _largest_after(run: Executed, start: float) -> float | None:
-    """Largest tracking error from a time (s) on: what an overload does."""
+    """Largest tracking error from a time (s) on, which shows the effect of an overload."""
     late = run.dataset["error"].sel(time=slice(start, None)).values
     return float(np.abs(late).max()) if late.size and run.status is Status.OK else None

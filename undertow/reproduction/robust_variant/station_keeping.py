@@ -1,19 +1,19 @@
-"""Station keeping of BlueROV2 Heavy at sea: preset `robust` beside a PID, by what navigation knows and by the truth.
+"""Station keeping of BlueROV2 Heavy at sea: preset `robust` and a PID, with real navigation and exact measurements.
 
-Both laws were tuned with the same budget; `benchmarks/station_keeping.py` finds their gains and flies 500 runs of each,
-with every published parameter set as the truth in turn.
+Both laws were tuned with the same budget; `benchmarks/station_keeping.py` finds their gains and simulates 500 runs of
+each, with every published parameter set as the true plant in turn.
 """
 
 from typing import Any
 
-_TOLD, _TRUE = "vonbenzon2022", "ng2024"
+_NOMINAL, _TRUE = "vonbenzon2022", "ng2024"
 _START, _END = 30.0, 60.0  # s
 
 _PID, _ROBUST = ("pid", "PID, tuned"), ("robust", "robust, tuned")
 
 
 def _pid(frequency: tuple, damping: tuple, integral_share: tuple) -> dict[str, Any]:
-    """A PID; a pair of gains is for translation and rotation."""
+    """A PID; pairs of gains are for translation and rotation."""
     gains = {"frequency": frequency, "damping": damping, "integral_share": integral_share}
     return {"kind": "pid", **_per_axis(gains)}
 
@@ -27,7 +27,7 @@ def _per_axis(gains: dict[str, tuple]) -> dict[str, list[float]]:
     return {name: [moving] * 3 + [turning] * 3 for name, (moving, turning) in gains.items()}
 
 
-# Place -> words, sensor, laws.
+# Setting -> words, sensor, laws.
 _PLACES = {
     "station": (
         "BlueROV2 Heavy keeps station, position fixes of 5 cm",
@@ -38,7 +38,7 @@ _PLACES = {
         },
     ),
     "station_known": (
-        "the same, position and velocity known",
+        "the same, exact position and velocity",
         "perfect",
         {
             _PID: _pid((9.015, 10.8), (1.74, 3.628), (0.1445, 0.0289)),
@@ -49,7 +49,7 @@ _PLACES = {
 
 
 def places() -> dict[str, tuple[str, dict[str, tuple[str, dict[str, Any]]]]]:
-    """Words of each place, and by law its name and the scenario."""
+    """Words of each setting, and by law its name and the scenario."""
     return {
         place: (words, {key: (name, _scenario(f"{name}: {words}", law, sensor)) for (key, name), law in laws.items()})
         for place, (words, sensor, laws) in _PLACES.items()
@@ -61,7 +61,7 @@ def _scenario(description: str, law: dict[str, Any], sensor: str) -> dict[str, A
     return {
         "description": description,
         "plant": {"vehicle": vehicle(_TRUE), "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
-        "model": {"vehicle": vehicle(_TOLD), "rate_term": True},
+        "model": {"vehicle": vehicle(_NOMINAL), "rate_term": True},
         "controller": law,
         "reference": {"kind": "setpoint", "position": [0] * 6},
         "disturbance": [
