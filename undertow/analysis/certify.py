@@ -65,7 +65,11 @@ def _signals(function: Lyapunov, rate: np.ndarray) -> dict[str, xr.Variable]:
         "lyapunov_estimation": ("its part that eps and the weights make", function.estimation, _UNITS),
         "lyapunov_rate": ("its mean rate since the record before", rate, "m^2/s^3, rad^2/s^3"),
     }
-    return {name: series(("time",), values, meaning, units) for name, (meaning, values, units) in described.items()}
+    return {
+        name: series(("time",), values, meaning, units)
+        for name, (meaning, values, units) in described.items()
+        if values is not None
+    }
 
 
 def _rate(value: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ class Lyapunov(NamedTuple):
 
     meaning: str
     value: PerRecord
-    estimation: PerRecord  # what eps and theta contribute; the rest is the tracking error's
+    estimation: PerRecord | None = None  # part of the modelling error and the weights; the rest is that of tracking
 
 
 def of_paper(law: RCAF, run: xr.Dataset) -> Lyapunov:
