@@ -1,4 +1,4 @@
-"""A controller that takes its vehicle for another one: its model is that of the other one, whatever is true."""
+"""A controller with the nominal model of another vehicle, whatever the true one is."""
 
 import jax.numpy as jnp
 import numpy as np

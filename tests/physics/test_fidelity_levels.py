@@ -1,4 +1,4 @@
-"""Each fidelity of the thruster ladder tends to the next lower one, at the rate that its small parameter sets."""
+"""Each fidelity level of the thruster tends to the next lower one, at the rate that its small parameter sets."""
 
 import equinox as eqx
 import jax
