@@ -54,6 +54,7 @@ def test_kill_9_at_twenty_moments(campaign_file, tmp_path):
     assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
     """A real cluster of two processes; one of them dies after the first results."""
     path = campaign_file(trials=200, chunk=20)
@@ -97,6 +98,7 @@ def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):
             time.sleep(0.1)
 
 
+@pytest.mark.slow
 def test_a_dead_scheduler_loses_nothing(campaign_file, tmp_path):
     """A scheduler in a process of its own is killed after the first results; the rest is flown without it."""
     path, out, file = campaign_file(trials=200, chunk=20), tmp_path / "cluster", tmp_path / "scheduler.json"

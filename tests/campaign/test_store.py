@@ -1,6 +1,7 @@
 """The store: what is flown once is kept, what is torn is flown again, and two do not write at once."""
 
 import errno
+import itertools
 import re
 import shutil
 from functools import partial
@@ -205,9 +206,13 @@ def test_spelling_makes_no_other_campaign(campaign, campaign_file, tmp_path):
 GROWING = {"cross": {"controller.frequency": [2.0, 3.0]}, "series": {"signals": ["position"], "every": 0.5}}
 
 
-@pytest.mark.parametrize("design", ["random", "sobol"])
-@pytest.mark.parametrize("changes", [{}, GROWING])
-@pytest.mark.parametrize("before", [1, 40])  # also where not even the first few samples are there
+@pytest.mark.parametrize(
+    ("design", "changes", "before"),  # also where not even the first few samples are there
+    [
+        pytest.param(*one, marks=() if one in (("random", GROWING, 1), ("sobol", {}, 40)) else pytest.mark.slow)
+        for one in itertools.product(("random", "sobol"), ({}, GROWING), (1, 40))
+    ],
+)
 def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp_path, design, changes, before):
     """The store is the same to the byte as if all had been asked for at first; only their tasks are flown."""
     asked = lambda trials: campaign_file(trials=trials, design=design, chunk=16 if before > 1 else 1, **changes)

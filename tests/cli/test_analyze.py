@@ -23,7 +23,7 @@ loop: {duration: 1, dt: 0.002}
 """
 
 
-def test_predictions_are_written_and_shown(undertow, tmp_path):
+def test_predictions_are_written_and_shown(undertow, whole_figures, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST)
     said = undertow("analyze", "s.yaml", "--out", "out")
     assert said.code == 0, said.err

@@ -178,8 +178,14 @@ EVERY = {
 }
 
 
-@pytest.mark.parametrize("signal", [2, 15])
-@pytest.mark.parametrize("command", EVERY)
+@pytest.mark.parametrize(
+    ("command", "signal"),
+    [
+        pytest.param(command, signal, marks=() if command in ("list", "simulate") else pytest.mark.slow)
+        for command in EVERY
+        for signal in (2, 15)
+    ],
+)
 def test_signals_while_modules_are_imported_end_every_command(tmp_path, command, signal):
     """It may not be forgotten by those that wait for no compiled code; SIGTERM ends like Ctrl-C, with its own code."""
     write(tmp_path)

@@ -69,6 +69,29 @@ def sliding(model) -> Sliding:
     return Sliding(model)
 '''
 
+CERTIFIED = (
+    SLIDING
+    + """
+
+from undertow.analysis.certificate.function import Lyapunov
+from undertow.analysis.certificate.hypotheses import Hypothesis
+from undertow.analysis.theory import RunCertificate, Theory, register
+
+
+@register(Sliding)
+def theory(law):
+    def certificate(run, until_end, window, dt):
+        small = until_end["distance"].values < 0.5
+        return RunCertificate(
+            Lyapunov("s^T s / 2", 0.5 * (run["surface"].values ** 2).sum(-1)),
+            [Hypothesis("near", "the surface is near", small)],
+            {"nearest": float(until_end["distance"].min())},
+        )
+
+    return Theory(certificate=certificate)
+"""
+)
+
 SCENARIO = {
     "plant": {"kind": "double_integrator", "axes": 2},
     "controller": {"kind": "pid", "frequency": 2.0, "reference_frequency": 0},
@@ -134,6 +157,24 @@ def test_a_signal_of_ones_own(folder):
     asked = {"scenario": SCENARIO | {"controller": law}, "trials": 1, "series": {"signals": ["surface"], "every": 0.02}}
     found = run_trials(dump(asked), str(folder), [0])
     np.testing.assert_allclose(found["series:surface"][0], run["surface"], rtol=1e-9, atol=1e-12)
+
+
+def test_a_certificate_of_ones_own(folder, capsys):
+    """Registered in the law's own file: in the dataset, metrics.json, on the terminal and as a figure."""
+    (folder / "certified.py").write_text(CERTIFIED)
+    path = written(folder, controller={"kind": "./certified.py:sliding"})
+    assert command(["simulate", str(path), "--out", str(folder / "out"), "--no-prediction"]) == 0
+    with xr.open_dataset(folder / "out" / "run.nc") as run:
+        value = 0.5 * (run["surface"].values ** 2).sum(-1)
+        np.testing.assert_allclose(run["lyapunov"], value, rtol=1e-15)
+        np.testing.assert_allclose(run["lyapunov_rate"][1:], np.diff(value) / np.diff(run["time"]), rtol=1e-12)
+        near = float((run["distance"] < 0.5).mean())
+    found = json.loads((folder / "out" / "metrics.json").read_text())["certificate"]
+    assert found["function"] == "s^T s / 2" and found["start"] == value[0] > found["end"] == value[-1]
+    assert found["hypotheses"][0]["name"] == "near" and found["hypotheses"][0]["whole"] == pytest.approx(near)
+    assert 0 < near < 1 and found["rising"]["whole"] == 0
+    assert "near" in capsys.readouterr().out
+    assert (folder / "out" / "figures" / "certificate.png").stat().st_size > 1e4
 
 
 def test_what_a_law_lacks_is_not_there(folder):

@@ -53,7 +53,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("hidden", ["simdjit", "llvmlite"])
+@pytest.mark.parametrize("hidden", ["simdjit", pytest.param("llvmlite", marks=pytest.mark.slow)])
 def test_simulate(folder, hidden):
     """The figures of backend simd to rounding, and the reason on the terminal and in the result."""
     import xarray as xr
@@ -83,6 +83,7 @@ def test_campaign(folder):
     assert "the batch compiler cannot be imported" in " ".join(done.stderr.split())
 
 
+@pytest.mark.slow
 def test_analyze(folder):
     done = without("simdjit", folder, "analyze", "scenario.yaml", "--out", "prediction")
     assert done.returncode == 0, done.stderr
