@@ -30,8 +30,8 @@ from undertow.loop.outcome import Outcome
 from undertow.navigation.perfect import perfect
 from undertow.scenario import execute
 from undertow.scenario.consistency import check_fit, check_times, rounded_times
+from undertow.scenario.finished_run import Measuring, certificate_of, label, metrics_of
 from undertow.scenario.reading import from_data, read
-from undertow.scenario.results import Measuring, certificate_of, label, metrics_of
 from undertow.scenario.schema import Initial, Loop, Window, complaint
 from undertow.scenario.step_size import step_failure
 

@@ -4,7 +4,7 @@ import pytest
 
 from undertow.analysis.metrics import MEANINGS
 from undertow.core import catalogue
-from undertow.loop.closed_loop import RECORDED
+from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.schema import keys
 

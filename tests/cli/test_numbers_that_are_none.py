@@ -5,7 +5,7 @@ import pytest
 
 from undertow.cli.tables import certificate_table, wide_console
 from undertow.scenario.execute import execute
-from undertow.scenario.results import certificate_of
+from undertow.scenario.finished_run import certificate_of
 
 BASE = {
     "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "ideal"}},

@@ -17,7 +17,7 @@ from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.observer import observer
 from undertow.navigation.white_noise import white_noise
-from undertow.numerics.randomness import keys_for, numbered
+from undertow.numerics.random_keys import keys_for, numbered
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed

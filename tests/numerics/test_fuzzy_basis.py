@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from undertow.core.errors import BadInput
 from undertow.estimation import FuzzySystem, gaussian_sets
-from undertow.estimation.tsk import even_memberships, is_even, memberships
+from undertow.estimation.fuzzy_system import even_memberships, is_even, memberships
 
 EPSILON = np.finfo(float).eps
 LAYOUTS = [(1, None), (2, None), (3, None), (3, 0.5), (5, None), (5, 0.25), (7, None), (7, 1.0), (15, None)]

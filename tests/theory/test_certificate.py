@@ -11,7 +11,7 @@ from undertow.controllers.rcaf import rcaf
 from undertow.controllers.robust.estimator import Estimator
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.disturbances.table import table
-from undertow.estimation.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.linear_plant import linear_plant

@@ -9,7 +9,7 @@ from undertow.controllers.rcaf import rcaf
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.estimation.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect

@@ -9,7 +9,7 @@ from undertow.analysis import drift
 from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.estimator import Estimator, EstimatorState
 from undertow.disturbances import none, sinusoid
-from undertow.estimation.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect, white_noise

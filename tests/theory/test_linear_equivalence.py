@@ -12,7 +12,7 @@ import pytest
 from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.estimation.tsk import memberships
+from undertow.estimation.fuzzy_system import memberships
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect

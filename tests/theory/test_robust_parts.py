@@ -9,13 +9,13 @@ from scipy.optimize import linprog
 
 from undertow.analysis.drift import gain_bound
 from undertow.controllers.presets.robust import robust
-from undertow.controllers.robust.allocation import allocate, attained
+from undertow.controllers.reference_filter import ReferenceFilter
 from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.reference_filter import ReferenceFilter
+from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.core.contracts import Target
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.estimation.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.numerics.integrators import rk4
 from undertow.plants import double_integrator, hybrid_vehicle
 from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage, t200

@@ -13,7 +13,7 @@ from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.none import none
-from undertow.estimation.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect

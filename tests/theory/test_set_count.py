@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.estimation.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 
 GATHERING = 0.4217  # rho of three sets, the layout matched by all others

@@ -10,7 +10,7 @@ from undertow.analysis.noise import Steps, steps
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.errors import BadInput
-from undertow.estimation.tsk import FuzzySystem
+from undertow.estimation.fuzzy_system import FuzzySystem
 
 
 def basis_slope(fuzzy: FuzzySystem) -> np.ndarray:

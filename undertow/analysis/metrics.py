@@ -15,8 +15,9 @@ from undertow.core.errors import BadInput
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.param import param
 from undertow.core.signals import Signal
-from undertow.loop.closed_loop import ClosedLoop, Signals
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
+from undertow.loop.recorded_signals import Signals
 from undertow.loop.sampled import AbstractAccumulator
 
 PerAxis = Float[Array, " n"]

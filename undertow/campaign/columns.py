@@ -15,7 +15,7 @@ from undertow.campaign.task import INVALID, NOT_JUDGED
 from undertow.campaign.trials import Trials, varied_keys
 from undertow.core.metric import Metric
 from undertow.core.status import Status
-from undertow.loop import recording
+from undertow.loop import dataset
 from undertow.scenario.build import Built
 
 # Codes of the columns `status` and `backend`, and their words.
@@ -76,8 +76,8 @@ def labels(several: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict
     loop = built.closed_loop
     for name in several.campaign.series.signals if several.campaign.series else ():
         signal = loop.signals()[name]
-        said = _said(*recording.meaning(signal, loop.plant)) | {"comment": _AFTER}
-        found[f"series:{name}"] = Label((*along, *recording.dimensions(signal)), said)
+        said = _said(*dataset.meaning(signal, loop.plant)) | {"comment": _AFTER}
+        found[f"series:{name}"] = Label((*along, *dataset.dimensions(signal)), said)
     return found
 
 
@@ -101,7 +101,7 @@ def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
     if several.campaign.series is None:
         return found
     plan = planned(built, several.campaign.series)
-    return found | recording.coordinates(plan.times(), built.closed_loop.plant)
+    return found | dataset.coordinates(plan.times(), built.closed_loop.plant)
 
 
 def _swept(entries: dict[str, Any]) -> np.ndarray:

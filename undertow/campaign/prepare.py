@@ -16,7 +16,7 @@ from undertow.core.metric import Metric
 from undertow.loop.simd_batch import unavailable
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
-from undertow.scenario.results import rules
+from undertow.scenario.finished_run import rules
 
 
 class Prepared(NamedTuple):

@@ -10,6 +10,7 @@ import numpy as np
 from undertow.analysis.metrics import accumulators
 from undertow.campaign.campaign_schema import Series
 from undertow.loop.simd_batch import Plan, Run
+from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.part_cache import structure
 
@@ -22,7 +23,7 @@ def run_of(built: Built) -> Run:
     scenario = built.scenario
     start = built.closed_loop.outputs_at_start(*(getattr(scenario.initial, name) for name in _STARTS))
     gathered = accumulators(built.closed_loop.plant, built.metrics, *built.window())
-    return Run(built.closed_loop, gathered, start, jax.random.PRNGKey(scenario.seed))
+    return Run(built.closed_loop, gathered, start, key_of_seed(scenario.seed))
 
 
 def planned(built: Built, asked: Series | None) -> Plan:

@@ -16,8 +16,8 @@ from undertow.prediction.warnings import advice
 from undertow.report.prediction_page import write_prediction
 from undertow.report.prediction_tables import Rows, tables
 from undertow.scenario.build import build
+from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
-from undertow.scenario.results import to_json
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 

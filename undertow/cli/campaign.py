@@ -31,9 +31,9 @@ from undertow.core.disk import alone
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import write_campaign
 from undertow.report.campaign_tables import by_xla
+from undertow.scenario.finished_run import to_json
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
-from undertow.scenario.results import to_json
 
 
 def campaign(

@@ -13,7 +13,7 @@ from undertow.cli.tables import wide_console
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.signals import Signal
-from undertow.loop.closed_loop import RECORDED
+from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.describing import summary
 from undertow.scenario.schema import keys

@@ -21,9 +21,9 @@ from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.figures import run_plots, save_all
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.execute import Executed, execute, save
+from undertow.scenario.finished_run import certificate_of, metrics_of, metrics_text
 from undertow.scenario.reading import dump, read
 from undertow.scenario.reproducibility import Repetition, compare
-from undertow.scenario.results import certificate_of, metrics_of, metrics_text
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 

@@ -17,8 +17,8 @@ from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
+from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
-from undertow.scenario.results import to_json
 from undertow.tuning.checkpoint import has_answers
 from undertow.tuning.objective import Step
 from undertow.tuning.tune import METHODS, Tuned, tune

@@ -9,8 +9,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.controllers.law_signals import ADAPTIVE_LAW, lyapunov_signals, share_given, weight_signals
 from undertow.controllers.robust_modification import RobustModification
-from undertow.controllers.signals import ADAPTIVE_LAW, lyapunov_signals, share_given, weight_signals
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
@@ -18,8 +18,8 @@ from undertow.core.contracts import Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.signals import Signal
+from undertow.estimation.fuzzy_system import FuzzySystem
 from undertow.estimation.series_parallel import SeriesParallel
-from undertow.estimation.tsk import FuzzySystem
 from undertow.numerics.linear_algebra import companion_lyapunov, matvec
 from undertow.numerics.smoothing import SWITCHES, switch
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.signals import ESTIMATE, MODELLING_ERROR
+from undertow.controllers.law_signals import ESTIMATE, MODELLING_ERROR
 from undertow.controllers.tracking_error import check_gains, demanded_acceleration
 from undertow.core import checks
 from undertow.core.actuator_model import force_of, input_for

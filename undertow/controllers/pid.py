@@ -9,9 +9,9 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
-from undertow.controllers.robust.allocation import allocate, attained
-from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
-from undertow.controllers.signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.reference_filter import FilterState, ReferenceFilter
+from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target

@@ -10,7 +10,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.numerics.randomness import keys_for
+from undertow.numerics.random_keys import keys_for
 
 _SINUSOIDS = 3  # per axis
 

@@ -13,7 +13,7 @@ from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.disturbances.adding import body_of, with_water
-from undertow.numerics.randomness import keys_for
+from undertow.numerics.random_keys import keys_for
 
 # Frequencies in units of the peak frequency; the range holds all but 1e-4 of the energy.
 _LOWEST, _HIGHEST, _POINTS = 0.4, 8.0, 4000

@@ -7,8 +7,9 @@ from jaxtyping import Array, Float, Int, PyTree
 
 from undertow.core.contracts import Inputs
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop, Signals
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.readings import all_finite
+from undertow.loop.recorded_signals import Signals
 
 
 class Ending(NamedTuple):

@@ -1,19 +1,17 @@
-"""Recording of the fixed-step loops, and a run as a labelled dataset."""
+"""Control steps and recording, which the fixed-step loops have in common."""
 
 from collections.abc import Callable
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
-import xarray as xr
 from jaxtyping import Array, Float, Int
 
-from undertow.core.contracts import AbstractPlant, Inputs
-from undertow.core.signals import Signal
+from undertow.core.contracts import Inputs
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop, Realization, Signals
-from undertow.loop.outcome import Ending, Outcome, status_of, wrong_input
+from undertow.loop.closed_loop import ClosedLoop, Realization
+from undertow.loop.outcome import Ending, status_of, wrong_input
+from undertow.loop.recorded_signals import Signals
 
 
 def record(
@@ -76,44 +74,3 @@ def freeze_on_failure(
 def instant(control_step: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:
     """Time of a control step, s."""
     return jnp.asarray(control_step, dtype=float) * dt
-
-
-def to_dataset(outcome: Outcome, loop: ClosedLoop) -> xr.Dataset:
-    """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1)."""
-    variables = {
-        name: series(dimensions(signal), np.asarray(outcome.signals[name]), *meaning(signal, loop.plant))
-        for name, signal in loop.signals().items()
-    }
-    status = Status(int(outcome.status))
-    return xr.Dataset(
-        variables,
-        coords=coordinates(np.asarray(outcome.time), loop.plant),
-        attrs={"status": status.word, "status_sentence": outcome.sentence(), "ended": float(outcome.ended)},
-    )
-
-
-def coordinates(time: np.ndarray, plant: AbstractPlant) -> dict[str, xr.Variable]:
-    """Coordinates of the dimensions `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1)."""
-    axis = series(("axis",), np.array(plant.outputs), "output")
-    axis.attrs["unit_of_each"] = ", ".join(plant.output_units)
-    return {
-        "time": series(("time",), time, "time", "s"),
-        "axis": axis,
-        "actuator": series(("actuator",), np.arange(1, plant.inputs() + 1), "input"),
-    }
-
-
-def dimensions(signal: Signal) -> tuple[str, ...]:
-    """Names of the dimensions of a series."""
-    return ("time", *signal.dimensions)
-
-
-def meaning(signal: Signal, plant: AbstractPlant) -> tuple[str, str]:
-    """Meaning of a signal and its unit; the units of all axes where they differ."""
-    return signal.meaning, signal.unit_for(plant.output_units, plant.input_unit)
-
-
-def series(dims: tuple[str, ...], values: np.ndarray, meaning: str, unit: str | None = None) -> xr.Variable:
-    """One variable of a dataset; as a plain array, for which xarray does not import dask."""
-    units = {} if unit is None else {"units": unit}
-    return xr.Variable(dims, values, {"long_name": meaning, **units}, fastpath=True)

@@ -11,8 +11,9 @@ from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
-from undertow.loop.closed_loop import ClosedLoop, Realization, Signals
+from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.outcome import Outcome, going
+from undertow.loop.recorded_signals import Signals
 from undertow.loop.recording import freeze_on_failure, instant, record
 from undertow.numerics.integrators import METHODS
 

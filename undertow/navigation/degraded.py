@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractNavigation, Measurement
 from undertow.core.param import param
-from undertow.numerics.randomness import numbered
+from undertow.numerics.random_keys import numbered
 from undertow.sensors.sampling import Sampling, SensorState
 
 

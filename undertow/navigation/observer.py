@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.errors import BadInput
-from undertow.numerics.randomness import numbered
+from undertow.numerics.random_keys import numbered
 from undertow.sensors.estimate import Estimate, estimate_of, motion_of
 from undertow.sensors.imu import IMU
 from undertow.sensors.propeller_speed import PropellerSpeed

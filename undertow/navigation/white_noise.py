@@ -9,7 +9,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.measurement import with_outputs
 from undertow.core.param import param
-from undertow.numerics.randomness import numbered
+from undertow.numerics.random_keys import numbered
 
 
 class WhiteNoise(AbstractInformedNavigation):

@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import jax
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
@@ -13,6 +12,7 @@ from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.response import from_start, metrics_of, signals_within
 from undertow.analysis.theory import theory_of
 from undertow.core.contracts import AbstractController
+from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
 
 _HELD = "at fixed weights"
@@ -40,7 +40,7 @@ def operating_point(built: Built) -> OperatingPoint:
     position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)
     unloaded = equilibrium(loop, settings.dt, position, np.zeros(len(position)))
     steps = min(round(settings.duration / settings.dt) + 1, _MAX_STEPS)
-    around = disturbance_profile(loop, unloaded, jax.random.PRNGKey(built.scenario.seed), steps, settings.dt)
+    around = disturbance_profile(loop, unloaded, key_of_seed(built.scenario.seed), steps, settings.dt)
     inside = (around.time >= start) & (around.time <= stop)
     load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
     mean = equilibrium(loop, settings.dt, position, load)
@@ -90,7 +90,7 @@ def _start(known: OperatingPoint) -> list[np.ndarray]:
     """States of plant and controller at t = 0 as vectors."""
     loop, initial = known.built.closed_loop, known.built.scenario.initial
     outputs = loop.outputs_at_start(initial.position, initial.velocity)
-    realization = loop.realize(jax.random.PRNGKey(known.built.scenario.seed))
+    realization = loop.realize(key_of_seed(known.built.scenario.seed))
     return [np.asarray(ravel_pytree(state)[0]) for state in realization.start(*outputs)]
 
 

@@ -13,8 +13,8 @@ from undertow.reproduction.running import run_all, start, write_all
 from undertow.reproduction.setup import CONTROLLERS
 from undertow.reproduction.thruster_response import ThrusterResponse, thruster_response
 from undertow.scenario.execute import Executed
+from undertow.scenario.finished_run import to_json
 from undertow.scenario.provenance import versions
-from undertow.scenario.results import to_json
 
 Progress = Callable[[str, float], None]
 

@@ -17,11 +17,12 @@ from undertow.core.status import Status
 from undertow.loop import continuous, sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
+from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
+from undertow.scenario.finished_run import Measuring, label
 from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
-from undertow.scenario.results import Measuring, label
 from undertow.scenario.schema import Initial, Loop
 from undertow.scenario.step_size import step_failure
 
@@ -88,7 +89,7 @@ def run_loop(
         not be used.
     """
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
-    common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
+    common: dict[str, Any] = {"duration": settings.duration, "key": key_of_seed(seed), **place}
     if settings.kind == "continuous":
         adaptive = (settings.rtol, settings.atol) if settings.method == "adaptive" else None
         outcome = continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.param import param
-from undertow.loop.closed_loop import Signals
+from undertow.loop.recorded_signals import Signals
 from undertow.loop.sampled import AbstractAccumulator
 from undertow.scenario.schema import Weights
 

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from undertow.core import catalogue, checks
 from undertow.core.contracts import AbstractPlant
 from undertow.core.errors import BadInput
+from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario import factory
 from undertow.scenario.build import Built
 from undertow.scenario.reading import Text
@@ -82,7 +83,7 @@ def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str],
     each = [(name, seed) for seed in range(runs.seeds) for name in names]
     return Trials(
         plants=stacked([plants[name] for name, _ in each]),
-        keys=jnp.stack([jax.random.PRNGKey((first_seed + seed) % 2**32) for _, seed in each]),
+        keys=jnp.stack([key_of_seed((first_seed + seed) % 2**32) for _, seed in each]),
         sizes=jnp.asarray([runs.sizes[seed % len(runs.sizes)] for _, seed in each], dtype=float),
         variants=tuple(name for name, _ in each),
     )

@@ -7,8 +7,8 @@ from undertow.controllers.robust_modification import modification_of
 from undertow.core import checks
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.estimation.series_parallel import SeriesParallel
-from undertow.estimation.tsk import gaussian_sets
 
 # Outermost sets of each fuzzy input. The paper does not give centres and widths: for eps, m/s and rad/s, as in the
 # benchmark; for the state input, wide enough for the paper's step of 4 m and its velocities.

@@ -5,13 +5,13 @@ import numpy as np
 from jax.core import Tracer
 
 from undertow.controllers.bandwidths import Axis, Bandwidths, alike, axes_of, robust_bandwidths
+from undertow.controllers.reference_filter import ReferenceFilter
 from undertow.controllers.robust.estimator import Estimator, widened
-from undertow.controllers.robust.reference_filter import ReferenceFilter
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core import checks
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
-from undertow.estimation.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 
 # With a given bandwidth: range of tracking bandwidths, and bandwidth of the actuator loop, as shares of it.
 _TRACKING_SHARES, _ACTUATORS_FASTER = (0.25, 0.5), 3.0

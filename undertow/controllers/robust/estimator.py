@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.param import param
-from undertow.estimation.tsk import FuzzySystem
+from undertow.estimation.fuzzy_system import FuzzySystem
 
 PerAxis = Float[Array, " n"]
 

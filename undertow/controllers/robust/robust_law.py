@@ -7,15 +7,15 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import largest_forces
-from undertow.controllers.robust.allocation import allocate, attained
+from undertow.controllers.law_signals import ADAPTIVE_LAW, lyapunov_signals, weight_signals
+from undertow.controllers.reference_filter import FilterState, ReferenceFilter, Room
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
-from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter, Room
-from undertow.controllers.signals import ADAPTIVE_LAW, lyapunov_signals, weight_signals
+from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.param import param
-from undertow.estimation.tsk import FuzzySystem
+from undertow.estimation.fuzzy_system import FuzzySystem
 from undertow.numerics.linear_algebra import companion_lyapunov, matvec
 
 PerAxis = Float[Array, " n"]

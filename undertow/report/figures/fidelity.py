@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from undertow.report.figures import signals, style
+from undertow.report.figures import recorded, style
 
 _SHOWN = {
     "tracking_rms": "tracking error rms, m and rad",
@@ -50,7 +50,7 @@ def _errors(panel: Axes, fidelity: str, entries: Mapping[str, Any], runs: Mappin
     panel.yaxis.set_minor_locator(NullLocator())
     for key, run in runs.items():
         name, look = style.CONTROLLERS[key]
-        error = signals.curve(run, name, "error", look)
+        error = recorded.curve(run, name, "error", look)
         time, size = error.time, np.sqrt((error.values**2).mean(axis=1))
         panel.plot(
             time,

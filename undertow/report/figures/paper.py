@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from undertow.report.figures import signals, style
+from undertow.report.figures import recorded, style
 from undertow.report.figures.multiples import Block, small_multiples
 from undertow.reproduction.thruster_response import Law, ThrusterResponse
 
@@ -85,14 +85,14 @@ def robust_term(title: str, runs: Controllers) -> Figure:
     """Fig. 8."""
     first = next(iter(runs.values()))
     looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    curves = [signals.curve(run, name, "robust_term", look) for run, name, look in looks]
+    curves = [recorded.curve(run, name, "robust_term", look) for run, name, look in looks]
     end = float(first["time"].values[-1])
     return small_multiples(
         title,
-        signals.axis_names(first),
+        recorded.axis_names(first),
         [
-            Block(curves, signals.per_axis(first, "$u_r$", "/s^2"), height=1.05, titled=True),
-            Block(curves, signals.per_axis(first, "$u_r$", "/s^2"), height=1.05, window=(end / 2, end)),
+            Block(curves, recorded.per_axis(first, "$u_r$", "/s^2"), height=1.05, titled=True),
+            Block(curves, recorded.per_axis(first, "$u_r$", "/s^2"), height=1.05, window=(end / 2, end)),
         ],
     )
 
@@ -101,9 +101,9 @@ def effort(title: str, runs: Controllers) -> Figure:
     """Figs. 9 and 13."""
     first = next(iter(runs.values()))
     looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    curves = [signals.curve(run, name, "input", look) for run, name, look in looks]
+    curves = [recorded.curve(run, name, "input", look) for run, name, look in looks]
     start, end = settled(first), float(first["time"].values[-1])
-    labels = signals.per_input(first, "voltage")
+    labels = recorded.per_input(first, "voltage")
     return small_multiples(
         title,
         [f"thruster {number}" for number in first["actuator"].values],
@@ -122,16 +122,16 @@ APART = style.Look("#555555", "-", 0.9, 3)
 
 def identification(title: str, run: xr.Dataset) -> Figure:
     """Fig. 11."""
-    state = signals.curve(run, "state $x$", "position", STATE)
-    model = signals.curve(run, r"series-parallel state $\hat{x}$", "predicted_position", MODEL)
-    apart = signals.difference(run, r"$\hat{x} - x$", "predicted_position", "position", APART)
+    state = recorded.curve(run, "state $x$", "position", STATE)
+    model = recorded.curve(run, r"series-parallel state $\hat{x}$", "predicted_position", MODEL)
+    apart = recorded.difference(run, r"$\hat{x} - x$", "predicted_position", "position", APART)
     apart = apart._replace(values=1000 * apart.values)
-    thousandths = [text.replace(", ", ", m") for text in signals.per_axis(run, r"$\hat{x} - x$")]
+    thousandths = [text.replace(", ", ", m") for text in recorded.per_axis(run, r"$\hat{x} - x$")]
     return small_multiples(
         title,
-        signals.axis_names(run),
+        recorded.axis_names(run),
         [
-            Block([state, model], signals.places(run), height=1.1, titled=True),
+            Block([state, model], recorded.places(run), height=1.1, titled=True),
             Block([apart], thousandths, height=0.9),
         ],
     )
@@ -141,23 +141,23 @@ def uncertainty(title: str, runs: Controllers) -> Figure:
     """Figs. 7 and 12."""
     first = next(iter(runs.values()))
     looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    true = signals.curve(first, "true $d$", "uncertainty", style.TRUTH)
-    estimates = [signals.curve(run, name, "estimate", look) for run, name, look in looks]
-    errors = [signals.difference(run, name, "estimate", "uncertainty", look) for run, name, look in looks]
+    true = recorded.curve(first, "true $d$", "uncertainty", style.TRUTH)
+    estimates = [recorded.curve(run, name, "estimate", look) for run, name, look in looks]
+    errors = [recorded.difference(run, name, "estimate", "uncertainty", look) for run, name, look in looks]
     start = settled(first)
     rate = "/s^2"
     return small_multiples(
         title,
-        signals.axis_names(first),
+        recorded.axis_names(first),
         [
             Block(
                 [true, *estimates],
-                signals.per_axis(first, r"$d$, $\hat{d}$", rate),
+                recorded.per_axis(first, r"$d$, $\hat{d}$", rate),
                 height=1.35,
                 limits_from=start,
                 titled=True,
             ),
-            Block(errors, signals.per_axis(first, r"$\hat{d} - d$", rate), height=0.85, limits_from=start),
+            Block(errors, recorded.per_axis(first, r"$\hat{d} - d$", rate), height=0.85, limits_from=start),
         ],
     )
 
@@ -171,15 +171,15 @@ def tracking(title: str, runs: Controllers) -> Figure:
     """Figs. 6 and 10."""
     first = next(iter(runs.values()))
     looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
-    desired = signals.curve(first, "desired $x_d$", "reference", style.TRUTH)
-    actual = [signals.curve(run, name, "position", look) for run, name, look in looks]
-    errors = [signals.magnitude(signals.curve(run, name, "error", look)) for run, name, look in looks]
+    desired = recorded.curve(first, "desired $x_d$", "reference", style.TRUTH)
+    actual = [recorded.curve(run, name, "position", look) for run, name, look in looks]
+    errors = [recorded.magnitude(recorded.curve(run, name, "error", look)) for run, name, look in looks]
     return small_multiples(
         title,
-        signals.axis_names(first),
+        recorded.axis_names(first),
         [
-            Block([desired, *actual], signals.places(first), height=1.1, titled=True),
-            Block(errors, signals.per_axis(first, "|error|"), height=1.0, scale="log"),
+            Block([desired, *actual], recorded.places(first), height=1.1, titled=True),
+            Block(errors, recorded.per_axis(first, "|error|"), height=1.0, scale="log"),
         ],
     )
 

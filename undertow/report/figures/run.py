@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from undertow.report.figures import signals, style
+from undertow.report.figures import recorded, style
 from undertow.report.figures.certificate import certificate
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
@@ -26,19 +26,19 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
 
 def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a run, by name."""
-    outputs, columns = signals.axis_names(run), _columns(run.sizes["axis"])
+    outputs, columns = recorded.axis_names(run), _columns(run.sizes["axis"])
     inputs = [f"input {number}" for number in run["actuator"].values]
-    desired = signals.curve(run, "desired $x_d$", "reference", style.TRUTH)
-    actual = signals.curve(run, "actual $x$", "position", style.SOLID)
-    error = signals.magnitude(signals.curve(run, "|$x_d - x$|", "error", style.SOLID))
-    true = signals.curve(run, "true $d$", "uncertainty", style.TRUTH)
+    desired = recorded.curve(run, "desired $x_d$", "reference", style.TRUTH)
+    actual = recorded.curve(run, "actual $x$", "position", style.SOLID)
+    error = recorded.magnitude(recorded.curve(run, "|$x_d - x$|", "error", style.SOLID))
+    true = recorded.curve(run, "true $d$", "uncertainty", style.TRUTH)
     curves = [true]
     if "estimate" in run:
-        curves.append(signals.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID))
-    commanded = signals.curve(run, "commanded", "commanded_input", style.DASHED)
-    applied = signals.curve(run, "applied", "input", style.SOLID)
-    places, errors = signals.places(run), signals.per_axis(run, "|error|")
-    rates = signals.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
+        curves.append(recorded.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID))
+    commanded = recorded.curve(run, "commanded", "commanded_input", style.DASHED)
+    applied = recorded.curve(run, "applied", "input", style.SOLID)
+    places, errors = recorded.places(run), recorded.per_axis(run, "|error|")
+    rates = recorded.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
     levels = [f"input, {run['input'].attrs['units']}"] * run.sizes["actuator"]
     figures: dict[str, Callable[[], Figure]] = {
         "tracking": lambda: small_multiples(
@@ -72,10 +72,10 @@ def _apart(run: xr.Dataset) -> list[Block]:
     """Measurement error of position and, below it, velocity."""
     blocks = []
     for signal, symbol, rate in (("position", "x", ""), ("velocity", r"\dot{x}", "/s")):
-        apart = signals.difference(run, "measured less true", f"measured_{signal}", signal, style.SOLID)
+        apart = recorded.difference(run, "measured less true", f"measured_{signal}", signal, style.SOLID)
         turns = np.array(["rad" in unit and not rate for unit in run["axis"].attrs["unit_of_each"].split(", ")])
         wrapped = np.where(turns, (apart.values + np.pi) % (2 * np.pi) - np.pi, apart.values)
-        quantities = signals.per_axis(run, f"error of ${symbol}$", rate)
+        quantities = recorded.per_axis(run, f"error of ${symbol}$", rate)
         blocks.append(_block(run, [apart._replace(values=wrapped)], quantities, 0.0)._replace(titled=not rate))
     return blocks
 

@@ -14,8 +14,8 @@ from undertow.analysis.success import Success, judged
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.dataset import to_dataset
 from undertow.loop.outcome import Outcome
-from undertow.loop.recording import to_dataset
 from undertow.power.ledger import closure
 from undertow.scenario.provenance import checksum, content_hash, versions
 

@@ -7,6 +7,11 @@ import jax
 from jaxtyping import Array, Int, PRNGKeyArray
 
 
+def key_of_seed(seed: int) -> PRNGKeyArray:
+    """The key from which all random numbers of a run follow; `seed` of a scenario, of which 32 bits count."""
+    return jax.random.PRNGKey(seed)
+
+
 def numbered(key: PRNGKeyArray, number: Int[Array, ""]) -> PRNGKeyArray:
     """A different key for every integer, negative ones included: all bits count, whereas JAX uses the last 32."""
     if number.dtype.itemsize == 4:

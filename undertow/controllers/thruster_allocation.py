@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.signals import share_given
+from undertow.controllers.law_signals import share_given
 from undertow.numerics.box_quadratic import box_minimum
 from undertow.numerics.linear_algebra import matvec
 
