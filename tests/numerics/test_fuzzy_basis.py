@@ -80,7 +80,8 @@ def test_quick_way_is_taken_only_where_it_holds():
 
 @settings(max_examples=30, deadline=None)
 @given(
-    weights=st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5),
+    # XLA flushes subnormal numbers to zero.
+    weights=st.lists(st.floats(-1e6, 1e6, allow_subnormal=False), min_size=5, max_size=5),
     x=st.floats(-1e6, 1e6, allow_nan=False),
     layout=st.sampled_from([(5, None), (5, 0.25)]),
 )

@@ -72,7 +72,7 @@ ABLATIONS = [
 
 def test_conclusions_say_what_the_numbers_say():
     found = conclusions(ROWS, ABLATIONS)
-    assert len(found["wins"]) == 1 and "17 m off, and RAFC 22 m (A10)" in found["wins"][0]
+    assert len(found["wins"]) == 1 and "in the model it is 17 m, that of RAFC 22 m (A10)" in found["wins"][0]
     assert (
         found["same"][0] == "Accuracy. A linear observer of the same bandwidth has 1.020 times the error of RCAFC (A3)."
     )

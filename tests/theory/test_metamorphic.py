@@ -89,4 +89,4 @@ def test_time_shift_shifts_every_bit(rails):
     for series, shifted in zip(jax.tree.leaves(early), jax.tree.leaves(late), strict=True):
         later = np.asarray(shifted)[shift:]
         np.testing.assert_array_equal(np.asarray(series)[: len(later)], later)
-    assert np.abs(np.asarray(early.position)).max() > 0
+    assert np.abs(np.asarray(early["position"])).max() > 0
