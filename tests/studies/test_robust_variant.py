@@ -80,7 +80,7 @@ def test_conclusions_say_what_the_numbers_say():
     (motor, drift), (again,) = found["loses"], found["neither"]
     assert "30 of 30 runs end within 20 s" in drift and "keep 0.1 m" in drift
     assert "ends after 1.5 s" in motor and "0.0003" in motor
-    assert "up to 1.2 off, and after 7.5 s back to 2e-05; Table 1 up to 1.2, then 0.4." in again
+    assert "up to 1.2 m or rad, after 7.5 s back at 2e-05; that of Table 1 is up to 1.2, then 0.4." in again
 
 
 def test_a_win_that_is_none_is_not_told():

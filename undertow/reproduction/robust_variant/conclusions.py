@@ -232,8 +232,8 @@ def _recovery(n: Numbers) -> str:
     how = "back at" if after < _RECOVERED else "not back yet, but at"
     return (
         f"An overload of 1.5 s. Beyond the authority of its motors at 24 V, the error of `robust` is up to "
-        f"{robust['largest_after']:.2g}, after 7.5 s {how} {after:.2g}; Table 1 up to {paper['largest_after']:.2g}, "
-        f"then {paper['steady']['tracking_rms']:.2g}."
+        f"{robust['largest_after']:.2g} m or rad, after 7.5 s {how} {after:.2g}; that of Table 1 is up to "
+        f"{paper['largest_after']:.2g}, then {paper['steady']['tracking_rms']:.2g}."
     )
 
 
@@ -241,7 +241,7 @@ def _beyond(n: Numbers) -> str:
     paper, robust = (n.fidelity("24V", law)["steady"]["tracking_rms"] for law in ("rcafc", "robust"))
     return (
         f"A load beyond the actuators. U1 at full size exceeds the thrust at 24 V: the error of Table 1 is "
-        f"{paper:.2g}, that of `robust` {robust:.2g}; no law can hold it."
+        f"{paper:.2g} m and rad, that of `robust` {robust:.2g}; no law can hold it."
     )
 
 
