@@ -1,11 +1,11 @@
-"""What a campaign costs: python benchmarks/campaign_scale.py [memory|dask|pieces] [--trials N]
+"""Cost of a campaign: python benchmarks/campaign_scale.py [memory|dask|pieces] [--trials N]
 
-memory: 100 000 trials of workload W1, 1 s each, in this process. Memory after the first tenth of the tasks and at the
-end, its peak, bytes of the store and time per trial.
+memory: 100 000 trials of workload W1, 1 s each, in this process: memory after a tenth of the tasks and at the end, its
+peak, bytes of the store and time per trial.
 dask: 1 000 trials of W1, 20 s each, by one worker and by two of a local cluster: the ratio of the times once the
 workers have compiled, the shortest of five each, and whether the stores are the same to the byte.
-pieces: milliseconds of building a trial where start and gain differ, or the mass of the vehicle; of writing a task of
-256 trials, or of 65 536; in one thread. And what memory a trial of a task takes while the task is flown.
+pieces: in one thread, milliseconds to build a trial with another start and gain or another mass of the vehicle, and to
+write a task of 256 or 65 536 trials; and the memory per trial while a task runs.
 
 Prints JSON.
 """
@@ -26,17 +26,16 @@ from undertow import process
 
 process.prepare()
 
+from undertow.campaign import task
+from undertow.campaign.columns import labels
+from undertow.campaign.executors import by_dask, cluster, in_threads
+from undertow.campaign.fingerprint import Identity
+from undertow.campaign.layout import Layout
+from undertow.campaign.prepare import prepare
+from undertow.campaign.run_campaign import STORE, run_campaign
+from undertow.campaign.store import Store
+from undertow.reproduction.setup import scenario
 from undertow.scenario.reading import dump
-from undertow.studies.campaign import task
-from undertow.studies.campaign.clusters import cluster
-from undertow.studies.campaign.columns import labels
-from undertow.studies.campaign.conduct import STORE, conduct
-from undertow.studies.campaign.engines import by_dask, in_threads
-from undertow.studies.campaign.identity import Identity
-from undertow.studies.campaign.layout import Layout
-from undertow.studies.campaign.prepare import prepare
-from undertow.studies.campaign.store import Store
-from undertow.studies.paper.setup import scenario
 
 VARY = {
     "initial.position[0]": {"normal": [0.0, 0.1]},
@@ -44,12 +43,12 @@ VARY = {
 }
 HEAVIER = {"plant.vehicle.mass": {"normal": [125.0, 3.0]}}
 
-_LARGE = 8192  # trials of a task whose memory is looked at
+_LARGE = 8192  # trials of the task whose memory is measured
 
 
 def prepared(folder: Path, trials: int, duration: float, chunk: int, vary: dict = VARY):
     loop = {"kind": "sampled", "duration": duration}
-    whole = scenario("W1", rung="electromechanical", composite=20.0, loop=loop) | {
+    whole = scenario("W1", fidelity="electromechanical", composite=20.0, loop=loop) | {
         "initial": {"position": [0.0] * 6},
         "steady": {"start": duration / 2},
     }
@@ -63,8 +62,8 @@ def memory(trials: int) -> dict:
     held, began = [], time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         campaign = prepared(Path(name), trials, 1.0, 256)
-        engine = lambda function, work: in_threads(function, work, 2)
-        conduct(campaign, Path(name), engine, lambda tally: held.append((tally.done, _resident())))
+        executor = lambda function, work: in_threads(function, work, 2)
+        run_campaign(campaign, Path(name), executor, lambda tally: held.append((tally.done, _resident())))
         taken = time.perf_counter() - began
         size = sum(file.stat().st_size for file in (Path(name) / STORE).rglob("*") if file.is_file())
     tenth = next(mebibytes for done, mebibytes in held if done >= trials / 10)
@@ -80,25 +79,25 @@ def memory(trials: int) -> dict:
 
 
 def pieces(trials: int) -> dict:
-    """One thread: building a trial, and writing a task of few or many; the shortest of three."""
+    """Building a trial, and writing a small or large task, in one thread; the shortest of three."""
     found = {}
     with tempfile.TemporaryDirectory() as name:
         for what, vary in (("build_start_and_gain_ms", VARY), ("build_mass_ms", HEAVIER)):
             campaign = prepared(Path(name), _LARGE, 1.0, 256, vary)
             here = task.site(campaign.text, str(campaign.folder))
             build = lambda i, here=here: [
-                task.build_trial(here.trials, here.workshop, row) for row in range(i * trials, (i + 1) * trials)
+                task.build_trial(here.trials, here.part_cache, row) for row in range(i * trials, (i + 1) * trials)
             ]
             found[what] = 1e3 * _shortest(build) / trials
-        columns = task.fly(campaign.text, str(campaign.folder), range(256))
+        columns = task.run(campaign.text, str(campaign.folder), range(256))
         before = _peak()
-        task.fly(campaign.text, str(campaign.folder), range(_LARGE))
+        task.run(campaign.text, str(campaign.folder), range(_LARGE))
         found["task_KiB_per_trial"] = 1024 * (_peak() - before) / _LARGE
         for rows in (256, 65_536):
             named = labels(campaign.trials, campaign.first)
             where = Path(name) / f"{rows}.zarr"
             store = Store(where, Layout((), 4 * rows, (rows,)), Identity("", {}), named, {})
-            chance = np.random.default_rng(0)  # numbers that cannot be told shorter than they are
+            chance = np.random.default_rng(0)  # random numbers cannot be compressed
             many = {key: chance.normal(size=rows).astype(values.dtype) for key, values in columns.items()}
             found[f"write_{rows}_ms"] = 1e3 * _shortest(lambda i, s=store, m=many: s.write(i, m))
             store.close()
@@ -106,7 +105,7 @@ def pieces(trials: int) -> dict:
 
 
 def _shortest(work: Callable[[int], Any]) -> float:
-    """Seconds of the shortest of three, after one that does not count."""
+    """Seconds of the shortest of three runs after a warm-up."""
     times = []
     for i in range(4):
         start = time.perf_counter()
@@ -116,18 +115,21 @@ def _shortest(work: Callable[[int], Any]) -> float:
 
 
 def _peak() -> float:
-    """MiB."""
+    """Peak memory, MiB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _resident() -> float:
-    """MiB."""
+    """Resident memory, MiB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize() / 2**20
 
 
 def dask(trials: int) -> dict:
-    """One worker and two, in turn; the shortest of five times each. All fly some first: compiling is not counted."""
+    """One worker and two, in turn; the shortest of five times each.
+
+    Every worker runs some trials first, so that compilation is not counted.
+    """
     times: dict[int, list[float]] = {1: [], 2: []}
     stores = []
     with contextlib.ExitStack() as stack:
@@ -140,9 +142,9 @@ def dask(trials: int) -> dict:
                 folder = Path(name) / f"{workers}-{number}"
                 folder.mkdir()
                 campaign = prepared(folder, trials, 20.0, 256)
-                client.run(task.fly, campaign.text, str(campaign.folder), range(8))
+                client.run(task.run_trials, campaign.text, str(campaign.folder), range(8))
                 start = time.perf_counter()
-                conduct(campaign, folder, lambda f, work, c=client: by_dask(f, work, c), lambda *_: None)
+                run_campaign(campaign, folder, lambda f, work, c=client: by_dask(f, work, c), lambda *_: None)
                 times[workers].append(time.perf_counter() - start)
                 files = sorted(file for file in (folder / STORE).rglob("*") if file.is_file())
                 stores.append({str(file.relative_to(folder)): file.read_bytes() for file in files})

@@ -1,13 +1,13 @@
-"""Where the numbers of `t200` and `t500` come from: python benchmarks/fit_t200.py [t200|t500] [pass|subtract] [TABLE]
+"""Fit of the parameters of `t200` and `t500`: python benchmarks/fit_t200.py [t200|t500] [pass|subtract] [TABLE]
 
-One set of constants for the manufacturer's whole table, at every supply voltage, in steady state. The bench is taken
-as duty = (PWM - 1500) / 400, V = duty V_supply, less the dead zone, and k_t = k_e, as in any DC motor. Outside the dead
-zone the motor gets V (`pass`) or what of it is beyond the zone (`subtract`); the converter before it loses no power, so
-that I_supply = I_motor V_motor / V_supply. Speed, current and thrust are fitted together, each in units of its own
-tolerance. TABLE is a CSV file with columns as in tests/peers/data, which is taken without one.
+One set of constants for the manufacturer's whole table, at every supply voltage, in steady state. The test bench has
+duty = (PWM - 1500) / 400, V = duty V_supply, less the dead zone, and k_t = k_e, as in any DC motor. Outside the dead
+zone the motor gets V (`pass`) or its part beyond the zone (`subtract`); the converter loses no power, so that
+I_supply = I_motor V_motor / V_supply. Speed, current and thrust are fitted together, each in units of its own
+tolerance. TABLE is a CSV file with columns as in tests/peers/data, which is the default.
 
-Friction is left out: the tables do not tell copper loss from shaft power. With friction and an offset in torque the
-fit is no better, but the propeller would come out with a figure of merit of 0.95.
+Friction is neglected, because the tables do not separate copper loss from shaft power. With friction and an offset in
+torque the fit is no better, but the propeller would have a figure of merit of 0.95.
 """
 
 import json
@@ -21,16 +21,16 @@ TABLES = Path(__file__).parents[1] / "tests" / "peers" / "data"
 WATER, RADIUS = 1000.0, {"t200": 0.038}  # kg/m^3 and m, for the figure of merit
 SETTINGS = {
     # dead zone (V), supply of the nominal point (V), tolerances of speed (rad/s), current (A) and thrust (N),
-    # start of the search: k_e, R, c_q, c_t, c_t-, c_q-; without the last where c_q- = c_q will do
+    # start of the search: k_e, R, c_q, c_t, c_t-, c_q-; without the last where c_q- = c_q
     "t200": (1.2, 16.0, (15.0, 0.8, 2.5), (0.02, 0.36, 4e-6, 3.7e-4, 3.0e-4)),
     "t500": (1.2, 24.0, (15.0, 1.0, 4.0), (0.04, 0.27, 2e-5, 1.5e-3, 1.0e-3, 2e-5)),
 }
 TIME_CONSTANT = 0.1  # s, about half of the full speed at the nominal supply: rotor inertias are not published
-SMALL = 4.0  # V: up to here thrusts are those of a vehicle that keeps its place in calm water
+SMALL = 4.0  # V: up to here thrusts are those of station keeping in still water
 
 
 def main(name: str, kind: str = "pass", table: str | None = None) -> dict:
-    """Fit, and say how well it fits."""
+    """Parameters, and errors of the fit."""
     dead_zone, nominal, tolerances, start = SETTINGS[name]
     path = table or TABLES / f"{name}_table.csv"
     supply, pwm, *measured = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
@@ -43,7 +43,7 @@ def main(name: str, kind: str = "pass", table: str | None = None) -> dict:
         return np.array([found - expected for found, expected in pairs])
 
     weighted = lambda scaled: (misfit(scaled) / np.array(tolerances)[:, None]).ravel()
-    # No constant may leave its sign on the way.
+    # Every constant stays positive.
     fit = least_squares(weighted, np.ones(len(start)), x_scale="jac", bounds=(1e-3, np.inf))
     back_emf, resistance, torque, *_ = constants = fit.x * start
     full_speed, _, _ = steady(outside(np.array([nominal]), dead_zone, kind), *constants)

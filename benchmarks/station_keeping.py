@@ -1,13 +1,13 @@
 """Station keeping of BlueROV2 Heavy at sea: preset `robust` against a PID tuned with the same budget.
 
-T200s at 16 V, 100 Hz, JONSWAP Hs 0.5 m at 3 m depth, current 0.5 m/s, the vehicle's own instruments. The controllers
-are told of one published parameter set; every one of them is the truth in turn.
+T200s at 16 V, 100 Hz, JONSWAP Hs 0.5 m at 3 m depth, current 0.5 m/s, the vehicle's own sensors. The nominal
+model has one published parameter set; every set is the true plant in turn.
 
     python benchmarks/station_keeping.py [--seeds 100] [--budget 240] [--laws pid,robust] [--fix-noise 0.05]
 
-The default position fixes (5 cm, every second, 0.2 s late) keep any controller above the error of its navigation, which
-is printed beside its own. `--fix-noise 0.005` takes fixes of 5 mm, ten a second and 10 ms late, so that what is left is
-the noise of DVL, IMU, depth and compass; `--fix-noise 0` knows position and velocity without error.
+The default position fixes (5 cm, every second, 0.2 s late) limit any controller by the error of its navigation, which
+is printed, too. `--fix-noise 0.005` has fixes of 5 mm, ten per second with a delay of 10 ms, so that the noise of DVL,
+IMU, depth and compass remains; `--fix-noise 0` has exact positions and velocities.
 """
 
 import argparse
@@ -22,15 +22,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-import undertow  # noqa: F401  (double precision)
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.sampled import AbstractAccumulator
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.scenario.schema import Tries
-from undertow.studies.tuning.trials import trials
-from undertow.studies.tuning.tune import tune
+from undertow.scenario.schema import TrainingRuns
+from undertow.tuning.training_runs import trials
+from undertow.tuning.tune import tune
+
+jax.config.update("jax_enable_x64", True)
 
 SETS = ["vonbenzon2022", "wu2018", "ng2024", "gazebo_box_drag", "px4"]
 DURATION, START = 60.0, 30.0  # s
@@ -43,7 +44,7 @@ SEA = {
     "model": {"rate_term": True},
     "reference": {"kind": "setpoint", "position": [0.0] * 6},
     "disturbance": [{"kind": "current", "velocity": [0.4, 0.3, 0.0]}, {"kind": "waves", "height": 0.5, "depth": 3.0}],
-    "sensor": {"kind": "navigation"},
+    "navigation": {"kind": "observer"},
     "loop": {"dt": 0.01, "duration": DURATION, "record": 0.05},
     "tune": {
         "duration": 20.0,
@@ -58,7 +59,7 @@ LAWS = {
     "pid_computed": {"kind": "pid", "motor": "computed"},
     "robust": {"kind": "rcaf", "preset": "robust"},
 }
-FIRST_SEED = 10_000  # none of the tuning's
+FIRST_SEED = 10_000  # different from those of tuning
 
 
 class Sums(NamedTuple):
@@ -71,33 +72,33 @@ class Sums(NamedTuple):
 
 
 class Station(AbstractAccumulator):
-    """Squares of the error, of what navigation gets wrong, and of the error against it; variation of the voltage."""
+    """Squares of the error, of the error of navigation, and of the measured error; variation of the voltage."""
 
-    def init(self, sample):
-        zero = jnp.zeros_like(sample.error)
-        return Sums(jnp.zeros(()), zero, zero, zero, jnp.zeros(()), sample.voltage)
+    def init(self, signals):
+        zero = jnp.zeros_like(signals["error"])
+        return Sums(jnp.zeros(()), zero, zero, zero, jnp.zeros(()), signals["input"])
 
-    def update(self, state, t, sample):
+    def update(self, state, t, signals):
         inside = jnp.where(t >= START, 1.0, 0.0)
         return Sums(
             state.samples + inside,
-            state.error + inside * sample.error**2,
-            state.navigation + inside * (sample.measured_position - sample.position) ** 2,
-            state.control + inside * (sample.target - sample.measured_position) ** 2,
-            state.variation + inside * jnp.abs(sample.voltage - state.last).mean(),
-            sample.voltage,
+            state.error + inside * signals["error"] ** 2,
+            state.navigation + inside * (signals["measured_position"] - signals["position"]) ** 2,
+            state.control + inside * (signals["reference"] - signals["measured_position"]) ** 2,
+            state.variation + inside * jnp.abs(signals["input"] - state.last).mean(),
+            signals["input"],
         )
 
 
-def fly(scenario, seeds):
-    """Per run, rms of each axis: error, error of navigation, error against it; variation, whether it lasted; truths."""
+def run_all(scenario, seeds):
+    """Per run, rms of each axis: error, error of navigation, measured error; variation, completion; plant variant."""
     text = from_data(scenario)
     built = build(text)
-    wanted = Tries.model_validate({"seeds": seeds, "sizes": [1.0], "sets": SETS})
-    loop, several = built.closed_loop, trials(text, built, wanted, (), "train", FIRST_SEED)
+    runs = TrainingRuns.model_validate({"seeds": seeds, "sizes": [1.0], "sets": SETS})
+    loop, several = built.closed_loop, trials(text, built, runs, (), "train", FIRST_SEED)
 
     def run(plant, key):
-        whole = ClosedLoop(plant, loop.controller, loop.reference, loop.disturbance, loop.sensor)
+        whole = ClosedLoop(plant, loop.controller, loop.reference, loop.disturbance, loop.navigation)
         found = sampled.simulate(whole, duration=DURATION, dt=0.01, key=key, record_every=0, accumulators=(Station(),))
         sums = found.accumulated[0]
         rms = lambda squares: jnp.sqrt(squares / sums.samples)
@@ -113,29 +114,29 @@ def fly(scenario, seeds):
         if together is None:
             together = batch.lower(*arguments).compile(compiler_options={"xla_backend_optimization_level": "1"})
         pieces.append(jax.tree.map(np.asarray, together(*arguments)))
-    return [np.concatenate(each)[: several.number] for each in zip(*pieces, strict=True)], np.array(several.truths)
+    return [np.concatenate(each)[: several.number] for each in zip(*pieces, strict=True)], np.array(several.variants)
 
 
 def at_sea(name, fix_noise):
-    """The scenario with a law as it comes."""
+    """The scenario with an untuned law."""
     if fix_noise == 0:
-        return {**copy.deepcopy(SEA), "controller": LAWS[name], "sensor": {"kind": "perfect"}}
+        return {**copy.deepcopy(SEA), "controller": LAWS[name], "navigation": {"kind": "perfect"}}
     fix = {"kind": "position_fix", "noise": fix_noise}
     if fix_noise != 0.05:
         fix |= {"period": 0.1, "delay": 0.01}
-    instruments = ["imu", "dvl", "depth", "compass", fix]
+    sensors = ["imu", "dvl", "depth", "compass", fix]
     return {
         **copy.deepcopy(SEA),
         "controller": LAWS[name],
-        "sensor": {"kind": "navigation", "instruments": instruments},
+        "navigation": {"kind": "observer", "sensors": sensors},
     }
 
 
 def tuned(name, scenario, budget):
     """The scenario with tuned gains."""
     with tempfile.TemporaryDirectory() as folder:
-        found = tune(from_data(scenario), Path(folder) / "journal", budget=budget)
-    best = found.judged[-1]
+        found = tune(from_data(scenario), Path(folder) / "checkpoint", budget=budget)
+    best = found.evaluated[-1]
     print(
         f"{name}: tuned in {found.elapsed:.0f} s, {found.evaluations} gains, training cost {best.train_cost:.4g}, "
         f"held out {best.held_out_cost:.4g}, spectral radius {best.certificate.worst:.5f}\n  {best.options}",
@@ -144,18 +145,16 @@ def tuned(name, scenario, budget):
     return found.scenario
 
 
-def report(title, flown):
-    (error, navigation, control, variation, lasted), truths = flown
-    print(f"\n{title}: {lasted.mean():.1%} of {len(lasted)} runs lasted; medians [5 %, 95 %] of rms over seeds")
-    print(
-        f"  {'truth':<18}{'position, cm':>22}{'attitude, mrad':>24}{'navigation, cm':>16}{'against it':>12}{'V/s':>8}"
-    )
+def report(title, runs):
+    (error, navigation, control, variation, lasted), variants = runs
+    print(f"\n{title}: {lasted.mean():.1%} of {len(lasted)} runs completed; medians [5 %, 95 %] of rms over seeds")
+    print(f"  {'plant':<18}{'position, cm':>22}{'attitude, mrad':>24}{'navigation, cm':>16}{'measured':>12}{'V/s':>8}")
     rms = lambda squares: np.sqrt((squares**2).mean(axis=-1))
     cut = lambda values: (
         f"{np.median(values):7.2f} [{np.quantile(values, 0.05):5.2f}, {np.quantile(values, 0.95):5.2f}]"
     )
     for name in [*SETS, "all"]:
-        of = (truths == name) | (name == "all")
+        of = (variants == name) | (name == "all")
         place, turned = 100 * rms(error[of][:, :3]), 1000 * rms(error[of][:, 3:])
         own, left = (np.median(100 * rms(each[of][:, :3])) for each in (navigation, control))
         print(f"  {name:<18}{cut(place):>22}{cut(turned):>24}{own:>16.2f}{left:>12.2f}{np.median(variation[of]):>8.1f}")
@@ -173,7 +172,7 @@ def main():
     for name in options.laws.split(","):
         begun = time.perf_counter()
         scenario = tuned(name, at_sea(name, options.fix_noise), options.budget)
-        errors[name] = report(name, fly(scenario, options.seeds))
+        errors[name] = report(name, run_all(scenario, options.seeds))
         print(f"  ({time.perf_counter() - begun:.0f} s)", flush=True)
     first, *others = errors
     whole = lambda name, axes: np.sqrt((errors[name][:, axes] ** 2).mean())

@@ -1,4 +1,4 @@
-"""`undertow tune` against Table 1 and against gains found by hand, on vehicles at sea: cost on held-out runs.
+"""`undertow tune` compared with Table 1 and with gains tuned by hand, on vehicles at sea: cost on held-out runs.
 
 python benchmarks/tuning.py [--budget 240] [--vehicles bluerov2_heavy,bluerov2,odin,rexrov]
 """
@@ -8,11 +8,10 @@ import tempfile
 import time
 from pathlib import Path
 
-import undertow  # noqa: F401  (double precision)
 from undertow.scenario.reading import from_data
-from undertow.studies.tuning.tune import judge, tune
+from undertow.tuning.tune import compare_gains, tune
 
-# The paper's law by hand: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors that lag by 0.1 s.
+# The paper's law tuned by hand: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors with a lag of 0.1 s.
 BY_HAND = {
     "feedback": [[4.0, 7.0]] * 3 + [[20.0, 13.0]] * 3,
     "pole": [4.0] * 3 + [3.0] * 3,
@@ -22,7 +21,7 @@ BY_HAND = {
     "compensation_gain": 0.0,
     "weights_bound": 40.0,
 }
-# A vehicle that cannot pitch is not made to.
+# Pitch of this vehicle cannot be controlled.
 BY_HAND_TOO = {
     "bluerov2": {
         "feedback": [[4.0, 7.0]] * 3 + [[20.0, 13.0], [1.0, 2.0], [20.0, 13.0]],
@@ -40,16 +39,16 @@ TABLE_1 = {
 THRUSTERS = {
     "bluerov2_heavy": {"kind": "t200", "supply": 16.0},
     "bluerov2": {"kind": "t200", "supply": 16.0},
-    "odin": {"kind": "paper_table3", "rung": "shaft", "supply": 24.0},
+    "odin": {"kind": "paper_table3", "fidelity": "shaft", "supply": 24.0},
     "rexrov": {"kind": "first_order", "thrust_per_volt": 60.0, "time_constant": 0.05, "supply": 24.0},
 }
 
-# Truths, where not all published sets are; the law is told of the first. Of BlueROV2's, two are left out that have the
-# damping and the inertia of other vehicles (`undertow describe bluerov2`): no gains suit them and the others.
+# Plant variants, where not all published sets; the first is nominal. Two sets of BlueROV2 are omitted that have damping
+# or inertia of other vehicles (`undertow describe bluerov2`): no gains suit both them and the others.
 SETS = {"bluerov2": ["li2020", "einarsson_lipenitis2020", "gazebo_box_drag"]}
 
-# Where the position is known to a centimetre: else the navigation decides, and no controller.
-INSTRUMENTS = [
+# Position known to a centimetre: otherwise the error of navigation dominates that of the controller.
+SENSORS = [
     "imu",
     {"kind": "dvl", "period": 0.125, "noise": 0.003},
     "depth",
@@ -60,14 +59,14 @@ INSTRUMENTS = [
 
 def scenario(vehicle, controller):
     sets = SETS.get(vehicle)
-    told = {"parameters": sets[0]} if sets else {}
+    nominal = {"parameters": sets[0]} if sets else {}
     return {
-        "plant": {"vehicle": {"kind": vehicle, **told}, "thruster": THRUSTERS[vehicle], "ledger": False},
+        "plant": {"vehicle": {"kind": vehicle, **nominal}, "thruster": THRUSTERS[vehicle], "ledger": False},
         "model": {"rate_term": True},
         "controller": {"kind": "rcaf", **controller},
         "reference": {"kind": "setpoint", "position": [2.0, 1.0, 1.0, 0.0, 0.0, 0.5], "settling": 15.0},
         "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0.0]}, {"kind": "waves", "height": 0.5}],
-        "sensor": {"kind": "navigation", "instruments": INSTRUMENTS},
+        "navigation": {"kind": "observer", "sensors": SENSORS},
         "loop": {"dt": 0.02, "duration": 60.0, "record": 0.1},
         "tune": {"duration": 16.0, "train": {"sets": sets and sets[:2]}, "held_out": {"sets": sets}},
     }
@@ -82,15 +81,15 @@ def main():
         begun, busy = time.perf_counter(), time.process_time()
         with tempfile.TemporaryDirectory() as folder:
             text = from_data(scenario(vehicle, {"preset": "robust"}))
-            found = tune(text, Path(folder) / "journal", budget=options.budget)
+            found = tune(text, Path(folder) / "checkpoint", budget=options.budget)
         wall, processor = time.perf_counter() - begun, time.process_time() - busy
         print(f"\n{vehicle}: {found.evaluations} gains in {wall:.0f} s, {processor:.0f} s of processor time")
         by_hand = {"preset": "paper", **BY_HAND, **BY_HAND_TOO.get(vehicle, {})}
-        letters = judge(from_data(scenario(vehicle, by_hand)), {"table 1": TABLE_1})
+        letters = compare_gains(from_data(scenario(vehicle, by_hand)), {"table 1": TABLE_1})
         names = {"given": "robust, as it comes", "start": "beginning", "tuned": "robust, tuned"}
         rows = [("by hand", letters[0]), ("Table 1", letters[1])]
-        rows += [(names[one.name], one) for one in found.judged]
-        best = found.judged[-1]
+        rows += [(names[one.name], one) for one in found.evaluated]
+        best = found.evaluated[-1]
         for name, one in rows:
             print(
                 f"  {name:<20} held-out cost {one.held_out_cost:8.4g} = {one.held_out_cost / best.held_out_cost:7.3g} "

@@ -9,7 +9,7 @@ import undertow as ut
 def main(fast: bool = False) -> ut.Run:
     """Hold a pose against suite U1; `fast` stops early."""
     rov = ut.vehicles.odin()
-    plant = ut.HybridVehicle(rov, ut.thrusters.paper_table3(rung="ideal"))
+    plant = ut.HybridVehicle(rov, ut.thrusters.paper_table3(fidelity="ideal"))
     law = ut.rcaf(plant.model(speed_sensor=True), preset="paper")
     run = ut.simulate(
         plant,

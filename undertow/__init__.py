@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from undertow import controllers as controllers
     from undertow import disturbances as disturbances
-    from undertow import instruments as instruments
+    from undertow import navigation as navigation
     from undertow import plants as plants
     from undertow import power as power
     from undertow import references as references
@@ -43,7 +43,7 @@ _HOMES = {
 _PACKAGES = (
     "controllers",
     "disturbances",
-    "instruments",
+    "navigation",
     "plants",
     "power",
     "references",

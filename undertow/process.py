@@ -1,40 +1,81 @@
 """Set-up of a process that is undertow's own: the command line, a test run, a benchmark. Imports no JAX."""
 
 import atexit
+import contextlib
 import gc
 import hashlib
 import os
 import platform
+import stat
 from pathlib import Path
 
-from undertow.lanes.cache import private_folder
+# XLA compiles the body of a small `while` loop into one plain function instead of a list of kernels to be
+# dispatched one by one. Its own limit (1 kB of loop state) is below a vehicle with its thrusters; with the limit
+# raised, one step of the closed loop takes a quarter of the time.
+_ONE_FUNCTION_PER_LOOP = "xla_cpu_small_while_loop_byte_threshold=100000000"
+
+_OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 # Objects before the youngest are looked through. Tracing makes millions that live: Python's 700 cost half a second.
 _YOUNG, _MIDDLE, _OLD = 50_000, 20, 100
 
 
 def prepare() -> None:
-    """Keep compiled code from one process to the next, and look for garbage seldom; before JAX is imported."""
+    """Set the environment variables of JAX and XLA, and look for garbage seldom; before JAX is imported.
+
+    Whoever calls this decides about the whole process, so nothing calls it at import. A caller's own settings stay.
+    """
     # Or XLA says on the terminal that compiling is slow, and asks for a bug report.
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    os.environ.setdefault("JAX_ENABLE_X64", "1")
+    _compile_loops_whole()
     _keep_xla_code()
     gc.set_threshold(_YOUNG, _MIDDLE, _OLD)
     atexit.register(gc.freeze)  # or Python looks through everything once more before it goes: half a second
 
 
+def _compile_loops_whole() -> None:
+    flags = os.environ.get("XLA_FLAGS", "")
+    if "xla_backend_extra_options" not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_extra_options={_ONE_FUNCTION_PER_LOOP}".strip()
+
+
 def _keep_xla_code() -> None:
-    """Let XLA keep its code, unless JAX was told of a place already.
+    """Let XLA keep its code, unless a folder is already set.
 
     The code is for one kind of processor: machines that share a home folder have a folder each. It is run as the
     user, and XLA asks nobody whose it is: where others may write there, nothing is kept.
     """
     try:
-        folder = private_folder(f"xla-{_processor()}")
+        folder = _private_folder(f"xla-{_processor()}")
     except OSError:
         return
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "0")
+
+
+def cache_folder() -> Path:
+    """UNDERTOW_CACHE, or `undertow` in the user's folder of caches."""
+    given = os.environ.get("UNDERTOW_CACHE")
+    return Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "undertow"
+
+
+def _private_folder(name: str) -> Path:
+    """A folder of the cache; made where there is none.
+
+    Raises:
+        OSError: it cannot be made, or belongs to somebody else, or others may write to it.
+    """
+    folder = cache_folder() / name
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    found = os.lstat(folder)
+    open_to_others = hasattr(os, "geteuid") and (found.st_uid != os.geteuid() or found.st_mode & _OTHERS_MAY_WRITE)
+    if open_to_others or not stat.S_ISDIR(found.st_mode):
+        raise OSError(f"somebody else may write to {folder}")
+    return folder
 
 
 def _processor() -> str:

@@ -10,13 +10,16 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from undertow.analysis.meanings import MEANINGS, unit_of
+from undertow.analysis.metrics import for_people, meanings
+from undertow.analysis.success import Success, criterion_of
+from undertow.core import checks, runtime
+from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
+    AbstractNavigation,
     AbstractPlant,
     AbstractReference,
-    AbstractSensor,
 )
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
@@ -24,13 +27,13 @@ from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
+from undertow.navigation.perfect import perfect
 from undertow.scenario import execute
-from undertow.scenario.fitting import check_fit, check_times, rounded_times
-from undertow.scenario.labelling import certificate_of, label
+from undertow.scenario.consistency import check_fit, check_times, rounded_times
+from undertow.scenario.finished_run import Measuring, certificate_of, label, metrics_of
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.schema import Initial, Loop, Window, complaint
-from undertow.scenario.stepping import step_failure
-from undertow.sensors.perfect import perfect
+from undertow.scenario.step_size import step_failure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,12 +49,14 @@ class Run:
             per-axis values as lists named `<name>_axes`; see `undertow describe metrics`.
         status: how it ended.
         outcome: the same series as arrays, and the final states.
+        success: whether control succeeded, by the scenario's criterion or the default one; None without one.
     """
 
     dataset: xr.Dataset
     metrics: dict[str, dict[str, Any] | None]
     status: Status
     outcome: Outcome
+    success: Success | None
 
     @property
     def certificate(self) -> dict[str, Any] | None:
@@ -76,11 +81,12 @@ class Run:
         steady, whole = self.metrics["steady"], self.metrics["whole"] or {}
         lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.dataset.attrs['status_sentence']}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
-        of_input = self.dataset["voltage"].attrs["units"]
-        for name in MEANINGS:
-            if name in whole:
-                late = f"{steady[name]:.4g}" if steady and name in steady else "-"
-                lines.append(f"  {name:<20}{late:>12}{whole[name]:>12.4g}  {unit_of(name, of_input)}".rstrip())
+        for name, metric in metrics_of(self.dataset).items():
+            value, unit = for_people(whole[name], metric.unit)
+            late = f"{for_people(steady[name], metric.unit)[0]:.4g}" if steady and name in steady else "-"
+            lines.append(f"  {name:<20}{late:>12}{value:>12.4g}  {unit}".rstrip())
+        if self.success is not None:
+            lines.append(f"  {self.success.sentence(metrics_of(self.dataset))}")
         return "\n".join(lines)
 
 
@@ -90,7 +96,7 @@ def simulate(
     reference: AbstractReference,
     *,
     disturbance: AbstractDisturbance | Sequence[AbstractDisturbance] | None = None,
-    sensor: AbstractSensor | None = None,
+    navigation: AbstractNavigation | None = None,
     duration: float = 20.0,
     loop: Literal["sampled", "continuous"] = "sampled",
     dt: float = 1e-3,
@@ -98,6 +104,7 @@ def simulate(
     seed: int = 0,
     position: Any = None,
     velocity: Any = None,
+    precision: Literal["float64", "float32"] = "float64",
 ) -> Run:
     """Run a plant under a controller. A run that fails says so in its status; nothing is raised.
 
@@ -106,7 +113,7 @@ def simulate(
         controller: the law, made from `plant.model()`.
         reference: what to follow.
         disturbance: what the surroundings do; several as a list, None for nothing.
-        sensor: what stands before the measurement; None for the truth.
+        navigation: filter that estimates position and velocity from measurements; None for the true ones.
         duration: s. The steady metrics are taken over its second half.
         loop: `sampled` (input held over each dt) or `continuous` (one ODE, the paper's setting).
         dt: sampling time of the controller, or step of the ODE, s.
@@ -114,6 +121,7 @@ def simulate(
         seed: of everything random.
         position: outputs at t = 0, shape (n,), m and rad; None for zero.
         velocity: their rates, shape (n,), m/s and rad/s; None for zero.
+        precision: of all numbers of the run, whatever `jax_enable_x64` is; that stays as it was.
 
     Raises:
         BadInput: something given cannot be used, or does not fit the rest.
@@ -125,22 +133,28 @@ def simulate(
         "controller": (controller, AbstractController),
         "reference": (reference, AbstractReference),
         "disturbance": (none() if disturbance is None else disturbance, AbstractDisturbance),
-        "sensor": (perfect() if sensor is None else sensor, AbstractSensor),
+        "navigation": (perfect() if navigation is None else navigation, AbstractNavigation),
     }
     for name, (part, contract) in roles.items():
         if not isinstance(part, contract):
             raise BadInput(name, f"be an {contract.__name__}", f"a {type(part).__name__}")
-    closed_loop = ClosedLoop(*(part for part, _ in roles.values()))
+    checks.choice("precision", precision, ("float64", "float32"))
+    with runtime.in_precision(precision):
+        closed_loop = in_present_precision(ClosedLoop(*(part for part, _ in roles.values())))
+        return _simulate(closed_loop, loop, (duration, dt, record), seed, position, velocity)
+
+
+def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], seed: int, position, velocity) -> Run:
     nowhere = from_data({})
     try:
-        times = {"duration": _plain(duration), "dt": _plain(dt), "record": _plain(record)}
-        settings = Loop.model_validate({"kind": loop, **times})
+        plain = dict(zip(("duration", "dt", "record"), map(_plain, times), strict=True))
+        settings = Loop.model_validate({"kind": kind, **plain})
         start = Initial(position=_plain(position), velocity=_plain(velocity))
         window = Window()
         check_times(nowhere, settings, window)
         check_fit(nowhere, closed_loop, start)
         for sentence in rounded_times(settings):
-            warnings.warn(sentence, stacklevel=2)
+            warnings.warn(sentence, stacklevel=3)
     except ValidationError as errors:
         wrong = complaint(errors, nowhere)
         raise BadInput("loop" if wrong.name == "kind" else wrong.name, wrong.must, wrong.got) from None
@@ -151,8 +165,9 @@ def simulate(
     attributes: dict[str, Any] = left_to_xla | {"title": "a closed loop run by undertow", "seed": seed}
     if why := step_failure(closed_loop, settings, outcome):
         attributes["status_sentence"] = why
-    steady = window.of_run(settings.duration)
-    return _run(outcome, *label(closed_loop, outcome, steady, settings.dt, attributes))
+    criterion = criterion_of(None, meanings(closed_loop))
+    how = Measuring(window.of_run(settings.duration), settings.dt, criterion=criterion)
+    return _run(outcome, *label(closed_loop, outcome, how, attributes))
 
 
 def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool = False) -> Run:
@@ -166,12 +181,14 @@ def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool
         BadInput: anything wrong with it, with key path and line.
     """
     text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
-    _, outcome, status, steady, whole, dataset = execute.execute(text)
-    return _run(outcome, status, steady, whole, dataset)
+    _, outcome, *labelled = execute.execute(text)
+    return _run(outcome, *labelled)
 
 
-def _run(outcome: Outcome, status: Status, steady: Any, whole: Any, dataset: xr.Dataset) -> Run:
-    return Run(dataset, {"steady": steady, "whole": whole}, status, outcome)
+def _run(
+    outcome: Outcome, status: Status, steady: Any, whole: Any, success: Success | None, dataset: xr.Dataset
+) -> Run:
+    return Run(dataset, {"steady": steady, "whole": whole}, status, outcome, success)
 
 
 def _plain(value: Any) -> Any:

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-from undertow.studies.campaign.conduct import STORE
+from undertow.campaign.run_campaign import STORE
 
 TYPED = (sys.executable, "-W", "ignore", "-m", "undertow.cli.main")
 VEHICLE = {

@@ -4,15 +4,15 @@ import copy
 
 import pytest
 
-from undertow.lanes import batches
-from undertow.studies.campaign.task import site
+from undertow.campaign.task import site
+from undertow.loop import vmap_batch
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},
     "controller": {"kind": "pid", "frequency": 2.0},
     "reference": {"kind": "setpoint", "position": [0.0]},
     "disturbance": {"kind": "sinusoid", "amplitude": 1.0},
-    "sensor": {"kind": "white_noise", "velocity": 0.01},
+    "navigation": {"kind": "white_noise", "velocity": 0.01},
     "loop": {"duration": 2.0, "dt": 0.02, "record": 0.1},
 }
 CAMPAIGN = {
@@ -20,7 +20,7 @@ CAMPAIGN = {
     "trials": 40,
     "chunk": 16,
     "vary": {"disturbance.amplitude": {"uniform": [0.5, 2.0]}},
-    "requirements": {"tracking_rms": {"below": 0.2, "share": 0.5}},
+    "requirements": {"position_rms": {"below": 0.2, "share": 0.5}},
     "seed": 7,
 }
 
@@ -44,11 +44,11 @@ def campaign_file(tmp_path, campaign):
     return write
 
 
-@pytest.fixture(params=["lanes", "xla"])
-def engine(request, monkeypatch):
+@pytest.fixture(params=["simd", "xla"])
+def backend(request, monkeypatch):
     """Programs of lanes, and what is used where there is no such program."""
-    monkeypatch.setattr(batches, "_WIDTH", 8)
-    monkeypatch.setitem(SCENARIO["loop"], "engine", request.param)
+    monkeypatch.setattr(vmap_batch, "_WIDTH", 8)
+    monkeypatch.setitem(SCENARIO["loop"], "backend", request.param)
     site.cache_clear()
     yield request.param
     site.cache_clear()

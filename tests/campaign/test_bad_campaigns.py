@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from command import VEHICLE, contents
 
+from undertow.campaign.prepare import prepare
+from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.cli.main import run
 from undertow.core.disk import alone
 from undertow.scenario.reading import dump
-from undertow.studies.campaign.conduct import STORE, conduct
-from undertow.studies.campaign.prepare import prepare
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ from undertow.studies.campaign.prepare import prepare
         ({"series": {"signals": ["positon"]}}, r"`series.signals\[0\]` must be one of .*position.*, but is positon"),
         (
             {"requirements": {"tracking": {"below": 1.0}}},
-            r"`requirements.tracking` must be a metric, but is unknown. Did you mean",
+            r"`requirements.tracking` must be a metric, but is unknown. Known: ",
         ),
         (
             {"vary": {"": {"uniform": [1.0, 2.0]}}},
@@ -47,20 +47,20 @@ from undertow.studies.campaign.prepare import prepare
             r"`vary.disturbance.amplitude.uniform` must have at least 2 entries, but is \[3.0\]",
         ),
         (
-            {"requirements": {"tracking_rms": 0.1}},
-            r"`requirements.tracking_rms` must be a mapping of keys to values, but is 0.1",
+            {"requirements": {"position_rms": 0.1}},
+            r"`requirements.position_rms` must be a mapping of keys to values, but is 0.1",
         ),
         (
             {"series": {"every": 0.1}, "vary": {"loop.duration": {"uniform": [1.0, 2.0]}}},
-            r"`series` must be of runs of one length and sampling time, but is beside loop.duration, which differs",
+            r"`series` must be of runs of one length and sampling time, but is given together with loop.duration",
         ),
         (
             {"vary": {"plant.limit": {"unifrom": [1.0, 2.0]}}},
             r"`vary.plant.limit.unifrom` must be a key of the campaign, .*line 14\). Did you mean `uniform`\?",
         ),
         (
-            {"requirements": {"tracking_rms": {"below": 1.0, "sahre": 0.5}}},
-            r"`requirements.tracking_rms.sahre` must be .* Did you mean `share`\?",
+            {"requirements": {"position_rms": {"below": 1.0, "sahre": 0.5}}},
+            r"`requirements.position_rms.sahre` must be .* Did you mean `share`\?",
         ),
         ({"series": {"evry": 1.0}}, r"`series.evry` must be .* Did you mean `every`\?"),
         (
@@ -80,14 +80,17 @@ from undertow.studies.campaign.prepare import prepare
             },
             r"`series` must be of plants with the same outputs and inputs, but is of several",
         ),
-        ({"cross": {"seed": [1, 2]}}, r"`cross.seed` must be left out \(small.yaml, line \d+\). Every trial has one"),
         (
-            {"vary": {"sensor.velocity": {"uniform": [0.0, 1.0]}, "sensor": {"choice": ["perfect"]}}},
-            r"`sensor.velocity` must not be beside sensor, which it is a part of",
+            {"cross": {"seed": [1, 2]}},
+            r"`cross.seed` must be left out \(small.yaml, line \d+\). Every trial has its own seed",
         ),
         (
-            {"requirements": {"tracking_rms": {"below": 1.0, "share": 1.0}}},
-            r"`requirements.tracking_rms.share` must be less than 1, .*; 0.99, for example, but is 1.0",
+            {"vary": {"navigation.velocity": {"uniform": [0.0, 1.0]}, "navigation": {"choice": ["perfect"]}}},
+            r"`navigation.velocity` must not be given together with navigation, which contains it",
+        ),
+        (
+            {"requirements": {"position_rms": {"below": 1.0, "share": 1.0}}},
+            r"`requirements.position_rms.share` must be less than 1, .*; 0.99, for example, but is 1.0",
         ),
         (
             {"cross": {"loop.dt": [0.02, 0.02]}},
@@ -137,11 +140,11 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
     [
         (
             ["campaign", "scenario.yaml"],
-            r"`CAMPAIGN` must be a campaign, but is a scenario .*`undertow simulate` runs it",
+            r"`CAMPAIGN` must be a campaign, but is a scenario .*Run it with `undertow simulate`",
         ),
         (
             ["simulate", "campaign.yaml"],
-            r"`scenario` must be a key of campaigns only .*`undertow campaign` flies campaigns",
+            r"`scenario` must be a key of campaigns only .*Run a campaign with `undertow campaign`",
         ),
         (["campaign", "campaign.yaml", "out"], r"`DIR` must follow the word `status`, but is out. .*`--out out`"),
         (["campaign", "status", "out", "--resume"], r"`--resume` must be left out with `status`"),
@@ -190,14 +193,14 @@ def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
     path, out = campaign_file(trials=8, chunk=4), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     before = contents(out)
-    torn = out / STORE / "tracking_rms" / "c" / "1"
+    torn = out / STORE / "position_rms" / "c" / "1"
     torn.write_bytes(torn.read_bytes()[:-1] + b"?")
     capsys.readouterr()
     assert run(["campaign", "status", str(out)]) == 4
-    assert re.search(r"is damaged .* --resume` mends what can be mended\n$", capsys.readouterr().err)
+    assert re.search(r"is damaged .* --resume` repairs it where possible\n$", capsys.readouterr().err)
     torn.unlink()
     assert run(["campaign", "status", str(out)]) == 0
-    assert capsys.readouterr().out == "4 of 8 trials done\n  ok: 4\n"
+    assert capsys.readouterr().out == "4 of 8 trials done\n  completed: 4\n"
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
     assert contents(out) == before
 
@@ -217,11 +220,11 @@ def test_a_mass_without_its_weight_is_told(campaign_file, tmp_path, capsys):
 def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):
     path, out = campaign_file(trials=4), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
-    assert "find a campaign to go on with" in capsys.readouterr().err
+    assert "find a campaign to continue" in capsys.readouterr().err
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     before = contents(out)
     assert run(["campaign", str(path), "--out", str(out)]) == 2
-    assert "Add --resume to go on with it, or --overwrite to begin anew" in capsys.readouterr().err
+    assert "Add --resume to continue it, or --overwrite to replace it" in capsys.readouterr().err
     assert contents(out) == before
     assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 0
     assert contents(out) == before
@@ -248,7 +251,9 @@ def test_a_store_without_its_first_file_is_told(campaign_file, tmp_path, capsys,
     assert run(["campaign", "status", str(out)]) == 4
     assert re.fullmatch(r"Error: files could not be .* is damaged \(.*\n", capsys.readouterr().err)
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
-    assert re.search(r"Error: `--out` .*zarr.json is damaged \(.*--overwrite begins anew\n", capsys.readouterr().err)
+    assert re.search(
+        r"Error: `--out` .*zarr.json is damaged \(.*Use --overwrite to start again\n", capsys.readouterr().err
+    )
     assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 0
 
 
@@ -256,7 +261,7 @@ def test_the_status_of_what_was_stopped_at_once(campaign_file, tmp_path, capsys)
     """No row is written yet, or not even what the campaign is."""
     path, out = campaign_file(trials=4), tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
-        conduct(prepare(path), out, stopped, lambda tally: None)
+        run_campaign(prepare(path), out, stopped, lambda tally: None)
     assert run(["campaign", "status", str(out)]) == 0
     assert capsys.readouterr().out == "0 of 4 trials done\n"
     (out / STORE / "zarr.json").write_text('{"zarr_format": 3, "node_type": "group", "attributes": {}}')
@@ -266,7 +271,7 @@ def test_the_status_of_what_was_stopped_at_once(campaign_file, tmp_path, capsys)
 
 
 def stopped(function, work):
-    """An engine that is stopped at once."""
+    """An executor that is stopped at once."""
     raise KeyboardInterrupt
 
 
@@ -274,18 +279,20 @@ def test_trials_that_will_be_refused_are_told_before(campaign_file, tmp_path, ca
     vary = {"controller.frequency": {"uniform": [-1.0, 2.0]}}
     assert run(["campaign", str(campaign_file(trials=12, vary=vary, seed=5)), "--out", str(tmp_path / "out")]) == 1
     said = capsys.readouterr()
-    assert re.fullmatch(r"Advice: 1 of the first 4 trials are refused: `controller.frequency` .*\n", said.err)
-    assert re.search(r"100% 12 of 12 trials, [\d.]+ per second, 0 failed, [2-6] refused\n", said.out)
+    assert re.fullmatch(r"Advice: 1 of the first 4 trials are invalid: `controller.frequency` .*\n", said.err)
+    assert re.search(r"100% 12 of 12 trials, [\d.]+ per second, 0 failed, [2-6] invalid\n", said.out)
 
 
 def test_a_share_that_so_few_trials_cannot_show_is_told(campaign_file, tmp_path, capsys):
     """The interval of n out of n starts at 0.025^(1/n): 0.9 needs 36 trials, and they are enough."""
-    required = {"tracking_rms": {"below": 1e6, "share": 0.9}}
+    required = {"position_rms": {"below": 1e6, "share": 0.9}}
     verdicts = []
     for trials in (35, 36):
         out = tmp_path / str(trials)
         assert run(["campaign", str(campaign_file(trials=trials, requirements=required)), "--out", str(out)]) == 0
-        told = "35 trials cannot show it even if all keep to it; 36 can" in capsys.readouterr().err
+        told = (
+            "which takes at least 36 trials without a failure to demonstrate; `trials` is 35" in capsys.readouterr().err
+        )
         combination = json.loads((out / "summary.json").read_text())["combinations"][0]
         verdicts.append((combination["requirements"][0]["verdict"], told))
     assert verdicts == [("open", True), ("holds", False)]

@@ -16,11 +16,10 @@ import pytest
 from command import contents, typed
 from distributed import Client, LocalCluster
 
+from undertow.campaign.executors import by_dask, cluster
+from undertow.campaign.prepare import prepare
+from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.cli.main import run
-from undertow.studies.campaign.clusters import cluster
-from undertow.studies.campaign.conduct import STORE, conduct
-from undertow.studies.campaign.engines import by_dask
-from undertow.studies.campaign.prepare import prepare
 
 
 def killed(path, out, kills, longest):
@@ -55,6 +54,7 @@ def test_kill_9_at_twenty_moments(campaign_file, tmp_path):
     assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
     """A real cluster of two processes; one of them dies after the first results."""
     path = campaign_file(trials=200, chunk=20)
@@ -68,7 +68,7 @@ def test_dask_workers_that_are_killed_lose_nothing(campaign_file, tmp_path):
             if len(seen) == 3:
                 os.kill(workers[0], signal.SIGKILL)
 
-        conduct(prepare(path), tmp_path / "cluster", lambda f, work: by_dask(f, work, client), watch)
+        run_campaign(prepare(path), tmp_path / "cluster", lambda f, work: by_dask(f, work, client), watch)
     assert seen[-1] == 200 and len(seen) == 11  # no task twice
     assert contents(tmp_path / "cluster") == contents(tmp_path / "whole")
 
@@ -90,7 +90,7 @@ def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):
     os.killpg(process.pid, signal.SIGINT)
     complaint = process.communicate(timeout=60)[1].decode()
     assert process.returncode == 130
-    assert complaint == f"Stopped. `undertow campaign {path} --out {out} --resume` goes on.\n"
+    assert complaint == f"Stopped. To resume: undertow campaign {path} --out {out} --resume\n"
     waited = time.monotonic() + 60
     with pytest.raises(ProcessLookupError):  # soon nobody is left
         while time.monotonic() < waited:
@@ -98,6 +98,7 @@ def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):
             time.sleep(0.1)
 
 
+@pytest.mark.slow
 def test_a_dead_scheduler_loses_nothing(campaign_file, tmp_path):
     """A scheduler in a process of its own is killed after the first results; the rest is flown without it."""
     path, out, file = campaign_file(trials=200, chunk=20), tmp_path / "cluster", tmp_path / "scheduler.json"
@@ -120,8 +121,8 @@ def test_a_dead_scheduler_loses_nothing(campaign_file, tmp_path):
             if len(seen) == 3:
                 scheduler.kill()
 
-        with pytest.raises(OSError, match="Dask cluster is gone"):
-            conduct(prepare(path), out, lambda f, work: by_dask(f, work, client), watch)
+        with pytest.raises(OSError, match="the connection to the Dask cluster is lost"):
+            run_campaign(prepare(path), out, lambda f, work: by_dask(f, work, client), watch)
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
     assert contents(out) == contents(tmp_path / "whole")
 

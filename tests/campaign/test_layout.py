@@ -1,25 +1,25 @@
-"""Blocks of a store: every trial in one task, and further draws in further tasks."""
+"""Blocks of a store: every trial in one task, and further samples in further tasks."""
 
 import numpy as np
 import pytest
 
+from undertow.campaign.campaign_schema import validate
+from undertow.campaign.layout import layout
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign.layout import layout
-from undertow.studies.campaign.schema import validate
 
 SIZES = [((), 40, 16), ((2,), 40, 16), ((2, 3), 5, 16), ((7, 3), 1, 10), ((3, 1, 4), 9, 4), ((2,), 3, 256)]
 
 
-def made(campaign, crossed, draws, chunk):
-    cross = {f"controller.k{i}": list(range(count)) for i, count in enumerate(crossed)}
-    return layout(validate(from_data(campaign(trials=draws, chunk=chunk, cross=cross))))
+def made(campaign, swept, samples, chunk):
+    cross = {f"controller.k{i}": list(range(count)) for i, count in enumerate(swept)}
+    return layout(validate(from_data(campaign(trials=samples, chunk=chunk, cross=cross))))
 
 
-@pytest.mark.parametrize("crossed, draws, chunk", SIZES)
-def test_a_task_is_a_block_of_the_numbers_of_all_trials(campaign, crossed, draws, chunk):
-    """Numbers: all combinations with the first draw, then with the next one."""
-    found = made(campaign, crossed, draws, chunk)
-    numbers = np.moveaxis(np.arange(found.draws * max(1, np.prod(crossed, dtype=int))).reshape(draws, *crossed), 0, -1)
+@pytest.mark.parametrize("swept, samples, chunk", SIZES)
+def test_a_task_is_a_block_of_the_numbers_of_all_trials(campaign, swept, samples, chunk):
+    """Numbers: all combinations with the first sample, then with the next one."""
+    found = made(campaign, swept, samples, chunk)
+    numbers = np.moveaxis(np.arange(found.samples * max(1, np.prod(swept, dtype=int))).reshape(samples, *swept), 0, -1)
     assert found.shape == numbers.shape
     for task in range(found.tasks):
         np.testing.assert_array_equal(found.trials(task), numbers[found.region(task)].ravel())
@@ -31,16 +31,16 @@ def test_a_task_is_a_block_of_the_numbers_of_all_trials(campaign, crossed, draws
     np.testing.assert_array_equal(np.sort(every), np.arange(numbers.size))
 
 
-@pytest.mark.parametrize("crossed, draws, chunk", SIZES)
-def test_further_draws_are_further_tasks(campaign, crossed, draws, chunk):
-    before = made(campaign, crossed, draws, chunk)
-    after = before._replace(draws=3 * draws + 7)
+@pytest.mark.parametrize("swept, samples, chunk", SIZES)
+def test_further_draws_are_further_tasks(campaign, swept, samples, chunk):
+    before = made(campaign, swept, samples, chunk)
+    after = before._replace(samples=3 * samples + 7)
     changed = [task for task in range(before.tasks) if before.trials(task).tolist() != after.trials(task).tolist()]
     assert changed == list(before.partial())
 
 
 @pytest.mark.parametrize(
-    "crossed, draws, chunk, block",
+    "swept, samples, chunk, block",
     [
         ((), 40, 256, (256,)),
         ((2,), 1000, 256, (1, 256)),
@@ -51,6 +51,6 @@ def test_further_draws_are_further_tasks(campaign, crossed, draws, chunk):
         ((2,), 20, 256, (2, 128)),
     ],
 )
-def test_a_task_has_many_draws_of_few_combinations(campaign, crossed, draws, chunk, block):
+def test_a_task_has_many_draws_of_few_combinations(campaign, swept, samples, chunk, block):
     """As laws and vehicles are programs of their own, and what differs by numbers only shares one."""
-    assert made(campaign, crossed, draws, chunk).chunk == block
+    assert made(campaign, swept, samples, chunk).chunk == block

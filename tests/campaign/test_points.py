@@ -1,13 +1,13 @@
-"""Draws: distributions by their quantiles, designs by what they are known for, seeds by being a matter of number."""
+"""Samples: distributions by their quantiles, designs by what they are known for, seeds by being a matter of number."""
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from undertow.campaign.campaign_schema import Distribution, validate
+from undertow.campaign.sampling import Samples, value
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign.points import Draws, value
-from undertow.studies.campaign.schema import Spread, validate
 
 TWO = {"loop.duration": {"uniform": [1, 2]}, "plant.limit": {"uniform": [0, 1]}}
 
@@ -15,8 +15,8 @@ TWO = {"loop.duration": {"uniform": [1, 2]}, "plant.limit": {"uniform": [0, 1]}}
 def points(data, rows=None):
     """Of a campaign, one row each; all of them unless told which."""
     asked = validate(from_data(data))
-    draws = Draws(asked)
-    return np.array([draws.point(row) for row in rows or range(asked.trials)])
+    samples = Samples(asked)
+    return np.array([samples.point(row) for row in rows or range(asked.trials)])
 
 
 @pytest.mark.parametrize(
@@ -30,11 +30,11 @@ def points(data, rows=None):
 def test_values_are_quantiles(given, law):
     for share in (0.0, 0.1, 0.5, 0.99):
         expected = law.ppf(max(share, 2.0**-53))
-        assert value(Spread.model_validate(given), share) == pytest.approx(expected, rel=1e-9)
+        assert value(Distribution.model_validate(given), share) == pytest.approx(expected, rel=1e-9)
 
 
 def test_choices_are_equally_likely():
-    spread = Spread.model_validate({"choice": ["a", "b", "c"]})
+    spread = Distribution.model_validate({"choice": ["a", "b", "c"]})
     shares = np.arange(300) / 300
     assert [sum(value(spread, share) == one for share in shares) for one in "abc"] == [100, 100, 100]
 
@@ -76,14 +76,14 @@ def test_a_latin_hypercube_has_a_limit(campaign):
 
 @pytest.mark.parametrize("design", ["random", "latin", "sobol"])
 def test_draws_are_a_matter_of_the_seed(campaign, design):
-    draw = lambda seed: points(campaign(design=design, seed=seed))
-    np.testing.assert_array_equal(draw(1), draw(1))
-    assert (draw(1) != draw(2)).all()
+    sample = lambda seed: points(campaign(design=design, seed=seed))
+    np.testing.assert_array_equal(sample(1), sample(1))
+    assert (sample(1) != sample(2)).all()
 
 
 def test_no_two_trials_share_a_seed(campaign):
-    draws = Draws(validate(from_data(campaign(trials=10_000))))
-    assert len({draws.seed(row) for row in range(10_000)}) > 9990
+    samples = Samples(validate(from_data(campaign(trials=10_000))))
+    assert len({samples.seed(row) for row in range(10_000)}) > 9990
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,10 @@
 
 import pytest
 
+from undertow.campaign.campaign_schema import validate
+from undertow.campaign.trials import trials
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
-from undertow.studies.campaign.schema import validate
-from undertow.studies.campaign.trials import trials
 
 LIST = [{"kind": "current", "velocity": [0.1, 0.2, 0.3]}, "waves"]
 
@@ -22,12 +22,12 @@ def test_values_stand_where_the_key_path_says(campaign):
         "disturbance[0].velocity[1]": 5.0,
         "disturbance[1].height": 0.7,
         "initial.position": [1.0],
-        "sensor": "perfect",
+        "navigation": "perfect",
     }
     data |= {"vary": {}, "cross": {key: [value] for key, value in put.items()}}
     found = made(data).data(0)
     assert found["disturbance"] == [{"kind": "current", "velocity": [0.1, 5.0, 0.3]}, {"kind": "waves", "height": 0.7}]
-    assert found["initial"] == {"position": [1.0]} and found["sensor"] == "perfect"
+    assert found["initial"] == {"position": [1.0]} and found["navigation"] == "perfect"
     assert data["scenario"]["disturbance"] is LIST and LIST[0]["velocity"][1] == 0.2
 
 
@@ -36,10 +36,38 @@ def test_every_combination_flies_the_same_draws_and_seeds(campaign):
     assert several.number == 20
     assert [several.values(i)["controller"] for i in range(4)] == ["pid", "pid", "rcaf", "rcaf"]
     assert [several.values(i)["loop.dt"] for i in range(4)] == [0.01, 0.02, 0.01, 0.02]
-    for draw in range(5):
-        same = [several.values(4 * draw + i)["disturbance.amplitude"] for i in range(4)]
+    for sample in range(5):
+        same = [several.values(4 * sample + i)["disturbance.amplitude"] for i in range(4)]
         assert len(set(same)) == 1
-        assert len({several.seed(4 * draw + i) for i in range(4)}) == 1
+        assert len({several.seed(4 * sample + i) for i in range(4)}) == 1
+
+
+def test_variants_change_several_keys_together(campaign):
+    """An axis of its own, after those of `cross`, on whose values a variant acts."""
+    fast = {"controller.frequency": 9.0, "loop.dt": 0.01}
+    data = campaign(
+        trials=2, cross={"controller": ["pid", {"kind": "pid", "damping": 2.0}]}, variants={"as is": {}, "fast": fast}
+    )
+    several = made(data)
+    assert several.number == 8 and list(several.campaign.axes) == ["controller", "variant"]
+    assert several.campaign.keys == ["disturbance.amplitude", "controller", "controller.frequency", "loop.dt"]
+    assert several.data(2)["controller"] == {"kind": "pid", "damping": 2.0} and several.data(2)["loop"]["dt"] == 0.02
+    assert several.data(3)["controller"] == {"kind": "pid", "damping": 2.0, "frequency": 9.0}
+    assert several.data(3)["loop"]["dt"] == 0.01 and several.seed(3) == several.seed(0) != several.seed(4)
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ({"variants": {"a": {"seed": 1}}}, "seed` must be left out"),
+        ({"variants": {"a": {"loop..dt": 1}}}, "be a key path"),
+        ({"variants": {"a": {"disturbance.amplitude": 1.0}}}, "not be in `vary` as well"),
+        ({"variants": {"a": {}}, "cross": {"variant": [1, 2]}}, "left out beside `variants`"),
+    ],
+)
+def test_variants_that_cannot_be(campaign, changes, said):
+    with pytest.raises(BadInput, match=said):
+        made(campaign(**changes))
 
 
 def test_parts_have_names(campaign):

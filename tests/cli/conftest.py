@@ -3,6 +3,9 @@ from typing import NamedTuple
 import pytest
 
 from undertow.cli.main import run
+from undertow.report.figures import writing
+
+BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
 
 
 class Said(NamedTuple):
@@ -12,9 +15,20 @@ class Said(NamedTuple):
 
 
 @pytest.fixture
-def undertow(tmp_path, monkeypatch, capsys):
-    """Run the command line in an empty folder, in this process; runs without a prediction unless it is asked for."""
+def whole_figures():
+    """For tests that look at figures: they are drawn, which takes most of the time of a short run."""
+
+
+@pytest.fixture
+def undertow(tmp_path, monkeypatch, capsys, request):
+    """Run the command line in an empty folder, in this process; without a prediction unless it is asked for.
+
+    Figures are made, but blank ones are written unless a test has the fixture `whole_figures`.
+    """
     monkeypatch.chdir(tmp_path)
+    if "whole_figures" not in request.fixturenames:
+        monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
+        monkeypatch.setattr(writing, "png", lambda figure: b"blank")
     monkeypatch.delenv("UNDERTOW_TRACEBACK", raising=False)
 
     def call(*arguments: str) -> Said:

@@ -3,7 +3,7 @@
 SCENARIO = """\
 plant:
   vehicle: {kind: odin, mass: 125}
-  thruster: {kind: paper_table3, rung: ideal}
+  thruster: {kind: paper_table3, fidelity: ideal}
 controller:
   feedback: [1, 2]
   weight: [[10, 0], [0, 10]]

@@ -15,7 +15,7 @@ QUICK = [path for path in SCENARIOS if path.stem in ("inverted_pendulum", "magne
 _NUMBERS = (0, 1, -1, 2, 0.5, -0.5, 1e-300, 5e-324, 1e-30, 1e-9, 1e12, 1e30, -1e30, 1e154, 1e200, -1e200, 1.7e308)
 _ODD = (float("nan"), float("inf"), -float("inf"), 10**18, 10**30, -(10**30), 2**63, True, False, None)
 _WORDS = ("", "x", "nan", "inf", "1e3", "odin", "rcaf", "none", "kind", "./no.py:f", "no.yaml", "no.csv", "2001-01-01")
-_WORDS += ("\u00e9\u4e16", "a\nb", " ", "../..", "\u202e", "{}", "lanes", "xla", "euler", "adaptive", "robust")
+_WORDS += ("\u00e9\u4e16", "a\nb", " ", "../..", "\u202e", "{}", "simd", "xla", "euler", "adaptive", "robust")
 _KEYS = (
     "kind",
     "position",
@@ -23,7 +23,7 @@ _KEYS = (
     "seed",
     "file",
     "samples",
-    "rung",
+    "fidelity",
     "mass",
     "preset",
     "loop",
@@ -36,8 +36,8 @@ _KEYS = (
 # Sections that most scenarios leave out, so that changes meet them as well.
 _EXTRA = {
     "initial": {"position": [0.1], "velocity": [0.0]},
-    "steady": {"start": 0.01, "stop": 0.02, "every_tick": True},
-    "sensor": {"kind": "white_noise", "position": 0.01, "velocity": [0.01]},
+    "steady": {"start": 0.01, "stop": 0.02, "every_step": True},
+    "navigation": {"kind": "white_noise", "position": 0.01, "velocity": [0.01]},
     "seed": 3,
     "model": {"speed_sensor": False},
 }
@@ -67,7 +67,7 @@ def campaign(chance: random.Random, examples=SCENARIOS) -> str:
         "trials": 2,
         "vary": {"loop.dt": {"choice": [0.01, 0.005]}},
         "cross": {"loop.method": ["rk4", "euler"]},
-        "requirements": {"tracking_rms": {"below": 0.1, "share": 0.5}},
+        "requirements": {"position_rms": {"below": 0.1, "share": 0.5}},
         "series": {"signals": ["position"], "every": 0.01},
         "seed": 1,
         "chunk": 2,

@@ -23,7 +23,7 @@ loop: {duration: 1, dt: 0.002}
 """
 
 
-def test_predictions_are_written_and_shown(undertow, tmp_path):
+def test_predictions_are_written_and_shown(undertow, whole_figures, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST)
     said = undertow("analyze", "s.yaml", "--out", "out")
     assert said.code == 0, said.err
@@ -32,13 +32,17 @@ def test_predictions_are_written_and_shown(undertow, tmp_path):
     assert found["estimators"][0]["ramp_error"] == pytest.approx(2 / 30)
     assert [point["held"] for point in found["points"]] == [True] * 3
     assert all(point["spectral_radius"] < 1 for point in found["points"])
-    assert found["reach"]["high"] == [8.0, 8.0] and found["reach"]["held"] == 1.0
-    assert found["reach"]["demand"] == pytest.approx([1.0, 2.0], rel=1e-3)
+    assert found["actuator_authority"]["high"] == [8.0, 8.0] and found["actuator_authority"]["held"] == 1.0
+    assert found["actuator_authority"]["demand"] == pytest.approx([1.0, 2.0], rel=1e-3)
     poles = [complex(*row["expected"]) for row in found["closed_forms"]]
     assert poles == pytest.approx([-30.0, -15.0], rel=1e-6)
     page = (tmp_path / "out" / "prediction.html").read_text()
     assert page.count("<img") == 3 and "undefined" not in page and "nan" not in page.lower().replace("nano", "")
-    for title in ("Poles over the operating range", "Error per unit of disturbance", "Actuators"):
+    for title in (
+        "Controllable closed-loop poles over the operating range",
+        "Error per unit of disturbance",
+        "Actuator authority",
+    ):
         assert title in said.out and title in page
     assert {path.name for path in (tmp_path / "out" / "figures").iterdir()} >= {"poles.png", "frequency.svg"}
 
@@ -48,8 +52,8 @@ def test_what_is_doubtful_is_advised(undertow, tmp_path):
     said = undertow("analyze", "s.yaml", "--out", "out")
     assert said.code == 0
     assert "Advice: the loop is unstable at 3 of 3 operating points: rightmost pole +" in said.err
-    assert "Advice: nothing bounds the weights" in said.err
-    assert "No metrics foretold: the loop linearised at fixed weights is unstable" in said.out
+    assert "Advice: the weights are not bounded" in said.err
+    assert "No metrics are predicted: the loop linearised at fixed weights is unstable" in said.out
     margins = json.loads((tmp_path / "out" / "prediction.json").read_text())["margins"]
     assert margins == {"sampling_time": 0.0, "delay": 0.0, "lag": 0.0, "gain_low": 1.0, "gain_high": 1.0}
 
@@ -57,17 +61,19 @@ def test_what_is_doubtful_is_advised(undertow, tmp_path):
 def test_a_run_is_put_beside_its_prediction(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST)
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
-    assert said.code == 0 and "As predicted: no metric departs by more than 10 %." in said.out, said.out
+    assert said.code == 0 and "The run agrees with the prediction: no metric departs by more than 10 %." in said.out, (
+        said.out
+    )
     found = json.loads((tmp_path / "out" / "metrics.json").read_text())
-    for name in ("tracking_rms", "estimation_rms", "input_rms"):
+    for name in ("position_rms", "estimation_rms", "input_rms"):
         assert found["predicted"][name] == pytest.approx(found["steady"][name], rel=0.1)
 
 
 def test_what_no_linear_prediction_knows_is_named(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST.replace("limit: 8", "limit: 1.5"))
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
-    assert "Departs from the linear prediction by more than 10 %: tracking_rms by" in said.out
-    assert "Inputs were at a limit for" in said.out
+    assert "The run departs from the linear prediction by more than 10 %: position_rms by" in said.out
+    assert "Actuators were saturated" in said.out
 
 
 def test_mistakes_are_those_of_a_scenario(refused, tmp_path):

@@ -134,14 +134,14 @@ MISTAKES = {
         "`controller.weight` must be symmetric, but is off by 1 (s.yaml, line 6)",
     ),
     "negative resistance": (
-        "rung: ideal",
-        "rung: ideal, motor: {resistance: -1.2}",
+        "fidelity: ideal",
+        "fidelity: ideal, motor: {resistance: -1.2}",
         "`plant.thruster.motor.resistance` must be positive, but is -1.2 (s.yaml, line 3)",
     ),
-    "unknown rung": (
-        "rung: ideal",
-        "rung: perfect",
-        "`plant.thruster.rung` must be one of ideal, static, shaft, electromechanical, but is perfect (s.yaml, line 3)",
+    "unknown fidelity": (
+        "fidelity: ideal",
+        "fidelity: perfect",
+        "`plant.thruster.fidelity` must be one of ideal, static, shaft, electromechanical, but is perfect (s.yaml, line 3)",
     ),
     "too many sets": (
         "feedback: [1, 2]",
@@ -232,13 +232,13 @@ MISTAKES = {
     ),
     "negative noise": (
         "seed: 3",
-        "sensor: {kind: white_noise, velocity: -1}",
-        "`sensor.velocity` must be zero or positive, but is -1 (s.yaml, line 11)",
+        "navigation: {kind: white_noise, velocity: -1}",
+        "`navigation.velocity` must be zero or positive, but is -1 (s.yaml, line 11)",
     ),
     "two sources of samples": (
         "kind: u1",
         "kind: table, file: d.csv, csv: t",
-        "`disturbance.csv` must be left out when there is another source of samples, but is beside `file` "
+        "`disturbance.csv` must be left out when there is another source of samples, but is given together with `file` "
         "(s.yaml, line 8)",
     ),
     "duplicate key": (
@@ -309,7 +309,7 @@ def test_numbers_and_words_of_yaml_1_2(tmp_path):
 
 
 def test_merged_keys_have_the_place_of_what_they_belong_to(refused, tmp_path):
-    text = SCENARIO.replace("disturbance: {kind: u1}", "disturbance: &x {kind: u1, scale: big}\nsensor:\n  <<: *x")
+    text = SCENARIO.replace("disturbance: {kind: u1}", "disturbance: &x {kind: u1, scale: big}\nnavigation:\n  <<: *x")
     (tmp_path / "s.yaml").write_text(text.replace("disturbance: &x", "model: &x"))
     said = "`model.kind` must be an option here, but is unknown (s.yaml, line 8). "
     assert refused("simulate", "s.yaml").startswith(said)

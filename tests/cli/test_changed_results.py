@@ -6,7 +6,7 @@ from good_scenario import SCENARIO
 from undertow.scenario.execute import execute, save
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
-from undertow.scenario.repetition import compare
+from undertow.scenario.reproducibility import compare
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def written(dataset, tmp_path):
 
 
 def better(dataset):
-    dataset.attrs["metrics"] = dataset.attrs["metrics"].replace('"tracking_rms": ', '"tracking_rms": 1')
+    dataset.attrs["metrics"] = dataset.attrs["metrics"].replace('"position_rms": ', '"position_rms": 1')
 
 
 HARM = {
@@ -60,7 +60,7 @@ def test_what_was_not_is_taken(written, dataset):
 def test_another_metric_is_a_difference_though_all_numbers_are_equal(written, dataset):
     """By somebody who has mended the checksum."""
     found = compare(written(better, mended=True), dataset)
-    said = "with the same versions. What differs: metrics.steady.tracking_rms, metrics.whole.tracking_rms"
+    said = "with the same versions. Differences: metrics.steady.position_rms, metrics.whole.position_rms"
     assert not found.equal and not found.explained and found.sentence.endswith(said)
 
 

@@ -135,7 +135,7 @@ def test_part_from_a_file_that_does_not(undertow, tmp_path):
 
 def test_part_from_a_file_that_is_none(refused, tmp_path):
     (tmp_path / "mine.py").write_text("def mine():\n    return 7\n")
-    said = "`THING` must return a vehicle, thruster, plant or other part, but is ./mine.py:mine: 7"
+    said = "`mine` returns 7, which is not a part. Return a vehicle, thruster, plant, controller or another part"
     assert refused("check", "./mine.py:mine") == said
 
 
@@ -152,7 +152,7 @@ def test_vehicle_from_a_python_file(undertow, tmp_path):
 
 
 def test_result_file_is_the_scenario_in_it(undertow, tmp_path):
-    (tmp_path / "s.yaml").write_text(SCENARIO.replace("rung: ideal", "rung: static"))
+    (tmp_path / "s.yaml").write_text(SCENARIO.replace("fidelity: ideal", "fidelity: static"))
     assert undertow("simulate", "s.yaml", "--out", "out").code == 0
     said = undertow("check", "out/run.nc")
     assert said.code == 0 and "odin (vehicle)" in said.out

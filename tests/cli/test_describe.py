@@ -2,8 +2,9 @@
 
 import pytest
 
-from undertow.analysis.meanings import MEANINGS
+from undertow.analysis.metrics import MEANINGS
 from undertow.core import catalogue
+from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.schema import keys
 
@@ -69,3 +70,11 @@ def test_metrics(undertow):
 
 def test_version(undertow):
     assert undertow("version").out.startswith("undertow ")
+
+
+def test_signals_are_those_that_are_declared(undertow):
+    """Of every run, and of a law: the same declarations that a result file is labelled by."""
+    out = undertow("describe", "signals").out
+    assert all(name in out and signal.meaning in out for name, signal in RECORDED.items())
+    out = undertow("describe", "pid").out
+    assert "estimate d_hat of the lumped uncertainty" in out and "attained_share" in out and "weights" not in out

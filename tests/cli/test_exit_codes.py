@@ -62,7 +62,7 @@ def test_internal_error_is_3(undertow, tmp_path, monkeypatch):
     said = undertow("simulate", "s.yaml", "--out", "out")
     line = (
         "Error: internal error, RuntimeError: broken in two lines. "
-        "To see where, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
+        "To see the traceback, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
     )
     assert said.code == 3
     assert said.err.splitlines()[-1] == line
@@ -173,13 +173,19 @@ EVERY = {
     "reproduce": ("reproduce", ["reproduce", "--out", "out"]),
     "check": ("check", ["check", "s.yaml"]),
     "describe": ("describe", ["describe", "odin"]),
-    "list": ("list_parts", ["list"]),
+    "list": ("describe", ["list"]),
     "simulate": ("simulate", ["simulate", "s.yaml"]),
 }
 
 
-@pytest.mark.parametrize("signal", [2, 15])
-@pytest.mark.parametrize("command", EVERY)
+@pytest.mark.parametrize(
+    ("command", "signal"),
+    [
+        pytest.param(command, signal, marks=() if command in ("list", "simulate") else pytest.mark.slow)
+        for command in EVERY
+        for signal in (2, 15)
+    ],
+)
 def test_signals_while_modules_are_imported_end_every_command(tmp_path, command, signal):
     """It may not be forgotten by those that wait for no compiled code; SIGTERM ends like Ctrl-C, with its own code."""
     write(tmp_path)

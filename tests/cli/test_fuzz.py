@@ -14,7 +14,7 @@ VALID = {
     "plant": {
         "kind": "hybrid_vehicle",
         "vehicle": {"kind": "odin", "mass": 125.0, "r_g": [0.0, 0.0, 0.05]},
-        "thruster": {"kind": "paper_table3", "rung": "ideal", "supply": 24.0, "motor": {"resistance": 1.2}},
+        "thruster": {"kind": "paper_table3", "fidelity": "ideal", "supply": 24.0, "motor": {"resistance": 1.2}},
     },
     "model": {"speed_sensor": False, "rate_term": True, "regularisation": 0.1},
     "controller": {
@@ -32,7 +32,7 @@ VALID = {
     },
     "reference": {"kind": "setpoint", "position": [1.0, 2.0, 3.0, 0.0, 0.0, 1.0]},
     "disturbance": {"kind": "table", "samples": [[0.0, 1, 2, 3, 4, 5, 6], [1.0, 0, 0, 0, 0, 0, 0]]},
-    "sensor": {"kind": "white_noise", "position": 0.1, "velocity": [0.1] * 6},
+    "navigation": {"kind": "white_noise", "position": 0.1, "velocity": [0.1] * 6},
     "loop": {"kind": "sampled", "duration": 1.0, "dt": 1e-3, "record": 1e-2, "substeps": 1, "method": "rk4"},
     "initial": {"position": [0.0] * 6, "velocity": None},
     "steady": {"start": 0.5, "stop": 1.0},

@@ -5,10 +5,10 @@ import pytest
 
 from undertow.cli.tables import certificate_table, wide_console
 from undertow.scenario.execute import execute
-from undertow.scenario.labelling import certificate_of
+from undertow.scenario.finished_run import certificate_of
 
 BASE = {
-    "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "rung": "ideal"}},
+    "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "ideal"}},
     "controller": {"kind": "rcaf", "preset": "paper"},
     "reference": {"kind": "setpoint", "position": [0.0] * 6},
     "loop": {"duration": 0.05, "dt": 0.01, "record": 0.01},
@@ -35,4 +35,4 @@ def test_bound_that_is_not_finite_is_a_dash(capsys):
     known = {"function": "V", "start": 1.0, "end": None, "rising": {"whole": 0.0, "steady": None}, "hypotheses": []}
     bound = {"estimation_bound": [1.0, None], "estimation_within": {"whole": 0.0, "steady": 0.0}}
     wide_console().print(certificate_table(known | bound, (0.0, 1.0)))
-    assert "allows (up to -): 0 % of the steady window." in capsys.readouterr().out
+    assert "(up to -) for 0 % of the steady window." in " ".join(capsys.readouterr().out.split())

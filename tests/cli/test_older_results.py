@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from undertow.scenario.provenance import checksum, content_hash
-from undertow.scenario.repetition import compare
+from undertow.scenario.reproducibility import compare
 
 
 def labelled(**columns):
@@ -29,7 +29,7 @@ def written(tmp_path):
 def test_what_an_older_file_holds_is_repeated(written):
     found = compare(written(labelled(position=np.array([1.0, 2.0]))), NOW)
     assert found.equal
-    said = "before.nc was repeated bit for bit in all that it holds; new since then: lyapunov, lyapunov_rate"
+    said = "before.nc was repeated bit for bit in all its contents; new since then: lyapunov, lyapunov_rate"
     assert found.sentence == said
 
 
@@ -37,14 +37,14 @@ def test_an_older_file_that_differs_is_explained(written):
     found = compare(written(labelled(position=np.array([1.0, 2.5]))), NOW)
     assert not found.equal and found.explained
     said = "before.nc was not repeated bit for bit; other versions: one without lyapunov, lyapunov_rate"
-    assert found.sentence == f"{said}. What differs: position"
+    assert found.sentence == f"{said}. Differences: position"
 
 
 def test_a_file_from_before_there_were_checksums_is_told(written):
     before = NOW.copy()
     del before.attrs["checksum"]
     found = compare(written(before), NOW)
-    assert found.equal and found.sentence.endswith("; it has no checksum that tells whether it is as it was written")
+    assert found.equal and found.sentence.endswith("; it has no checksum that could reveal changes to the file")
 
 
 def test_missing_rates_do_not_hide_a_difference(written):

@@ -40,7 +40,7 @@ def test_part_from_a_file_runs(undertow, tmp_path):
         (
             "./my_rov.py:my_rov",
             "def my_rov():\n    return 1 / 0",
-            "`plant.vehicle` must be something that can be made, but is not: ZeroDivisionError: division by zero",
+            "`plant.vehicle`: cannot run `my_rov`: ZeroDivisionError: division by zero (my_rov.py, line 2)",
         ),
         (
             "./my_rov.py:my_rov",
@@ -68,7 +68,7 @@ from undertow.core.contracts import AbstractDisturbance
 
 
 class Bytes(AbstractDisturbance):
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def at(self, path, t, place, calm):
@@ -83,10 +83,10 @@ def my_bytes():
 """
 
 
-def test_a_part_that_lanes_cannot_do_is_told_once_with_the_reason(undertow, tmp_path):
+def test_a_part_that_simd_lacks_is_reported_once_with_the_reason(undertow, tmp_path):
     (tmp_path / "my_bytes.py").write_text(BYTES)
     (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: u1", "kind: ./my_bytes.py:my_bytes"))
-    reason = "lanes (docs/lanes.md) lack something: numbers of type int8."
+    reason = "slower than simd (docs/simd.md): numbers of type int8."
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0, said.err
     assert said.err.count(reason) == 1

@@ -9,7 +9,7 @@ import undertow as ut
 
 @pytest.fixture(scope="module")
 def parts():
-    plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3(rung="ideal"))
+    plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3(fidelity="ideal"))
     return plant, ut.rcaf(plant.model(), preset="paper"), ut.references.setpoint([2, 3, 4, 0, 0, 1])
 
 
@@ -17,9 +17,9 @@ def test_run_has_series_metrics_and_figures(parts, tmp_path):
     run = ut.simulate(*parts, duration=0.1, seed=7)
     assert isinstance(run, ut.Run) and run.status == 0
     assert run.dataset["position"].shape == (11, 6) and run.dataset.attrs["seed"] == 7
-    assert run.metrics["whole"]["tracking_max"] == pytest.approx(4.0)
-    assert run.metrics["steady"]["tracking_max"] < 4.0
-    assert "tracking_rms" in repr(run) and "ok at 0.1 s" in repr(run)
+    assert run.metrics["whole"]["position_max"] == pytest.approx(4.0)
+    assert run.metrics["steady"]["position_max"] < 4.0
+    assert "position_rms" in repr(run) and "completed at 0.1 s" in repr(run)
     assert "tracking" in run.plot()
     run.save(tmp_path / "run.nc")
     assert (tmp_path / "run.nc").is_file()
@@ -34,7 +34,7 @@ def test_python_and_scenario_agree_bit_for_bit(parts, tmp_path):
 
 def test_scenario_as_data():
     run = ut.simulate_scenario({"reference": {"kind": "setpoint", "position": [1] * 6}, "loop": {"duration": 0.02}})
-    assert run.status == 0 and run.metrics["steady"]["tracking_max"] <= run.metrics["whole"]["tracking_max"]
+    assert run.status == 0 and run.metrics["steady"]["position_max"] <= run.metrics["whole"]["position_max"]
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_scenario_as_data():
             {"disturbance": ut.disturbances.wrench([1.0])},
             "`disturbance.value` must have 6 entries, but is of shape (1,)",
         ),
-        ({"sensor": 3}, "`sensor` must be an AbstractSensor, but is a int"),
+        ({"navigation": 3}, "`navigation` must be an AbstractNavigation, but is a int"),
     ],
 )
 def test_bad_argument_is_one_line(parts, options, said):

@@ -29,7 +29,7 @@ def test_progress_verdicts_and_place_of_the_report(undertow, tmp_path, short_stu
     said = undertow("reproduce", "--quick", "--out", "here")
     assert said == (
         0,
-        " 50% ran something\n 90% drawing\nC1  holds, quick True: It converges.\nReport: here/report.html\n",
+        " 50% ran something\n 90% figures and report\nC1  holds, quick True: It converges.\nReport: here/report.html\n",
         "",
     )
     assert sorted(path.name for path in (tmp_path / "here").iterdir()) == ["report.html", "results.json", "runs"]

@@ -158,14 +158,16 @@ def test_earlier_result_is_refused(refused, tmp_path):
 def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     """It is a warning; the other figures are drawn, and the exit code is that of the run."""
 
-    def drawings(run):
+    def plots(run):
         return {"tracking": lambda: 1 / 0, "error": Figure}
 
-    monkeypatch.setattr("undertow.cli.simulate.run_drawings", drawings)
+    monkeypatch.setattr("undertow.cli.simulate.run_plots", plots)
     (tmp_path / "s.yaml").write_text(SCENARIO)
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0
-    line = "Warning: figure `tracking` could not be drawn (ZeroDivisionError: division by zero); the results are whole"
+    line = (
+        "Warning: figure `tracking` could not be made (ZeroDivisionError: division by zero); the results are complete"
+    )
     assert said.err.splitlines()[-1] == line
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "figures",
@@ -180,7 +182,7 @@ def test_an_interrupt_while_figures_are_drawn_costs_no_results(undertow, tmp_pat
     def interrupted(run):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("undertow.cli.simulate.run_drawings", interrupted)
+    monkeypatch.setattr("undertow.cli.simulate.run_plots", interrupted)
     (tmp_path / "s.yaml").write_text(SCENARIO)
     assert undertow("simulate", "s.yaml", "--out", "out").code == 130
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["metrics.json", "run.nc", "scenario.yaml"]

@@ -7,10 +7,10 @@ import xarray as xr
 from good_scenario import SCENARIO
 from ruamel.yaml import YAML
 
-from undertow.analysis.meanings import MEANINGS, PER_AXIS
+from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.scenario.provenance import checksum, content_hash
 
-NOISY = SCENARIO.replace("seed: 3", "seed: 3\nsensor: white_noise\nsteady: {start: 0.05, stop: 0.1}")
+NOISY = SCENARIO.replace("seed: 3", "seed: 3\nnavigation: white_noise\nsteady: {start: 0.05, stop: 0.1}")
 
 
 @pytest.fixture
@@ -21,13 +21,15 @@ def ran(undertow, tmp_path):
     return said
 
 
-def test_files_of_a_run(ran, tmp_path):
+def test_files_of_a_run(ran, whole_figures, tmp_path):
     folder = tmp_path / "runs" / "s"
     assert sorted(path.name for path in folder.iterdir()) == ["figures", "metrics.json", "run.nc", "scenario.yaml"]
     assert {".png", ".svg"} == {path.suffix for path in (folder / "figures").iterdir()}
     metrics = json.loads((folder / "metrics.json").read_text())
-    assert metrics["status"] == "ok" and metrics["ended"] == pytest.approx(0.1)
-    assert set(metrics["whole"]) == {*MEANINGS, *(f"{name}_axes" for name in PER_AXIS)} == set(metrics["steady"])
+    assert metrics["status"] == "completed" and metrics["ended"] == pytest.approx(0.1)
+    defined = set(MEANINGS) - {"tracking_rms", "tracking_max"}  # of plants with other units
+    assert set(metrics["whole"]) == {*defined, *(f"{name}_axes" for name in PER_AXIS)} == set(metrics["steady"])
+    assert metrics["success"]["criterion"] == {"position_rms": 0.05, "attitude_rms": 0.05}
     resolved = YAML(typ="safe", pure=True).load((folder / "scenario.yaml").read_text())
     assert resolved["controller"]["adaptation"] == 100.0
     with xr.open_dataset(folder / "run.nc") as dataset:
@@ -39,8 +41,9 @@ def test_files_of_a_run(ran, tmp_path):
     limits = next(one for one in certificate["hypotheses"] if one["name"] == "limits")
     assert limits["whole"] == limits["steady"] == 1.0 and limits["first_failure"] is None
     assert "no input is at its limit" in ran.out and "V_f of Eq. (46): " in ran.out
-    assert (folder / "figures" / "certificate.svg").is_file()
-    assert "tracking_rms" in ran.out and "Status: ok. Results: runs/s" in ran.out
+    assert all(path.stat().st_size > 5e3 for path in (folder / "figures").iterdir())
+    assert (folder / "figures" / "certificate.svg").read_text().startswith("<?xml")
+    assert "position_rms" in ran.out and "Status: completed" in ran.out and "Results: runs/s" in ran.out
     assert ran.err.startswith("Advice: torque constant / back-EMF constant is 117")
 
 
@@ -74,7 +77,7 @@ def test_other_numbers_with_equal_versions_are_a_failure(ran, undertow, tmp_path
     changed(tmp_path, other_numbers)
     said = undertow("simulate", "changed.nc", "--out", "again")
     assert said.code == 1
-    line = "Error: changed.nc was not repeated bit for bit, with the same versions. What differs: position"
+    line = "Error: changed.nc was not repeated bit for bit, with the same versions. Differences: position"
     assert said.err.splitlines()[-1] == line
 
 
@@ -106,7 +109,7 @@ def test_steady_metrics_are_those_of_the_second_half(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     assert undertow("simulate", "s.yaml", "--out", "out").code == 0
     metrics = json.loads((tmp_path / "out/metrics.json").read_text())
-    assert 0 < metrics["steady"]["tracking_max"] < metrics["whole"]["tracking_max"]
+    assert 0 < metrics["steady"]["position_max"] < metrics["whole"]["position_max"]
 
 
 def test_continuous_loop_and_late_window(undertow, tmp_path):
@@ -114,5 +117,7 @@ def test_continuous_loop_and_late_window(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(text)
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0
-    assert "Advice: the steady window starts at 10 s, the run ends at 0.1 s: no steady metrics" in said.err
+    assert (
+        "Advice: there are no steady metrics: the steady window starts at 10 s, and the run ends at 0.1 s" in said.err
+    )
     assert json.loads((tmp_path / "out/metrics.json").read_text())["steady"] is None

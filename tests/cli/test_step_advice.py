@@ -7,14 +7,14 @@ import pytest
 import undertow as ut
 from undertow.core.status import Status
 from undertow.scenario.build import build
+from undertow.scenario.consistency import rounded_times
 from undertow.scenario.execute import execute
-from undertow.scenario.fitting import rounded_times
 from undertow.scenario.schema import Loop
-from undertow.scenario.stepping import fastest_decay, step_advice
+from undertow.scenario.step_size import fastest_decay, step_advice
 from undertow.thrusters import first_order, linear_voltage, t200
 
 SCENARIO = """
-plant: {{vehicle: odin, thruster: {{kind: t200, rung: electromechanical}}, ledger: false}}
+plant: {{vehicle: odin, thruster: {{kind: t200, fidelity: electromechanical}}, ledger: false}}
 reference: {{kind: setpoint, position: [0, 0, 0, 0, 0, 0]}}
 disturbance: {{kind: wrench, value: [5, 0, 0, 0, 0, 0]}}
 loop: {{dt: 0.01, duration: 0.5, substeps: {substeps}}}
@@ -22,8 +22,8 @@ loop: {{dt: 0.01, duration: 0.5, substeps: {substeps}}}
 
 
 def test_decay_of_the_winding_is_that_of_its_time_constant():
-    motor = t200(rung="electromechanical").motor
-    assert fastest_decay(t200(rung="electromechanical")) == pytest.approx(
+    motor = t200(fidelity="electromechanical").motor
+    assert fastest_decay(t200(fidelity="electromechanical")) == pytest.approx(
         float(motor.resistance / motor.inductance), rel=0.01
     )
     assert fastest_decay(first_order(time_constant=0.2)) == pytest.approx(5.0)
@@ -31,12 +31,14 @@ def test_decay_of_the_winding_is_that_of_its_time_constant():
 
 
 def test_advice_says_how_many_substeps_are_enough():
-    said = step_advice(t200(rung="electromechanical"), Loop(dt=0.01))
-    assert len(said) == 1 and "Take loop.substeps: 9 or more" in said[0]
-    assert not step_advice(t200(rung="electromechanical"), Loop(dt=0.01, substeps=9))
+    said = step_advice(t200(fidelity="electromechanical"), Loop(dt=0.01))
+    assert len(said) == 1 and "Use loop.substeps: 9 or more" in said[0]
+    assert not step_advice(t200(fidelity="electromechanical"), Loop(dt=0.01, substeps=9))
     assert not step_advice(t200(), Loop(dt=0.01))
-    assert not step_advice(t200(rung="electromechanical"), Loop(kind="continuous", dt=0.01, method="adaptive"))
-    assert "a loop.dt of at most" in step_advice(t200(rung="electromechanical"), Loop(kind="continuous", dt=0.01))[0]
+    assert not step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01, method="adaptive"))
+    assert (
+        "a loop.dt of at most" in step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01))[0]
+    )
 
 
 @pytest.mark.parametrize(("substeps", "code"), [(8, 1), (9, 0)])
@@ -44,7 +46,7 @@ def test_the_number_is_right(undertow, tmp_path, substeps, code):
     (tmp_path / "s.yaml").write_text(SCENARIO.format(substeps=substeps))
     said = undertow("simulate", "s.yaml")
     assert said.code == code, said
-    assert ("steps of 1.25 ms are unstable beyond 1.2" in said.err) == bool(code)
+    assert ("but the step is 1.25 ms: the run will diverge numerically" in said.err) == bool(code)
 
 
 def plant_of(decay):
@@ -67,7 +69,11 @@ def test_a_plant_too_stiff_for_its_steps_is_not_called_an_unstable_loop(method):
     said = failed.dataset.attrs["status_sentence"]
     assert failed.status is not Status.OK and "the loop is unstable" not in said.replace("because the loop is", "")
     enough = math.ceil(0.01 * 1000 / {"rk4": 2.785, "euler": 2.0}[method])
-    assert f"steps of 10 ms ({method})" in said and f"loop.substeps: {enough} or more" in said
+    assert (
+        f"steps of {method} above" in said
+        and "but the step is 10 ms" in said
+        and f"loop.substeps: {enough} or more" in said
+    )
     for substeps, status in ((enough - 1, False), (enough, True)):
         loop = BASE["loop"] | {"method": method, "substeps": substeps}
         assert (execute(BASE | {"loop": loop}).status is Status.OK) == status
@@ -93,7 +99,7 @@ def test_a_law_too_stiff_for_one_ode():
     loop = {"kind": "continuous", "duration": 20.0, "record": 0.1}
     failed = execute(scenario | {"loop": loop | {"dt": 0.05}})
     assert failed.status is not Status.OK
-    assert "plant and law together settle in" in failed.dataset.attrs["status_sentence"]
+    assert "plant and controller have a time constant of" in failed.dataset.attrs["status_sentence"]
     assert execute(scenario | {"loop": loop | {"dt": 0.01}}).status is Status.OK
 
 
@@ -141,5 +147,5 @@ def test_python_warns_of_them_too():
 def test_single_precision_says_when_its_clock_stops():
     long = {"duration": 2e5, "dt": 0.01, "record": 1.0}
     said = build(BASE | {"plant": plant_of(1.0), "precision": "float32", "loop": long}).advice()
-    assert any("float32 tells no instants apart beyond 16777216 steps, 167772 s" in one for one in said)
+    assert any("float32 cannot distinguish instants beyond 16777216 steps, 167772 s" in one for one in said)
     assert not any("float32" in one for one in build(BASE | {"plant": plant_of(1.0), "loop": long}).advice())

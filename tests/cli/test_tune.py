@@ -18,14 +18,14 @@ tune: {parameters: {frequency: [0.5, 8]}, iterations: 3, train: {seeds: 1}, held
 def test_interrupted_and_resumed_its_result_can_be_flown(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("undertow.studies.tuning.tune.descend", interrupted)
+        patch.setattr("undertow.tuning.tune.descend", interrupted)
         said = undertow("tune", "s.yaml", "--out", "out")
     assert said.code == 130 and "--resume" in said.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["tuning.jsonl"]
     assert undertow("tune", "s.yaml", "--out", "out").code == 2
     said = undertow("tune", "s.yaml", "--out", "out", "--budget", "600", "--resume")
     assert said.code == 0, said
-    assert "Held-out cost" in said.out
+    assert "The held-out cost is" in said.out
     found = json.loads((tmp_path / "out" / "tuning.json").read_text())
     costs = [step["cost"] for step in found["history"]]
     assert costs == sorted(costs, reverse=True) and all(step["radius"] < 1 for step in found["history"])
@@ -62,7 +62,7 @@ def interrupted(*arguments):
         (
             "seeds: 1",
             "sets: [wu2018]",
-            "`tune.train.sets` must be left out: there is but one parameter set, but is ['wu2018'] (s.yaml, line 6)",
+            "`tune.train.sets` must be left out: there is only one parameter set, but is ['wu2018'] (s.yaml, line 6)",
         ),
         (
             "iterations: 3",
@@ -93,11 +93,11 @@ def test_wrong_options(refused, tmp_path):
 
 
 def test_a_budget_that_ends_while_compiling_gives_what_was_begun(undertow, tmp_path):
-    """No time for anything: the given gains are tried all the same, with some beside them, certified and judged."""
+    """No time for anything: the given gains are tried all the same, with some beside them, certified and evaluated."""
     (tmp_path / "s.yaml").write_text(SCENARIO)
     said = undertow("tune", "s.yaml", "--out", "out", "--budget", "1e-3")
     assert said.code == 0, said
-    assert "ended by its budget before the search began" in said.out
+    assert "the time budget is used up, and only the initial design" in said.out
     found = json.loads((tmp_path / "out" / "tuning.json").read_text())
     assert not found["finished"] and found["evaluations"] == 12
     given, tuned = found["gains"]["given"], found["gains"]["tuned"]
@@ -107,7 +107,7 @@ def test_a_budget_that_ends_while_compiling_gives_what_was_begun(undertow, tmp_p
 
 def test_an_interrupt_before_the_first_answer_promises_nothing(undertow, tmp_path, monkeypatch):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    monkeypatch.setattr("undertow.studies.tuning.evaluation.Evaluation.costs", interrupted)
+    monkeypatch.setattr("undertow.tuning.evaluator.Evaluation.costs", interrupted)
     said = undertow("tune", "s.yaml", "--out", "out")
     assert said.code == 130 and said.err == ""
     assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
@@ -119,5 +119,5 @@ def test_a_journal_that_cannot_be_read(refused, tmp_path, content):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "tuning.jsonl").write_bytes(content.encode("utf-8", "surrogateescape"))
     assert refused("tune", "s.yaml", "--out", "out", "--resume").startswith(
-        "`--resume` must find a journal that can be"
+        "`--resume` must find a checkpoint that can be"
     )

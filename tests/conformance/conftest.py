@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from undertow.core import catalogue
-from undertow.instruments import compass, depth, dvl, imu, position_fix
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.scenario.parts import presets_of
+from undertow.scenario.factory import presets_of
+from undertow.sensors import compass, depth, dvl, imu, position_fix
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -25,7 +25,7 @@ def required(argument):
         "model": lambda: hybrid_vehicle(odin(), thruster).model(),
         "position": lambda: np.linspace(-0.5, 0.5, 6),
         "samples": lambda: rows,
-        "instruments": lambda: [imu(), dvl(), depth(), position_fix(), compass()],
+        "sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()],
         "points": lambda: rows[:, 1:4],
     }[argument]()
 
@@ -54,9 +54,23 @@ def pytest_generate_tests(metafunc):
     """Tests with the argument `part` run for every part there is."""
     if "part" in metafunc.fixturenames:
         metafunc.parametrize("part", ALL, ids=["/".join(pair) for pair in ALL], indirect=True)
+    if "part_name" in metafunc.fixturenames:
+        metafunc.parametrize("part_name", ALL, ids=["/".join(pair) for pair in ALL])
 
 
 @pytest.fixture
 def part(request):
     kind, name = request.param
     return kind, make(kind, name)
+
+
+@pytest.fixture
+def made_anew():
+    """Makes a part, and everything that it is made from, once more."""
+
+    def made(part_name):
+        make.cache_clear()
+        required.cache_clear()
+        return make(*part_name)
+
+    return made

@@ -65,6 +65,37 @@ def test_abstract_classes_say_so():
             assert cls.__name__.startswith("Abstract") == is_abstract(cls), cls.__qualname__
 
 
+def overridden(classes_of_interest):
+    """Methods of a class that its base already has an implementation of."""
+    for cls in classes_of_interest:
+        for name, value in vars(cls).items():
+            for base in cls.__mro__[1:]:
+                inherited = vars(base).get(name)
+                ours = base.__module__.startswith("undertow.") and not name.startswith("__")
+                if ours and callable(value) and callable(inherited) and not is_abstract_method(inherited):
+                    yield f"{base.__qualname__}.{name}", cls.__qualname__
+
+
+def is_abstract_method(method):
+    return getattr(method, "__isabstractmethod__", False)
+
+
+# Of a thruster that is commanded in newtons and not in volts, and of one whose motor is known.
+STILL_OVERRIDDEN = {f"AbstractThruster.{name}" for name in ("limits", "terminal", "electrical_power", "actuator_model")}
+
+
+def test_no_concrete_method_is_overridden():
+    found = {name for name, _ in overridden(c for c in classes() if c.__module__.startswith("undertow."))}
+    assert found <= STILL_OVERRIDDEN, found - STILL_OVERRIDDEN
+
+
+def test_the_check_sees_an_overridden_method():
+    """Negative control."""
+    base = next(cls for cls in classes() if cls.__name__ == "AbstractOutputCoordinates")
+    heir = type("Heir", (base,), {"__module__": __name__, "velocity": lambda self, y: y})
+    assert ("AbstractOutputCoordinates.velocity", "Heir") in set(overridden([heir]))
+
+
 def test_the_check_sees_an_heir_of_a_final_class():
     """Negative control."""
     final = next(cls for cls in classes() if cls.__module__.startswith("undertow.") and not is_abstract(cls))

@@ -4,10 +4,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from undertow.core.contracts import Load, Measurement, Place, Target
-from undertow.instruments.estimate import estimate_of, motion_of
+from undertow.core.contracts import Load, Pose, Target
+from undertow.core.measurement import measurement_of_outputs
 from undertow.numerics.rotations import rotation_from_euler
 from undertow.power import ESC
+from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.thrusters.thruster import PropellerReport
 
 NUMBERS = 64
@@ -46,19 +47,19 @@ def plants(plant, v):
 
 
 def controllers(controller, v):
-    n = len(controller.model.angles)
-    rest = Measurement(v[:n], v[6 : 6 + n])
+    n = len(controller.model.coordinates.angles)
+    rest = controller.model.coordinates.measurement(v[:n], v[6 : 6 + n])
     wanted = Target(v[12 : 12 + n], v[18 : 18 + n], v[24 : 24 + n])
     z = _filled(controller.init(rest, wanted), v)
-    u, telemetry = controller.command(z, rest, wanted)
-    return u, telemetry, controller.advance(z, rest, wanted, u, jnp.asarray(1e-3))
+    u, signals = controller.command(z, rest, wanted)
+    return u, signals, controller.advance(z, rest, wanted, u, jnp.asarray(1e-3))
 
 
 def disturbances(disturbance, v):
     calm = Load(v[:6], v[6:12])
     angles = jnp.stack([v[13], v[14], 3 * v[15]])
-    place = Place(jnp.stack([v[16], v[17], 3 + v[18]]), rotation_from_euler(angles), v[19:22])
-    return disturbance.at(disturbance.draw(jax.random.PRNGKey(1)), 1.0 + v[12], place, calm)
+    place = Pose(jnp.stack([v[16], v[17], 3 + v[18]]), rotation_from_euler(angles), v[19:22])
+    return disturbance.at(disturbance.realize(jax.random.PRNGKey(1)), 1.0 + v[12], place, calm)
 
 
 def power(part, v):
@@ -71,28 +72,31 @@ def power(part, v):
     return limit, part.energy(drawn), *[tell(drawn, watts) for tell in told]
 
 
-def instruments(instrument, v):
-    truth = Measurement(v[:6], v[6:12], PropellerReport(100 * v[25:33], 10 * v[33:41]))
-    estimate = estimate_of(Measurement(v[13:19], v[19:25], truth.actuator))
+def sensors(sensor, v):
+    truth = measurement_of_outputs(v[:6], v[6:12], PropellerReport(100 * v[25:33], 10 * v[33:41]))
+    estimate = estimate_of(measurement_of_outputs(v[13:19], v[19:25], truth.actuator))
     motion = motion_of(truth, v[41:44], 0.01)
-    reading = instrument.reading(motion)
-    state = instrument.sampling.init(reading, v[: reading.size])
-    heard = instrument.sampling.hear(state, 1 + jnp.abs(v[12]), reading, v[: reading.size + 1])
-    later = instrument.foretell(estimate, heard[0].reading).predicted(0.01)
-    return heard, instrument.correct(later, heard[0].reading)
+    reading = sensor.reading(motion)
+    state = sensor.sampling.init(reading, v[: reading.size])
+    heard = sensor.sampling.deliver(state, 1 + jnp.abs(v[12]), reading, v[: reading.size + 1])
+    moved = sensor.predict(estimate, heard[0].reading) if hasattr(sensor, "predict") else estimate
+    later = moved.predicted(0.01)
+    return heard, sensor.correct(later, heard[0].reading)
 
 
 def references(reference, v):
     return reference.at(5.0 + v[0])
 
 
-def sensors(sensor, v):
-    truth = Measurement(v[:6], v[6:12])
-    path = sensor.draw(jax.random.PRNGKey(2))
-    return sensor.measure(path, sensor.init(path, Measurement(v[13:19], v[19:25])), jnp.abs(v[12]), truth)
+def navigation(filter_, v):
+    truth = measurement_of_outputs(v[:6], v[6:12])
+    realization = filter_.realize(jax.random.PRNGKey(2))
+    return filter_.measure(
+        realization, filter_.init(realization, measurement_of_outputs(v[13:19], v[19:25])), jnp.abs(v[12]), truth
+    )
 
 
-KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, instruments, sensors)
+KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation)
 USES = {use.__name__: use for use in KINDS}
 
 

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-README, LANES, LIMITS = (
-    (ROOT / name).read_text("utf-8") for name in ("README.md", "docs/lanes.md", "docs/known-limits.md")
+README, SIMD, LIMITS = (
+    (ROOT / name).read_text("utf-8") for name in ("README.md", "docs/simd.md", "docs/known-limits.md")
 )
 
 
@@ -15,11 +15,11 @@ def plain(text):
 
 
 def test_speed():
-    """Nanoseconds per step and the factor over NumPy of README are those of the table in docs/lanes.md."""
+    """Nanoseconds per step and the factor over NumPy of README are those of the table in docs/simd.md."""
     said = re.search(r"about (\d+) ns per step .*?, (\d+) times faster than plain NumPy", plain(README))
     assert said is not None
     ns, times = said.groups()
-    row = next(line for line in plain_rows(LANES) if line[0] == "many runs, two threads")
+    row = next(line for line in plain_rows(SIMD) if line[0] == "many runs, two threads")
     assert (ns, times) == (row[1], row[2])
 
 
@@ -29,7 +29,7 @@ def plain_rows(text):
 
 def test_times_of_divergence():
     """Seconds after which the paper's laws end, in the section of failures, are those of the page of limits."""
-    section = plain(README).split("## What fails in it")[1].split("## What there is")[0]
+    section = plain(README).split("## Where the paper's claims fail")[1].split("## Beyond the paper")[0]
     ends = re.findall(r"(?:after|lasts|with none) (\d+(?:\.\d+)?) s\b", section)
     assert {"60", "1829", "139", "545", "122"} <= set(ends)
     for end in ("60", "1829", "139", "545", "122"):

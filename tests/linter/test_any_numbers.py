@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from undertow.analysis.vehicle_lint import derived, lint
+from undertow.checks.vehicle_lint import derived, lint
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import read
 from undertow.scenario.vehicle_data import parse

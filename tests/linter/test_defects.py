@@ -1,7 +1,7 @@
 """Defects of published models, each as a vehicle file with the numbers of its source: the linter finds every one.
 
 Not here, since no vehicle file shows them: thrust limits (von Benzon's 30.4 N for a T200), tables and plants (T500,
-MLS2EM), and defects of code; for those see the docstring of undertow/analysis/vehicle_lint.
+MLS2EM), and defects of code; for those see the docstring of undertow/checks/vehicle_lint.
 """
 
 import warnings
@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from undertow.analysis.thruster_lint import derived_of_thruster, lint_thruster
-from undertow.analysis.vehicle_lint import lint
+from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
+from undertow.checks.vehicle_lint import lint
 from undertow.scenario.vehicle_file import read_vehicle
 from undertow.thrusters import paper_table3, t200
 

@@ -5,7 +5,7 @@ import importlib
 import numpy as np
 import pytest
 
-from undertow.analysis.vehicle_lint import derived, facts_of, lint
+from undertow.checks.vehicle_lint import derived, facts_of, lint
 from undertow.core import catalogue
 
 # Hull -> what is said about it, with the number that causes it; about layouts, below.

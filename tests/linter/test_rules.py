@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from undertow.analysis.vehicle_lint import facts_of, lint
+from undertow.checks.vehicle_lint import facts_of, lint
 from undertow.scenario.vehicle_file import read_vehicle
 from undertow.vehicles import odin
 

@@ -9,9 +9,9 @@ from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.white_noise import white_noise
 
 TICKS, DT = 600, 2e-3
 
@@ -21,12 +21,12 @@ class Gathered(sampled.AbstractAccumulator):
 
     def init(self, sample):
         zero = jnp.zeros(())
-        return zero, zero, jnp.zeros_like(sample.error), jnp.zeros_like(sample.estimate), sample.voltage
+        return zero, zero, jnp.zeros_like(sample["error"]), jnp.zeros_like(sample["estimate"]), sample["input"]
 
     def update(self, state, t, sample):
         count, times, squares, largest, _ = state
-        largest = jnp.maximum(largest, jnp.abs(sample.estimate))
-        return count + 1, times + t, squares + sample.error**2, largest, sample.voltage
+        largest = jnp.maximum(largest, jnp.abs(sample["estimate"]))
+        return count + 1, times + t, squares + sample["error"] ** 2, largest, sample["input"]
 
 
 @pytest.fixture(scope="module")
@@ -49,28 +49,30 @@ def test_same_end_however_much_is_recorded(runs):
 
 
 def test_accumulated_is_the_sum_of_the_series(runs):
-    series = jax.tree.map(lambda leaf: np.asarray(leaf)[:-1], runs[1].samples)  # the end is after the last tick
+    series = jax.tree.map(lambda leaf: np.asarray(leaf)[:-1], runs[1].signals)  # the end is after the last step
     time = np.asarray(runs[1].time)[:-1]
     for run in runs.values():
         count, times, squares, largest, last = map(np.asarray, run.accumulated[0])
         assert count == TICKS
         np.testing.assert_allclose(times, time.sum(), rtol=1e-12)
-        np.testing.assert_allclose(squares, (series.error**2).sum(0), rtol=1e-11)
-        np.testing.assert_allclose(largest, np.abs(series.estimate).max(0), rtol=1e-11)
-        np.testing.assert_allclose(last, series.voltage[-1], rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(squares, (series["error"] ** 2).sum(0), rtol=1e-11)
+        np.testing.assert_allclose(largest, np.abs(series["estimate"]).max(0), rtol=1e-11)
+        np.testing.assert_allclose(last, series["input"][-1], rtol=1e-10, atol=1e-12)
 
 
 def test_records_are_every_tenth_tick_and_the_end(runs):
     fine, coarse, none = runs[1], runs[10], runs[0]
     np.testing.assert_allclose(np.asarray(fine.time), DT * np.arange(TICKS + 1), rtol=1e-14)
     np.testing.assert_allclose(np.asarray(coarse.time), np.asarray(fine.time)[::10], rtol=1e-14)
-    assert none.time.shape == (0,) and none.samples.error.shape == (0, 2)
-    for name in ("position", "estimate", "voltage"):
-        pair = np.asarray(getattr(coarse.samples, name)), np.asarray(getattr(fine.samples, name))[::10]
+    assert none.time.shape == (0,) and none.signals["error"].shape == (0, 2)
+    for name in ("position", "estimate", "input"):
+        pair = np.asarray(coarse.signals[name]), np.asarray(fine.signals[name])[::10]
         np.testing.assert_allclose(*pair, rtol=1e-10, atol=1e-12, err_msg=name)
 
 
 def test_the_last_record_is_the_final_state(runs):
     x, z = runs[10].final
-    np.testing.assert_array_equal(np.asarray(runs[10].samples.position[-1]), np.asarray(x.position))
-    np.testing.assert_array_equal(np.asarray(runs[10].samples.predicted_velocity[-1]), np.asarray(z.predicted_velocity))
+    np.testing.assert_array_equal(np.asarray(runs[10].signals["position"][-1]), np.asarray(x.position))
+    np.testing.assert_array_equal(
+        np.asarray(runs[10].signals["predicted_velocity"][-1]), np.asarray(z.predicted_velocity)
+    )

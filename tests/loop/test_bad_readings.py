@@ -11,27 +11,28 @@ import pytest
 from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractController, AbstractModel, AbstractSensor, Measurement, Telemetry
+from undertow.core.contracts import AbstractController, AbstractNavigation, Model
+from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.instruments import compass, dvl, imu, position_fix
-from undertow.instruments.depth import Depth
-from undertow.instruments.sampling import Sampling
-from undertow.loop import continuous, in_lanes, sampled
+from undertow.loop import continuous, sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.observer import observer
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.sensors.navigation import navigation
-from undertow.sensors.perfect import perfect
+from undertow.sensors import compass, dvl, imu, position_fix
+from undertow.sensors.depth import Depth
+from undertow.sensors.sampling import Sampling
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2_heavy
 
 DT = 0.01
 NAN, INF = float("nan"), float("inf")
 AMPLITUDE, FREQUENCY = 0.5, 1.0  # of the load, m/s^2 and rad/s
-BACK_ENDS = {"xla": sampled.simulate, "lanes": in_lanes.simulate}
+BACK_ENDS = {"xla": sampled.simulate, "simd": simd_batch.simulate}
 LAWS = {
     "robust": lambda model: rcaf(model, preset="robust", sampling_time=DT, bandwidth=0.35 / DT),
     "pid": lambda model: pid(model, sampling_time=DT, frequency=3.0),
@@ -39,7 +40,7 @@ LAWS = {
 }
 
 
-class Faulty(AbstractSensor):
+class Faulty(AbstractNavigation):
     """The truth, but for some entries (of position, then velocity) that are something else from a time to another."""
 
     entries: jax.Array = eqx.field(converter=jnp.asarray)  # 1 for those that fail
@@ -48,7 +49,7 @@ class Faulty(AbstractSensor):
     last: jax.Array = eqx.field(converter=jnp.asarray)  # s
     smooth: bool = eqx.field(static=True, default=False)
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def init(self, path, truth):
@@ -78,18 +79,18 @@ def test_a_gap_costs_what_the_load_changes_meanwhile(law, back_end):
     missed = run(law, Faulty(np.ones(4), NAN, at, at + gap), simulate)
     assert (Status(int(missed.status)), float(missed.ended)) == (Status.OK, 6.0)
     steps, begin = round(gap / DT), round(at / DT)
-    counts = np.asarray(missed.samples.bad_readings)
+    counts = np.asarray(missed.signals["bad_readings"])
     assert counts[begin - 1] == 0 and counts[begin] == 1 and (counts[begin + steps :] == steps).all()
-    assert (np.asarray(sound.samples.bad_readings) == 0).all()
-    wrong = np.abs(sound.samples.estimate[begin] - sound.samples.uncertainty[begin]).max()
+    assert (np.asarray(sound.signals["bad_readings"]) == 0).all()
+    wrong = np.abs(sound.signals["estimate"][begin] - sound.signals["uncertainty"][begin]).max()
     allowed = wrong * gap**2 / 2 + AMPLITUDE * FREQUENCY * gap**3 / 6
-    told = np.abs(missed.samples.measured_position - missed.samples.position)[begin : begin + steps]
+    told = np.abs(missed.signals["measured_position"] - missed.signals["position"])[begin : begin + steps]
     assert 0 < told.max() <= 1.1 * allowed
-    later = np.abs(missed.samples.position - sound.samples.position)
+    later = np.abs(missed.signals["position"] - sound.signals["position"])
     assert later.max() <= 3 * allowed, "and it is taken back afterwards"
-    np.testing.assert_array_equal(missed.samples.position[:begin], sound.samples.position[:begin])
+    np.testing.assert_array_equal(missed.signals["position"][:begin], sound.signals["position"][:begin])
     if law == "robust":  # what it has learnt stays what it was
-        learnt = missed.samples.estimate[begin : begin + steps]
+        learnt = missed.signals["estimate"][begin : begin + steps]
         assert np.abs(learnt - learnt[0]).max() < 0.05 * AMPLITUDE
 
 
@@ -99,17 +100,17 @@ def test_one_bad_number_changes_nothing_to_speak_of(entry, value):
     """Whatever it is and wherever it stands; a good neighbour is still used. Without a load nothing is foreseen wrongly."""
     one = (np.arange(4) == entry).astype(float)
     sound, hit = (run("robust", Faulty(one, value, 1.0, end), load=none(), duration=2.0) for end in (1.0, 1.0 + DT))
-    assert Status(int(hit.status)) is Status.OK and int(hit.samples.bad_readings[-1]) == 1
-    assert np.abs(hit.samples.position - sound.samples.position).max() < 20.0 * DT**2 / 2
+    assert Status(int(hit.status)) is Status.OK and int(hit.signals["bad_readings"][-1]) == 1
+    assert np.abs(hit.signals["position"] - sound.signals["position"]).max() < 20.0 * DT**2 / 2
     other = [axis for axis in range(2) if axis != entry % 2]
-    np.testing.assert_allclose(hit.samples.position[:, other], sound.samples.position[:, other], rtol=1e-12)
+    np.testing.assert_allclose(hit.signals["position"][:, other], sound.signals["position"][:, other], rtol=1e-12)
 
 
 def test_the_very_first_reading():
     """The law knows where it was put: a start in the dark is that of a law that sees."""
     sound, dark = (run("robust", Faulty(np.ones(4), NAN, 0.0, end), load=none(), duration=1.0) for end in (0.0, DT))
-    np.testing.assert_array_equal(dark.samples.command[0], sound.samples.command[0])
-    assert int(dark.samples.bad_readings[0]) == 1
+    np.testing.assert_array_equal(dark.signals["commanded_input"][0], sound.signals["commanded_input"][0])
+    assert int(dark.signals["bad_readings"][0]) == 1
 
 
 @pytest.mark.parametrize(("law", "within"), [("robust", 1e-2), ("pid", 3e-2)])
@@ -118,12 +119,12 @@ def test_a_vehicle_in_its_own_axes(law, within):
 
     Of a PID it costs more: its integral, on the way, is no estimate of a load.
     """
-    plant = hybrid_vehicle(bluerov2_heavy(), t200(rung="static", dead_zone=0.0))
+    plant = hybrid_vehicle(bluerov2_heavy(), t200(fidelity="static", dead_zone=0.0))
     controller = LAWS[law](plant.model())
     entries = np.repeat([0.0, 1.0], [3, 9])
     at = {"duration": 3.0, "dt": DT, "record_every": 1, "velocity": np.array([0.3, 0, 0, 0, 0.2, 0.5])}
     sound, hit = (
-        in_lanes.simulate(
+        simd_batch.simulate(
             ClosedLoop(
                 plant, controller, setpoint([1.0, 0.5, 1.0, 0.1, 0.2, 1.0]), none(), Faulty(entries, NAN, 1, end)
             ),
@@ -131,15 +132,17 @@ def test_a_vehicle_in_its_own_axes(law, within):
         )
         for end in (1.0, 1.5)
     )
-    assert Status(int(hit.status)) is Status.OK and int(hit.samples.bad_readings[-1]) == 50
-    assert np.abs(sound.samples.position[150, 3:] - sound.samples.position[100, 3:]).max() > 0.1, "it turns meanwhile"
-    assert np.abs(hit.samples.position - sound.samples.position).max() < within
+    assert Status(int(hit.status)) is Status.OK and int(hit.signals["bad_readings"][-1]) == 50
+    assert np.abs(sound.signals["position"][150, 3:] - sound.signals["position"][100, 3:]).max() > 0.1, (
+        "it turns meanwhile"
+    )
+    assert np.abs(hit.signals["position"] - sound.signals["position"]).max() < within
 
 
 class Broken(AbstractContinuousController):
     """A spring, but for one input that is something else from a time on; the clock is the position of an axis."""
 
-    model: AbstractModel
+    model: Model
     value: jax.Array = eqx.field(converter=jnp.asarray)
     after: jax.Array = eqx.field(converter=jnp.asarray)
     method: str = eqx.field(static=True, default="euler")
@@ -151,8 +154,10 @@ class Broken(AbstractContinuousController):
     def command(self, z, y, r):
         u = -y.position - y.velocity
         u = u.at[1].set(jnp.where(z > self.after, self.value, u[1]))
-        still = jnp.zeros_like(y.position)
-        return u, Telemetry(still, still, still, y.position, y.velocity, jnp.zeros((2, 0)))
+        return u, {}
+
+    def signals(self):
+        return {}
 
     def flow(self, z, y, r, u_applied):
         return jnp.ones(())
@@ -168,7 +173,7 @@ def broken(value, after=0.5):
 
 WAYS = {
     "xla": partial(sampled.simulate, duration=1.0, dt=DT),
-    "lanes": partial(in_lanes.simulate, duration=1.0, dt=DT),
+    "simd": partial(simd_batch.simulate, duration=1.0, dt=DT),
     "continuous": partial(continuous.simulate, duration=1.0, dt=DT, record_step=0.1),
 }
 
@@ -194,14 +199,16 @@ def test_the_adaptive_integrator_says_so_too():
 class Mute(AbstractController):
     """No input but what is no number."""
 
-    model: AbstractModel
+    model: Model
 
     def init(self, y, r):
         return jnp.zeros(())
 
     def command(self, z, y, r):
-        still, inputs = jnp.zeros_like(y.position), self.model.gain(y).shape[1]
-        return jnp.full(inputs, NAN), Telemetry(still, still, still, y.position, y.velocity, jnp.zeros((6, 0)))
+        return jnp.full(self.model.dynamics.gain(y).shape[1], NAN), {}
+
+    def signals(self):
+        return {}
 
     def advance(self, z, y, r, u_applied, dt):
         return z
@@ -209,7 +216,7 @@ class Mute(AbstractController):
 
 def test_behind_a_dead_zone():
     """The dead zone of a thruster made 0 V of it, and the run ended as ok."""
-    thruster = paper_table3(rung="static", dead_zone=1.0)
+    thruster = paper_table3(fidelity="static", dead_zone=1.0)
     np.testing.assert_array_equal(thruster.terminal(jnp.array([NAN, 0.5, -1.0, 1.5, -INF])), [NAN, 0.0, 0.0, 1.5, -INF])
     plant = hybrid_vehicle(bluerov2_heavy(), thruster)
     loop = ClosedLoop(plant, Mute(plant.model()), setpoint(np.zeros(6)), none(), perfect())
@@ -227,9 +234,9 @@ class Flooded(Depth):
 def test_navigation_leaves_out_readings_that_are_none():
     """As if they were lost: the estimate goes on, each is counted, and the depth is known again afterwards."""
     quiet = [imu(angle_noise=0, rate_noise=0, force_noise=0), dvl(noise=0, resolution=0, delay=0), compass(noise=0)]
-    sensor = navigation([*quiet, position_fix(noise=0, delay=0), Flooded(Sampling(0.05), 0.2)])
-    motion = lambda t: Measurement(jnp.zeros(6).at[2].set(jnp.sin(t)), jnp.zeros(6).at[2].set(jnp.cos(t)))
-    path = sensor.draw(jax.random.PRNGKey(0))
+    sensor = observer([*quiet, position_fix(noise=0, delay=0), Flooded(Sampling(0.05), 0.2)])
+    motion = lambda t: measurement_of_outputs(jnp.zeros(6).at[2].set(jnp.sin(t)), jnp.zeros(6).at[2].set(jnp.cos(t)))
+    path = sensor.realize(jax.random.PRNGKey(0))
 
     def step(state, t):
         told, state = sensor.measure(path, state, t, motion(t))

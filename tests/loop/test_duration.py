@@ -8,9 +8,9 @@ from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 
 
 @pytest.mark.parametrize("tolerances", [None, (1e-10, 1e-12)], ids=["fixed", "adaptive"])
@@ -26,5 +26,5 @@ def test_the_end_does_not_depend_on_the_records(tolerances):
     np.testing.assert_allclose(often.time[-1], 0.29, atol=1e-15)
     for one, other in zip(*(jax.tree.leaves(run.final) for run in (often, seldom)), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-12)
-    np.testing.assert_allclose(often.samples.position[-1], seldom.final[0].position, rtol=1e-7)
-    assert abs(float(often.samples.position[-1, 0] - often.samples.position[-10, 0])) > 1e-3  # it moves meanwhile
+    np.testing.assert_allclose(often.signals["position"][-1], seldom.final[0].position, rtol=1e-7)
+    assert abs(float(often.signals["position"][-1, 0] - often.signals["position"][-10, 0])) > 1e-3  # it moves meanwhile

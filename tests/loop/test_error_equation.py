@@ -12,9 +12,9 @@ import pytest
 from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.references.circle import circle
-from undertow.sensors.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -22,23 +22,23 @@ STATES = 32
 THRUSTERS = {"all eight": range(1, 9), "five, rank below six": (1, 2, 3, 5, 6)}
 
 
-def terms(drawn, t, position, velocity, estimates):
+def terms(realization, t, position, velocity, estimates):
     """Both sides of the error equation, sigma, and d as measured and as prescribed."""
-    loop = drawn.loop
+    loop = realization.loop
     model, law = loop.controller.model, loop.controller
-    x, z = drawn.start(position, velocity)
+    x, z = realization.start(position, velocity)
     z = z._replace(weights=jnp.broadcast_to(estimates[:, None], z.weights.shape))
-    seen = drawn.decide(t, x, z)
-    moved = loop.plant.dynamics(t, x, seen.applied, drawn.load(t, x))
+    seen = realization.decide(t, x, z)
+    moved = loop.plant.dynamics(t, x, seen.applied, realization.load(t, x))
     _, acceleration = jax.jvp(lambda x: loop.plant.output(t, x).velocity, (x,), (moved,))
-    sample = drawn.sample(t, x, z, seen)
+    sample = realization.signals(t, x, z, seen)
     left = seen.r.acceleration - acceleration
-    feedback = law.feedback[0] * sample.error + law.feedback[1] * (seen.r.velocity - sample.velocity)
-    wanted = -model.drift(seen.y) - sample.estimate + feedback + seen.r.acceleration + sample.robust
-    sigma = wanted - model.gain(seen.y) @ seen.command
-    prescribed = drawn.load(t, x).acceleration
-    right = -feedback + sample.estimate - prescribed - sample.robust
-    return left, right, sigma, sample.uncertainty, prescribed
+    feedback = law.feedback[0] * sample["error"] + law.feedback[1] * (seen.r.velocity - sample["velocity"])
+    wanted = -model.dynamics.drift(seen.y) - sample["estimate"] + feedback + seen.r.acceleration + sample["robust_term"]
+    sigma = wanted - model.dynamics.gain(seen.y) @ seen.command
+    prescribed = realization.load(t, x).acceleration
+    right = -feedback + sample["estimate"] - prescribed - sample["robust_term"]
+    return left, right, sigma, sample["uncertainty"], prescribed
 
 
 @pytest.fixture(scope="module", params=THRUSTERS)
@@ -46,11 +46,11 @@ def batch(request):
     plant = HybridVehicle(odin().with_thrusters(tuple(THRUSTERS[request.param])), paper_table3("ideal"))
     load = sinusoid(np.arange(1.0, 7.0), 3.0, offset=-1.0)
     loop = ClosedLoop(plant, rcaf(plant.model()), circle(depth=1.0), load, perfect())
-    drawn = loop.draw(jax.random.PRNGKey(0))
+    realization = loop.realize(jax.random.PRNGKey(0))
     random = np.random.default_rng(14)
     pose = random.uniform(-1, 1, (STATES, 6)) * np.array([4, 4, 4, 3, 1.3, 3])
     arguments = random.uniform(0, 9, STATES), pose, random.normal(size=(STATES, 6)), random.normal(size=(STATES, 6))
-    values = jax.jit(jax.vmap(lambda *a: terms(drawn, *a)))(*map(jnp.asarray, arguments))
+    values = jax.jit(jax.vmap(lambda *a: terms(realization, *a)))(*map(jnp.asarray, arguments))
     return request.param, [np.asarray(v) for v in values]
 
 

@@ -12,10 +12,10 @@ from undertow.core.contracts import AbstractDisturbance
 from undertow.core.status import Status
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.outcome import health
+from undertow.loop.outcome import status_of
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 
 
 class Breaks(AbstractDisturbance):
@@ -23,7 +23,7 @@ class Breaks(AbstractDisturbance):
 
     value: Float[Array, ""]
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def at(self, path, t, place, calm):
@@ -39,7 +39,7 @@ def loop_with(value):
     return ClosedLoop(plant, rcaf(plant.model()), setpoint(np.ones(1)), load, perfect())
 
 
-BREAK = 0.2512  # s; inside a tick and between two records
+BREAK = 0.2512  # s; inside a step and between two records
 RUNS = {
     "sampled": lambda loop: sampled.simulate(loop, duration=0.5, dt=2.0**-10, record_every=16),
     "continuous": lambda loop: continuous.simulate(loop, duration=0.5, record_step=2.0**-6, tolerances=(1e-8, 1e-9)),
@@ -73,13 +73,13 @@ def test_last_sound_state_is_kept(batch):
     name, (sound, *failed), _ = batch
     for outcome in failed:
         before, after = outcome.time < BREAK, outcome.time > BREAK + 2.0**-6
-        np.testing.assert_allclose(outcome.samples.position[before], sound.samples.position[before], rtol=1e-6)
-        for series in (outcome.samples.position, outcome.samples.velocity, outcome.samples.weights):
+        np.testing.assert_allclose(outcome.signals["position"][before], sound.signals["position"][before], rtol=1e-6)
+        for series in (outcome.signals["position"], outcome.signals["velocity"], outcome.signals["weights"]):
             assert np.isfinite(series).all()
             assert (series[after] == series[after][0]).all(), "records after the failure repeat the last sound one"
         if name == "sampled":
             assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(outcome.final))
-            at_break = np.interp(BREAK, sound.time, sound.samples.position[:, 0])
+            at_break = np.interp(BREAK, sound.time, sound.signals["position"][:, 0])
             assert outcome.final[0].position[0] == pytest.approx(at_break, rel=1e-2)
 
 
@@ -88,7 +88,7 @@ def test_continuous_loop_ends_when_nothing_is_finite():
     outcome = RUNS["continuous"](loop_with(float("nan")))
     assert Status(int(outcome.status)) in (Status.NOT_FINITE, Status.STEPS_EXHAUSTED)
     assert float(outcome.ended) == pytest.approx(BREAK, abs=1e-6)
-    assert np.isfinite(np.asarray(outcome.samples.position)).all()
+    assert np.isfinite(np.asarray(outcome.signals["position"])).all()
 
 
 @pytest.mark.parametrize("kind, most", [(jnp.float64, 1.34e154), (jnp.float32, 1.84e19)])
@@ -96,13 +96,15 @@ def test_continuous_loop_ends_when_nothing_is_finite():
 def test_a_state_whose_square_overflows_is_not_finite(kind, most, share, code):
     """sqrt(1.798e308) and sqrt(3.403e38): a controller that grows to there in silence gives metrics that are infinite."""
     loop = loop_with(0.5)
-    x, _ = loop.draw(jax.random.PRNGKey(0)).start(*loop.outputs_at_start(None, None))
-    assert int(health(loop, x, (jnp.zeros(2, dtype=kind), jnp.asarray([0.0, share * most], dtype=kind)))) == int(code)
+    x, _ = loop.realize(jax.random.PRNGKey(0)).start(*loop.outputs_at_start(None, None))
+    assert int(status_of(loop, x, (jnp.zeros(2, dtype=kind), jnp.asarray([0.0, share * most], dtype=kind)))) == int(
+        code
+    )
 
 
 def test_neighbours_are_not_hurt(batch):
     name, together, alone = batch
-    pairs = zip(jax.tree.leaves(together[0].samples), jax.tree.leaves(alone.samples), strict=True)
+    pairs = zip(jax.tree.leaves(together[0].signals), jax.tree.leaves(alone.signals), strict=True)
     for one, other in pairs:
         np.testing.assert_allclose(one, np.asarray(other), rtol=1e-9, atol=1e-9)
-    assert np.abs(together[0].samples.velocity).max() > 0.1, name
+    assert np.abs(together[0].signals["velocity"]).max() > 0.1, name

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.analysis.meanings import MEANINGS, unit_of
-from undertow.analysis.metrics import Metrics, overall, results
+from undertow.analysis.metrics import MEANINGS, Metrics, meanings, results, results_of_batch
 from undertow.cli.main import run as command
 from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
@@ -15,12 +14,12 @@ from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants import double_integrator, inverted_pendulum, magnetic_levitation, two_link_arm
 from undertow.references.setpoint import setpoint
 from undertow.references.sine import sine
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
-from undertow.sensors.perfect import perfect
 
 DT = 0.01
 
@@ -33,14 +32,14 @@ def settling(reference, duration=20.0, position=None, load=None, stop=np.inf):
     )
     at = {"duration": duration, "dt": DT, "record_every": 1, "position": position}
     outcome = sampled.simulate(loop, accumulators=(Metrics(0.0, stop),), **at)
-    found = results(outcome.accumulated[0])
+    found = results((Metrics(0.0, stop),), outcome.accumulated)
     return found.get("settling_time"), found.get("settling_time_axes"), outcome
 
 
 def test_a_step_settles_when_the_error_stays_within_2_percent_of_it():
     """By the recorded error itself."""
     whole, axes, outcome = settling(setpoint([1.0, -3.0]), position=np.array([0.5, 0.0]))
-    error, time = np.abs(np.asarray(outcome.samples.error)), np.asarray(outcome.time)
+    error, time = np.abs(np.asarray(outcome.signals["error"])), np.asarray(outcome.time)
     wanted = [time[np.flatnonzero(error[:, i] > 0.02 * step)[-1]] for i, step in enumerate((0.5, 3.0))]
     np.testing.assert_allclose(axes, wanted, atol=1e-12)
     assert whole == max(axes) and 1.0 < whole < 15.0
@@ -49,7 +48,7 @@ def test_a_step_settles_when_the_error_stays_within_2_percent_of_it():
 def test_a_transition_settles_after_its_end():
     """Not before the target rests, however well it is followed; 2 % of the way, not of an error that was none at first."""
     whole, _, outcome = settling(setpoint([1.0, 2.0], settling=5.0))
-    error, time = np.abs(np.asarray(outcome.samples.error)), np.asarray(outcome.time)
+    error, time = np.abs(np.asarray(outcome.signals["error"])), np.asarray(outcome.time)
     late = max(time[np.flatnonzero(error[:, i] > 0.02 * way)[-1:]].max(initial=0.0) for i, way in enumerate((1.0, 2.0)))
     assert whole == pytest.approx(max(5.0, late), abs=2 * DT)
 
@@ -77,8 +76,8 @@ def test_many_runs_at_once_have_the_same_times():
 
     _, _, outcome = settling(setpoint([1.0, -3.0]))
     several = jax.tree.map(lambda leaf: np.stack([leaf, leaf]), outcome.accumulated[0])
-    one = overall(outcome.accumulated[0])
-    for name, values in overall(several).items():
+    one = Metrics().values(outcome.accumulated[0])
+    for name, values in results_of_batch((Metrics(),), (several,)).items():
         np.testing.assert_array_equal(values, [one[name]] * 2, err_msg=name)
 
 
@@ -93,7 +92,10 @@ def test_many_runs_at_once_have_the_same_times():
 )
 def test_inputs_are_told_in_their_own_unit(plant, unit):
     assert plant.input_unit == unit
-    told = {name: unit_of(name, plant.input_unit) for name in MEANINGS}
+    loop = ClosedLoop(
+        plant, pid(plant.model(), frequency=2.0), setpoint(np.zeros(len(plant.outputs))), none(), perfect()
+    )
+    told = {name: metric.unit for name, metric in meanings(loop).items()}
     assert told["input_rms"] == told["input_peak"] == unit and told["input_variation"] == f"{unit}/s"
     assert not any("[" in one for one in told.values())
     assert not any("voltage" in name or "V" in one.unit or "volt" in one.meaning for name, one in MEANINGS.items())

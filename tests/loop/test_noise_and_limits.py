@@ -10,10 +10,10 @@ from undertow.core.contracts import Measurement
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
+from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
-from undertow.sensors.white_noise import white_noise
 
 LIMIT, DT = 3.0, 1e-3
 
@@ -21,7 +21,7 @@ LIMIT, DT = 3.0, 1e-3
 def measured(key, samples, truth=0.0, dt=1e-3):
     """Measurements of a plant that stands still, one after the other."""
     sensor = white_noise(0.1, 0.2)
-    path, still = sensor.draw(key), Measurement(jnp.full(3, truth), jnp.full(3, truth))
+    path, still = sensor.realize(key), Measurement(jnp.full(3, truth), jnp.full(3, truth))
 
     def step(state, t):
         told, state = sensor.measure(path, state, t, still)
@@ -49,14 +49,14 @@ def test_noise_is_white_with_the_given_deviations(key):
 
 
 def test_two_laws_meet_the_same_noise(key):
-    """From eps = x_hat_dot - (x_dot + noise), both runs give back the same noise at every tick."""
+    """From eps = x_hat_dot - (x_dot + noise), both runs give back the same noise at every step."""
     plant = double_integrator(2)
 
     def noise(**gains):
         law = rcaf(plant.model(), **gains)
         loop = ClosedLoop(plant, law, setpoint(np.ones(2)), sinusoid(), white_noise(0.0, 0.01))
-        samples = sampled.simulate(loop, duration=0.2, dt=DT, record_every=1, key=key).samples
-        return np.asarray(samples.predicted_velocity - samples.modelling_error - samples.velocity)
+        samples = sampled.simulate(loop, duration=0.2, dt=DT, record_every=1, key=key).signals
+        return np.asarray(samples["predicted_velocity"] - samples["modelling_error"] - samples["velocity"])
 
     one, other = noise(), noise(composite=0.0, feedback=(4.0, 4.0))
     np.testing.assert_allclose(one, other, atol=1e-12)
@@ -68,31 +68,31 @@ def limited():
     plant = double_integrator(2, LIMIT)
     law = rcaf(plant.model(), sets=3)
     loop = ClosedLoop(plant, law, setpoint(np.array([2.0, -1.0])), sinusoid(1.0, 2.0), perfect())
-    samples = sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).samples
+    samples = sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).signals
     return law, jax.tree.map(np.asarray, samples)
 
 
 def test_limits_are_respected(limited):
     _, samples = limited
-    assert np.abs(samples.command).max() > 3 * LIMIT, "the law does ask for more"
-    np.testing.assert_array_equal(samples.voltage, np.clip(samples.command, -LIMIT, LIMIT))
-    np.testing.assert_array_equal(samples.saturated, (np.abs(samples.voltage) >= LIMIT).astype(float))
-    assert 0 < samples.saturated.mean() < 1
+    assert np.abs(samples["commanded_input"]).max() > 3 * LIMIT, "the law does ask for more"
+    np.testing.assert_array_equal(samples["input"], np.clip(samples["commanded_input"], -LIMIT, LIMIT))
+    np.testing.assert_array_equal(samples["saturated"], (np.abs(samples["input"]) >= LIMIT).astype(float))
+    assert 0 < samples["saturated"].mean() < 1
 
 
 def test_law_is_advanced_with_what_was_applied(limited):
     """One Euler step of Eq. (32) from record to record: right with the applied input, wrong with the command."""
     law, samples = limited
-    eps, now = samples.modelling_error, samples.predicted_velocity
-    own = -150.0 * eps + samples.estimate - 0.1 * np.tanh(eps / 0.5)
-    told = {name: now + DT * (own + getattr(samples, name)) for name in ("voltage", "command")}
-    np.testing.assert_allclose(told["voltage"][:-1], now[1:], atol=1e-12)
-    assert np.abs(told["command"][:-1] - now[1:]).max() > 1e-3
-    xi_sum = samples.weights.shape[-1]
+    eps, now = samples["modelling_error"], samples["predicted_velocity"]
+    own = -150.0 * eps + samples["estimate"] - 0.1 * np.tanh(eps / 0.5)
+    told = {name: now + DT * (own + samples[name]) for name in ("input", "commanded_input")}
+    np.testing.assert_allclose(told["input"][:-1], now[1:], atol=1e-12)
+    assert np.abs(told["commanded_input"][:-1] - now[1:]).max() > 1e-3
+    xi_sum = samples["weights"].shape[-1]
     assert xi_sum == law.fuzzy.rules
 
 
 def test_plant_moves_with_what_was_applied(limited):
     _, samples = limited
-    acceleration = samples.voltage + np.sin(2.0 * DT * np.arange(len(samples.voltage)))[:, None]
-    np.testing.assert_allclose(np.diff(samples.velocity, axis=0) / DT, acceleration[:-1], atol=2e-3)
+    acceleration = samples["input"] + np.sin(2.0 * DT * np.arange(len(samples["input"])))[:, None]
+    np.testing.assert_allclose(np.diff(samples["velocity"], axis=0) / DT, acceleration[:-1], atol=2e-3)

@@ -7,16 +7,17 @@ import pytest
 from jaxtyping import Array, Float
 
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractDisturbance, AbstractPlant
+from undertow.core.contracts import AbstractDisturbance
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.plants.inverted_pendulum import inverted_pendulum
+from undertow.plants.mechanism import AbstractMechanism
 from undertow.plants.two_link_arm import two_link_arm
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -31,7 +32,7 @@ class Step(AbstractDisturbance):
     end: float = eqx.field(static=True)
     declared: bool = eqx.field(static=True, default=True)
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def at(self, path, t, place, calm):
@@ -47,10 +48,10 @@ def rail(disturbance, limit=float("inf"), **gains):
     return ClosedLoop(plant, rcaf(plant.model(), **gains), setpoint(np.zeros(1)), disturbance, perfect())
 
 
-class Pendulum(AbstractPlant):
+class Pendulum(AbstractMechanism):
     """x_ddot = -20 sin x + u + d, smooth; a double integrator in everything else."""
 
-    rail: AbstractPlant
+    rail: AbstractMechanism
     outputs: tuple[str, ...] = eqx.field(static=True, default=("angle",))
     output_units: tuple[str, ...] = eqx.field(static=True, default=("rad",))
     input_unit: str = eqx.field(static=True, default="rad/s^2")
@@ -67,23 +68,14 @@ class Pendulum(AbstractPlant):
     def output(self, t, x):
         return self.rail.output(t, x)
 
-    def place(self, x):
-        return None
+    def limits(self):
+        return self.rail.limits()
 
-    def admissible(self, x, u):
-        return self.rail.admissible(x, u)
+    def power(self, x, u):
+        return self.rail.power(x, u)
 
-    def effort(self, x, u):
-        return self.rail.effort(x, u)
-
-    def inputs(self):
-        return 1
-
-    def health(self, x):
-        return self.rail.health(x)
-
-    def advice(self):
-        return ()
+    def status(self, x):
+        return self.rail.status(x)
 
     def model(self):
         return self.rail.model()
@@ -119,7 +111,7 @@ def swimming():
 
 @pytest.mark.parametrize("make", [swinging, balancing, reaching, pytest.param(swimming, marks=pytest.mark.slow)])
 def test_fourth_order_in_the_step_of_the_plant(make):
-    """1, 2 and 4 steps of RK4 per tick; the control rate stays 20 Hz."""
+    """1, 2 and 4 steps of RK4 per step; the control rate stays 20 Hz."""
     loop, velocity = make()
     ends = {}
     for substeps in (1, 2, 4):
@@ -131,21 +123,21 @@ def test_fourth_order_in_the_step_of_the_plant(make):
 
 
 def test_a_jump_at_a_tick_is_met_exactly():
-    """No input, constant load within a tick: the motion is a parabola, and RK4 has it to rounding."""
+    """No input, constant load within a step: the motion is a parabola, and RK4 has it to rounding."""
     outcome = sampled.simulate(
         rail(Step(jnp.asarray(3.0), 0.25, 0.75), limit=0.0), duration=1.0, dt=2.0**-6, record_every=1
     )
     t = np.asarray(outcome.time)
     pushed = np.clip(t - 0.25, 0.0, 0.5)
     exact = 1.5 * pushed**2 + 1.5 * np.clip(t - 0.75, 0.0, None)
-    assert np.abs(np.asarray(outcome.samples.position)[:, 0] - exact).max() < 1e-8
-    # Negative control: a jump inside a tick is smeared.
+    assert np.abs(np.asarray(outcome.signals["position"])[:, 0] - exact).max() < 1e-8
+    # Negative control: a jump inside a step is smeared.
     inside = sampled.simulate(
         rail(Step(jnp.asarray(3.0), 0.255, 0.75), limit=0.0), duration=1.0, dt=2.0**-6, record_every=1
     )
     late = np.clip(t - 0.255, 0.0, 0.495)
     smeared = 1.5 * late**2 + 3.0 * 0.495 * np.clip(t - 0.75, 0.0, None)
-    assert np.abs(np.asarray(inside.samples.position)[:, 0] - smeared).max() > 1e-4
+    assert np.abs(np.asarray(inside.signals["position"])[:, 0] - smeared).max() > 1e-4
 
 
 def test_declared_jumps_are_met_by_the_continuous_loop():
@@ -155,6 +147,6 @@ def test_declared_jumps_are_met_by_the_continuous_loop():
     for declared in (True, False):
         loop = rail(Step(jnp.asarray(1000.0), 5.0, 5.0001, declared), **slow)
         outcome = continuous.simulate(loop, duration=5.02, record_step=0.01, tolerances=(1e-8, 1e-9))
-        speeds[declared] = float(outcome.samples.velocity[-1, 0])
+        speeds[declared] = float(outcome.signals["velocity"][-1, 0])
     assert 0.09 < speeds[True] < 0.1
     assert abs(speeds[False]) < 1e-6, "negative control: undeclared, it is stepped over"

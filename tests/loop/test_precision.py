@@ -9,22 +9,22 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.campaign.campaign_schema import read_text
+from undertow.campaign.layout import layout
+from undertow.campaign.task import run_trials, site
 from undertow.core import runtime
-from undertow.core.contracts import Load, Place
+from undertow.core.contracts import Load, Pose
 from undertow.disturbances.u1 import u1
 from undertow.numerics.rotations import cross
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
-from undertow.studies.campaign.layout import layout
-from undertow.studies.campaign.reading import read_text
-from undertow.studies.campaign.task import fly, site
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "limit": 20.0},
     "controller": {"kind": "pid", "frequency": 2.0},
     "reference": {"kind": "setpoint", "position": [1.0]},
     "disturbance": {"kind": "sinusoid", "amplitude": 1.0},
-    "sensor": {"kind": "white_noise", "velocity": 0.01},
+    "navigation": {"kind": "white_noise", "velocity": 0.01},
     "loop": {"duration": 1.0, "dt": 0.01, "record": 0.02},
 }
 PROGRAM = """
@@ -36,13 +36,13 @@ print(execute(read(Path(sys.argv[1]))).dataset.attrs["content_hash"])
 """
 
 
-def scenario(precision, engine="lanes"):
-    return SCENARIO | {"precision": precision, "loop": SCENARIO["loop"] | {"engine": engine}}
+def scenario(precision, backend="simd"):
+    return SCENARIO | {"precision": precision, "loop": SCENARIO["loop"] | {"backend": backend}}
 
 
-def content(precision, engine="lanes"):
-    found = execute(scenario(precision, engine))
-    assert found.outcome.samples.position.dtype == precision == str(found.dataset["position"].dtype)
+def content(precision, backend="simd"):
+    found = execute(scenario(precision, backend))
+    assert found.outcome.signals["position"].dtype == precision == str(found.dataset["position"].dtype)
     return found.dataset.attrs["content_hash"]
 
 
@@ -85,7 +85,7 @@ def test_a_campaign_across_precisions():
     campaign = {"scenario": SCENARIO, "trials": 3, "chunk": 2, "seed": 7}
     campaign["vary"] = {"disturbance.amplitude": {"uniform": [0.5, 2.0]}}
     alone = {
-        precision: fly(dump(campaign | {"scenario": scenario(precision)}), "", range(3))
+        precision: run_trials(dump(campaign | {"scenario": scenario(precision)}), "", range(3))
         for precision in ("float64", "float32")
     }
     text = dump(campaign | {"cross": {"precision": list(alone)}})
@@ -93,18 +93,18 @@ def test_a_campaign_across_precisions():
     assert where.tasks == 4
     for task in range(where.tasks):
         rows = where.trials(task).tolist()
-        found = fly(text, "", rows)
-        assert found["tracking_rms"].dtype == np.float64
+        found = run_trials(text, "", rows)
+        assert found["position_rms"].dtype == np.float64
         for place, row in enumerate(rows):
             trial, combination = divmod(row, 2)
-            for name in ("tracking_rms", "input_variation", "weights_peak"):
+            for name in ("position_rms", "input_variation", "input_rms"):
                 assert found[name][place] == alone[list(alone)[combination]][name][trial], name
     site.cache_clear()
 
 
 def test_constants_of_parts_follow():
     """JAX remembers what NumPy arrays were made into: constants of u1 and of rotations are made anew in each precision."""
-    place = Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3))
+    place = Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3))
     load = jax.jit(lambda t, calm: u1().at((), t, place, calm).acceleration)
     for precision in ("float64", "float32", "float64"):
         with runtime.in_precision(precision):

@@ -1,24 +1,27 @@
 """Every part has a key of its own, and noise is new at every sample however long a run is or however short its steps."""
 
+import inspect
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from undertow.controllers.pid import pid
-from undertow.core import runtime
-from undertow.core.contracts import AbstractDisturbance, AbstractSensor, Measurement
+from undertow.core import catalogue, runtime
+from undertow.core.contracts import AbstractDisturbance, AbstractNavigation, Measurement
+from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
-from undertow.instruments import compass, depth, dvl, imu, position_fix, propeller_speed
-from undertow.instruments.instrument import AbstractInstrument
-from undertow.loop import in_lanes, sampled
+from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.numerics.randomness import numbered
+from undertow.navigation.observer import observer
+from undertow.navigation.white_noise import white_noise
+from undertow.numerics.random_keys import keys_for, numbered
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.navigation import navigation
-from undertow.sensors.white_noise import white_noise
+from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.sensors.sensor import AbstractSensor
 
 DEVIATION = 0.1
 
@@ -26,7 +29,7 @@ DEVIATION = 0.1
 class Keyed(AbstractDisturbance):
     """No load; its path is its key."""
 
-    def draw(self, key):
+    def realize(self, key):
         return key
 
     def at(self, path, t, place, calm):
@@ -38,15 +41,17 @@ class Keyed(AbstractDisturbance):
 
 @pytest.mark.parametrize("seed", [0, 1, 2**32 - 1])
 def test_no_two_parts_share_a_key(seed):
-    """Disturbances by nine, three of them in a group of their own, all instruments, and each of their samples."""
+    """Disturbances by nine, three of them in a group of their own, all sensors, and each of their samples."""
     disturbance = Together((*(Keyed() for _ in range(6)), Together((Keyed(), Keyed(), Keyed()))))
-    instruments = [imu(), dvl(), depth(), position_fix(), compass(), propeller_speed()]
+    sensors = [imu(), dvl(), depth(), position_fix(), compass(), propeller_speed()]
     plant = double_integrator()
-    loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, navigation(instruments))
-    drawn = loop.draw(jax.random.PRNGKey(seed))
-    keys = [*jax.tree.leaves(drawn.disturbance_path), *drawn.sensor_path]
-    samples = [numbered(key, jnp.asarray(k)) for key in drawn.sensor_path for k in (-1, 0, 1, 2, 3, 4, 5)]
-    assert len(keys) == 9 + len(instruments) and all(isinstance(one, AbstractInstrument) for one in instruments)
+    loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, observer(sensors))
+    realization = loop.realize(jax.random.PRNGKey(seed))
+    keys = [*jax.tree.leaves(realization.disturbance_realization), *realization.navigation_realization]
+    samples = [
+        numbered(key, jnp.asarray(k)) for key in realization.navigation_realization for k in (-1, 0, 1, 2, 3, 4, 5)
+    ]
+    assert len(keys) == 9 + len(sensors) and all(isinstance(one, AbstractSensor) for one in sensors)
     assert len({tuple(np.asarray(key).tolist()) for key in (*keys, *samples)}) == len(keys) + len(samples)
 
 
@@ -64,11 +69,11 @@ def noise_of_a_run(duration, dt, simulate=sampled.simulate):
     plant = double_integrator()
     law = pid(plant.model(), sampling_time=dt, frequency=0.05 / dt)
     loop = ClosedLoop(plant, law, setpoint([0.0]), none(), white_noise(DEVIATION, 0.0))
-    samples = simulate(loop, duration=duration, dt=dt, record_every=1).samples
-    return np.asarray(samples.measured_position - samples.position)[:-1, 0]
+    samples = simulate(loop, duration=duration, dt=dt, record_every=1).signals
+    return np.asarray(samples["measured_position"] - samples["position"])[:-1, 0]
 
 
-@pytest.mark.parametrize("simulate", [sampled.simulate, in_lanes.simulate], ids=["xla", "lanes"])
+@pytest.mark.parametrize("simulate", [sampled.simulate, simd_batch.simulate], ids=["xla", "simd"])
 @pytest.mark.parametrize(("duration", "dt"), [(6e3, 1.0), (1e7, 2e3), (5e-4, 1e-7)])
 def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
     """Beyond 2^32 microseconds, to four months, and below a microsecond."""
@@ -88,9 +93,9 @@ def test_instruments_are_heard_and_noisy_at_any_time(precision):
     with runtime.in_precision(precision):
         times = [(0.0, 10.0), (1e7, 10.0)] + [(0.0, 1e-7), (1e5, 1e-7)] * (precision == "float64")
         for start, period in times:
-            sensor = navigation([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
-            truth = Measurement(jnp.zeros(6), jnp.zeros(6))
-            path = sensor.draw(jax.random.PRNGKey(1))
+            sensor = observer([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
+            truth = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
+            path = sensor.realize(jax.random.PRNGKey(1))
 
             def step(state, k, sensor=sensor, path=path, truth=truth, start=start, period=period):
                 told, state = sensor.measure(path, state, start + period * k, truth)
@@ -105,7 +110,78 @@ def test_instruments_are_heard_and_noisy_at_any_time(precision):
 def test_single_precision_noise_outlives_its_clock():
     """Beyond 2^24 steps two instants are one in float32, but their noise is not: samples are counted."""
     with runtime.in_precision("float32"):
-        sensor: AbstractSensor = white_noise(DEVIATION, 0.0)
-        path, truth, state = sensor.draw(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)), 2**24
+        sensor: AbstractNavigation = white_noise(DEVIATION, 0.0)
+        path, truth, state = sensor.realize(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)), 2**24
         told = [sensor.measure(path, jnp.asarray(state + k), jnp.asarray(1e5), truth)[0].position[0] for k in range(9)]
         assert len(set(map(float, told))) == 9
+
+
+REQUIRED = {"sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()]}
+DRAWING = ("uniform", "normal", "permutation", "bernoulli", "exponential", "choice", "randint")
+BRANCHING = ("split", "fold_in")
+
+
+def every(kind, base):
+    """All parts of a kind that can be made with their defaults."""
+    for part in catalogue.names(kind).values():
+        needed = [p.name for p in inspect.signature(part).parameters.values() if p.default is inspect.Parameter.empty]
+        if set(needed) <= {"sensors"}:
+            made = part(**{name: REQUIRED[name]() for name in needed})
+            if isinstance(made, base):
+                yield made
+
+
+@pytest.fixture
+def used(monkeypatch):
+    """Keys that are drawn from and keys that others are made of, as they are used."""
+    found = {"drawing": [], "branching": []}
+
+    def watched(name, kind):
+        real = getattr(jax.random, name)
+
+        def call(key, *rest, **options):
+            jax.debug.callback(lambda key: found[kind].append(tuple(np.asarray(key).tolist())), key)
+            return real(key, *rest, **options)
+
+        monkeypatch.setattr(jax.random, name, call)
+
+    for name in DRAWING:
+        watched(name, "drawing")
+    for name in BRANCHING:
+        watched(name, "branching")
+    return found
+
+
+@pytest.mark.parametrize("seed", [0, 2**32 - 1])
+def test_no_key_is_used_twice(used, seed):
+    """Every random part of the catalogue in one loop: each draws from keys of its own, and from no key twice."""
+    plant = double_integrator()
+    law = pid(plant.model())
+    disturbance = Together(tuple(every("disturbances", AbstractDisturbance)))
+    for several in every("navigation", AbstractNavigation):
+        used["drawing"].clear()
+        used["branching"].clear()
+        loop = ClosedLoop(plant, law, setpoint([0.0]), disturbance, several)
+        realization = loop.realize(jax.random.PRNGKey(seed))
+        truth = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
+        state = several.init(realization.navigation_realization, truth)
+        for k in range(3):
+            _, state = several.measure(
+                realization.navigation_realization, state, jnp.asarray(1.5 * k), truth
+            )  # a new reading of each
+        jax.effects_barrier()
+        drawn = used["drawing"]
+        assert len(drawn) > 6 and len(set(drawn)) == len(drawn), "a key is drawn from once"
+        assert not set(drawn) & set(used["branching"]), "and no other key is made of it"
+
+
+def test_keys_by_name():
+    """All different, found by name, and a name that comes in later leaves the others as they were."""
+    key = jax.random.PRNGKey(4)
+    few, more = keys_for(key, "disturbance", "navigation"), keys_for(key, "disturbance", "navigation", "faults")
+    assert list(more) == ["disturbance", "navigation", "faults"]
+    assert len({tuple(np.asarray(one).tolist()) for one in (key, *more.values())}) == 4
+    for name, own in few.items():
+        np.testing.assert_array_equal(own, more[name])
+    with pytest.raises(ValueError, match="must be different, but are: waves, waves"):
+        keys_for(key, "waves", "waves")

@@ -8,9 +8,9 @@ from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -42,7 +42,7 @@ def test_first_order(truth):
         assert int(outcome.status) == 0
         np.testing.assert_allclose(outcome.time, truth.time, atol=1e-12)
         names = ("position", "velocity", "estimate", "predicted_velocity")
-        pairs = [(getattr(outcome.samples, name), getattr(truth.samples, name)) for name in names]
+        pairs = [(outcome.signals[name], truth.signals[name]) for name in names]
         return np.array([float(np.abs(np.asarray(a) - np.asarray(b)).max()) for a, b in pairs])
 
     errors = np.stack([gaps(dt) for dt in STEPS])
@@ -67,6 +67,6 @@ def test_fixed_and_adaptive_steps_agree(truth):
     errors = []
     for dt in (RECORD / 20, RECORD / 40):
         fixed = continuous.simulate(loop, duration=DURATION, record_step=RECORD, dt=dt)
-        errors.append(np.abs(np.asarray(fixed.samples.position - truth.samples.position)).max())
+        errors.append(np.abs(np.asarray(fixed.signals["position"] - truth.signals["position"])).max())
     assert errors[1] < 1e-7
     assert errors[0] / errors[1] > 2**3.5

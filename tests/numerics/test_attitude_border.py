@@ -56,7 +56,7 @@ def commanded():
         r = Target(goal, jnp.zeros(6), jnp.zeros(6))
         y = plant.output(jnp.zeros(()), plant.initial_state()._replace(attitude=q, nu=nu))
         volts = controller.command(controller.init(y, r), y, r)[0]
-        return volts, controller.model.drift(y) + controller.model.gain(y) @ volts
+        return volts, controller.model.dynamics.drift(y) + controller.model.dynamics.gain(y) @ volts
 
     return evaluate
 
@@ -72,7 +72,7 @@ def test_both_quaternions_of_an_attitude_get_the_same_voltages(commanded):
 def test_euler_error_differs_by_whole_turns_and_is_at_most_half_a_turn():
     model = hybrid_vehicle(odin(), paper_table3("ideal")).model()
     targets, actuals = RNG.uniform(-20, 20, (2, 200, 6))
-    error = np.asarray(jax.vmap(model.difference)(targets, actuals))
+    error = np.asarray(jax.vmap(model.coordinates.difference)(targets, actuals))
     raw = targets - actuals
     np.testing.assert_array_equal(error[:, :3], raw[:, :3])
     assert np.abs(error[:, 3:]).max() <= np.pi + 1e-14

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from undertow.fuzzy import gaussian_sets
+from undertow.estimation import gaussian_sets
 
 # spacing / width: rho of 3, 5 and 7 sets, and sigma^2 |xi'(0)|^2 of 3 and 5 sets, four digits.
 TABLE = {
@@ -24,14 +24,16 @@ def sets(count, spacing_over_width, reach=1.0):
 @pytest.mark.parametrize("ratio", TABLE)
 @pytest.mark.parametrize(("column", "count"), [(0, 3), (1, 5), (2, 7)])
 def test_gathering_is_the_table(ratio, column, count):
-    np.testing.assert_allclose(sets(count, ratio).gathering(), TABLE[ratio][column], rtol=0, atol=5e-5)
+    np.testing.assert_allclose(sets(count, ratio).basis_norm_squared(), TABLE[ratio][column], rtol=0, atol=5e-5)
 
 
 @pytest.mark.parametrize("ratio", TABLE)
 @pytest.mark.parametrize("reach", [0.01, 1.0, 30.0])
 def test_gathering_of_three_sets_in_closed_form_whatever_the_unit(ratio, reach):
     r = np.exp(-(ratio**2))
-    np.testing.assert_allclose(sets(3, ratio, reach).gathering(), (1 + 2 * r**2) / (1 + 2 * r) ** 2, rtol=1e-13)
+    np.testing.assert_allclose(
+        sets(3, ratio, reach).basis_norm_squared(), (1 + 2 * r**2) / (1 + 2 * r) ** 2, rtol=1e-13
+    )
 
 
 @pytest.mark.parametrize("ratio", TABLE)
@@ -53,13 +55,13 @@ def test_slope_of_the_basis_is_the_table(ratio, column, count):
 def test_gathering_runs_from_one_over_rules_to_one(inputs):
     wide = gaussian_sets(5, (1.0,) * inputs, 1e4)
     narrow = gaussian_sets(5, (1.0,) * inputs, 0.05)
-    np.testing.assert_allclose(wide.gathering(), 1 / 5**inputs, rtol=1e-6)
-    np.testing.assert_allclose(narrow.gathering(), 1.0, rtol=1e-6)
-    np.testing.assert_allclose(gaussian_sets(1, (1.0,) * inputs).gathering(), 1.0, rtol=0, atol=0)
+    np.testing.assert_allclose(wide.basis_norm_squared(), 1 / 5**inputs, rtol=1e-6)
+    np.testing.assert_allclose(narrow.basis_norm_squared(), 1.0, rtol=1e-6)
+    np.testing.assert_allclose(gaussian_sets(1, (1.0,) * inputs).basis_norm_squared(), 1.0, rtol=0, atol=0)
 
 
 def test_gathering_of_two_inputs_is_the_square_of_one():
     """5 x 5 rules at Table 2: 0.405 falls to 0.164."""
-    two = gaussian_sets(5, (4.0, 2.0)).gathering()
-    np.testing.assert_allclose(two, float(gaussian_sets(5).gathering()) ** 2, rtol=1e-13)
+    two = gaussian_sets(5, (4.0, 2.0)).basis_norm_squared()
+    np.testing.assert_allclose(two, float(gaussian_sets(5).basis_norm_squared()) ** 2, rtol=1e-13)
     np.testing.assert_allclose(two, 0.164, atol=5e-4)

@@ -9,7 +9,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from undertow.controllers import rcaf
 from undertow.core.errors import BadInput
-from undertow.numerics.lyapunov import companion_lyapunov
+from undertow.numerics.linear_algebra import companion_lyapunov
 from undertow.plants import double_integrator
 
 RNG = np.random.default_rng(3)

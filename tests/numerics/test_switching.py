@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.identification import SeriesParallel
+from undertow.estimation import SeriesParallel
 from undertow.numerics.smoothing import switch
 
 

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from undertow.bench import plain_numpy
+from undertow.reproduction.all_outputs import with_all_outputs
+from undertow.reproduction.setup import CONTROLLERS, scenario
 from undertow.scenario.execute import execute
-from undertow.studies.paper.setup import CONTROLLERS, scenario
-from undertow.studies.speed import plain_numpy
 
-# Benchmark definitions, section 4: tracking, estimation, uncertainty and robust rms on rung `ideal`, suite U1.
+# Benchmark definitions, section 4: tracking, estimation, uncertainty and robust rms on fidelity `ideal`, suite U1.
 REFERENCE = {
     "rcafc": {"tracking_rms": 1.6e-4, "estimation_rms": 0.201, "uncertainty_rms": 3.224, "robust_rms": 0.144},
     "rafc": {"tracking_rms": 7.22e-3, "estimation_rms": 1.607, "uncertainty_rms": 3.224, "robust_rms": 1.579},
@@ -18,7 +19,7 @@ REFERENCE = {
 def test_example_1_gives_the_reference_figures(controller):
     run = execute(scenario("", composite=CONTROLLERS[controller]))
     for metric, expected in REFERENCE[controller].items():
-        np.testing.assert_allclose(run.steady[metric], expected, rtol=0.02)
+        np.testing.assert_allclose(with_all_outputs(run.steady)[metric], expected, rtol=0.02)
 
 
 def check(run, solution):
@@ -31,13 +32,16 @@ def check(run, solution):
 def test_example_2_agrees_with_plain_numpy(controller):
     loop = {"kind": "continuous", "duration": 12.0}
     window = {"start": 10.0, "stop": 12.0}
-    run = execute(scenario("", rung="static", composite=CONTROLLERS[controller], loop=loop, steady=window))
-    check(run.steady, plain_numpy.paper_example("static", CONTROLLERS[controller], duration=12.0, h=2e-3, every=5))
+    run = execute(scenario("", fidelity="static", composite=CONTROLLERS[controller], loop=loop, steady=window))
+    check(
+        with_all_outputs(run.steady),
+        plain_numpy.paper_example("static", CONTROLLERS[controller], duration=12.0, h=2e-3, every=5),
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rung", ["ideal", "static"])
+@pytest.mark.parametrize("fidelity", ["ideal", "static"])
 @pytest.mark.parametrize("controller", CONTROLLERS)
-def test_examples_agree_with_plain_numpy_throughout(rung, controller):
-    run = execute(scenario("", rung=rung, composite=CONTROLLERS[controller]))
-    check(run.steady, plain_numpy.paper_example(rung, CONTROLLERS[controller]))
+def test_examples_agree_with_plain_numpy_throughout(fidelity, controller):
+    run = execute(scenario("", fidelity=fidelity, composite=CONTROLLERS[controller]))
+    check(with_all_outputs(run.steady), plain_numpy.paper_example(fidelity, CONTROLLERS[controller]))

@@ -10,19 +10,20 @@ from undertow.analysis.drift import gain_of, time_to_divergence
 from undertow.controllers.presets.paper import paper
 from undertow.core.status import Status
 from undertow.plants.double_integrator import double_integrator
+from undertow.reproduction import claims, drifting, horizons, lag_map
+from undertow.reproduction.all_outputs import with_all_outputs
+from undertow.reproduction.claims import c05_fuzzy_input, conditions
+from undertow.reproduction.claims.c04_chattering import perfect_variation
+from undertow.reproduction.running import run_batches
+from undertow.reproduction.setup import FIDELITIES, SIX_AXES, law_of, scenario
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
-from undertow.studies.paper import claims, drifting, horizons, lag_map
-from undertow.studies.paper.batches import fly
-from undertow.studies.paper.claims import c05_fuzzy_input, conditions
-from undertow.studies.paper.claims.c04_chattering import perfect_variation
-from undertow.studies.paper.setup import RUNGS, SIX_AXES, law_of, scenario
 
 WINDOWS = ((10.0, 20.0), (100.0, 200.0))
 
 
 def flown(scenarios, windows=WINDOWS):
-    return fly(scenarios, windows, 1.0, ("weights_peak",))
+    return run_batches(scenarios, windows, 1.0, ("weights_peak",))
 
 
 def shortened(one, seconds):
@@ -43,10 +44,10 @@ def test_a_batch_is_its_runs_one_by_one():
     runs["d"] = scenario("d", loop=horizons.sampled(2.0), **SIX_AXES, disturbance="none")
     found = flown(runs, ((0.0, 2.0), (1.0, 4.0)))
     for name, (start, stop) in (("a", (0.0, 2.0)), ("b", (1.0, 4.0))):
-        alone = execute(runs[name] | {"steady": {"start": start, "stop": stop, "every_tick": True}})
+        alone = execute(runs[name] | {"steady": {"start": start, "stop": stop, "every_step": True}})
         window = found[name].windows[0 if name == "a" else 1]
         for metric in ("tracking_rms", "input_variation", "weights_peak"):
-            assert window[metric] == pytest.approx(alone.steady[metric], rel=1e-12), (name, metric)
+            assert window[metric] == pytest.approx(with_all_outputs(alone.steady)[metric], rel=1e-12), (name, metric)
         same = alone.dataset["weights_peak"].sel(time=found[name].time, method="nearest")
         np.testing.assert_allclose(found[name].series["weights_peak"], same, rtol=1e-12)
     assert found["a"].windows[1] is None and found["a"].lasted, "it was over before the end of the window"
@@ -56,7 +57,7 @@ def test_a_batch_is_its_runs_one_by_one():
 
 
 def test_w1_lasts_only_with_bounded_weights():
-    """Benchmark, section 7: gamma_eps 20 on the whole motor is lost after 139 s; within a box of 20 it lasts."""
+    """Benchmark, section 7: gamma_eps 20 on the full motor model is lost after 139 s; within a box of 20 it lasts."""
     names = [horizons.name_of("electromechanical", "w1", bounded) for bounded in (False, True)]
     free, bounded = flown({name: horizons.scenarios(True)[name] for name in names}).values()
     assert free.windows[0] is not None, "20 s show nothing"
@@ -88,7 +89,7 @@ def test_the_winding_breaks_it():
 
 def test_weights_drift_until_the_loop_is_stable():
     """Behind 50 ms every axis ends with a gain c beyond what the linearised loop asks for; a box of 20 keeps it away."""
-    found = fly(drifting.scenarios(), ((10.0, 20.0),), 1.0, ("weights", "weights_peak"))
+    found = run_batches(drifting.scenarios(), ((10.0, 20.0),), 1.0, ("weights", "weights_peak"))
     free, bounded = found["drifting_free"], found["drifting_bounded"]
     needed, _ = lag_map.stable_gains(lambda c: lag_map.lag_matrix(law_of(free), drifting.LAG, drifted=c), 2000.0)
     gains = [gain_of(law_of(run), run.series["weights"][-1]) for run in (free, bounded)]
@@ -109,7 +110,8 @@ def test_limits_and_noise_decide_between_rcafc_and_rafc_at_the_same_gain():
     for volts in conditions.LIMITS:
         rcafc, rafc, bounded = (found[f"c02_{law}_{volts:g}V"].windows[0] for law in ("rcafc", "rafc", "rafc_bounded"))
         assert rcafc["tracking_rms"] == pytest.approx(1.6e-4, rel=0.02)
-        assert rafc is None or rafc["tracking_rms"] > 0.5
+        # Its weights wind up, and how far it strays is chaotic: 0.3 to 16 in the last digit of a rounding.
+        assert rafc is None or rafc["tracking_rms"] > 1000 * rcafc["tracking_rms"]
         assert bounded["tracking_rms"] == pytest.approx(1.58e-4, rel=0.02)
     noisy = [found[f"c02_{law}_noise"].windows[0]["estimation_rms"] for law in ("rcafc", "rafc")]
     assert noisy[1] > 4 * noisy[0]
@@ -127,14 +129,14 @@ def test_drift_by_noise_with_the_sets_of_the_benchmark():
 
 def test_fuzzy_input_is_judged_on_every_level():
     wanted = c05_fuzzy_input.batched(False)
-    assert {name.split("_")[1] for name in wanted} == set(RUNGS)
+    assert {name.split("_")[1] for name in wanted} == set(FIDELITIES)
     one_rule = build(wanted["c05_shaft_error_1"]).closed_loop.controller
     five = paper(double_integrator(1).model())
-    assert float(one_rule.fuzzy.gathering()) == 1.0
-    assert float(one_rule.adaptation) == pytest.approx(100 * float(five.fuzzy.gathering()), rel=1e-4)
+    assert float(one_rule.fuzzy.basis_norm_squared()) == 1.0
+    assert float(one_rule.adaptation) == pytest.approx(100 * float(five.fuzzy.basis_norm_squared()), rel=1e-4)
 
 
-def test_rows_of_the_long_ladder_keep_their_scenarios(tmp_path):
+def test_rows_of_the_long_runs_keep_their_scenarios(tmp_path):
     """One row per run; curves start after the start and are as long as the run."""
     names = [horizons.name_of("shaft", "rafc", bounded) for bounded in (False, True)]
     runs = flown({name: shortened(horizons.scenarios(True)[name], 20.0) for name in names}, WINDOWS[:1])
@@ -145,4 +147,4 @@ def test_rows_of_the_long_ladder_keep_their_scenarios(tmp_path):
         assert row["weights_peak"][0] >= row["growth"]["weights_peak"][-1] > 0
     json.dumps(rows)
     quick, full = (set(horizons.scenarios(quick)) for quick in (True, False))
-    assert quick < full and {name.split("_")[1] for name in full} == set(RUNGS)
+    assert quick < full and {name.split("_")[1] for name in full} == set(FIDELITIES)

@@ -11,7 +11,7 @@ from mujoco_states import poses, undertow_acceleration
 
 from undertow.core.errors import BadInput
 from undertow.interop.mujoco_engine import Submerged, Water, mjcf
-from undertow.interop.mujoco_engine.rigid_body import as_rigid_body
+from undertow.interop.mujoco_engine.mjcf import as_rigid_body
 from undertow.numerics.rotations import Kinematics, rotation_from_euler
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import paper_table3

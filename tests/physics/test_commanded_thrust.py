@@ -9,16 +9,17 @@ from scipy.optimize import linprog
 
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target
+from undertow.core.contracts import AbstractController, Model, Target
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances import none
-from undertow.loop import in_lanes, sampled
+from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect
 from undertow.numerics.integrators import rk4
 from undertow.plants import hybrid_vehicle
 from undertow.power import battery
 from undertow.references import setpoint
-from undertow.sensors import perfect
 from undertow.thrusters import commanded_thrust, first_order
 from undertow.vehicles import bluerov2_heavy, odin
 
@@ -68,7 +69,7 @@ def test_each_side_is_clipped_at_its_own_limit():
 class Asking(AbstractController):
     """A law that asks for the same whatever happens."""
 
-    model: AbstractModel
+    model: Model
     asked: jax.Array
     inner: AbstractController
 
@@ -77,6 +78,9 @@ class Asking(AbstractController):
 
     def command(self, z, y, r):
         return self.asked, self.inner.command(z, y, r)[1]
+
+    def signals(self):
+        return self.inner.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         return self.inner.advance(z, y, r, u_applied, dt)
@@ -89,7 +93,7 @@ def test_metrics_count_each_limit():
     law = Asking(plant.model(), asked, pid(plant.model(), sampling_time=0.02))
     loop = ClosedLoop(plant, law, setpoint([0.0] * 6), none(), perfect())
     run = sampled.simulate(loop, duration=1.0, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 1.0),))
-    found = results(run.accumulated[0])
+    found = results((Metrics(0.0, 1.0),), run.accumulated)
     assert found["saturated_fraction"] == pytest.approx(2 / 8)
     assert found["input_peak"] == pytest.approx(FORWARD)
     assert found["input_rms"] == pytest.approx(np.sqrt((30**2 + 12**2 + 15**2 + 11**2) / 8))
@@ -121,7 +125,7 @@ THRUSTERS = {
 @pytest.mark.parametrize("name", THRUSTERS)
 def test_a_drive_knows_both_limits_and_the_steady_curve(name):
     thruster, limits = THRUSTERS[name]
-    drive = thruster.drive(3, False)
+    drive = thruster.actuator_model(3, False)
     still, natural = drive.init(), 10.0  # 1/s: no faster than by itself
     np.testing.assert_allclose(drive.range(still, natural), np.repeat(np.array(limits)[:, None], 3, 1))
     np.testing.assert_allclose(drive.range(still, 2 * natural), np.repeat(np.array(limits)[:, None], 3, 1) / 2)
@@ -129,15 +133,15 @@ def test_a_drive_knows_both_limits_and_the_steady_curve(name):
     newtons = np.array([-5.0, 0.5, 11.0])
     commands = drive.command(still, newtons, natural)
     np.testing.assert_allclose(settle(thruster, commands, 3.0).thrust, newtons, rtol=1e-9)
-    np.testing.assert_allclose(drive.steady().force((), commands), newtons, rtol=1e-12)
-    np.testing.assert_allclose(drive.aim(still, commands, natural), newtons, rtol=1e-12)
+    np.testing.assert_allclose(drive.quasi_static().force((), commands), newtons, rtol=1e-12)
+    np.testing.assert_allclose(drive.target_of(still, commands, natural), newtons, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", THRUSTERS)
 def test_a_drive_predicts_the_thrust_behind_its_lag(name):
     """Step by step with the thruster itself; made to follow faster than by itself, it does: exp(-rate t)."""
     thruster, _ = THRUSTERS[name]
-    drive, rate, dt = thruster.drive(3, False), 30.0, 0.01
+    drive, rate, dt = thruster.actuator_model(3, False), 30.0, 0.01
     wanted, believed, true = jnp.array([-1.0, 0.5, 3.0]), drive.init(), thruster.initial_state(3)
     for k in range(1, 20):
         volts = drive.command(believed, wanted, rate)
@@ -161,17 +165,22 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
 
     @eqx.filter_jit
     def decide(position):
-        y = Measurement(jnp.zeros(6), jnp.zeros(6))
+        y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
         r = Target(position, jnp.zeros(6), jnp.zeros(6))
         unfiltered = eqx.tree_at(lambda c: c.filter, controller, None)
         z = unfiltered.init(y, r)
-        u, telemetry = unfiltered.command(z, y, r)
-        return u, telemetry.books["attained_share"], unfiltered._plan(z, y, r).forces, own.effect(y)
+        u, signals = unfiltered.command(z, y, r)
+        return (
+            u,
+            signals["attained_share"],
+            unfiltered._plan(z, y, r).forces,
+            own.dynamics.gain(y),
+        )
 
     for _ in range(6):
         position = jnp.asarray(rng.normal(size=6) * [3.0, 3.0, 3.0, 0.3, 0.3, 0.6])
         u, share, forces, effect = decide(position)
-        given = thruster.drive(8, False).steady().force((), u)
+        given = thruster.actuator_model(8, False).quasi_static().force((), u)
         assert float(jnp.min(given)) >= low - 1e-9 and float(jnp.max(given)) <= high + 1e-9
         wanted = np.asarray(effect @ forces)
         # max s with effect f = s a, low <= f <= high, 0 <= s <= 1
@@ -194,9 +203,9 @@ def test_a_vehicle_comes_to_its_place_within_both_limits(law):
     loop = ClosedLoop(plant, controller, setpoint([3.0, 0.0, 1.0, 0.0, 0.0, 0.0]), none(), perfect())
     how = dict(duration=30.0, dt=0.05, record_every=5)
     run = sampled.simulate(loop, **how)
-    error, u = np.asarray(run.samples.error), np.asarray(run.samples.voltage)
+    error, u = np.asarray(run.signals["error"]), np.asarray(run.signals["input"])
     assert int(run.status) == 0
-    assert u.min() >= -4.0 and u.max() <= 40.0 and np.asarray(run.samples.saturated).any()
+    assert u.min() >= -4.0 and u.max() <= 40.0 and np.asarray(run.signals["saturated"]).any()
     np.testing.assert_allclose(error[-1], 0.0, atol=0.02)
     assert error[:, :3].min() > -0.05
 
@@ -208,10 +217,10 @@ def test_batches_and_xla_agree(law):
     controller = LAWS[law](plant.model(), sampling_time=0.02)
     loop = ClosedLoop(plant, controller, setpoint([3.0, 0.0, 1.0, 0.0, 0.0, 0.0]), none(), perfect())
     how = dict(duration=0.6, dt=0.02, record_every=5)
-    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
-    wrench = lambda samples: np.asarray(samples.voltage) @ np.asarray(plant.thruster_matrix).T
-    for pick in (wrench, lambda samples: np.asarray(samples.position)):
-        here, there = pick(found.samples), pick(wanted.samples)
+    found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
+    wrench = lambda samples: np.asarray(samples["input"]) @ np.asarray(plant.thruster_matrix).T
+    for pick in (wrench, lambda samples: np.asarray(samples["position"])):
+        here, there = pick(found.signals), pick(wanted.signals)
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max())
-    np.testing.assert_array_equal(found.samples.saturated, wanted.samples.saturated)
-    assert np.asarray(wanted.samples.saturated).any()
+    np.testing.assert_array_equal(found.signals["saturated"], wanted.signals["saturated"])
+    assert np.asarray(wanted.signals["saturated"]).any()

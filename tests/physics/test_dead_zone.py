@@ -6,25 +6,29 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from simdjit import Loop
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
+from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.disturbances import sinusoid
-from undertow.lanes.program import Program
-from undertow.loop import in_lanes, sampled
+from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect
 from undertow.numerics.integrators import rk4
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
-from undertow.sensors import perfect
 from undertow.thrusters import first_order, linear_voltage, paper_table3, quadratic_voltage, t200, t500
 from undertow.vehicles import bluerov2_heavy
 
 ZONE, SUPPLY = 1.5, 12.0  # V
 KINDS = ("pass", "subtract")
 MAKERS = {
-    **{rung: lambda rung=rung, **zone: paper_table3(rung, **zone) for rung in ("ideal", "static")},
-    **{rung: lambda rung=rung, **zone: paper_table3(rung, **zone) for rung in ("shaft", "electromechanical")},
+    **{fidelity: lambda fidelity=fidelity, **zone: paper_table3(fidelity, **zone) for fidelity in ("ideal", "static")},
+    **{
+        fidelity: lambda fidelity=fidelity, **zone: paper_table3(fidelity, **zone)
+        for fidelity in ("shaft", "electromechanical")
+    },
     "linear": linear_voltage,
     "quadratic": quadratic_voltage,
     "first_order": lambda **zone: first_order(reverse_share=0.6, **zone),
@@ -64,7 +68,7 @@ def test_a_voltage_that_is_not_a_number_does_not_become_zero_volts(kind):
     thruster, volts = with_zone("static", kind), np.array([[np.nan], [0.3], [-6.0]])
     by_xla = np.asarray(eqx.filter_jit(thruster.terminal)(volts))
     one, nothing = jnp.zeros(1), np.zeros(())
-    program = Program(
+    program = Loop(
         lambda numbers: numbers,
         lambda numbers: nothing,
         lambda numbers, carry, k: carry,
@@ -73,7 +77,7 @@ def test_a_voltage_that_is_not_a_number_does_not_become_zero_volts(kind):
         [False],
         0,
     )
-    _, batched = program.run((volts,), ticks=1, every=1)
+    _, batched = program.run((volts,), steps=1, every=1)
     for found in (by_xla, np.asarray(batched)[:, 0]):
         assert np.isnan(found[0, 0])
         np.testing.assert_allclose(found[1:, 0], [0.0, -6.0 if kind == "pass" else -4.5], rtol=1e-15)
@@ -86,7 +90,7 @@ def test_slope_and_precision(kind):
     terminal = with_zone("static", kind).terminal
     slopes = jax.vmap(jax.grad(terminal))(jnp.array([-4.0, -1.0, 1.0, 4.0]))
     np.testing.assert_array_equal(slopes, [1.0, 0.0, 0.0, 1.0])
-    with jax.enable_x64(False):
+    with runtime.in_precision("float32"):
         found = with_zone("static", kind).terminal(jnp.asarray(VOLTS))
     assert found.dtype == jnp.float32
     np.testing.assert_allclose(found, TURNS[kind], rtol=0, atol=2e-7)
@@ -110,7 +114,7 @@ def test_voltage_for_a_thrust(name):
     """The curve of a drive and its inverse; `pass` cannot give the thrusts whose voltage is inside the zone."""
     newtons = np.array([-30.0, -8.0, -0.01, 0.0, 0.01, 8.0, 30.0])
     for kind in KINDS:
-        drive = with_zone(name, kind).drive(7, False).steady()
+        drive = with_zone(name, kind).actuator_model(7, False).quasi_static()
         volts = np.asarray(drive.command((), newtons, 1.0))
         found = np.asarray(drive.force((), volts))
         lost = np.abs(volts) <= ZONE
@@ -124,20 +128,20 @@ def test_voltage_for_a_thrust(name):
 def test_drive_of_a_motor(name, kind):
     """Its command aims where it was told to; its prediction turns as the true motor; its range ends at the supply."""
     thruster, rate = with_zone(name, kind), 40.0
-    drive = thruster.drive(4, False)
+    drive = thruster.actuator_model(4, False)
     state = jax.tree.map(lambda leaf: jnp.asarray([20.0, -30.0, 5.0, 0.5]), drive.init())
     wanted = jnp.asarray([9.0, -7.0, 15.0, -4.0])
     volts = drive.command(state, wanted, rate)
     heard = np.abs(volts) > ZONE
     assert heard.sum() >= (3 if kind == "pass" else 4)
-    np.testing.assert_allclose(drive.aim(state, volts, rate)[heard], wanted[heard], rtol=1e-9)
+    np.testing.assert_allclose(drive.target_of(state, volts, rate)[heard], wanted[heard], rtol=1e-9)
     resting = drive.init()
     for limit, side in zip(drive.range(resting, 10.0), (-1.0, 1.0), strict=True):
         expected = thruster.motor.thrust(
             side * (SUPPLY - (ZONE if kind == "subtract" else 0.0)) / thruster.motor.k1 / 10
         )
         np.testing.assert_allclose(limit, np.full(4, expected), rtol=1e-12)
-    assert drive.steady().thruster.dead_zone_kind == kind
+    assert drive.quasi_static().thruster.dead_zone_kind == kind
 
     if name == "shaft":
         return  # the drive knows of the inductance that this fidelity leaves out
@@ -163,9 +167,9 @@ def test_energy_is_accounted_for(kind):
     """What the drives take goes into copper, water and rotors, to the error of the integrator."""
     law = lambda model: rcaf(model, preset="robust", sampling_time=0.02)
     run = sampled.simulate(station(kind, law, offset=0.2), duration=2.0, dt=0.02, record_every=10, substeps=8)
-    found = {name: np.asarray(values) for name, values in run.samples.books.items() if name.startswith("energy_")}
+    found = {name: np.asarray(values) for name, values in run.signals.items() if name.startswith("energy_")}
     assert found["energy_source"][-1] > 5.0
-    assert np.abs(found["energy_defect"]).max() < 1e-3 * found["energy_source"][-1]
+    assert np.abs(found["energy_integration_error"]).max() < 1e-3 * found["energy_source"][-1]
 
 
 @pytest.mark.parametrize("make", [t200, t500], ids=["t200", "t500"])
@@ -173,7 +177,7 @@ def test_a_law_that_knows_the_zone_loses_nothing_to_it(make):
     """Small forces: `subtract` gives them all, as its inverse adds the zone; `pass` none below its own."""
     newtons = jnp.linspace(-0.2, 0.2, 21)
     for kind, least in (("subtract", 0.0), ("pass", None)):
-        drive = make(dead_zone_kind=kind).drive(21, False).steady()
+        drive = make(dead_zone_kind=kind).actuator_model(21, False).quasi_static()
         given = np.asarray(drive.force((), drive.command((), newtons, 1.0)))
         if least is None:
             np.testing.assert_array_equal(given, 0.0)
@@ -186,12 +190,12 @@ def test_batches_and_xla_agree_where_the_zone_subtracts(law):
     options = {"preset": "robust"} if law is rcaf else {}
     loop = station("subtract", lambda model: law(model, sampling_time=0.02, **options))
     how = dict(duration=0.6, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 0.6),))
-    found, wanted = in_lanes.simulate(loop, **how), sampled.simulate(loop, **how)
-    for name in ("position", "voltage", "power"):
-        here, there = getattr(found.samples, name), np.asarray(getattr(wanted.samples, name))
+    found, wanted = simd_batch.simulate(loop, **how), sampled.simulate(loop, **how)
+    for name in ("position", "input", "power"):
+        here, there = found.signals[name], np.asarray(wanted.signals[name])
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max(), err_msg=name)
-    assert np.abs(wanted.samples.voltage[np.abs(wanted.samples.voltage) > 0]).min() > 1.2, "the zone is added"
-    assert results(found.accumulated[0])["input_rms"] > 1.2
+    assert np.abs(wanted.signals["input"][np.abs(wanted.signals["input"]) > 0]).min() > 1.2, "the zone is added"
+    assert results(how["accumulators"], found.accumulated)["input_rms"] > 1.2
 
 
 def test_what_cannot_be():

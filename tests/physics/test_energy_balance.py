@@ -55,8 +55,8 @@ def balance(plant, steps, strength):
         return new, jnp.maximum(rise, energy(plant, new.x) - energy(plant, state.x))
 
     start = Ledger(plant.initial_state(*START), jnp.zeros(()), jnp.zeros(()))
-    ticks = jnp.asarray(steps, dtype=int)
-    end, rise = jax.lax.fori_loop(0, ticks, step, (start, jnp.asarray(-jnp.inf)))
+    steps = jnp.asarray(steps, dtype=int)
+    end, rise = jax.lax.fori_loop(0, steps, step, (start, jnp.asarray(-jnp.inf)))
     gained = energy(plant, end.x) - energy(plant, start.x)
     return (gained - end.work) / end.throughput, end.throughput, -gained, rise
 

@@ -87,7 +87,7 @@ def accelerations(pose, velocity, speed, current, volts, wrench):
         model = NOMINAL.model(speed_sensor=speed_sensor, rate_term=rate_term)
         wrenches = PLANT.thruster_matrix @ unknown - wrench - delta
         lumped = j @ jnp.linalg.solve(nominal.mass_matrix, wrenches)
-        known = model.drift(y) + model.gain(y) @ volts
+        known = model.dynamics.drift(y) + model.dynamics.gain(y) @ volts
         return known + lumped if rate_term else known + lumped + j_rate @ nu
 
     plant = PLANT.acceleration(t, x, volts, load)
@@ -110,7 +110,7 @@ def gains(pose):
     b_alpha = NOMINAL.thruster_matrix * NOMINAL.thruster.voltage_gain()
     m = NOMINAL.body.mass_matrix
     lagrangian = jnp.linalg.solve(inverse.T @ m @ inverse, inverse.T @ b_alpha)
-    return NOMINAL.model().gain(y), j @ jnp.linalg.solve(m, b_alpha), lagrangian
+    return NOMINAL.model().dynamics.gain(y), j @ jnp.linalg.solve(m, b_alpha), lagrangian
 
 
 STEEP = POSE * np.array([1, 1, 1, 1, 1.5 / 1.3, 1])
@@ -131,7 +131,9 @@ def test_rank_of_gain_is_the_rank_of_the_thruster_matrix(numbers, rank):
     """Wherever |pitch| < 1.5: geometry decides once and for all."""
     plant = hybrid_vehicle(odin().with_thrusters(tuple(numbers)), paper_table3("ideal"))
     columns = np.array(numbers) - 1
-    np.testing.assert_allclose(plant.model().body_gain, np.asarray(NOMINAL.model().body_gain)[:, columns], rtol=1e-14)
+    np.testing.assert_allclose(
+        plant.model().dynamics.body_gain, np.asarray(NOMINAL.model().dynamics.body_gain)[:, columns], rtol=1e-14
+    )
     singular = np.linalg.svd(CODE[:, :, columns], compute_uv=False)
     assert ((singular > 1e-10 * singular[:, :1]).sum(1) == rank).all()
     assert plant.rank() == rank
@@ -145,7 +147,7 @@ def test_inverse_of_the_model_is_the_pseudo_inverse_of_its_gain():
 
         def both(pose, wanted, plant=plant, model=model):
             y = plant.output(jnp.zeros(()), plant.initial_state(pose))
-            return model.invert(y, wanted), jnp.linalg.pinv(model.gain(y), rtol=1e-10) @ wanted
+            return model.dynamics.invert(y, wanted), jnp.linalg.pinv(model.dynamics.gain(y), rtol=1e-10) @ wanted
 
         found, expected = map(np.asarray, jax.jit(jax.vmap(both))(POSE, VELOCITY))
         difference = np.linalg.norm(found - expected, axis=1)

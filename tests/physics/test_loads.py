@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.core.contracts import Place
+from undertow.core.contracts import Pose
 from undertow.core.errors import BadInput
 from undertow.disturbances.adding import Together
 from undertow.disturbances.parameter_error import parameter_error
@@ -31,7 +31,7 @@ def body_rate(plant, load=None, t=0.0):
     """nu_dot at a state in motion; without the paper's convention on J_dot nu, which is about d."""
     x = plant.initial_state(POSE, RATES)
     calm = plant.no_load()
-    felt = calm if load is None else load.at(load.draw(jax.random.PRNGKey(7)), jnp.asarray(t), plant.place(x), calm)
+    felt = calm if load is None else load.at(load.realize(jax.random.PRNGKey(7)), jnp.asarray(t), plant.pose(x), calm)
     return np.asarray(plant.dynamics(ZERO, x, VOLTS, felt).nu)
 
 
@@ -77,7 +77,7 @@ def test_factor_scales_its_term_of_the_equation_of_motion(name):
         "restoring": -body.restoring(rotation_from_euler(POSE[3:])[2]),
         "thrust": PLANT.thruster_matrix @ THRUSTER.thrust(x.thrusters, VOLTS),
     }
-    # Remark 2: on this rung J_dot nu belongs to what is prescribed, whatever the body is.
+    # Remark 2: on this fidelity J_dot nu belongs to what is prescribed, whatever the body is.
     prescribed = body_rate(PLANT) - np.linalg.solve(body.mass_matrix, sum(terms.values()))
     force = sum(factors[key] * term for key, term in terms.items())
     expected = np.linalg.solve(factors["mass"] * body.mass_matrix, force) + prescribed
@@ -86,7 +86,7 @@ def test_factor_scales_its_term_of_the_equation_of_motion(name):
 
 
 def test_factors_are_drawn_from_their_ranges():
-    drawn = jax.vmap(parameter_error(mass=(0.9, 1.1), damping=(0.5, 2.0)).draw)(
+    drawn = jax.vmap(parameter_error(mass=(0.9, 1.1), damping=(0.5, 2.0)).realize)(
         jax.random.split(jax.random.PRNGKey(1), 2000)
     )
     for values, (low, high) in ((drawn.mass, (0.9, 1.1)), (drawn.damping, (0.5, 2.0))):
@@ -96,7 +96,7 @@ def test_factors_are_drawn_from_their_ranges():
 
 
 def pull(cable, position, angles=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0)):
-    place = Place(jnp.asarray(position), rotation_from_euler(jnp.asarray(angles)), jnp.asarray(velocity))
+    place = Pose(jnp.asarray(position), rotation_from_euler(jnp.asarray(angles)), jnp.asarray(velocity))
     return -np.asarray(cable.at((), ZERO, place, PLANT.no_load()).wrench)
 
 

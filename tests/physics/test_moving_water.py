@@ -6,14 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.core.contracts import Place, Water
+from undertow.core.contracts import Pose, Water
 from undertow.core.errors import BadInput
 from undertow.disturbances.adding import Together
 from undertow.disturbances.current import current
 from undertow.disturbances.gauss_markov_current import gauss_markov_current
-from undertow.disturbances.jonswap import spectrum
 from undertow.disturbances.sheared_current import sheared_current
-from undertow.disturbances.waves import waves
+from undertow.disturbances.waves import spectrum, waves
 from undertow.numerics.integrators import rk4
 from undertow.numerics.rotations import rotation_from_euler
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
@@ -29,20 +28,20 @@ STEP, TICKS = 2e-3, 2500
 
 
 def at(position):
-    return Place(jnp.asarray(position), rotation_from_euler(POSE[3:]), jnp.zeros(3))
+    return Pose(jnp.asarray(position), rotation_from_euler(POSE[3:]), jnp.zeros(3))
 
 
 def fly(disturbance, velocity):
     """Outputs after five seconds."""
-    path = disturbance.draw(jax.random.PRNGKey(0))
+    path = disturbance.realize(jax.random.PRNGKey(0))
 
     def rate(t, x):
-        return PLANT.dynamics(t, x, VOLTS, disturbance.at(path, t, PLANT.place(x), CALM))
+        return PLANT.dynamics(t, x, VOLTS, disturbance.at(path, t, PLANT.pose(x), CALM))
 
-    def tick(k, x):
+    def step(k, x):
         return rk4(rate, k.astype(float) * STEP, x, jnp.asarray(STEP))
 
-    x = jax.jit(lambda x: jax.lax.fori_loop(0, TICKS, tick, x))(PLANT.initial_state(POSE, velocity))
+    x = jax.jit(lambda x: jax.lax.fori_loop(0, TICKS, step, x))(PLANT.initial_state(POSE, velocity))
     y = PLANT.output(0.0, x)
     return np.concatenate([y.position, y.velocity])
 
@@ -86,7 +85,7 @@ def test_morison():
 
 
 def water_of(disturbance, key, t, position):
-    return disturbance.at(disturbance.draw(key), t, at(position), CALM).water
+    return disturbance.at(disturbance.realize(key), t, at(position), CALM).water
 
 
 def test_wave_acceleration_is_the_rate_of_the_velocity():
@@ -122,7 +121,7 @@ def test_variance_of_orbital_velocity(depth):
 
 def test_wandering_current_has_its_variance_and_correlation():
     process = gauss_markov_current(mean=(0.3, 0.0, 0.0), deviation=(0.1, 0.2, 0.0), correlation_time=10.0, step=0.5)
-    paths = np.asarray(jax.vmap(process.draw)(jax.random.split(jax.random.PRNGKey(3), 500)))
+    paths = np.asarray(jax.vmap(process.realize)(jax.random.split(jax.random.PRNGKey(3), 500)))
     np.testing.assert_allclose(paths.std(axis=(0, 1)), [0.1, 0.2, 0.0], rtol=0.02)
     lag = 20  # 10 s
     correlation = (paths[:, :-lag, :2] * paths[:, lag:, :2]).mean(axis=(0, 1)) / paths[..., :2].var(axis=(0, 1))
@@ -132,7 +131,7 @@ def test_wandering_current_has_its_variance_and_correlation():
 def test_wandering_current_is_its_samples_and_linear_between():
     process = gauss_markov_current(span=10.0, step=0.5)
     key = jax.random.PRNGKey(4)
-    path = np.asarray(process.draw(key)) + [0.3, 0.0, 0.0]
+    path = np.asarray(process.realize(key)) + [0.3, 0.0, 0.0]
     for t, expected, slope in (
         (2.0, path[4], (path[5] - path[4]) / 0.5),
         (2.25, path[4:6].mean(0), (path[5] - path[4]) / 0.5),
@@ -152,7 +151,7 @@ def test_sheared_current(down, north):
 
 def test_currents_add_and_each_member_has_its_own_randomness():
     two = Together((gauss_markov_current(), gauss_markov_current(), current((0.0, 0.2, 0.0))))
-    path = two.draw(jax.random.PRNGKey(0))
+    path = two.realize(jax.random.PRNGKey(0))
     assert np.abs(path[0] - path[1]).max() > 0.01
     water = two.at(path, jnp.asarray(3.0), at(jnp.zeros(3)), CALM).water
     np.testing.assert_allclose(water.velocity, np.array([0.6, 0.2, 0.0]) + path[0][6] + path[1][6], rtol=0, atol=1e-12)

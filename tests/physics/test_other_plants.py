@@ -12,17 +12,17 @@ from undertow.core.status import Status
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.numerics.integrators import rk4
 from undertow.plants import inverted_pendulum, linear_plant, magnetic_levitation, two_link_arm
-from undertow.plants.levitation_rig import RIGS
+from undertow.plants.magnetic_levitation import RIGS
 from undertow.plants.reachability import lost_directions, open_loop_advice
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 
 UNDER = ((1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # pushes x1 and x2 alike
 PLANTS = {
     "pendulum": inverted_pendulum(),
-    "levitation": magnetic_levitation(rung="ideal"),
+    "levitation": magnetic_levitation(fidelity="ideal"),
     "arm": two_link_arm(),
     "redundant": linear_plant(position_term=-np.eye(2), velocity_term=-0.3 * np.ones((2, 2))),
     "under-actuated": linear_plant(UNDER, -4 * np.eye(3)),
@@ -42,9 +42,9 @@ def integrate(plant, x, u, duration, dt):
     """State after a time under a constant input, by RK4."""
 
     @eqx.filter_jit
-    def run(plant, x, dt, ticks):
+    def run(plant, x, dt, steps):
         field = lambda t, x: plant.dynamics(t, x, jnp.asarray(u), plant.no_load())
-        return jax.lax.fori_loop(0, ticks, lambda k, x: rk4(field, jnp.zeros(()), x, dt), x)
+        return jax.lax.fori_loop(0, steps, lambda k, x: rk4(field, jnp.zeros(()), x, dt), x)
 
     return run(plant, x, np.asarray(dt), np.asarray(round(duration / dt)))
 
@@ -64,13 +64,13 @@ def test_a_model_told_the_truth_gives_the_acceleration(name):
         load = plant.no_load()._replace(acceleration=jnp.asarray(rng.normal(size=len(plant.outputs))))
         found = plant.acceleration(0.0, x, u, load)
         np.testing.assert_allclose(
-            found, model.drift(y) + model.gain(y) @ u + load.acceleration, rtol=1e-12, atol=1e-12
+            found, model.dynamics.drift(y) + model.dynamics.gain(y) @ u + load.acceleration, rtol=1e-12, atol=1e-12
         )
         rates = plant.dynamics(0.0, x, u, load)
         _, second = jax.jvp(lambda x: plant.output(0.0, x).velocity, (x,), (rates,))
         np.testing.assert_allclose(second, found, rtol=1e-14, err_msg="the state moves as `acceleration` says")
-        reached = model.gain(y) @ model.invert(y, model.gain(y) @ u)
-        np.testing.assert_allclose(reached, model.gain(y) @ u, rtol=1e-12, atol=1e-12)
+        reached = model.dynamics.gain(y) @ model.dynamics.invert(y, model.dynamics.gain(y) @ u)
+        np.testing.assert_allclose(reached, model.dynamics.gain(y) @ u, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", PLANTS)
@@ -90,11 +90,11 @@ def test_every_plant_converges_at_fourth_order(name):
 def test_pendulum_published_values():
     """Wang's constants: b(0) = 1.46341 1/(kg m), slope 15.7756 1/s^2, so an unstable pole at 3.972 1/s."""
     cart_pole = inverted_pendulum().cart_pole
-    np.testing.assert_allclose(cart_pole.gain(0.0), 1.4634146, rtol=1e-7)
-    slope = jax.grad(cart_pole.drift)(0.0, 0.0)
+    np.testing.assert_allclose(cart_pole.lever(0.0), 1.4634146, rtol=1e-7)
+    slope = jax.grad(lambda angle: cart_pole.drift(Measurement(angle, 0.0)))(0.0)
     np.testing.assert_allclose(slope, 15.7756, rtol=2e-6)
     np.testing.assert_allclose(np.sqrt(slope), 3.972, atol=5e-4)
-    np.testing.assert_allclose(cart_pole.drift(0.3, 1.2), _textbook_drift(0.3, 1.2), rtol=1e-13)
+    np.testing.assert_allclose(cart_pole.drift(Measurement(0.3, 1.2)), _textbook_drift(0.3, 1.2), rtol=1e-13)
 
 
 def _textbook_drift(x1, x2, m_c=1.0, m=0.1, half=0.5, g=9.8):
@@ -133,8 +133,8 @@ def test_work_of_the_force_is_the_gain_of_energy():
 
 def test_pendulum_ends_where_its_pole_lies_flat():
     plant = inverted_pendulum()
-    assert plant.health(plant.initial_state(jnp.array([1.5]))) == int(Status.OK)
-    assert plant.health(plant.initial_state(jnp.array([1.57]))) == int(Status.OUT_OF_RANGE)
+    assert plant.status(plant.initial_state(jnp.array([1.5]))) == int(Status.OK)
+    assert plant.status(plant.initial_state(jnp.array([1.57]))) == int(Status.OUT_OF_RANGE)
 
 
 # -------------------------------------------------------------------------------------------------- levitation
@@ -225,13 +225,13 @@ def test_levitation_plant_moves_by_the_same_equations():
 
 
 def test_levitation_allocates_to_the_coil_that_pulls_the_wanted_way():
-    plant = magnetic_levitation(rung="ideal")
+    plant = magnetic_levitation(fidelity="ideal")
     model = plant.model()
     for wanted in (-3.0, 5.0):
         y = Measurement(jnp.array([0.012]), jnp.zeros(1))
-        u = model.invert(y, jnp.array([wanted]))
+        u = model.dynamics.invert(y, jnp.array([wanted]))
         assert (u >= 0).all() and (u > 0).sum() == 1
-        np.testing.assert_allclose(model.gain(y) @ u, wanted, rtol=1e-13)
+        np.testing.assert_allclose(model.dynamics.gain(y) @ u, wanted, rtol=1e-13)
 
 
 # --------------------------------------------------------------------------------------------------------- arm
@@ -262,7 +262,7 @@ def test_arm_moves_by_lagrange():
         by_rate = jax.grad(lagrangian, argnums=1)
         forces = jax.grad(lagrangian)(q, rate) - jax.jacfwd(by_rate)(q, rate) @ rate
         expected = np.linalg.solve(jax.jacfwd(by_rate, argnums=1)(q, rate), forces)
-        np.testing.assert_allclose(links.drift(q, rate), expected, rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(links.drift(Measurement(q, rate)), expected, rtol=1e-10, atol=1e-12)
         np.testing.assert_allclose(jax.grad(links.energy)(q, still), links.weight(q), rtol=1e-12, atol=1e-13)
 
 
@@ -314,40 +314,40 @@ def test_under_actuated_controlled_rows_follow_and_the_rest_is_the_open_loop():
     load = sinusoid(1.0, jnp.array([1.0, 2.0, 3.0]))
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), load, perfect())
     outcome = sampled.simulate(loop, duration=12.0, dt=1e-3, record_every=10)
-    samples = outcome.samples
-    error, apart = np.asarray(samples.error), np.array([1.0, -1.0, 0.0])
+    samples = outcome.signals
+    error, apart = np.asarray(samples["error"]), np.array([1.0, -1.0, 0.0])
     late = np.asarray(outcome.time) > 8
     together = (error[:, 0] + error[:, 1])[late]
     assert np.abs(together).max() < 0.02 and np.abs(error[late, 2]).max() < 0.02
 
     idle = ClosedLoop(linear_plant(UNDER, springs, brakes, limit=0.0), loop.controller, loop.reference, load, perfect())
-    free = np.asarray(sampled.simulate(idle, duration=12.0, dt=1e-3, record_every=10).samples.position)
-    np.testing.assert_allclose(np.asarray(samples.position) @ apart, free @ apart, atol=1e-9)
-    assert np.abs((np.asarray(samples.position) - free) @ np.array([1.0, 1.0, 0.0])).max() > 0.1, "negative control"
+    free = np.asarray(sampled.simulate(idle, duration=12.0, dt=1e-3, record_every=10).signals["position"])
+    np.testing.assert_allclose(np.asarray(samples["position"]) @ apart, free @ apart, atol=1e-9)
+    assert np.abs((np.asarray(samples["position"]) - free) @ np.array([1.0, 1.0, 0.0])).max() > 0.1, "negative control"
 
 
 def test_under_actuated_error_equation_holds_along_the_controlled_rows():
     """Q^T (e_ddot + K^T E - d_hat + d + u_r) = 0 to 1e-9, with Q an orthonormal basis of the range of G."""
     plant = linear_plant(UNDER, -np.eye(3), -0.5 * np.eye(3))
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), sinusoid(1.0, 2.0), perfect())
-    drawn, rng = loop.draw(jax.random.PRNGKey(0)), np.random.default_rng(6)
+    drawn, rng = loop.realize(jax.random.PRNGKey(0)), np.random.default_rng(6)
     basis = np.linalg.svd(np.asarray(UNDER))[0][:, :2]
     for t in rng.uniform(0, 5, 10):
         x, z = drawn.start(jnp.asarray(rng.normal(size=3)), jnp.asarray(rng.normal(size=3)))
         z = z._replace(weights=jnp.asarray(rng.normal(size=z.weights.shape)))
         seen = drawn.decide(t, x, z)
-        sample = drawn.sample(t, x, z, seen)
+        sample = drawn.signals(t, x, z, seen)
         acceleration = plant.acceleration(t, x, seen.applied, drawn.load(t, x))
         k1, k2 = loop.controller.feedback
-        left = seen.r.acceleration - acceleration + k1 * sample.error + k2 * (seen.r.velocity - sample.velocity)
-        residual = left - sample.estimate + drawn.load(t, x).acceleration + sample.robust
+        left = seen.r.acceleration - acceleration + k1 * sample["error"] + k2 * (seen.r.velocity - sample["velocity"])
+        residual = left - sample["estimate"] + drawn.load(t, x).acceleration + sample["robust_term"]
         np.testing.assert_allclose(basis.T @ residual, 0.0, atol=1e-9)
         assert np.abs(residual).max() > 1e-3, "negative control: not so across them"
 
 
 def test_loads_act_as_they_say():
     """A wrench opposes: through the mass for the ball, through M^-1 for the arm."""
-    ball, arm = magnetic_levitation(rung="ideal"), two_link_arm()
+    ball, arm = magnetic_levitation(fidelity="ideal"), two_link_arm()
     for plant, mobility in ((ball, np.eye(1) / 0.039), (arm, None)):
         x = start(plant)
         n = len(plant.outputs)

@@ -1,4 +1,4 @@
-"""The plant's outputs and accelerations are time derivatives of each other, on every rung; and Euler angles would do."""
+"""The plant's outputs and accelerations are time derivatives of each other, on every fidelity; and Euler angles would do."""
 
 import jax
 import jax.numpy as jnp
@@ -26,7 +26,7 @@ def close(found, expected):
 
 @pytest.fixture(scope="module", params=["ideal", "electromechanical"])
 def pairs(request):
-    """Found and expected vectors of the tests below: on the rungs with and without a prescribed acceleration."""
+    """Found and expected vectors of the tests below: on the fidelities with and without a prescribed acceleration."""
     plant, t = hybrid_vehicle(odin(), paper_table3(request.param)), jnp.zeros(())
     model, lumped_is_all = plant.model(), request.param == "ideal"
 
@@ -44,7 +44,7 @@ def pairs(request):
             "position": (y.position, pose),
             "velocity": (y_rate.position, y.velocity),
             "acceleration": (y_rate.velocity, acceleration),
-            "load": (acceleration, model.drift(y) + j @ plant.body.inverse_mass_matrix @ tau + prescribed),
+            "load": (acceleration, model.dynamics.drift(y) + j @ plant.body.inverse_mass_matrix @ tau + prescribed),
         }
 
     return jax.jit(jax.vmap(compare))(POSE, VELOCITY, VOLTS, PUSH, WRENCH, NOISE)
@@ -56,7 +56,7 @@ def test_velocity_and_acceleration_are_time_derivatives_of_the_output(pairs, nam
 
 
 def test_prescribed_acceleration_enters_as_the_benchmark_says(pairs):
-    """Added to x_ddot on every rung; on `ideal` and `static` it is all of d, J_dot nu included."""
+    """Added to x_ddot on every fidelity; on `ideal` and `static` it is all of d, J_dot nu included."""
     assert close(*pairs["load"])
 
 

@@ -1,4 +1,4 @@
-"""Battery, speed controllers and energy ledger: closed forms, limits that are met and never passed, books that close."""
+"""Battery, speed controllers and energy ledger: closed forms, limits that are met and never passed, diagnostics that close."""
 
 import equinox as eqx
 import jax
@@ -10,19 +10,19 @@ from scipy.integrate import quad
 
 import undertow as ut
 from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractModel, Telemetry
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.disturbances.none import none
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.numerics.integrators import METHODS
 from undertow.plants import hybrid_vehicle
 from undertow.power import battery, esc
 from undertow.power.ledger import closure
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 from undertow.thrusters import first_order, linear_voltage, paper_table3, t200
-from undertow.thrusters.ladder import RUNGS
+from undertow.thrusters.fidelity import FIDELITIES
 from undertow.vehicles import odin
 
 THRUSTERS = {"t200": t200, "table3": paper_table3}
@@ -33,7 +33,7 @@ BATTERY = battery(resistance=0.01)
 class Driven(AbstractContinuousController):
     """Voltages size * (bias + sin(7 t + phase)), whatever is measured; the state is the time."""
 
-    model: AbstractModel
+    model: Model
     size: Float[Array, ""]
     bias: Float[Array, ""]
     method: str = eqx.field(static=True, default="rk4")
@@ -43,9 +43,11 @@ class Driven(AbstractContinuousController):
         return jnp.zeros(())
 
     def command(self, z, y, r):
-        zero = jnp.zeros_like(y.position)
         volts = self.size * (self.bias + jnp.sin(7 * z + jnp.arange(8.0)))
-        return volts, Telemetry(zero, zero, zero, zero, zero, zero[:, None])
+        return volts, {}
+
+    def signals(self):
+        return {}
 
     def flow(self, z, y, r, u_applied):
         return jnp.ones(())
@@ -61,67 +63,69 @@ def loop_of(thruster, size=8.0, bias=0.0, **power):
 
 
 def recorded(outcome):
-    return {"time": outcome.time, **outcome.samples.books}
+    return {"time": outcome.time, **outcome.signals}
 
 
-# ----------------------------------------------------------------------------------------------------- the books
+# ----------------------------------------------------------------------------------------------------- the diagnostics
 
 
-@pytest.mark.parametrize("rung", RUNGS)
+@pytest.mark.parametrize("fidelity", FIDELITIES)
 @pytest.mark.parametrize("name", THRUSTERS)
-def test_rates_of_the_ledger_cancel_at_every_instant(name, rung):
+def test_rates_of_the_ledger_cancel_at_every_instant(name, fidelity):
     """source + conversion = copper + friction + water + d(stored)/dt at random states, in both directions."""
-    thruster, rng = THRUSTERS[name](rung), np.random.default_rng(1)
+    thruster, rng = THRUSTERS[name](fidelity), np.random.default_rng(1)
     volts = 12 * rng.normal(size=400)
     state = jax.tree.map(lambda leaf: leaf + 30 * rng.normal(size=leaf.shape), thruster.initial_state(400))
     flows = thruster.powers(state, volts)
     _, stored = jax.jvp(thruster.stored, (state,), (thruster.dynamics(state, volts),))
     left = flows.source + flows.conversion - flows.copper - flows.friction - flows.water - stored
     assert (np.abs(left) <= 1e-12 * np.max(np.abs(flows), axis=0)).all()
-    if name == "t200" and rung != "ideal":
+    if name == "t200" and fidelity != "ideal":
         np.testing.assert_array_equal(flows.conversion, 0.0, err_msg="k_t = k_e: nothing out of nothing")
 
 
 @pytest.mark.parametrize("kind", ["sampled", "continuous"])
-@pytest.mark.parametrize("rung", RUNGS)
+@pytest.mark.parametrize("fidelity", FIDELITIES)
 @pytest.mark.parametrize("name", THRUSTERS)
-def test_ledger_closes_in_both_loops(name, rung, kind):
-    """1e-8 of the energy drawn. Every rung and loop meets a battery with one thruster and none with the other."""
+def test_ledger_closes_in_both_loops(name, fidelity, kind):
+    """1e-8 of the energy drawn. Every fidelity and loop meets a battery with one thruster and none with the other."""
     cells = BATTERY if (name == "t200") == (kind == "sampled") else None
-    loop, dt = loop_of(THRUSTERS[name](rung), battery=cells), 2e-4
+    loop, dt = loop_of(THRUSTERS[name](fidelity), battery=cells), 2e-4
     if kind == "sampled":
         outcome = sampled.simulate(loop, duration=0.5, dt=dt, record_every=50)
     else:
         outcome = continuous.simulate(loop, duration=0.5, record_step=1e-2, dt=dt)
     assert int(outcome.status) == 0
-    books = recorded(outcome)
-    assert books["energy_source"][-1] > 1, "J: something was drawn"
-    assert ("state_of_charge" in books) == (cells is not None)
-    shares = closure(books)
-    assert shares["energy_books_share"] <= 1e-12, shares
-    assert shares["energy_defect_share"] <= 1e-5, shares
+    diagnostics = recorded(outcome)
+    assert diagnostics["energy_source"][-1] > 1, "J: something was drawn"
+    assert ("state_of_charge" in diagnostics) == (cells is not None)
+    shares = closure(diagnostics)
+    assert shares["energy_balance_residual"] <= 1e-12, shares
+    assert shares["energy_integration_residual"] <= 1e-5, shares
     if cells is not None:
-        gone = cells.energy(books["charge_drawn"][-1])
-        np.testing.assert_allclose(gone, books["energy_source"][-1] + books["energy_battery"][-1], rtol=1e-9)
+        gone = cells.energy(diagnostics["charge_drawn"][-1])
+        np.testing.assert_allclose(
+            gone, diagnostics["energy_source"][-1] + diagnostics["energy_battery"][-1], rtol=1e-9
+        )
 
 
 @pytest.mark.parametrize("cells", [None, BATTERY], ids=["supply", "battery"])
 @pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("euler", 1)])
-@pytest.mark.parametrize(("rung", "dt"), [("shaft", 0.02), ("electromechanical", 4e-3)])
-def test_defect_falls_with_the_step_at_the_order_of_the_integrator(rung, dt, method, order, cells):
-    """The plant under a constant voltage, by steps h, h/2, h/4 (Euler: from h/8). `books` do not care."""
-    plant, volts = hybrid_vehicle(odin(), paper_table3(rung), battery=cells), jnp.linspace(2.0, 6.0, 8)
+@pytest.mark.parametrize(("fidelity", "dt"), [("shaft", 0.02), ("electromechanical", 4e-3)])
+def test_defect_falls_with_the_step_at_the_order_of_the_integrator(fidelity, dt, method, order, cells):
+    """The plant under a constant voltage, by steps h, h/2, h/4 (Euler: from h/8). `diagnostics` do not care."""
+    plant, volts = hybrid_vehicle(odin(), paper_table3(fidelity), battery=cells), jnp.linspace(2.0, 6.0, 8)
     step, first = METHODS[method], 1 if method == "rk4" else 8
 
     @jax.jit
-    def books(dt, ticks):
+    def diagnostics(dt, steps):
         field = lambda t, x: plant.dynamics(t, x, volts, plant.no_load())
         move = lambda k, x: step(field, jnp.zeros(()), x, dt)
-        return plant.books(jax.lax.fori_loop(0, ticks, move, plant.initial_state()), volts)
+        return plant.diagnostics(jax.lax.fori_loop(0, steps, move, plant.initial_state()), volts)
 
-    ends = [books(dt / n, np.asarray(round(0.2 / dt * n))) for n in (first, 2 * first, 4 * first)]
-    assert all(abs(end["energy_books"]) < 1e-12 * end["energy_source"] for end in ends)
-    defects = np.abs([end["energy_defect"] / end["energy_source"] for end in ends])
+    ends = [diagnostics(dt / n, np.asarray(round(0.2 / dt * n))) for n in (first, 2 * first, 4 * first)]
+    assert all(abs(end["energy_residual"]) < 1e-12 * end["energy_source"] for end in ends)
+    defects = np.abs([end["energy_integration_error"] / end["energy_source"] for end in ends])
     assert defects[-1] > 1e-12, "above rounding"
     slopes = np.log2(defects[:-1] / defects[1:])
     assert abs(slopes[-1] - order) < 0.2, (defects, slopes)
@@ -129,15 +133,17 @@ def test_defect_falls_with_the_step_at_the_order_of_the_integrator(rung, dt, met
 
 def test_closure_over_a_part_of_a_run():
     time = np.arange(5.0)
-    books = {
+    diagnostics = {
         "time": time,
         "energy_source": 100 * time,
-        "energy_books": np.array([0.0, 1.0, -2.0, 0.5, 0.5]),
-        "energy_defect": np.array([0.0, 0.0, 0.0, 0.0, 8.0]),
+        "energy_residual": np.array([0.0, 1.0, -2.0, 0.5, 0.5]),
+        "energy_integration_error": np.array([0.0, 0.0, 0.0, 0.0, 8.0]),
     }
-    assert closure(books) == {"energy_books_share": 0.005, "energy_defect_share": 0.02}
-    assert closure(books, 2.0, 3.0) == {"energy_books_share": 0.025, "energy_defect_share": 0.0}
-    assert closure(books, 2.2, 2.4) == {"energy_books_share": 0.0, "energy_defect_share": 0.0}, "no record, no claim"
+    assert closure(diagnostics) == {"energy_balance_residual": 0.005, "energy_integration_residual": 0.02}
+    assert closure(diagnostics, 2.0, 3.0) == {"energy_balance_residual": 0.025, "energy_integration_residual": 0.0}
+    assert closure(diagnostics, 2.2, 2.4) == {"energy_balance_residual": 0.0, "energy_integration_residual": 0.0}, (
+        "no record, no claim"
+    )
     assert closure({"time": time}) == {}
 
 
@@ -156,7 +162,7 @@ def test_every_run_says_how_far_its_books_close():
         plant = ut.HybridVehicle(odin(), paper_table3(), ledger=ledger)
         run = ut.simulate(plant, ut.rcaf(plant.model(), composite=20.0), setpoint([2, 3, 4, 0, 0, 1]), duration=0.2)
         for window in ("steady", "whole"):
-            share = run.metrics[window].get("energy_books_share")
+            share = run.metrics[window].get("energy_balance_residual")
             assert share is None if ledger is False else 0 <= share <= 1e-8
 
 
@@ -230,20 +236,20 @@ def test_impossible_batteries_are_refused(wrong):
 def tight(plant, x, applied, slack):
     """Whether the largest voltage is that of the bus, or the power the most that the battery has, up to a share."""
     bus = float(plant.power.bus_voltage(plant.thruster, x.thrusters, x.power, applied))
-    emf = float(plant.power.battery.open_circuit_voltage(x.power.drawn))
+    emf = float(plant.power.battery.open_circuit_voltage(x.power.charge))
     power = float(plant.effort(x, applied).power.sum())
     most = emf**2 / (4 * float(plant.power.battery.resistance))
     return float(np.abs(applied).max()) >= bus * (1 - slack) or power >= most * (1 - 2 * slack)
 
 
-@pytest.mark.parametrize("rung", RUNGS)
-def test_voltages_stay_within_what_the_battery_gives_and_reach_it(rung):
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_voltages_stay_within_what_the_battery_gives_and_reach_it(fidelity):
     """Asked for far too much: never above the bus under that load, as high as it goes, smaller ones untouched."""
-    plant = hybrid_vehicle(odin(), t200(rung, supply=30.0), battery=battery(resistance=0.1))
+    plant = hybrid_vehicle(odin(), t200(fidelity, supply=30.0), battery=battery(resistance=0.1))
     asked = jnp.array([40.0, -40.0, 25.0, 3.0, -3.0, 0.5, 0.0, 16.0])
     x = plant.initial_state()
     for drawn in (0.0, 30_000.0, 64_800.0):
-        at = x._replace(power=x.power._replace(drawn=jnp.asarray(drawn)))
+        at = x._replace(power=x.power._replace(charge=jnp.asarray(drawn)))
         applied = plant.admissible(at, asked)
         bus = plant.power.bus_voltage(plant.thruster, at.thrusters, at.power, applied)
         assert np.abs(applied).max() <= bus * (1 + 1e-12)
@@ -255,17 +261,17 @@ def test_voltages_stay_within_what_the_battery_gives_and_reach_it(rung):
         assert plant.effort(at, 0.99 * applied).saturated.sum() == 0
 
 
-@pytest.mark.parametrize("rung", ["static", "shaft"])
-def test_limit_holds_along_a_run_and_the_battery_sags(rung):
+@pytest.mark.parametrize("fidelity", ["static", "shaft"])
+def test_limit_holds_along_a_run_and_the_battery_sags(fidelity):
     """With speed controllers, which round down there: no voltage above the bus under the load that it makes."""
-    loop = loop_of(t200(rung, supply=30.0), size=40.0, battery=battery(resistance=0.1, capacity=0.2), esc=esc())
+    loop = loop_of(t200(fidelity, supply=30.0), size=40.0, battery=battery(resistance=0.1, capacity=0.2), esc=esc())
     outcome = sampled.simulate(loop, duration=1.0, dt=5e-4, record_every=20)
-    top, bus = np.abs(outcome.samples.voltage).max(1), np.asarray(outcome.samples.books["bus_voltage"])
+    top, bus = np.abs(outcome.signals["input"]).max(1), np.asarray(outcome.signals["bus_voltage"])
     assert (top <= bus * (1 + 1e-12)).all()
-    assert np.asarray(outcome.samples.saturated).any(1).mean() > 0.9
+    assert np.asarray(outcome.signals["saturated"]).any(1).mean() > 0.9
     x, _ = outcome.final
-    assert tight(loop.plant, x, outcome.samples.voltage[-1], 1 / 200)
-    assert outcome.samples.books["state_of_charge"][-1] < 0.9
+    assert tight(loop.plant, x, outcome.signals["input"][-1], 1 / 200)
+    assert outcome.signals["state_of_charge"][-1] < 0.9
 
 
 # ------------------------------------------------------------------------------------------------ speed controllers
@@ -293,7 +299,7 @@ def test_applied_voltages_are_whole_pulses_and_pass_unchanged_a_second_time():
 
 
 def test_speed_controllers_need_a_bus_voltage():
-    with pytest.raises(BadInput, match="`esc` must have a bus voltage"):
+    with pytest.raises(BadInput, match="`esc` must have a finite bus voltage"):
         hybrid_vehicle(odin(), paper_table3(), esc=esc())
     hybrid_vehicle(odin(), paper_table3(), esc=esc(), battery=battery())
 
@@ -307,14 +313,14 @@ def test_gradients_of_the_battery_are_finite_at_its_limit():
             assert np.isfinite(jax.grad(of, argnums=(0, 1))(0.0, power)).all()
 
 
-@pytest.mark.parametrize("rung", RUNGS)
-def test_gradients_through_a_run_with_battery_and_books_are_finite(rung):
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_gradients_through_a_run_with_battery_and_books_are_finite(fidelity):
     """From rest, where square roots have none: energies and motion by size of the voltage and internal resistance."""
 
     @jax.jit
     def gradient(size, resistance):
         def total(size, resistance):
-            plant = hybrid_vehicle(odin(), t200(rung, dead_zone=0.0), battery=battery())
+            plant = hybrid_vehicle(odin(), t200(fidelity, dead_zone=0.0), battery=battery())
             plant = eqx.tree_at(lambda of: of.power.battery.resistance, plant, resistance)
             volts = size * jnp.linspace(-1.0, 1.0, 8)
 
@@ -323,7 +329,7 @@ def test_gradients_through_a_run_with_battery_and_books_are_finite(rung):
                 return METHODS["euler"](lambda t, x: plant.dynamics(t, x, applied, plant.no_load()), 0.0, x, 1e-3), None
 
             x, _ = jax.lax.scan(step, plant.initial_state(), None, length=10)
-            return sum(jnp.sum(leaf) for leaf in jax.tree.leaves((plant.books(x, volts), x)))
+            return sum(jnp.sum(leaf) for leaf in jax.tree.leaves((plant.diagnostics(x, volts), x)))
 
         return jax.grad(total, argnums=(0, 1))(size, resistance)
 

@@ -11,11 +11,11 @@ from undertow.core.errors import BadInput
 from undertow.disturbances.none import none
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, waypoints
-from undertow.scenario import parts
+from undertow.scenario import factory
 from undertow.scenario.execute import execute
-from undertow.sensors.perfect import perfect
 
 RNG = np.random.default_rng(4)
 SQUARE = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [0, 4, 1], [0, 0, 0.5]], dtype=float)
@@ -123,12 +123,12 @@ def test_settling_starts_where_the_plant_does_unless_told():
     """A cart and a vehicle that start away from zero are not sent to zero and back; a step and a given start stay."""
     goal, begun = np.array([3.0, -1.0]), np.array([5.0, 2.0])
     for told, start in ((None, begun), ([1.0, 0.0], [1.0, 0.0])):
-        position, _, _ = at(setpoint(goal, 4.0, told).beginning_at(begun), np.linspace(0, 4, 401))
+        position, _, _ = at(setpoint(goal, 4.0, told).starting_at(begun), np.linspace(0, 4, 401))
         np.testing.assert_array_equal(position[[0, -1]], [start, goal])
         assert (position <= np.maximum(start, goal) + 1e-12).all() and (
             position >= np.minimum(start, goal) - 1e-12
         ).all()
-    np.testing.assert_array_equal(at(setpoint(goal).beginning_at(begun), [0.0])[0], [goal])
+    np.testing.assert_array_equal(at(setpoint(goal).starting_at(begun), [0.0])[0], [goal])
     cart = {
         "plant": "inverted_pendulum",
         "controller": {"kind": "pid", "frequency": 4.0},
@@ -136,13 +136,13 @@ def test_settling_starts_where_the_plant_does_unless_told():
         "loop": {"duration": 0.1, "dt": 0.01},
         "initial": {"position": [0.1]},
     }
-    assert float(execute(cart).dataset["target"][0, 0]) == 0.1
+    assert float(execute(cart).dataset["reference"][0, 0]) == 0.1
     plant = double_integrator(2)
     for simulate in (sampled.simulate, continuous.simulate):
         law = rcaf(plant.model(), sets=3)
         loop = ClosedLoop(plant, law, setpoint(goal, 4.0), none(), perfect())
         found = simulate(loop, duration=0.1, dt=0.01, position=begun)
-        np.testing.assert_array_equal(found.samples.target[0], begun)
+        np.testing.assert_array_equal(found.signals["reference"][0], begun)
 
 
 def test_settling_may_be_traced_and_zero():
@@ -248,7 +248,7 @@ def test_recorded_replays_its_rows():
 def test_recorded_comes_from_a_file(tmp_path):
     text = "t,d1,d2\n0,1,2\n1,3,-1\n4,0,0.5\n"
     (tmp_path / "x.csv").write_text(text)
-    part, resolved = parts.make("references", {"kind": "recorded", "file": "x.csv"}, tmp_path)
+    part, resolved = factory.make("references", {"kind": "recorded", "file": "x.csv"}, tmp_path)
     np.testing.assert_allclose(at(part, [1.0, 9.0])[0], [[3, -1], [0, 0.5]], rtol=0, atol=1e-14)
     assert resolved == {"kind": "recorded", "csv": text}
 

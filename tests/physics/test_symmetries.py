@@ -10,10 +10,10 @@ from undertow.core.contracts import Load
 from undertow.disturbances import u1
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.sampled import simulate
+from undertow.navigation import perfect
 from undertow.numerics.integrators import rk4
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
-from undertow.sensors import perfect
 from undertow.thrusters import paper_table3
 from undertow.vehicles import odin
 
@@ -128,9 +128,9 @@ def test_renaming_the_thrusters_renames_the_voltages_and_nothing_else():
     """In closed loop with the paper's law, gains and disturbances."""
     named = simulate(closed_loop(odin().with_thrusters(range(1, 9))), duration=2.0)
     renamed = simulate(closed_loop(odin().with_thrusters(ORDER)), duration=2.0)
-    volts = np.asarray(named.samples.voltage)
+    volts = np.asarray(named.signals["input"])
     assert np.abs(volts).max() > 10
-    np.testing.assert_allclose(renamed.samples.position, named.samples.position, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(renamed.signals["position"], named.signals["position"], rtol=0, atol=1e-12)
     np.testing.assert_allclose(
-        renamed.samples.voltage, volts[:, np.array(ORDER) - 1], rtol=0, atol=1e-11 * np.abs(volts).max()
+        renamed.signals["input"], volts[:, np.array(ORDER) - 1], rtol=0, atol=1e-11 * np.abs(volts).max()
     )

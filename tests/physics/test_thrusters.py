@@ -1,4 +1,4 @@
-"""Thrusters: both directions of a motor, agreement of the rungs at rest, order of integration, lag and axial flow."""
+"""Thrusters: both directions of a motor, agreement of the fidelities at rest, order of integration, lag and axial flow."""
 
 from itertools import pairwise
 
@@ -21,7 +21,7 @@ from undertow.thrusters import (
     t200,
     t500,
 )
-from undertow.thrusters.ladder import RUNGS, on_rung
+from undertow.thrusters.fidelity import FIDELITIES, with_fidelity
 
 # A motor with everything: friction, and a propeller that is another one in reverse.
 UNEVEN = DCMotor(
@@ -45,10 +45,10 @@ def simulate(thruster, volts, duration, dt, method="rk4"):
     step, count = METHODS[method], len(volts(0.0))
 
     @eqx.filter_jit
-    def run(thruster, dt, ticks):
+    def run(thruster, dt, steps):
         field = lambda t, state: thruster.dynamics(state, volts(t))
         move = lambda k, state: step(field, jnp.asarray(k, dtype=float) * dt, state, dt)
-        return jax.lax.fori_loop(0, ticks, move, thruster.initial_state(count))
+        return jax.lax.fori_loop(0, steps, move, thruster.initial_state(count))
 
     return run(thruster, np.asarray(dt), np.asarray(round(duration / dt)))
 
@@ -84,10 +84,10 @@ def test_thrust_and_speed_are_inverse(name):
     np.testing.assert_allclose(MOTORS[name].speed_at(MOTORS[name].thrust(speed)), speed, rtol=1e-13)
 
 
-@pytest.mark.parametrize("rung", RUNGS)
-def test_gradients_are_finite_at_rest(rung):
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_gradients_are_finite_at_rest(fidelity):
     """Where the square root of Eq. (11) has none."""
-    thruster = on_rung(UNEVEN, rung)
+    thruster = with_fidelity(UNEVEN, fidelity)
 
     def total(volts):
         state = thruster.initial_state(2)
@@ -97,14 +97,14 @@ def test_gradients_are_finite_at_rest(rung):
     assert np.isfinite(jax.grad(total)(jnp.zeros(2))).all()
 
 
-# ------------------------------------------------------------------------------------------------------ rungs
+# ------------------------------------------------------------------------------------------------------ fidelities
 
 
 @pytest.mark.parametrize("name", ["uneven", "t200"])
-@pytest.mark.parametrize("rung", ["shaft", "electromechanical"])
-def test_dynamic_rungs_settle_on_the_static_one(name, rung):
-    motor, static = MOTORS[name], on_rung(MOTORS[name], "static")
-    thruster = on_rung(motor, rung)
+@pytest.mark.parametrize("fidelity", ["shaft", "electromechanical"])
+def test_dynamic_rungs_settle_on_the_static_one(name, fidelity):
+    motor, static = MOTORS[name], with_fidelity(MOTORS[name], "static")
+    thruster = with_fidelity(motor, fidelity)
     state = simulate(thruster, held(VOLTS), 6.0, 2e-4)
     for of in ("thrust", "current"):
         np.testing.assert_allclose(getattr(thruster, of)(state, VOLTS), getattr(static, of)((), VOLTS), rtol=1e-8)
@@ -117,14 +117,14 @@ def test_ideal_rung_is_the_static_one_without_speed_term_in_both_directions():
     motor = eqx.tree_at(
         lambda m: [getattr(m, name) for name in constants], UNEVEN, list(map(jnp.asarray, constants.values()))
     )
-    ideal, static = on_rung(motor, "ideal"), on_rung(motor, "static")
+    ideal, static = with_fidelity(motor, "ideal"), with_fidelity(motor, "static")
     np.testing.assert_allclose(ideal.thrust((), VOLTS), static.thrust((), VOLTS), rtol=1e-5)
     np.testing.assert_allclose(ideal.current((), VOLTS), static.current((), VOLTS), rtol=1e-5)
 
 
 def test_speed_term_and_thrust_add_up_in_reverse_too():
     """Eq. (15), T = alpha V + phi - alpha L I_dot, with the one alpha of forward motion."""
-    thruster, rng = on_rung(UNEVEN, "electromechanical"), np.random.default_rng(3)
+    thruster, rng = with_fidelity(UNEVEN, "electromechanical"), np.random.default_rng(3)
     state = thruster.initial_state(8)._replace(speed=100 * rng.normal(size=8), current=8 * rng.normal(size=8))
     assert (state.speed < 0).any() and (state.speed > 0).any()
     rates, report = thruster.dynamics(state, VOLTS), thruster.report(state)
@@ -136,9 +136,9 @@ def test_speed_term_and_thrust_add_up_in_reverse_too():
 
 
 @pytest.mark.parametrize("make", [t200, t500], ids=["t200", "t500"])
-@pytest.mark.parametrize("rung", RUNGS)
-def test_dead_zone_of_real_thrusters(make, rung):
-    thruster = make(rung)
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_dead_zone_of_real_thrusters(make, fidelity):
+    thruster = make(fidelity)
     inside = np.array([-1.2, -0.6, 0.0, 0.6, 1.2])
     state = thruster.initial_state(5)
     np.testing.assert_array_equal(thruster.thrust(state, inside), 0.0)
@@ -165,15 +165,15 @@ def test_a_speed_without_its_rate_is_not_enough_for_the_speed_term():
     report = thruster.report(state)
     np.testing.assert_array_equal(report.speed, [3.0, -5.0])
     assert report.acceleration is None
-    with pytest.raises(BadInput, match="`speed_sensor` must be false on rung `shaft`"):
+    with pytest.raises(BadInput, match="`speed_sensor` must be false on fidelity `shaft`"):
         thruster.speed_term(report)
 
 
 # ------------------------------------------------------------------------------------------ order of integration
 
 DYNAMIC = {
-    "shaft": (on_rung(UNEVEN, "shaft"), 12.0, 4e-3),
-    "electromechanical": (on_rung(UNEVEN, "electromechanical"), 12.0, 1e-3),
+    "shaft": (with_fidelity(UNEVEN, "shaft"), 12.0, 4e-3),
+    "electromechanical": (with_fidelity(UNEVEN, "electromechanical"), 12.0, 1e-3),
     "paper": (paper_table3("electromechanical"), 12.0, 1e-3),
     "first_order": (first_order(time_constant=0.05), 12.0, 1e-2),
     "axial_flow": (axial_flow(), 3.0, 1e-2),

@@ -2,44 +2,44 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.report.figures import ladder_figure, run_figures
-from undertow.report.paper_report import write_report
+from undertow.report.figures import fidelity_figure, run_figures
+from undertow.report.reproduction.report import write_report
 
 
-def run_of(controller="rcafc", axes=6, inputs=8, status="ok", ended=20.0, samples=201):
+def run_of(controller="rcafc", axes=6, inputs=8, status="completed", ended=20.0, samples=201):
     """A run in the shape of undertow's datasets, with signals that can be told apart."""
     time = np.linspace(0.0, 20.0, samples)
     size = {"rcafc": 1e-4, "rafc": 1e-2}[controller]
-    wanted = np.ones((samples, axes)) * np.arange(1, axes + 1)
-    error = wanted * np.exp(-time)[:, None] + size * np.sin(3 * time)[:, None]
+    desired = np.ones((samples, axes)) * np.arange(1, axes + 1)
+    error = desired * np.exp(-time)[:, None] + size * np.sin(3 * time)[:, None]
     d = 3 * np.sin(time)[:, None] * np.arange(1, axes + 1)
     miss = (100 * size * np.cos(time) + 40 * np.exp(-30 * time))[:, None] * np.ones(axes)
     volts = 10 * np.sin(time)[:, None] * np.arange(1, inputs + 1)
-    if status != "ok":
+    if status != "completed":
         volts = volts * np.exp(np.minimum(time, ended) * 4)[:, None]
         d = d * np.exp(np.minimum(time, ended) * 4)[:, None]
     per_axis = {
-        "position": wanted - error,
+        "position": desired - error,
         "velocity": error.copy(),
-        "measured_position": wanted - error,
+        "measured_position": desired - error,
         "measured_velocity": error,
-        "target": wanted,
+        "reference": desired,
         "error": error,
         "uncertainty": d,
         "estimate": d + miss,
-        "robust": miss / 2,
-        "predicted_position": wanted - error + 2e-3,
+        "robust_term": miss / 2,
+        "predicted_position": desired - error + 2e-3,
     }
-    per_input = {"voltage": volts, "command": 2 * volts}
+    per_input = {"input": volts, "commanded_input": 2 * volts}
     names = ["north", "east", "down", "roll", "pitch", "yaw", "extra"][:axes]
     units = ["m", "m", "m", "rad", "rad", "rad", "1"][:axes]
     return xr.Dataset(
         {name: (("time", "axis"), values) for name, values in per_axis.items()}
-        | {name: (("time", "input"), values, {"units": "V"}) for name, values in per_input.items()},
+        | {name: (("time", "actuator"), values, {"units": "V"}) for name, values in per_input.items()},
         coords={
             "time": ("time", time),
             "axis": ("axis", names, {"unit_of_each": ", ".join(units)}),
-            "input": ("input", np.arange(1, inputs + 1)),
+            "actuator": ("actuator", np.arange(1, inputs + 1)),
         },
         attrs={"status": status, "ended": ended},
     )
@@ -70,13 +70,13 @@ def metrics(scale):
         "settling_time": 4.03,
         "rules": 5,
     }
-    return {name: value * scale for name, value in overall.items()} | {"tracking_rms_axes": [1e-4] * 6}
+    return {name: value * scale for name, value in overall.items()} | {"error_rms_axes": [1e-4] * 6}
 
 
 def results_of_a_study():
     both = {"rcafc": {"steady": metrics(1), "whole": metrics(2)}, "rafc": {"steady": metrics(10), "whole": metrics(20)}}
     lasted = {
-        "status": "ok",
+        "status": "completed",
         "diverged_at": None,
         "simulated_s": 20.0,
         "steady": metrics(1),
@@ -91,7 +91,7 @@ def results_of_a_study():
         "example1": both,
         "example2": both,
         "table2": {key: lasted | {"steady": metrics(k + 1)} for k, key in enumerate(table)},
-        "ladder": {
+        "fidelity": {
             "ideal": {"rcafc": lasted, "rafc": lasted},
             "electromechanical": {"rcafc": failed, "rafc": lasted},
         },
@@ -118,7 +118,7 @@ def results():
 def page(runs, tmp_path_factory):
     """The report of the study with two figures: its folder and its text."""
     folder, results = tmp_path_factory.mktemp("report"), results_of_a_study()
-    figures = {"fig06": run_figures(runs["rcafc"])["tracking"], "ladder": ladder_figure(results["ladder"])}
+    figures = {"fig06": run_figures(runs["rcafc"])["tracking"], "fidelity": fidelity_figure(results["fidelity"])}
     written = write_report(results, figures, folder)
     assert written == folder / "report.html"
     return written.read_text(encoding="utf-8")

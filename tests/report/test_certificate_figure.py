@@ -27,7 +27,7 @@ def certified(make_run):
         }
         for name, values in columns.items():
             run[name] = ("time", values)
-        run["saturated"] = (("time", "input"), np.zeros((len(time), 3)))
+        run["saturated"] = (("time", "actuator"), np.zeros((len(time), 3)))
         run["saturated"][50:60, 1] = 1.0
         run.attrs["certificate"] = json.dumps({"weights_bound": [bound, 1.0]})
         return run
@@ -65,7 +65,7 @@ def test_lines_and_shades_are_the_data(certified):
 
 def test_where_tracking_is_no_part_of_v_the_key_says_so(certified):
     names = list(lines(run_figures(certified(alone=True))["certificate"].axes[0]))
-    assert names == ["V of the estimator", "tracking, beside it"]
+    assert names == ["V of the estimator", "tracking, not in V"]
 
 
 def test_without_a_bound_none_is_drawn(certified):

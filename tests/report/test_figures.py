@@ -6,18 +6,9 @@ import pytest
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from PIL import Image
 
-from undertow.report.figures import (
-    ladder_figure,
-    paper_figures,
-    png,
-    run_figures,
-    save,
-    svg,
-    sweep_figure,
-)
-from undertow.report.figures.effort import effort
-from undertow.report.figures.uncertainty import uncertainty
-from undertow.studies.paper.thruster_response import thruster_response
+from undertow.report.figures import fidelity_figure, paper_figures, png, run_figures, save, svg, sweep_figure
+from undertow.report.figures.paper import effort, uncertainty
+from undertow.reproduction.thruster_response import thruster_response
 
 AXES = ["north", "east", "down", "roll", "pitch", "yaw"]
 
@@ -67,7 +58,7 @@ def test_lines_are_the_data(figures, runs):
         upper, lower = titled(figures["fig06"], axis)
         pick = lambda run, name, column=column: run[name].values[:, column]
         np.testing.assert_array_equal(line(upper, "RAFC").get_ydata(), pick(runs["rafc"], "position"))
-        np.testing.assert_array_equal(line(upper, "wanted $x_d$").get_ydata(), pick(runs["rcafc"], "target"))
+        np.testing.assert_array_equal(line(upper, "desired $x_d$").get_ydata(), pick(runs["rcafc"], "reference"))
         np.testing.assert_array_equal(line(lower, "RCAFC").get_ydata(), abs(pick(runs["rcafc"], "error")))
         assert lower.get_yscale() == "log"
         upper, lower = titled(figures["fig07"], axis)
@@ -83,7 +74,7 @@ def test_line_style_carries_the_meaning(figures):
     assert line(panel, "RCAFC").get_linestyle() == "-"
     assert line(panel, "RAFC").get_linestyle() == "--"
     assert line(panel, "true $d$")._unscaled_dash_pattern[1][0] < 1.5
-    assert [one.get_label() for one in titled(figures["fig10"], "north")[0].lines] == ["wanted $x_d$", "RCAFC"]
+    assert [one.get_label() for one in titled(figures["fig10"], "north")[0].lines] == ["desired $x_d$", "RCAFC"]
 
 
 def test_what_leaves_a_panel_is_written_above_it(figures):
@@ -95,7 +86,7 @@ def test_what_leaves_a_panel_is_written_above_it(figures):
 def test_voltages_are_split_into_start_and_rest(figures, runs):
     start, rest = titled(figures["fig09"], "thruster 3")
     drawn = np.concatenate([line(p, "RCAFC").get_ydata() for p in (start, rest)])
-    volts = runs["rcafc"]["voltage"].values[:, 2]
+    volts = runs["rcafc"]["input"].values[:, 2]
     assert start.get_xlim() == pytest.approx((0, 1))
     assert rest.get_xlim() == pytest.approx((1, 20))
     assert len(drawn) in (len(volts), len(volts) + 1)
@@ -126,7 +117,7 @@ def test_the_fullest_figures_stay_small(make_run):
     """As many samples as a run of 20 s recorded every 10 ms, each of them far from the next."""
     runs = {name: make_run(name, samples=2001) for name in ("rcafc", "rafc")}
     for run in runs.values():
-        run["voltage"] = run["voltage"] * np.cos(60 * run["time"])
+        run["input"] = run["input"] * np.cos(60 * run["time"])
         run["estimate"] = run["estimate"] * np.cos(20 * run["time"])
     for figure in (uncertainty("Fig. 7", runs), effort("Fig. 9", runs)):
         assert len(svg(figure)) < 400_000
@@ -169,8 +160,8 @@ def test_run_figures_for_any_size(make_run, axes, inputs):
     assert list(figures) == ["tracking", "error", "estimate", "effort"]
     assert [len(figure.axes) for figure in figures.values()] == [axes, axes, axes, inputs]
     last = figures["effort"].axes[-1]
-    np.testing.assert_array_equal(line(last, "applied").get_ydata(), run["voltage"].values[:, -1])
-    np.testing.assert_array_equal(line(last, "asked for").get_ydata(), run["command"].values[:, -1])
+    np.testing.assert_array_equal(line(last, "applied").get_ydata(), run["input"].values[:, -1])
+    np.testing.assert_array_equal(line(last, "commanded").get_ydata(), run["commanded_input"].values[:, -1])
     assert last.get_ylabel() == "input, V"
 
 
@@ -201,13 +192,13 @@ def test_diverged_run_is_drawn_up_to_its_end(make_run):
 def test_a_run_with_gaps_is_drawn(make_run):
     run = make_run(axes=2, inputs=1)
     run["estimate"][:, 0] = np.nan
-    run["voltage"][100:] = np.inf
+    run["input"][100:] = np.inf
     for figure in run_figures(run).values():
         assert svg(figure)
 
 
-def test_ladder_marks_what_failed(results, make_run):
-    alone = ladder_figure(results["ladder"])
+def test_fidelity_figure_marks_what_failed(results, make_run):
+    alone = fidelity_figure(results["fidelity"])
     assert len(alone.axes) == 4
     tracking = alone.axes[0]
     assert line(tracking, "RAFC").get_ydata() == pytest.approx([1.6e-4, 1.6e-4])
@@ -215,7 +206,7 @@ def test_ladder_marks_what_failed(results, make_run):
     assert [text.get_text() for text in tracking.texts] == ["RCAFC diverged at 3.29 s"]
     pair = {"rcafc": make_run(status="diverged", ended=3.295), "rafc": make_run("rafc")}
     runs = {"ideal": {key: make_run(key) for key in pair}, "electromechanical": pair}
-    whole = ladder_figure(results["ladder"], runs)
+    whole = fidelity_figure(results["fidelity"], runs)
     assert [panel.get_title(loc="left") for panel in whole.axes[:2]] == ["ideal", "electromechanical"]
     assert line(whole.axes[1], "RCAFC, electromechanical").get_xdata()[-1] <= 3.295
     assert svg(whole)

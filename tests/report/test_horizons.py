@@ -5,10 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from undertow.report.figures.drifting import drifting_figure
 from undertow.report.figures.horizons import horizons_figure
-from undertow.report.figures.lags import lags_figure
-from undertow.report.paper_report import write_report
+from undertow.report.figures.lags import drifting_figure, lags_figure
+from undertow.report.reproduction.report import write_report
 
 WINDOWS = [[10.0, 20.0], [100.0, 200.0]]
 
@@ -18,14 +17,14 @@ def row(level, law, composite, bounded, ended, **more):
     by_window = lambda value: [value, 2 * value if lasted else None]
     return {
         "level": level, "law": law, "words": law, "composite": composite, "bounded": bounded,
-        "scenario": f"scenarios/long_{level}_{law}.yaml", "status": "ok" if lasted else "diverged", "ended": ended,
+        "scenario": f"scenarios/long_{level}_{law}.yaml", "status": "completed" if lasted else "diverged", "ended": ended,
         "lasted": lasted, "tracking_rms": by_window(1e-4), "estimation_rms": by_window(0.2),
         "input_variation": by_window(50.0), "weights_peak": by_window(14.0),
         "growth": {"time": [1.0, 10.0, min(ended, 150.0)], "weights_peak": [3.0, 30.0, 300.0]},
     } | more  # fmt: skip
 
 
-LADDER = [
+ROWS_OF_FIDELITIES = [
     row("shaft", "rcafc", 500.0, False, 200.0),
     row("electromechanical", "rcafc", 500.0, False, 1.5),
     row("electromechanical", "rcafc", 500.0, True, 200.0),
@@ -45,16 +44,16 @@ CURVES = {
     "tracking": np.exp(-TIME),
 }
 DRIFTING = {"lag": 0.05, "needed": 453.0, "runs": {"free": CURVES, "bounded": CURVES}}
-RESULTS = {"ladder": {}, "horizons": {"duration": 200.0, "windows": WINDOWS, "rows": LADDER}, "lags": MAP}
+RESULTS = {"fidelity": {}, "horizons": {"duration": 200.0, "windows": WINDOWS, "rows": ROWS_OF_FIDELITIES}, "lags": MAP}
 
 
 def test_growth_is_drawn_up_to_the_end_of_each_run():
-    shaft, motor, survival = horizons_figure(LADDER, 200.0).axes
+    shaft, motor, survival = horizons_figure(ROWS_OF_FIDELITIES, 200.0).axes
     np.testing.assert_array_equal(shaft.lines[0].get_ydata(), [3.0, 30.0, 300.0])
     crosses = sorted(line.get_xdata()[0] for line in motor.lines if line.get_marker() == "X")
     assert crosses == [1.5, 139.4], "a run that is bounded lasts"
     said = [text.get_text() for text in survival.texts]
-    assert sorted(said) == ["1.5 s", "139 s", "lasts"]
+    assert sorted(said) == ["1.5 s", "139 s", "completed"]
     tops = sorted(line.get_ydata()[1] for line in survival.lines)
     assert tops == [1.5, 139.4, 200.0]
 
@@ -80,8 +79,8 @@ def test_damping_and_what_is_asked_of_it_share_a_panel():
 def test_page_says_how_long_everything_lasted(results, tmp_path):
     page = write_report(results | {key: RESULTS[key] for key in ("horizons", "lags")}, {}, tmp_path).read_text("utf-8")
     words = re.sub(r"<[^>]+>", " ", page)
-    for said in ("diverged at 139 s", "diverged at 1.5 s", "lasts 200 s", "For how long: 200 s", "10 to 20 s"):
+    for said in ("diverged at 139 s", "diverged at 1.5 s", "lasts 200 s", "Long runs: 200 s", "10 to 20 s"):
         assert said in words
-    assert "from 453 on" in words and "876 to 4382" in words and "never" in words
+    assert "above 453" in words and "876 to 4382" in words and "never" in words
     assert "Simulated: level ideal, 10 s." in words
-    assert "lasts 20 s" in words, "the ladder of 20 s says so, too"
+    assert "lasts 20 s" in words, "the comparison over 20 s says so, too"

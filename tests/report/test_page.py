@@ -6,7 +6,7 @@ import pytest
 from undertow.report.figures import sweep_figure
 from undertow.report.formats import chip, number, percent, prose
 from undertow.report.page import Html, document, join, table, tag, text
-from undertow.report.paper_report import write_report
+from undertow.report.reproduction.report import write_report
 
 VOID = {"meta", "img", "br"}
 
@@ -69,7 +69,7 @@ def test_percent_has_a_sign_but_no_negative_zero():
 
 def test_prose_sets_powers_indices_and_code():
     assert prose("m/s^2 of k_e < `sign`") == "m/s<sup>2</sup> of k<sub>e</sub> &lt; <code>sign</code>"
-    assert prose("x_ddot, gamma_eps, c01_x") == "x_ddot, gamma_eps, c01_x"
+    assert prose("c01_x, tracking_rms, x_ddotted") == "c01_x, tracking_rms, x_ddotted"
 
 
 def test_chip_says_its_verdict_in_words():
@@ -100,14 +100,16 @@ def test_links_lead_somewhere(page):
 def test_page_shows_every_figure_and_claim(page, results):
     parser = parsed(page)
     shown = [attributes.get("id") for name, attributes in parser.elements if name == "figure"]
-    assert shown == ["figure-fig06", "figure-ladder"]
+    assert shown == ["figure-fig06", "figure-fidelity"]
     words = "".join(parser.words)
     for claim in results["claims"]:
         assert words.count(claim["claim"]) == 2  # at a glance and in the audit
         if claim["scenario"]:
             assert f"undertow simulate {claim['scenario']}" in words
     assert "d < 103 rad/s" in words
-    assert words.index("What was assumed") < words.index("Dotted: wanted or true")
+    assert "Ghavidel and Kalat" in words and "Nonlinear Dynamics, 2017, DOI 10.1007/s11071-017-3590-2" in words
+    assert page.count("<math>") > 20, "formulas are typeset"
+    assert words.index("Assumptions") < words.index("Dotted lines are desired or true values")
     assert "9.8.7" in words
 
 
@@ -123,7 +125,7 @@ def test_table2_has_numbers_and_the_papers_words(page):
     assert [word for word in ("excellent", "fair", "poor") if word in row] == ["excellent", "fair", "poor"]
 
 
-def test_diverged_rung_says_when_and_why(page):
+def test_diverged_level_says_when_and_why(page):
     row = next(part for part in page.split("<tr>") if "diverged at" in part and "RCAFC" in part)
     assert "diverged at 3.29 s" in row
     assert "motor lag" in row
@@ -137,7 +139,7 @@ def test_figures_are_written_as_files_too(results, tmp_path):
     assert written == ["figures/sweep.png", "figures/sweep.svg", "report.html"]
 
 
-@pytest.mark.parametrize("gone", ["example1", "example2", "table2", "ladder", "claims", "provenance"])
+@pytest.mark.parametrize("gone", ["example1", "example2", "table2", "fidelity", "claims", "provenance"])
 def test_missing_parts_are_left_out(results, tmp_path, gone):
     del results[gone]
     parsed(write_report(results, {}, tmp_path).read_text(encoding="utf-8"))
@@ -145,5 +147,5 @@ def test_missing_parts_are_left_out(results, tmp_path, gone):
 
 def test_nothing_at_all_is_still_a_page(tmp_path):
     words = "".join(parsed(write_report({}, {}, tmp_path).read_text(encoding="utf-8")).words)
-    assert "What was assumed" in words
+    assert "Assumptions" in words
     assert "Audit" not in words

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from undertow.studies.paper.thruster_response import thruster_response
+from undertow.reproduction.thruster_response import thruster_response
 from undertow.thrusters.paper_table3 import paper_table3
 
 MOTOR = paper_table3().motor

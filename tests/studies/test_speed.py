@@ -8,31 +8,29 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from lanes.emulated_gpu import EmulatedGpu
+from batch_compiler.emulated_gpu import EmulatedGpu
 
+from simdjit import Driver, Loop, nvidia
+from undertow.bench import measure, plain_numpy, workload
 from undertow.cli.main import run
-from undertow.lanes import nvidia
-from undertow.lanes.cuda import Driver
-from undertow.lanes.program import Program
 from undertow.loop import sampled
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
-from undertow.studies.speed import measure, plain_numpy, workload
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 W1 = workload.workload(workload.W1)
 
 
-def short(one, ticks):
-    return one._replace(plan=one.plan._replace(ticks=ticks))
+def short(one, steps):
+    return one._replace(plan=one.plan._replace(steps=steps))
 
 
 def test_the_workload_is_that_of_plain_numpy():
     """Mean square of the error over the second half of the first two seconds: two programs that share no code."""
     late = eqx.tree_at(lambda run: (run.accumulators[0].start, run.accumulators[0].stop), W1.run, (0.9995, 1.9995))
-    fleet = workload.fleet(short(workload.Workload(late, W1.plan), 2000))
-    found = workload.tracking(fleet.fly(workload.alone(late)).accumulated)[0]
+    batch = workload.batch(short(workload.Workload(late, W1.plan), 2000))
+    found = workload.tracking(batch.run(workload.alone(late)).accumulated)[0]
     bounded = np.sqrt(plain_numpy.workload_w1(2000))
     assert found == pytest.approx(bounded, rel=1e-9)
     assert abs(np.sqrt(plain_numpy.workload_w1(2000, bound=np.inf)) / bounded - 1) > 1e-3, "the bound is met"
@@ -40,7 +38,7 @@ def test_the_workload_is_that_of_plain_numpy():
 
 def test_runs_of_a_batch_start_from_different_places():
     run = W1.run
-    rms = workload.tracking(workload.fleet(short(W1, 11_000)).fly(workload.several(run, 9)).accumulated)
+    rms = workload.tracking(workload.batch(short(W1, 11_000)).run(workload.several(run, 9)).accumulated)
     assert len(set(rms)) == 9
     places = workload.several(run, 9).start
     at = {"position": places[0][4], "velocity": places[1][4]}
@@ -57,26 +55,26 @@ def test_workloads_are_the_examples(data, example, steps):
     for one, other in zip(*(jax.tree.leaves(each.closed_loop) for each in (ours, theirs)), strict=True):
         np.testing.assert_array_equal(one, other)
     mine = workload.workload(data)
-    assert mine.ticks == steps == round(theirs.scenario.loop.duration / theirs.scenario.loop.dt)
+    assert mine.steps == steps == round(theirs.scenario.loop.duration / theirs.scenario.loop.dt)
     assert mine.plan.dt == theirs.scenario.loop.dt and mine.plan.every == 0
 
 
 def test_operations_are_counted():
     """Adding one axis to six adds a sixth of what the law does; a loop of plain arithmetic is counted by hand."""
-    program = lambda step: Program(
+    program = lambda step: Loop(
         lambda numbers: numbers, lambda known: known, step, lambda known, carry, k: carry, jnp.ones(3), [False]
     )
     assert program(lambda known, carry, k: carry * 2.5 + known).operations == 6
     assert program(lambda known, carry, k: carry + jnp.sin(known)).operations == 3, "sin(known) is done before"
-    assert workload.fleet(short(W1, 1), lanes=1).operations > 2_000
+    assert workload.batch(short(W1, 1), width=1).operations > 2_000
 
 
 def test_what_a_gpu_would_do(monkeypatch):
     """What is measured on a GPU: by `jax.vmap`, a narrow program here, and by threads, for which this processor stands in."""
     assert measure.vmapped_ns(short(W1, 5), runs=3) > 0
-    monkeypatch.setattr(nvidia, "ptx", lambda assembly, generation: assembly)
+    monkeypatch.setattr(nvidia, "ptx", lambda assembly, *rest: assembly)
     found = measure.on_gpu(short(W1, 5), Driver(EmulatedGpu()), runs=40)
-    assert found["ns"] > 0 and found["ticks_per_second"] == pytest.approx(1e9 / found["ns"])
+    assert found["ns"] > 0 and found["steps_per_second"] == pytest.approx(1e9 / found["ns"])
 
 
 @pytest.mark.slow
@@ -87,7 +85,7 @@ def test_bench(capsys):
     assert found["single_times_numpy"] == pytest.approx(found["numpy_ns"] / found["single_ns"], rel=1e-4)
     assert found["first_cold_s"] > found["first_kept_s"] > 0
     assert found["batch_float64_ns"] < found["single_ns"] < found["numpy_ns"]
-    assert found["w2_tracking_rms"] == pytest.approx(0.0082, rel=0.05) and found["w2_ticks"] == 12_000
+    assert found["w2_tracking_rms"] == pytest.approx(0.0082, rel=0.05) and found["w2_steps"] == 12_000
     assert found["w2_operations"] > found["operations"] > 2_000
     assert run(["bench"]) == 0
     said = capsys.readouterr().out

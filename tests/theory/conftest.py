@@ -6,9 +6,9 @@ import pytest
 from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.none import none
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 
 THREE_SETS = {"sets": 3}  # at -1, 0, 1 with width 1: the layout of section 3
 

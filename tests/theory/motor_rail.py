@@ -5,8 +5,11 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
-from undertow.core.contracts import AbstractController, AbstractModel, AbstractPlant, Effort, Load, Measurement
+from undertow.core.actuator_model import DirectActuator
+from undertow.core.contracts import AbstractController, AbstractDynamics, Load, Measurement, Model
+from undertow.core.coordinates import OutputCoordinates
 from undertow.core.status import Status
+from undertow.plants.mechanism import AbstractMechanism, both_ways
 from undertow.thrusters.thruster import AbstractThruster
 
 MASS, COUNT = 187.5, 4  # kg
@@ -19,12 +22,11 @@ class RailState(NamedTuple):
     thrusters: Any
 
 
-class RailModel(AbstractModel):
+class RailDynamics(AbstractDynamics):
     """F = 0, or what the speed sensors explain; G from the voltage gain."""
 
     thruster: AbstractThruster
     speed_sensor: bool = eqx.field(static=True, default=False)
-    angles: tuple[bool, ...] = eqx.field(static=True, default=(False,))
 
     def drift(self, y):
         if not self.speed_sensor:
@@ -38,7 +40,7 @@ class RailModel(AbstractModel):
         return jnp.broadcast_to(acceleration * MASS / COUNT / self.thruster.voltage_gain(), (COUNT,))
 
 
-class MotorRail(AbstractPlant):
+class MotorRail(AbstractMechanism):
     """x_ddot = sum of thrusts / mass + d."""
 
     thruster: AbstractThruster
@@ -60,33 +62,22 @@ class MotorRail(AbstractPlant):
     def acceleration(self, t, x, u, d: Load):
         return self.thruster.thrust(x.thrusters, u).sum()[None] / MASS + d.acceleration
 
-    def place(self, x):
-        return None
+    def limits(self):
+        return both_ways(self.thruster.supply, COUNT)
 
-    def admissible(self, x, u):
-        return jnp.clip(u, -self.thruster.supply, self.thruster.supply)
+    def power(self, x, u):
+        return jnp.zeros(COUNT)
 
-    def effort(self, x, u):
-        return Effort(jnp.zeros(COUNT), (jnp.abs(u) >= self.thruster.supply).astype(u.dtype))
-
-    def inputs(self):
-        return COUNT
-
-    def health(self, x):
+    def status(self, x):
         far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
-    def advice(self):
-        return ()
-
     def model(self, *, speed_sensor: bool = False):
-        return RailModel(self.thruster, speed_sensor)
+        return Model(RailDynamics(self.thruster, speed_sensor), OutputCoordinates((False,)), DirectActuator())
 
 
-class ThrustModel(AbstractModel):
+class ThrustDynamics(AbstractDynamics):
     """The same axis with thrusts for inputs."""
-
-    angles: tuple[bool, ...] = eqx.field(static=True, default=(False,))
 
     def drift(self, y):
         return jnp.zeros(1)
@@ -98,13 +89,18 @@ class ThrustModel(AbstractModel):
         return jnp.broadcast_to(acceleration * MASS / COUNT, (COUNT,))
 
 
+def thrust_model():
+    """The same axis with thrusts for inputs."""
+    return Model(ThrustDynamics(), OutputCoordinates((False,)), DirectActuator())
+
+
 class InnerLoop(AbstractController):
     """A law that asks for thrusts, over a loop on measured propeller speeds by computed voltage, lambda in 1/s.
 
     V = k_2 Om + k_3 Q + k_1 lambda (Om_wanted - Om); the law hears which thrusts there are. Section X9.
     """
 
-    model: AbstractModel
+    model: Model
     law: AbstractController
     thruster: Any
     rate: float
@@ -113,10 +109,13 @@ class InnerLoop(AbstractController):
         return self.law.init(y, r)
 
     def command(self, z, y, r):
-        thrust, telemetry = self.law.command(z, y, r)
+        thrust, signals = self.law.command(z, y, r)
         motor, speed = self.thruster.motor, y.actuator.speed
         wanted = motor.speed_at(thrust)
-        return motor.steady_voltage(speed) + motor.k1 * self.rate * (wanted - speed), telemetry
+        return motor.steady_voltage(speed) + motor.k1 * self.rate * (wanted - speed), signals
+
+    def signals(self):
+        return self.law.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         return self.law.advance(z, y, r, self.thruster.motor.thrust(y.actuator.speed), dt)

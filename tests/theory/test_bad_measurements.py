@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractSensor, Measurement
+from undertow.core.contracts import AbstractNavigation, Measurement
 from undertow.disturbances.none import none
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
@@ -30,7 +30,7 @@ def delay_margin(law):
 
     With the loop cut at the measurement, u = -C(p) x and x = u / p^2: C / p^2 = -exp(p delay).
     """
-    g = linear.gains(law)
+    g = small_signal.gains(law)
     frequency = np.geomspace(1e-2, 1e4, 400_001)
     p = 1j * frequency
     # eps = x_hat_dot - v and z of the law, driven by x and u.
@@ -45,14 +45,14 @@ def delay_margin(law):
     return float((lag / frequency[at]).min())
 
 
-class Late(AbstractSensor):
-    """Everything as it was a number of ticks ago."""
+class Late(AbstractNavigation):
+    """Everything as it was a number of steps ago."""
 
-    ticks: jax.Array
+    steps: jax.Array
     longest: int = eqx.field(static=True, default=80)
     smooth: bool = eqx.field(static=True, default=False)
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
     def init(self, path, truth) -> Any:
@@ -61,7 +61,7 @@ class Late(AbstractSensor):
 
     def measure(self, path, state, t, truth):
         now = jnp.stack([truth.position, truth.velocity])
-        return Measurement(*state[self.longest - self.ticks]), jnp.concatenate([state[1:], now[None]])
+        return Measurement(*state[self.longest - self.steps]), jnp.concatenate([state[1:], now[None]])
 
 
 @pytest.mark.parametrize("name", MARGINS)
@@ -71,22 +71,22 @@ def test_delay_margin(name):
     law = rcaf(plant.model(), sets=3, **choices)
     margin = delay_margin(law)
     print(f"{name}: {1e3 * margin:.3f} ms, printed {1e3 * printed}")
-    whole_ticks = np.floor((margin - DT / 2) / DT)  # an input that is held is itself half a tick late
+    whole_ticks = np.floor((margin - DT / 2) / DT)  # an input that is held is itself half a step late
     assert whole_ticks * DT == pytest.approx(printed)
     for factor, stable in ((0.9, True), (1.1, False)):
-        ticks = round(factor * margin / DT - 0.5)
-        loop = ClosedLoop(plant, law, setpoint([1e-6]), none(), Late(jnp.asarray(ticks)))
-        rate = np.abs(np.asarray(sampled.simulate(loop, duration=4.0, dt=DT, record_every=1).samples.velocity))[:, 0]
-        assert (rate[-1000:].max() < 0.1 * rate[:1000].max()) == stable, (factor, ticks)
+        steps = round(factor * margin / DT - 0.5)
+        loop = ClosedLoop(plant, law, setpoint([1e-6]), none(), Late(jnp.asarray(steps)))
+        rate = np.abs(np.asarray(sampled.simulate(loop, duration=4.0, dt=DT, record_every=1).signals["velocity"]))[:, 0]
+        assert (rate[-1000:].max() < 0.1 * rate[:1000].max()) == stable, (factor, steps)
 
 
-class OneBad(AbstractSensor):
+class OneBad(AbstractNavigation):
     """The truth, but for one sample of the velocity."""
 
     error: float
     smooth: bool = eqx.field(static=True, default=False)
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
     def init(self, path, truth) -> tuple[()]:
@@ -105,8 +105,8 @@ def test_one_bad_sample(error, spacing, printed):
     for bound in (np.inf, 20.0):
         law = rcaf(plant.model(), sets=3, reach=(spacing,), weights_bound=bound)
         loop = ClosedLoop(plant, law, setpoint([0.0]), none(), OneBad(error))
-        samples = sampled.simulate(loop, duration=0.5, dt=1e-3, record_every=1).samples
-        peaks.append(float(jnp.abs(samples.estimate).max()))
+        samples = sampled.simulate(loop, duration=0.5, dt=1e-3, record_every=1).signals
+        peaks.append(float(jnp.abs(samples["estimate"]).max()))
     print(f"{error} m/s, sets {spacing}: {peaks}, printed {printed}")
     assert peaks[0] == pytest.approx(printed, rel=0.1)
     assert peaks[1] <= min(peaks[0], 20.0) * (1 + 1e-12)

@@ -39,10 +39,10 @@ def plant_matrices(axis, lag_factor, added):
     return step[:, :n], step[:, n], step[:, n + 1]
 
 
-def loop(axis, chosen, lag_factor=1.0, added=0.0, ticks=0):
+def loop(axis, chosen, lag_factor=1.0, added=0.0, steps=0):
     """A, B of load and velocity noise, and u = C s + D n, of the whole sampled loop with preset `robust`."""
     step, push, load = plant_matrices(axis, lag_factor, added)
-    n, dt, late = len(step), axis.sampling_time, ticks + round(axis.delay / axis.sampling_time)
+    n, dt, late = len(step), axis.sampling_time, steps + round(axis.delay / axis.sampling_time)
     rates, estimate, force = n, n + 1, n + 2
     size = n + 3 + late
     unit = np.eye(size)
@@ -78,9 +78,9 @@ def loop(axis, chosen, lag_factor=1.0, added=0.0, ticks=0):
 def test_no_margin_is_broken(axis):
     """Spectral radius of the sampled loop with every lag, added lag and delay that the rule promises to survive."""
     chosen = robust_bandwidths(axis)
-    for factor, added, ticks, _ in MARGINS:
-        matrix, *_ = loop(axis, chosen, factor, added, int(ticks))
-        assert np.abs(np.linalg.eigvals(matrix)).max() < 1, (factor, added, ticks)
+    for factor, added, steps, _ in MARGINS:
+        matrix, *_ = loop(axis, chosen, factor, added, int(steps))
+        assert np.abs(np.linalg.eigvals(matrix)).max() < 1, (factor, added, steps)
 
 
 def test_the_margins_are_those_that_are_stated():
@@ -126,9 +126,9 @@ def test_noise_and_delay_slow_a_law_and_limits_price_its_chattering():
 def test_pid_keeps_the_same_margins(lag):
     axis = Axis(0.01, lag, 35.0, 0.0, 0.0, 1.0, 5.0)
     frequency = pid_frequency(axis)
-    for factor, added, ticks, _ in MARGINS:
+    for factor, added, steps, _ in MARGINS:
         step, push, _ = plant_matrices(axis, factor, added)
-        n, late = len(step), int(ticks)
+        n, late = len(step), int(steps)
         matrix = np.zeros((n + 1 + late, n + 1 + late))
         matrix[:n, :n], matrix[n, n], matrix[n, 0] = step, 1.0, -0.01 * 0.1 * frequency**3
         u = np.zeros(n + 1 + late)
@@ -139,7 +139,7 @@ def test_pid_keeps_the_same_margins(lag):
                 matrix[n + 1 + i, n + i] = 1.0
         else:
             matrix[:n] += np.outer(push, u)
-        assert np.abs(np.linalg.eigvals(matrix)).max() < 1, (factor, added, ticks)
+        assert np.abs(np.linalg.eigvals(matrix)).max() < 1, (factor, added, steps)
 
 
 def test_laws_take_them():
@@ -147,7 +147,7 @@ def test_laws_take_them():
     model = hybrid_vehicle(bluerov2_heavy(), t200()).model()
     noise = [0.5, 0.5, 0.5, 1e-3, 1e-3, 1e-3]
     law = robust(model, sampling_time=0.01, velocity_noise=noise)
-    axes = bandwidths.axes_of(model.own_axes(), 0.01, 0.0, noise, 1.0)
+    axes = bandwidths.axes_of(model.in_body_axes(), 0.01, 0.0, noise, 1.0)
     np.testing.assert_allclose(law.estimator.bandwidth, [robust_bandwidths(axis).bandwidth for axis in axes])
     np.testing.assert_allclose(law.feedback[..., 1] / 2, [robust_bandwidths(axis).tracking for axis in axes])
     assert robust_bandwidths(axes[0]).tracking < robust_bandwidths(axes[5]).tracking
@@ -158,7 +158,7 @@ def test_laws_take_them():
     np.testing.assert_allclose(np.sqrt(slow.feedback[..., 0]), 1.5)
     assert float(slow.actuator_rate) == pytest.approx(9.0)
     lagged = hybrid_vehicle(bluerov2_heavy(), first_order(time_constant=0.2)).model()
-    assert bandwidths.axes_of(lagged.own_axes(), 0.01, 0.0, 0.0, 1.0)[0].lag == pytest.approx(0.2)
+    assert bandwidths.axes_of(lagged.in_body_axes(), 0.01, 0.0, 0.0, 1.0)[0].lag == pytest.approx(0.2)
     still = bandwidths.axes_of(double_integrator(1).model(), 0.01, 0.0, 0.0, 1.0)[0]
     assert still.lag == 0.0 and np.isinf(still.authority)
 

@@ -6,24 +6,23 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.analysis.certificate.bounds import residual
-from undertow.analysis.certificate.function import gramian, transition
+from undertow.analysis.certificate.function import gramian, lyapunov_residual, transition
 from undertow.controllers.rcaf import rcaf
 from undertow.controllers.robust.estimator import Estimator
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.disturbances.table import table
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
+from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.linear_plant import linear_plant
-from undertow.sensors.white_noise import white_noise
 
 CONSTANTS = np.array([3.0, -20.0, 45.0, 0.5])
 RISE = 1e-10  # of V(0)
 FAST = {"preset": "robust", "sets": 1}
 
 
-def flown(d, law=None, axes=1, limit=np.inf, goal=2.0, dt=1e-3, duration=2.0, sensor=None, loop="sampled"):
-    """A run on independent axes, recorded at every tick; `law` are choices of the controller."""
+def flown(d, law=None, axes=1, limit=np.inf, goal=2.0, dt=1e-3, duration=2.0, navigation=None, loop="sampled"):
+    """A run on independent axes, recorded at every step; `law` are choices of the controller."""
     plant = double_integrator(axes, limit)
     choices = dict(law or {})
     if choices.get("preset") == "robust":
@@ -33,7 +32,7 @@ def flown(d, law=None, axes=1, limit=np.inf, goal=2.0, dt=1e-3, duration=2.0, se
         rcaf(plant.model(), **choices),
         ut.references.setpoint([goal] * axes),
         disturbance=d,
-        sensor=sensor,
+        navigation=navigation,
         duration=duration,
         dt=dt,
         record=dt,
@@ -77,14 +76,14 @@ def test_its_rate_is_the_one_of_the_proof():
     run = flown(constant([3.0]), dt=1e-4, duration=0.5, loop="continuous")
     series, eps = run.dataset, run.dataset["modelling_error"].values[:, 0]
     s = 5 * (series["error"] - series["velocity"]).values[:, 0]
-    taken = 500 * (150 * eps**2 + eps * 0.1 * np.tanh(eps / 0.5)) + s * series["robust"].values[:, 0]
+    taken = 500 * (150 * eps**2 + eps * 0.1 * np.tanh(eps / 0.5)) + s * series["robust_term"].values[:, 0]
     exact = -(series["lyapunov_decay"].values + taken)
     np.testing.assert_allclose(series["lyapunov_rate"].values[1:], (exact[1:] + exact[:-1]) / 2, rtol=2e-4)
 
 
 @pytest.mark.parametrize("dt", [1e-3, 1e-2, 0.1])
 def test_discrete_function_of_the_robust_law_falls_at_any_sampling_time(dt):
-    """One rule: by exactly l_1 eps^2 per tick, limits of the input or not (X4); the error ends at rounding."""
+    """One rule: by exactly l_1 eps^2 per step, limits of the input or not (X4); the error ends at rounding."""
     run = flown(constant(CONSTANTS), FAST | {"bandwidth": 0.35 / dt}, axes=4, limit=30.0, dt=dt, duration=300 * dt)
     assert hypothesis(run, "limits")["whole"] < 1
     v, eps = run.dataset["lyapunov"].values, run.dataset["modelling_error"].values
@@ -105,7 +104,7 @@ def test_robust_law_with_five_rules_and_the_box():
 
 
 def test_with_a_tracking_share_the_whole_function_falls_but_for_the_first_tick():
-    """mu = 1 / gamma_eps > 0: V_f holds 1/2 E^T P E, too. What is learnt at t = 0 counts a tick later: order dt^2."""
+    """mu = 1 / gamma_eps > 0: V_f holds 1/2 E^T P E, too. What is learnt at t = 0 counts a step later: order dt^2."""
     law, rises = {"preset": "robust", "bandwidth": 50.0, "tracking_share": 0.01}, []
     for dt in (5e-4, 2.5e-4):
         run = flown(constant([3.0]), law, dt=dt, duration=400 * dt)
@@ -114,7 +113,7 @@ def test_with_a_tracking_share_the_whole_function_falls_but_for_the_first_tick()
         np.testing.assert_allclose(series["lyapunov"], series["lyapunov_tracking"] + series["lyapunov_estimation"])
         rises.append(float(series["lyapunov_rate"][1]) * dt / float(series["lyapunov"][0]))
     assert 0 < rises[1] < 1e-6 and 3.7 < rises[0] / rises[1] < 4.1
-    start = 100 * 5 * 3.0**2 * float(gaussian_sets(5).gathering()) / (2 * 50**2)  # five weights that miss by 3
+    start = 100 * 5 * 3.0**2 * float(gaussian_sets(5).basis_norm_squared()) / (2 * 50**2)  # five weights that miss by 3
     assert float(series["lyapunov"][0]) == pytest.approx(start, rel=0.03)
 
 
@@ -135,7 +134,7 @@ def test_rises_only_where_the_basis_moves():
     """Negative control: a slow estimator errs beyond its fuzzy sets, and its function rises there only."""
     run = flown(constant(CONSTANTS), {"preset": "robust", "bandwidth": 5.0, "reach": (1.0,)}, axes=4)
     rho = (np.asarray(gaussian_sets(5).basis(run.dataset["modelling_error"].values.reshape(-1, 1))) ** 2).sum(-1)
-    moved = (np.abs(rho / float(gaussian_sets(5).gathering()) - 1) > 0.01).reshape(-1, 4).any(-1)
+    moved = (np.abs(rho / float(gaussian_sets(5).basis_norm_squared()) - 1) > 0.01).reshape(-1, 4).any(-1)
     up = rising(run)
     assert up.any() and not (up & ~moved[:-1]).any()
     assert hypothesis(run, "basis")["whole"] == pytest.approx(1 - moved.mean())
@@ -165,7 +164,7 @@ def test_rises_under_saturation_only():
 def test_weights_leave_the_interior_under_noise():
     """Drift (3.8 of the theory) brings the paper's weights to their box: the share of time inside it falls."""
     law = {"sets": 5, "reach": (0.1,), "weights_bound": 20.0}
-    quiet, noisy = (flown(constant([0.5]), law, goal=0.0, sensor=s) for s in (None, white_noise(0, 0.01)))
+    quiet, noisy = (flown(constant([0.5]), law, goal=0.0, navigation=s) for s in (None, white_noise(0, 0.01)))
     assert hypothesis(quiet, "weights")["whole"] == 1.0
     weights = hypothesis(noisy, "weights")
     assert weights["steady"] < weights["whole"] < 1 and weights["first_failure"] > 0.2
@@ -185,8 +184,8 @@ def test_compensation_must_exceed_half_the_range_of_d():
 def test_residual_of_table_1():
     """U9: 0.2785 (phi w_bar + phi gamma_eps omega_bar) = 8.36 per axis; none with sign."""
     model = double_integrator(2).model()
-    assert residual(rcaf(model), 2) == pytest.approx(2 * 8.354, rel=1e-3)
-    assert residual(rcaf(model, switching="sign"), 2) == 0.0
+    assert lyapunov_residual(rcaf(model), 2) == pytest.approx(2 * 8.354, rel=1e-3)
+    assert lyapunov_residual(rcaf(model, switching="sign"), 2) == 0.0
 
 
 def test_estimation_error_of_a_ramp_reaches_its_bound():

@@ -6,7 +6,7 @@ One run per invariant; every axis is one signal.
 import numpy as np
 import pytest
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.disturbances.table import table
 from undertow.loop import continuous
 
@@ -21,10 +21,10 @@ def test_constant_is_learnt_and_ramp_is_followed_at_a_distance(rails):
     rows = np.array([[0.0, *starts], [6.0, *(starts + 6 * rates)]])
     loop = rails(5, disturbance=table(rows))
     outcome = continuous.simulate(loop, duration=5.0, record_step=0.5, tolerances=(1e-10, 1e-12))
-    d_til = np.asarray(outcome.samples.estimate - outcome.samples.uncertainty)[-1]
+    d_til = np.asarray(outcome.signals["estimate"] - outcome.signals["uncertainty"])[-1]
     assert (np.abs(d_til[:3]) <= 1e-8).all(), d_til
     assert np.abs(d_til[3:] / ramps) == pytest.approx(0.00712, rel=0.02)
-    assert np.abs(d_til[3:] / ramps) == pytest.approx(linear.ramp_error(loop.controller)[1], rel=1e-3)
+    assert np.abs(d_til[3:] / ramps) == pytest.approx(small_signal.ramp_error(loop.controller)[1], rel=1e-3)
 
 
 def bounded_rate_signals():
@@ -45,10 +45,10 @@ def test_errors_stay_below_the_peak_gains(rails):
     assert np.abs(np.diff(rows[:, 1:], axis=0) / np.diff(rows[:, :1], axis=0)).max() <= RATE * (1 + 1e-9)
     loop = rails(rows.shape[1] - 1, disturbance=table(rows))
     outcome = continuous.simulate(loop, duration=END, record_step=2.5e-3, tolerances=(1e-6, 1e-8))
-    samples, settled = outcome.samples, np.asarray(outcome.time) > 1.0
-    error = np.abs(np.asarray(samples.error))[settled]
-    d_til = np.abs(np.asarray(samples.estimate - samples.uncertainty))[settled]
-    s = 5 * (samples.error - samples.velocity)[settled]
+    samples, settled = outcome.signals, np.asarray(outcome.time) > 1.0
+    error = np.abs(np.asarray(samples["error"]))[settled]
+    d_til = np.abs(np.asarray(samples["estimate"] - samples["uncertainty"]))[settled]
+    s = 5 * (samples["error"] - samples["velocity"])[settled]
     assert np.abs(np.asarray(s)).max() < 0.2 * 0.5, "the tanh is in its linear range"
     assert error.max() <= 1.05 * 6.95e-5 * RATE
     assert d_til.max() <= 1.05 * 0.01165 * RATE

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from undertow.analysis import drift, linear, noise
+from undertow.analysis import drift, noise, small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.status import Status
 from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
+from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
-from undertow.sensors.white_noise import white_noise
 
 DT = 1e-3
 # Noise (m/s), distance of the sets, and as printed: c_dot (1/s^2) measured, time of divergence (s).
@@ -34,7 +34,7 @@ def noisy(duration, velocity, spacing, **choices):
     law = rcaf(plant.model(), **({"sets": 3, "reach": (spacing,)} | choices))
     loop = ClosedLoop(plant, law, setpoint([0.0]), none(), white_noise(0.0, velocity))
     outcome = sampled.simulate(loop, duration=duration, dt=DT, record_every=10)
-    weights = np.asarray(outcome.samples.weights)[:, 0]
+    weights = np.asarray(outcome.signals["weights"])[:, 0]
     return law, np.asarray(outcome.time), drift.gain_of(law, weights), weights, outcome
 
 
@@ -95,7 +95,7 @@ def test_certificate_separates_what_stays_calm_from_what_does_not():
         law, _, gain, _, outcome = noisy(15.0, 1e-2, 0.1, weights_bound=theta_max)
         assert drift.is_certified(law, DT) == calm
         assert gain.max() <= drift.gain_bound(law) * (1 + 1e-12)
-        late = float(np.sqrt((np.asarray(outcome.samples.modelling_error)[-1000:] ** 2).mean()))
+        late = float(np.sqrt((np.asarray(outcome.signals["modelling_error"])[-1000:] ** 2).mean()))
         print(f"box {theta_max:.4g}: rms of eps {late:.3g} m/s at the end")
         assert (late < 0.04) == calm
 
@@ -108,7 +108,7 @@ def test_ripple_drives_weights_apart_too():
         law = rcaf(plant.model(), sets=3, reach=(spacing,))
         loop = ClosedLoop(plant, law, setpoint([0.0]), sinusoid(5.0, 20.0), perfect())
         outcome = sampled.simulate(loop, duration=100.0, dt=DT, record_every=1000)
-        found[spacing] = float(drift.gain_of(law, np.asarray(outcome.samples.weights)[-1, 0]))
+        found[spacing] = float(drift.gain_of(law, np.asarray(outcome.signals["weights"])[-1, 0]))
         expected = after_ripple(law, 5.0, 20.0, 100.0)
         print(f"sets {spacing}: c = {found[spacing]:.4g}, predicted {expected:.4g}")
         assert found[spacing] == pytest.approx(expected, rel=0.05)
@@ -117,7 +117,7 @@ def test_ripple_drives_weights_apart_too():
 
 def after_ripple(law, amplitude, frequency, duration):
     """c by its own equation, in which eps = -p d / (p^2 + (a1 + c) p + b2), p = i frequency."""
-    g, p, rate = linear.gains(law), 1j * frequency, drift.drift_rate(law, DT, 1.0)
+    g, p, rate = small_signal.gains(law), 1j * frequency, drift.drift_rate(law, DT, 1.0)
     eps = lambda gain: abs(p / (p**2 + (g.pole + gain) * p + g.b2)) * amplitude
     return solve_ivp(lambda _, gain: rate * eps(gain) ** 2 / 2, (0.0, duration), [0.0], rtol=1e-8).y[0, -1]
 

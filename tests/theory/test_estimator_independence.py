@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 
@@ -26,13 +26,16 @@ class DeafToLimits(AbstractController):
     """A law told what it asked for instead of what was applied."""
 
     law: AbstractController
-    model: AbstractModel
+    model: Model
 
     def init(self, y, r):
         return self.law.init(y, r)
 
     def command(self, z, y, r):
         return self.law.command(z, y, r)
+
+    def signals(self):
+        return self.law.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         return self.law.advance(z, y, r, self.law.command(z, y, r)[0], dt)
@@ -41,8 +44,8 @@ class DeafToLimits(AbstractController):
 def estimator(loop):
     outcome = sampled.simulate(loop, duration=4.0, record_every=1)
     assert int(outcome.status) == 0
-    samples = outcome.samples
-    return np.asarray(samples.modelling_error), np.asarray(samples.estimate - samples.uncertainty), samples
+    samples = outcome.signals
+    return np.asarray(samples["modelling_error"]), np.asarray(samples["estimate"] - samples["uncertainty"]), samples
 
 
 @pytest.fixture
@@ -54,7 +57,7 @@ def free(rails):
 def test_same_estimator_behind_any_controller(rails, free, case):
     eps, d_til, samples = estimator(rails(2, disturbance=sinusoid(**PROBES), **(COMPOSITE_ONLY | CASES[case])))
     assert np.abs(eps - free[0]).max() <= 1e-9 and np.abs(d_til - free[1]).max() <= 1e-9
-    assert np.abs(samples.position - free[2].position).max() > 1e-2, "yet the motion is another one"
+    assert np.abs(samples["position"] - free[2]["position"]).max() > 1e-2, "yet the motion is another one"
 
 
 def test_s_branch_spoils_it(rails):
@@ -68,5 +71,5 @@ def test_commanded_instead_of_applied_spoils_it(rails, free):
     loop = rails(2, disturbance=sinusoid(**PROBES), **(COMPOSITE_ONLY | CASES["hard against the stop"]))
     deaf = eqx.tree_at(lambda loop: loop.controller, loop, DeafToLimits(loop.controller, loop.controller.model))
     outcome = sampled.simulate(deaf, duration=4.0, record_every=1)
-    eps = jnp.abs(outcome.samples.modelling_error - free[0])
+    eps = jnp.abs(outcome.signals["modelling_error"] - free[0])
     assert float(eps.max()) > 1e-3

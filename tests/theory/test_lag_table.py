@@ -7,18 +7,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from motor_rail import COUNT, MASS, InnerLoop, MotorRail, ThrustModel
+from motor_rail import COUNT, MASS, InnerLoop, MotorRail, thrust_model
 
-from undertow.analysis import linear, motor_loop
+from undertow.analysis import motor_loop, small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import Load, Target
 from undertow.core.status import Status
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.numerics.integrators import rk4
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 from undertow.thrusters.electromechanical import ElectromechanicalState
 from undertow.thrusters.paper_table3 import paper_table3
 
@@ -29,7 +29,7 @@ SPEEDS = np.array([2.0, 10.0, 20.0, 40.0])  # rad/s
 def observer(bandwidth):
     """A pure linear observer in Table 1's letters: no robust term, no share of s, critically damped."""
     nothing = {"robust_gain": 0.0, "compensation_gain": 0.0, "weight": np.eye(2) * 1e-9}
-    rho = float(rcaf(ThrustModel(), sets=3).fuzzy.gathering())
+    rho = float(rcaf(thrust_model(), sets=3).fuzzy.basis_norm_squared())
     return nothing | {"sets": 3, "pole": 2 * bandwidth, "composite": bandwidth**2 / (100 * rho)}
 
 
@@ -53,7 +53,7 @@ def departure(law, speed):
     target = Target(*(jnp.zeros(1) for _ in range(3)))
     y = plant.output(0.0, start)
     z = law.init(y, target)
-    held = -(law.model.gain(y) @ volts)
+    held = -(law.model.dynamics.gain(y) @ volts)
     z = z._replace(weights=jnp.broadcast_to(held[:, None], z.weights.shape))
 
     def flow(t, state):
@@ -63,14 +63,14 @@ def departure(law, speed):
         return plant.dynamics(t, x, u, load), law.flow(z, y, target, u)
 
     def second(state, _):
-        def tick(state, _):
+        def step(state, _):
             state = rk4(flow, 0.0, state, 1e-3)
             x, z = state
             away = [x.position, x.velocity, x.thrusters.speed - speeds, z.weights.mean(1) - held]
             away = jnp.abs(jnp.concatenate(away)).max()
             return state, jnp.where(jnp.isfinite(away), away, jnp.inf)
 
-        state, away = jax.lax.scan(tick, state, None, length=1000)
+        state, away = jax.lax.scan(step, state, None, length=1000)
         return state, away.max()
 
     return jax.lax.scan(second, (start._replace(velocity=jnp.full(1, 1e-7)), z), None, length=12)[1]
@@ -97,19 +97,19 @@ def test_a_linear_observer_is_stable_between_two_bandwidths():
     """20 to 60 rad/s at every speed from 1 rad/s; slower ones cannot hold motors that hardly turn."""
     rightmost = lambda law, speed: motor_loop.rightmost(motor_loop.motor_matrix(law, WHOLE.motor, speed)).real
     for bandwidth in (20.0, 30.0, 60.0):
-        law = rcaf(ThrustModel(), **observer(bandwidth))
+        law = rcaf(thrust_model(), **observer(bandwidth))
         assert all(rightmost(law, speed) < 0 for speed in (1.0, 2.0, 5.0, 20.0, 40.0, 80.0))
-    slow = rcaf(ThrustModel(), **observer(10.0))
+    slow = rcaf(thrust_model(), **observer(10.0))
     assert rightmost(slow, 1.0) > 0.05 and rightmost(slow, 2.0) < 0
 
 
 PERIOD = 2 * np.pi
 ROWS = {
-    "ideal": {"rung": "ideal"},
+    "ideal": {"fidelity": "ideal"},
     "motor": {},
     "motor, 24 V": {"supply": 24.0},
     "speed sensor": {"speed_sensor": True},
-    "speed sensor, 24 V": {"speed_sensor": True, "supply": 24.0},
+    "speed navigation, 24 V": {"speed_sensor": True, "supply": 24.0},
     "rafc": {"composite": 0.0},
     "rafc, 24 V": {"composite": 0.0, "supply": 24.0},
     "inner loop, 24 V": {"inner": 60.0, "supply": 24.0},
@@ -129,16 +129,16 @@ def rows():
     return table
 
 
-def row(rung="electromechanical", supply=np.inf, speed_sensor=False, inner=None, dt=1e-3, **choices):
-    thruster = paper_table3(rung, supply=supply)
+def row(fidelity="electromechanical", supply=np.inf, speed_sensor=False, inner=None, dt=1e-3, **choices):
+    thruster = paper_table3(fidelity, supply=supply)
     plant = MotorRail(thruster)
-    law = rcaf(plant.model(speed_sensor=speed_sensor) if inner is None else ThrustModel(), **({"sets": 3} | choices))
+    law = rcaf(plant.model(speed_sensor=speed_sensor) if inner is None else thrust_model(), **({"sets": 3} | choices))
     flown = law if inner is None else InnerLoop(law.model, law, thruster, inner)
     loop = ClosedLoop(plant, flown, setpoint([2.0]), sinusoid(0.5, 1.0, offset=0.5), perfect())
     duration = 15.0 + 2 * PERIOD
     run = sampled.simulate(loop, duration=duration, dt=dt, record_every=1, substeps=round(dt / 1e-3))
     late = np.asarray(run.time) > 15.0
-    error, volts = np.asarray(run.samples.error)[late, 0], np.asarray(run.samples.voltage)[late, 0]
+    error, volts = np.asarray(run.signals["error"])[late, 0], np.asarray(run.signals["input"])[late, 0]
     rms = lambda series: float(np.sqrt((series**2).mean()))
     found = {"e": rms(error), "V": rms(volts), "variation": float(np.abs(np.diff(volts)).sum() / (2 * PERIOD))}
     return int(run.status), float(run.ended), found, law
@@ -148,7 +148,7 @@ def row(rung="electromechanical", supply=np.inf, speed_sensor=False, inner=None,
 def test_ideal_thrusters(rows):
     status, _, found, law = rows["ideal"]
     assert status == int(Status.OK)
-    assert found["e"] == pytest.approx(0.5 * abs(linear.tracking_response(law, 1.0)) / np.sqrt(2), rel=0.02)
+    assert found["e"] == pytest.approx(0.5 * abs(small_signal.tracking_response(law, 1.0)) / np.sqrt(2), rel=0.02)
     assert found["e"] == pytest.approx(1.8e-5, rel=0.05)
     needed = MASS / COUNT * np.sqrt(0.25 + 0.125) / float(WHOLE.voltage_gain())
     assert found["V"] == pytest.approx(needed, rel=1e-3)
@@ -159,7 +159,7 @@ def test_table_1_on_its_own_motor(rows):
     for name, seconds in (("motor", 3.0), ("speed sensor", 1.5)):
         status, ended, _, _ = rows[name]
         assert status != int(Status.OK) and ended < seconds, name
-    for name, error in (("motor, 24 V", 16e-3), ("speed sensor, 24 V", 11e-3)):
+    for name, error in (("motor, 24 V", 16e-3), ("speed navigation, 24 V", 11e-3)):
         status, _, found, _ = rows[name]
         assert status == int(Status.OK), name
         assert found["V"] > 0.9 * 24.0 and found["variation"] > 500.0, "from stop to stop, for ever"

@@ -9,12 +9,12 @@ from undertow.analysis import drift
 from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.estimator import Estimator, EstimatorState
 from undertow.disturbances import none, sinusoid
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect, white_noise
 from undertow.plants import double_integrator
 from undertow.references import setpoint
-from undertow.sensors import perfect, white_noise
 
 DT, NOISE, AXES = 1e-3, 0.003, 20  # s, m/s; every axis has noise of its own
 
@@ -26,7 +26,7 @@ def drift_gain(leakage):
     loop = ClosedLoop(plant, law, setpoint(np.zeros(AXES)), none(), white_noise(0.0, NOISE))
     run = sampled.simulate(loop, duration=100.0, dt=DT, record_every=1000)
     assert int(run.status) == 0
-    return drift.gain_of(law, np.asarray(run.samples.weights)).mean(axis=1), law
+    return drift.gain_of(law, np.asarray(run.signals["weights"])).mean(axis=1), law
 
 
 def test_drift_ends_where_leakage_takes_as_much_as_noise_brings():
@@ -44,8 +44,8 @@ def test_a_constant_load_is_estimated_without_bias():
     plant = double_integrator(1)
     law = robust(plant.model(), bandwidth=30.0, reach=(0.5,), leakage=0.5, reference_frequency=0.0)
     loop = ClosedLoop(plant, law, setpoint([0.0]), sinusoid(0.0, 1.0, offset=3.0), perfect())
-    last = jax.tree.map(lambda x: x[-1], sampled.simulate(loop, duration=60.0, dt=DT, record_every=1000).samples)
-    np.testing.assert_allclose(last.estimate, 3.0, rtol=1e-9)
+    last = jax.tree.map(lambda x: x[-1], sampled.simulate(loop, duration=60.0, dt=DT, record_every=1000).signals)
+    np.testing.assert_allclose(last["estimate"], 3.0, rtol=1e-9)
 
 
 def test_leakage_alone_never_takes_weights_away_from_those_of_a_constant_load():
@@ -54,7 +54,7 @@ def test_leakage_alone_never_takes_weights_away_from_those_of_a_constant_load():
     estimator = Estimator(gaussian_sets(5), bandwidth=20.0, bound=jnp.inf, leakage=3.0)
     for _ in range(200):
         weights, d, rate = rng.normal(size=(1, 5)), rng.normal(), jnp.asarray(rng.normal(size=1))
-        still = estimator.look(EstimatorState(rate, jnp.asarray(weights)), rate)  # no modelling error
+        still = estimator.estimate(EstimatorState(rate, jnp.asarray(weights)), rate)  # no modelling error
         after = estimator.advance(EstimatorState(rate, jnp.asarray(weights)), still, jnp.zeros(1), jnp.zeros(1), 0.05)
         assert ((after.weights - d) ** 2).sum() < ((weights - d) ** 2).sum()
         np.testing.assert_allclose(after.weights.mean(), weights.mean(), atol=1e-12)

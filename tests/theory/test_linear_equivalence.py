@@ -9,15 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.fuzzy.memberships import memberships
+from undertow.estimation.fuzzy_system import memberships
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 
 FREQUENCIES = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 150.0, 200.0])
 FAST = np.flatnonzero(FREQUENCIES >= 100)
@@ -31,7 +31,7 @@ def record():
     loop = ClosedLoop(plant, law, goal, sinusoid(1.0, FREQUENCIES), perfect())
     outcome = continuous.simulate(loop, duration=16.0, tolerances=(1e-7, 1e-9))
     assert int(outcome.status) == 0
-    return law, np.asarray(outcome.time), jax.tree.map(np.asarray, outcome.samples)
+    return law, np.asarray(outcome.time), jax.tree.map(np.asarray, outcome.signals)
 
 
 def amplitudes(time, series, starts, ends):
@@ -53,34 +53,34 @@ def early():
 
 def test_estimation_error_within_one_percent(record):
     law, time, samples = record
-    measured = amplitudes(time, samples.estimate - samples.uncertainty, *early())
-    np.testing.assert_allclose(measured, np.abs(linear.estimation_response(law, FREQUENCIES)), rtol=0.01)
+    measured = amplitudes(time, samples["estimate"] - samples["uncertainty"], *early())
+    np.testing.assert_allclose(measured, np.abs(small_signal.estimation_response(law, FREQUENCIES)), rtol=0.01)
 
 
 def test_tracking_error_within_one_percent(record):
     law, time, samples = record
-    measured = amplitudes(time, samples.error, *early())
-    np.testing.assert_allclose(measured, np.abs(linear.tracking_response(law, FREQUENCIES)), rtol=0.01)
+    measured = amplitudes(time, samples["error"], *early())
+    np.testing.assert_allclose(measured, np.abs(small_signal.tracking_response(law, FREQUENCIES)), rtol=0.01)
 
 
 def test_measured_uncertainty_is_the_disturbance(record):
     _, time, samples = record
-    np.testing.assert_allclose(samples.uncertainty, np.sin(FREQUENCIES * time[:, None]), atol=1e-12)
+    np.testing.assert_allclose(samples["uncertainty"], np.sin(FREQUENCIES * time[:, None]), atol=1e-12)
 
 
 def test_departure_after_a_while_is_the_gain_that_drift_adds(record):
     """Negative control and section 3.8: by the end the fast axes are off by more; d_hat = z - c eps explains it."""
     law, time, samples = record
     starts, ends = np.full(len(FREQUENCIES), 14.0), np.full(len(FREQUENCIES), 16.0)
-    measured = amplitudes(time, samples.estimate - samples.uncertainty, starts, ends)
-    plain = np.abs(linear.estimation_response(law, FREQUENCIES))
+    measured = amplitudes(time, samples["estimate"] - samples["uncertainty"], starts, ends)
+    plain = np.abs(small_signal.estimation_response(law, FREQUENCIES))
     assert (np.abs(measured / plain - 1)[FAST] > 0.01).all()
     sets = law.fuzzy
     slope = np.asarray(jax.jacfwd(lambda x: memberships(x, sets.centres[0], sets.widths[0]))(jnp.zeros(())))
-    added = -samples.weights[1500] @ slope  # c, 1/s
+    added = -samples["weights"][1500] @ slope  # c, 1/s
     assert (added[FAST] > 1).all() and (added > -1e-9).all()
     for axis in FAST:
-        g = linear.gains(law)
+        g = small_signal.gains(law)
         p = 1j * FREQUENCIES[axis]
         drifted = p * (p + g.pole) / (p**2 + (g.pole + added[axis]) * p + g.b2)
         observer = p * (p + g.pole) / (p**2 + g.pole * p + g.b2)

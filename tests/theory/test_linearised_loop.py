@@ -4,21 +4,21 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.analysis import linear, motor_loop, noise
-from undertow.analysis.linearised import margins
-from undertow.analysis.linearised.forecast import compare
-from undertow.analysis.linearised.rest import rest
-from undertow.analysis.linearised.surroundings import surroundings
+from undertow.analysis import motor_loop, noise, small_signal
+from undertow.analysis.linearization import margins
+from undertow.analysis.linearization.disturbance_profile import disturbance_profile
+from undertow.analysis.linearization.equilibrium import equilibrium
+from undertow.analysis.linearization.response import compare_metrics
 from undertow.controllers import rcaf
 from undertow.disturbances import none, sinusoid
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.sampled import simulate
+from undertow.navigation import perfect
 from undertow.plants import double_integrator, hybrid_vehicle
+from undertow.prediction.operating_point import operating_point, predicted
 from undertow.references import setpoint
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
-from undertow.sensors import perfect
-from undertow.studies.prediction.grounding import foretold, ground
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2, odin, remus100
 
@@ -37,7 +37,7 @@ def on_axes(law_options, preset="paper", axes=2):
 
 
 def at_rest(loop, dt, load=(0.5, 1.0)):
-    found = rest(loop, dt, np.zeros(len(load)), np.asarray(load))
+    found = equilibrium(loop, dt, np.zeros(len(load)), np.asarray(load))
     assert found.found, found.moving
     return found
 
@@ -56,25 +56,29 @@ def test_poles_and_responses_are_those_of_the_small_model(name):
     poles = margins.poles(one_ode)
     # In RAFC nothing follows from eps, so its pole is not seen.
     assert len(poles) == (6 if name == "rafc" else 8)
-    assert unlike(linear.poles(law), poles) < 1e-6
+    assert unlike(small_signal.poles(law), poles) < 1e-6
     sampled = margins.closed(found, dt)
-    expected = np.log(np.linalg.eigvals(linear.sampled_matrix(law, dt)).astype(complex)) / dt
+    expected = np.log(np.linalg.eigvals(small_signal.sampled_matrix(law, dt)).astype(complex)) / dt
     assert unlike(expected, margins.poles(sampled)) < 1e-6
     frequency = np.array([0.5, 5.0, 50.0])
     response = margins.response(one_ode, "error", frequency)
-    np.testing.assert_allclose(np.abs(response[:, 1, 1]), np.abs(linear.tracking_response(law, frequency)), rtol=2e-3)
+    np.testing.assert_allclose(
+        np.abs(response[:, 1, 1]), np.abs(small_signal.tracking_response(law, frequency)), rtol=2e-3
+    )
     assert np.abs(response[:, 0, 1]).max() < 1e-12  # axes do not touch each other
 
 
 def test_what_the_loop_bears():
     """Sections 3.6 and 3.9: 7.03 ms of sampling time, 7.2 ms of lag; delays are those of test_bad_measurements."""
     sampled = at_rest(on_axes(LAWS["rcafc"]), 1e-3)
-    longest = linear.largest_sampling_time(sampled.parts.loop.controller)
+    longest = small_signal.largest_sampling_time(sampled.parts.loop.controller)
     assert margins.largest_sampling_time(sampled, 1e-3, 1.0) == pytest.approx(longest, rel=2e-3)
 
-    def continuous(bears, name):
+    def continuous(tolerated_status, name):
         """Sampling eats of it in proportion to the step: two steps tell what there is without it."""
-        coarse, half = (bears(at_rest(on_axes(LAWS[name], axes=1), step, [0.5]), step, 1.0) for step in (2e-4, 1e-4))
+        coarse, half = (
+            tolerated_status(at_rest(on_axes(LAWS[name], axes=1), step, [0.5]), step, 1.0) for step in (2e-4, 1e-4)
+        )
         assert coarse < half
         return 2 * half - coarse
 
@@ -85,11 +89,11 @@ def test_what_the_loop_bears():
 
 
 def test_a_delay_of_whole_ticks_is_that_many_held_inputs():
-    """Two ways to the same poles: a delay in seconds, and one less tick with all but nothing of the next."""
+    """Two ways to the same poles: a delay in seconds, and one less step with all but nothing of the next."""
     found, dt = at_rest(on_axes(THREE_SETS), 1e-3), 1e-3
     radius = lambda delay: margins.spectral_radius(margins.closed(found, dt, delay=delay))
-    for ticks in (1, 2, 3):
-        assert radius(ticks * dt) == pytest.approx(radius(ticks * dt * (1 - 1e-9)), abs=1e-7)
+    for steps in (1, 2, 3):
+        assert radius(steps * dt) == pytest.approx(radius(steps * dt * (1 - 1e-9)), abs=1e-7)
     assert radius(4 * dt) < 1 < radius(5 * dt)
 
 
@@ -109,7 +113,7 @@ def test_motors_are_in_it():
     plant = hybrid_vehicle(odin(), paper_table3("electromechanical"))
     law = rcaf(plant.model(), **THREE_SETS)
     loop = ClosedLoop(plant, law, setpoint([0.0] * 6), none(), perfect())
-    found = rest(loop, 1e-4, np.zeros(6), np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0]))
+    found = equilibrium(loop, 1e-4, np.zeros(6), np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0]))
     assert found.found
     x, _ = found.parts.states(found.at)
     speed = float(np.abs(x.thrusters.speed).max())
@@ -125,7 +129,7 @@ def test_counters_and_idle_weights_are_not_poles():
     plant = hybrid_vehicle(odin(), paper_table3("shaft"), ledger=True)
     law = rcaf(plant.model(), preset="robust", sampling_time=1e-2)
     loop = ClosedLoop(plant, law, setpoint([0.0] * 6), none(), perfect())
-    found = rest(loop, 1e-2, np.zeros(6), np.array([0.3, 0.2, 0.5, 0.1, 0.1, 0.1]))
+    found = equilibrium(loop, 1e-2, np.zeros(6), np.array([0.3, 0.2, 0.5, 0.1, 0.1, 0.1]))
     closed = margins.closed(found, 1e-2)
     poles = margins.poles(closed)
     assert len(poles) == 12 + 12 + 8 + 16  # body, estimator, propellers, and these with their currents as believed
@@ -139,27 +143,27 @@ def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
     plant = hybrid_vehicle(bluerov2(), t200(supply=16.0, dead_zone=0.0))
     law = rcaf(plant.model(), preset="robust", sampling_time=dt)
     still = setpoint([0.0] * 6)
-    found = rest(ClosedLoop(plant, law, still, none(), perfect()), dt, np.zeros(6), load)
+    found = equilibrium(ClosedLoop(plant, law, still, none(), perfect()), dt, np.zeros(6), load)
     assert found.found, found.moving
     pushed = ClosedLoop(plant, law, still, sinusoid(0.0, offset=load), perfect())
     flown = simulate(pushed, duration=200.0, dt=dt, record_every=100)
-    last = jax.tree.map(lambda series: np.asarray(series)[-1], flown.samples)
-    assert abs(last.error[4]) > 0.05
-    np.testing.assert_allclose(found.local.values["error"], last.error, atol=2e-4)
-    np.testing.assert_allclose(found.at["u"], last.voltage, atol=2e-3)
+    last = jax.tree.map(lambda series: np.asarray(series)[-1], flown.signals)
+    assert abs(last["error"][4]) > 0.05
+    np.testing.assert_allclose(found.local.values["error"], last["error"], atol=2e-4)
+    np.testing.assert_allclose(found.at["u"], last["input"], atol=2e-3)
 
 
 def test_a_load_that_no_input_holds_is_told():
     plant = hybrid_vehicle(remus100(), paper_table3("static"))
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([0.0] * 6), none(), perfect())
-    assert not rest(loop, 1e-3, np.zeros(6), np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])).found
+    assert not equilibrium(loop, 1e-3, np.zeros(6), np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])).found
 
 
 def test_loads_along_the_reference_are_the_disturbance():
     """Where the model is exact and the target stands, nothing else is unknown."""
     plant = double_integrator(2)
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([0.0, 0.0]), sinusoid([1.0, 2.0], [3.0, 7.0]), perfect())
-    around = surroundings(loop, at_rest(loop, 1e-2), jax.random.PRNGKey(0), 200, 1e-2)
+    around = disturbance_profile(loop, at_rest(loop, 1e-2), jax.random.PRNGKey(0), 200, 1e-2)
     expected = np.stack([np.sin(3 * around.time), 2 * np.sin(7 * around.time)], axis=1)
     np.testing.assert_allclose(around.load, expected, atol=1e-9)
     assert not around.noise.any()
@@ -173,7 +177,7 @@ SCENARIOS = {
     },
     "noise, sampled": {
         "controller": {"kind": "rcaf", "preset": "paper", "sets": 1},  # with more, noise drives the weights
-        "sensor": {"kind": "white_noise", "velocity": 0.003},
+        "navigation": {"kind": "white_noise", "velocity": 0.003},
         "loop": {"duration": 40.0, "dt": 0.002},
     },
     "one ODE": {
@@ -189,33 +193,33 @@ def test_runs_do_what_was_foretold(name):
     """Every metric within 10 %, from the transient of the start on."""
     common = {"plant": {"kind": "double_integrator", "axes": 2}, "initial": {"position": [0.02, -0.01]}}
     built = build(common | {"reference": {"kind": "setpoint", "position": [0.0, 0.0]}} | SCENARIOS[name])
-    metrics, why_not = foretold(ground(built))
+    metrics, why_not = predicted(operating_point(built))
     assert metrics is not None, why_not
     run = execute(built)
-    for one in compare(metrics, run.steady):
+    for one in compare_metrics(metrics, run.steady):
         if one.measured > 1e-6 and not one.name.endswith(("max", "peak")):
             assert one.departure < 0.10, one
 
 
-@pytest.mark.parametrize(("sets", "said"), [(5, "weights that move apart may change that"), (1, "")])
+@pytest.mark.parametrize(("sets", "said"), [(5, "adapting weights may change that"), (1, "")])
 def test_what_is_said_of_moving_weights(sets, said):
     """Table 1 on `shaft`: five sets last 2,000 s where one does not, and both have these poles at fixed weights."""
-    _, why_not = foretold(ground(build(_odin("shaft", {"sets": sets}))))
+    _, why_not = predicted(operating_point(build(_odin("shaft", {"sets": sets}))))
     assert why_not.startswith("the loop linearised at fixed weights is unstable") and said in why_not
-    assert ("only a run tells" in why_not) == (sets > 1)
+    assert ("only a run shows" in why_not) == (sets > 1)
 
 
 @pytest.mark.parametrize("bound", [None, 20.0])
 def test_no_figure_is_predicted_that_the_law_forbids(bound):
     """W1: the linear model's robust term passes 10 m/s^2, which tanh cannot."""
     choices = {"composite": 20} | ({} if bound is None else {"weights_bound": bound})
-    metrics, why_not = foretold(ground(build(_odin("electromechanical", choices))))
-    assert metrics is None and "asks for a robust term of" in why_not and "bounds to 10" in why_not
+    metrics, why_not = predicted(operating_point(build(_odin("electromechanical", choices))))
+    assert metrics is None and "requires a robust term of" in why_not and "limits to 10" in why_not
 
 
 def _odin(fidelity, choices):
     return {
-        "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "rung": fidelity}},
+        "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": fidelity}},
         "controller": {"kind": "rcaf", **choices},
         "reference": {"kind": "setpoint", "position": [2, 3, 4, 1.0472, 0.7854, 1.2566]},
         "disturbance": "u1",

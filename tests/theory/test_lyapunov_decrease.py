@@ -38,9 +38,9 @@ def lyapunov(law, truth, state, d):
 
 
 @eqx.filter_jit
-def watch(loop, ticks):
+def watch(loop, steps):
     """Largest increase of Vf in one step over Vf(0); largest |d_hat|; final e and d_til; each per axis."""
-    drawn = loop.draw(jax.random.PRNGKey(0))
+    drawn = loop.realize(jax.random.PRNGKey(0))
 
     def flow(t, state):
         x, z = state
@@ -51,10 +51,10 @@ def watch(loop, ticks):
     def value(t, state):
         return lyapunov(loop.controller, loop.reference.at(t), state, drawn.load(t, state[0]).acceleration)
 
-    def tick(k, carry):
+    def step(k, carry):
         (x, z), before, worst, peak = carry
         t = k.astype(float) * STEP
-        peak = jnp.maximum(peak, jnp.abs(drawn.decide(t, x, z).telemetry.estimate))
+        peak = jnp.maximum(peak, jnp.abs(drawn.decide(t, x, z).signals["estimate"]))
         x, z = rk4(flow, t, (x, z), STEP)
         state = x, loop.controller.project(z)
         after = value(t + STEP, state)
@@ -63,10 +63,10 @@ def watch(loop, ticks):
     start = drawn.start()
     first = value(jnp.zeros(()), start)
     nothing = jnp.full_like(first, -jnp.inf)
-    (x, z), _, worst, peak = jax.lax.fori_loop(0, ticks, tick, (start, first, nothing, nothing))
-    end = jnp.asarray(ticks * STEP)
-    sample = drawn.sample(end, x, z, drawn.decide(end, x, z))
-    return worst / first, peak, sample.error, sample.estimate - sample.uncertainty
+    (x, z), _, worst, peak = jax.lax.fori_loop(0, steps, step, (start, first, nothing, nothing))
+    end = jnp.asarray(steps * STEP)
+    sample = drawn.record(end, x, z)
+    return worst / first, peak, sample["error"], sample["estimate"] - sample["uncertainty"]
 
 
 def watched(rails, layout, **choices):
@@ -102,6 +102,6 @@ def test_increases_when_the_disturbance_moves(rails):
 def test_starts_at_the_energy_of_the_step(rails):
     """Vf itself: at rest, 1/2 p11 e^2 + |theta*|^2 / (2 gamma)."""
     loop = rails(1, goal=START, disturbance=sinusoid(0.0, 1.0, offset=3.0))
-    drawn = loop.draw(jax.random.PRNGKey(0))
+    drawn = loop.realize(jax.random.PRNGKey(0))
     value = lyapunov(loop.controller, setpoint(np.array([START])).at(0.0), drawn.start(), jnp.array([3.0]))
     assert float(value[0]) == pytest.approx(0.5 * 15 * START**2 + 3 * 9 / 200)

@@ -12,9 +12,9 @@ from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -27,7 +27,7 @@ class Stairs(AbstractDisturbance):
     values: Float[Array, " steps"]
     start: Float[Array, ""]
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def at(self, path, t, place, calm):
@@ -49,9 +49,9 @@ def swimmer(disturbance):
 def test_fixed_point_stays_for_a_hundred_seconds():
     outcome = sampled.simulate(swimmer(none()), duration=100.0, dt=2e-3, position=POSE, record_every=1000)
     assert int(outcome.status) == 0
-    samples = outcome.samples
+    samples = outcome.signals
     for name in ("error", "velocity", "estimate", "modelling_error"):
-        assert np.abs(np.asarray(getattr(samples, name))).max() <= 1e-12, name
+        assert np.abs(np.asarray(samples[name])).max() <= 1e-12, name
 
 
 def test_axes_do_not_meet():
@@ -59,7 +59,7 @@ def test_axes_do_not_meet():
     for axis in range(6):
         load = sinusoid(2.0 * np.eye(6)[axis], 3.0)
         outcome = continuous.simulate(swimmer(load), duration=0.5, record_step=0.05, position=POSE)
-        moved = np.abs(np.asarray(outcome.samples.error)).max(0)
+        moved = np.abs(np.asarray(outcome.signals["error"])).max(0)
         assert np.delete(moved, axis).max() <= 1e-9, (axis, moved)
         assert moved[axis] > 1e-6
 
@@ -68,25 +68,25 @@ def test_axes_do_not_meet():
 def test_doubling_a_small_load_doubles_the_answer(rails, factor):
     loads = np.array([0.2, 0.2 * factor])
     loop = rails(2, disturbance=sinusoid(loads, 10.0, offset=loads))
-    samples = jax.tree.map(np.asarray, sampled.simulate(loop, duration=4.0, record_every=1).samples)
-    for series in (samples.estimate - samples.uncertainty, samples.error):
+    samples = jax.tree.map(np.asarray, sampled.simulate(loop, duration=4.0, record_every=1).signals)
+    for series in (samples["estimate"] - samples["uncertainty"], samples["error"]):
         gap = np.abs(series[:, 1] - factor * series[:, 0]).max()
         assert gap <= 0.01 * np.abs(series[:, 1]).max()
-    d_til = samples.estimate - samples.uncertainty
+    d_til = samples["estimate"] - samples["uncertainty"]
     assert np.abs(d_til[:, 1] - 2.5 * d_til[:, 0]).max() > 0.01 * np.abs(d_til[:, 1]).max()
 
 
 def test_time_shift_shifts_every_bit(rails):
-    """Ticks of 2^-10 s and shifts of whole ticks: the clock adds without rounding."""
+    """Ticks of 2^-10 s and shifts of whole steps: the clock adds without rounding."""
     values = np.random.default_rng(3).normal(0.0, 3.0, 16)
-    tick, shift = 2.0**-10, 512
+    step, shift = 2.0**-10, 512
 
-    def run(start, ticks):
+    def run(start, steps):
         loop = rails(1, disturbance=Stairs(jnp.asarray(values), jnp.asarray(start)))
-        return sampled.simulate(loop, duration=ticks * tick, dt=tick, record_every=1).samples
+        return sampled.simulate(loop, duration=steps * step, dt=step, record_every=1).signals
 
-    early, late = run(0.0, 2048), run(shift * tick, 2048)
+    early, late = run(0.0, 2048), run(shift * step, 2048)
     for series, shifted in zip(jax.tree.leaves(early), jax.tree.leaves(late), strict=True):
         later = np.asarray(shifted)[shift:]
         np.testing.assert_array_equal(np.asarray(series)[: len(later)], later)
-    assert np.abs(np.asarray(early.position)).max() > 0
+    assert np.abs(np.asarray(early["position"])).max() > 0

@@ -11,14 +11,14 @@ import pytest
 
 from undertow.controllers import pid
 from undertow.controllers.presets.robust import robust
-from undertow.core.contracts import AbstractSensor
+from undertow.core.contracts import AbstractNavigation
 from undertow.disturbances import current, waves
 from undertow.disturbances.adding import Together
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect, white_noise
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
-from undertow.sensors import perfect, white_noise
 from undertow.thrusters import first_order, t200
 from undertow.vehicles import bluerov2_heavy
 
@@ -26,17 +26,17 @@ DT, GOAL = 0.01, [2.0, 1.0, 1.0, 0.0, 0.0, 0.5]  # s; m, rad
 SEA = Together((current([0.3, 0.2, 0.0]), waves(height=0.5, period=5.0)))
 
 
-class Late(AbstractSensor):
+class Late(AbstractNavigation):
     """A perfect sensor whose measurements come some sampling times late."""
 
-    ticks: int = eqx.field(static=True)
+    steps: int = eqx.field(static=True)
     smooth: bool = eqx.field(static=True, default=False)
 
-    def draw(self, key):
+    def realize(self, key):
         return ()
 
     def init(self, path, truth):
-        return jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (self.ticks, *leaf.shape)), truth)
+        return jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (self.steps, *leaf.shape)), truth)
 
     def measure(self, path, state, t, truth):
         held = jax.tree.map(lambda old, new: jnp.concatenate([old[1:], new[None]]), state, truth)
@@ -57,17 +57,17 @@ def motor(lag):
 @eqx.filter_jit
 def flown(loop):
     run = sampled.simulate(loop, duration=30.0, dt=DT, record_every=5, position=[0.0] * 6)
-    late = run.samples
-    half = late.error.shape[0] // 2
-    swings = jnp.abs(jnp.diff(late.voltage[half:], axis=0)).mean() / (5 * DT)
-    return run.status, jnp.sqrt((late.error[half:] ** 2).mean()), swings
+    late = run.signals
+    half = late["error"].shape[0] // 2
+    swings = jnp.abs(jnp.diff(late["input"][half:], axis=0)).mean() / (5 * DT)
+    return run.status, jnp.sqrt((late["error"][half:] ** 2).mean()), swings
 
 
-def error(thruster, nominal, make=robust, sensor=None):
+def error(thruster, nominal, make=robust, navigation=None):
     """Rms error over the second half, m and rad; it must have lasted, and not swing (V/s)."""
     plant = hybrid_vehicle(bluerov2_heavy(), thruster, ledger=False)
     law = make(plant.model(rate_term=True, thruster=nominal), sampling_time=DT)
-    status, rms, swings = flown(ClosedLoop(plant, law, setpoint(GOAL, settling=8.0), SEA, sensor or perfect()))
+    status, rms, swings = flown(ClosedLoop(plant, law, setpoint(GOAL, settling=8.0), SEA, navigation or perfect()))
     assert int(status) == 0
     return float(rms), float(swings)
 
@@ -89,9 +89,9 @@ def test_a_lag_that_is_wrong_by_three_costs_little(make):
 
 def test_delay_and_noise_that_nobody_tells_of():
     """Four sampling times of delay, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
-    for sensor in (Late(4), white_noise(0.0, 0.01)):
-        own, _ = error(t200(), None, robust, sensor)
-        other, _ = error(t200(), None, pid, sensor)
+    for navigation in (Late(4), white_noise(0.0, 0.01)):
+        own, _ = error(t200(), None, robust, navigation)
+        other, _ = error(t200(), None, pid, navigation)
         exact, _ = error(t200(), None, robust)
-        print(f"{type(sensor).__name__}: robust {own:.3g}, pid {other:.3g}, robust without {exact:.3g}")
+        print(f"{type(navigation).__name__}: robust {own:.3g}, pid {other:.3g}, robust without {exact:.3g}")
         assert own < other and own < 3 * exact

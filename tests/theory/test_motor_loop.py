@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from undertow.analysis import drift, linear, motor_loop
+from undertow.analysis import drift, motor_loop, small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 from undertow.thrusters.electromechanical import ElectromechanicalState
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
@@ -66,7 +66,7 @@ def test_motor_as_a_lag(table1, speed):
 def test_critical_unity_gain_lags(table1):
     assert motor_loop.critical_lag(table1()) == pytest.approx(7.2e-3, rel=0.03)
     assert motor_loop.critical_lag(table1(sets=1)) == pytest.approx(3.0e-3, rel=0.03)
-    third = (1 / 3) / float(table1().fuzzy.gathering())
+    third = (1 / 3) / float(table1().fuzzy.basis_norm_squared())
     assert motor_loop.critical_lag(table1(adaptation=100 * third)) == pytest.approx(9.1e-3, rel=0.03)
     assert motor_loop.critical_lag(table1(robust_gain=0.0)) == pytest.approx(45e-3, rel=0.03)
     assert motor_loop.critical_lag(table1(sets=1, robust_gain=0.0)) == pytest.approx(5e-3, rel=0.03)
@@ -74,7 +74,7 @@ def test_critical_unity_gain_lags(table1):
 
 def test_observer_alone_tolerates_any_lag_or_a_closed_form(table1):
     assert motor_loop.critical_observer_lag(table1()) == np.inf
-    g = linear.gains(table1(sets=1))
+    g = small_signal.gains(table1(sets=1))
     critical = motor_loop.critical_observer_lag(table1(sets=1))
     assert critical * (g.b2 - g.pole**2) == pytest.approx(g.pole)
     for factor, stable in ((0.99, True), (1.01, False)):
@@ -95,11 +95,11 @@ def test_linear_model_is_the_jacobian_of_the_code(skew):
     thrust = plant.body.accelerate(plant.thruster_matrix @ MOTOR.thrust(jnp.asarray(speeds)))
     x = plant.initial_state()._replace(thrusters=ElectromechanicalState(jnp.asarray(speeds), current))
     y = plant.output(0.0, x)
-    held = -(thrust + law.model.drift(y))  # the load that these speeds balance
+    held = -(thrust + law.model.dynamics.drift(y))  # the load that these speeds balance
     loop = ClosedLoop(plant, law, setpoint(np.zeros(6)), sinusoid(0.0, 1.0, offset=held), perfect())
-    drawn = loop.draw(jax.random.PRNGKey(0))
+    drawn = loop.realize(jax.random.PRNGKey(0))
     _, z = drawn.start()
-    estimate = -(law.model.drift(y) + law.model.gain(y) @ volts)
+    estimate = -(law.model.dynamics.drift(y) + law.model.dynamics.gain(y) @ volts)
     z = z._replace(weights=estimate[:, None] + skew * jnp.array([1.0, 0.0, -1.0]))
     drifted = drift.gain_of(law, np.asarray(z.weights))[0]
     assert drifted == pytest.approx(skew * 0.848, rel=1e-3)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from undertow.analysis import drift, linear, noise
+from undertow.analysis import drift, noise, small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.errors import BadInput
 from undertow.disturbances.none import none
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.white_noise import white_noise
 
 SEEDS = 20  # one axis each
 AS_FAST = {"bandwidth": 150.0, "tracking": 30.0}  # rad/s, as Table 1
@@ -30,9 +30,9 @@ def simulated(law_of, velocity, position=0.0):
     loop = ClosedLoop(plant, law, setpoint(np.zeros(SEEDS)), none(), white_noise(position, velocity))
     outcome = sampled.simulate(loop, duration=60.0, dt=1e-3, record_every=10)
     assert int(outcome.status) == 0
-    late = lambda name: float(np.sqrt((np.asarray(getattr(outcome.samples, name))[1000:] ** 2).mean()))
-    found = noise.Deviations(late("error"), late("modelling_error"), late("estimate"), late("command"))
-    return law, found, float(drift.gain_of(law, outcome.samples.weights[-1]).mean())
+    late = lambda name: float(np.sqrt((np.asarray(outcome.signals[name])[1000:] ** 2).mean()))
+    found = noise.Deviations(late("error"), late("modelling_error"), late("estimate"), late("commanded_input"))
+    return law, found, float(drift.gain_of(law, outcome.signals["weights"][-1]).mean())
 
 
 SLOW = {"robust, with a tracking share", "Table 1 without robust term"}
@@ -71,8 +71,8 @@ def test_noise_of_the_position_counts_too():
 
 def test_the_matrix_is_that_of_the_sampled_law(table1):
     for law in (table1(), table1(sets=1), table1(composite=0.0)):
-        matrix, _ = noise.tick_matrices(noise.steps(law, 2e-3))
-        np.testing.assert_allclose(matrix, linear.sampled_matrix(law, 2e-3), atol=1e-12)
+        matrix, _ = noise.step_matrices(noise.steps(law, 2e-3))
+        np.testing.assert_allclose(matrix, small_signal.sampled_matrix(law, 2e-3), atol=1e-12)
 
 
 def test_numbers_of_section_3_7(table1):

@@ -12,9 +12,9 @@ from undertow.core.errors import BadInput
 from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect
 from undertow.plants import double_integrator, hybrid_vehicle, inverted_pendulum, magnetic_levitation
 from undertow.references import setpoint
-from undertow.sensors import perfect
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2_heavy
 
@@ -32,14 +32,14 @@ def test_error_follows_the_placed_poles():
     matrix = np.array([[0, 1, 0], [-k_p, -k_d, -1], [k_i, 0, 0]])
     for k in (500, 1500, 4000):
         expected = (expm(matrix * found.time[k]) @ [-0.3, 0.0, 0.0])[0]
-        np.testing.assert_allclose(found.samples.error[k, 0], expected, atol=5e-4)
+        np.testing.assert_allclose(found.signals["error"][k, 0], expected, atol=5e-4)
 
 
 def test_integral_is_the_estimate_of_a_constant_load():
     law = pid(double_integrator(2).model(), frequency=3.0)
     found = run(double_integrator(2), law, [0.0, 0.0], sinusoid(0.0, 1.0, offset=[1.5, -0.5]), duration=60.0)
-    np.testing.assert_allclose(found.samples.estimate[-1], [1.5, -0.5], rtol=1e-6)
-    np.testing.assert_allclose(found.samples.error[-1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(found.signals["estimate"][-1], [1.5, -0.5], rtol=1e-6)
+    np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)
 
 
 def test_gains_may_be_given():
@@ -54,8 +54,8 @@ def test_limits_do_not_wind_up():
     plant = double_integrator(1, limit=1.5)
     law = pid(plant.model(), sampling_time=1e-2, frequency=2.0, integral_share=0.3, reference_frequency=0.0)
     found = run(plant, law, [5.0], sinusoid(0.0, 1.0, offset=-1.0), duration=60.0)
-    overshoot = -float(found.samples.error.min())
-    np.testing.assert_allclose(found.samples.error[-1], 0.0, atol=1e-4)
+    overshoot = -float(found.signals["error"].min())
+    np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-4)
 
     target, dt = Target(jnp.array([5.0]), jnp.zeros(1), jnp.zeros(1)), 1e-2
 
@@ -76,17 +76,17 @@ def test_an_integral_faster_than_the_sampling_stays_bounded():
     plant, dt, frequency, limit = double_integrator(1, limit=1.5), 1e-2, 2617.0, 1.5
     law = pid(plant.model(), sampling_time=dt, frequency=frequency, reference_frequency=0.0)
     found = run(plant, law, [5.0], duration=10.0, dt=dt)
-    error, rate = (float(np.abs(one).max()) for one in (found.samples.error, found.samples.velocity))
+    error, rate = (float(np.abs(one).max()) for one in (found.signals["error"], found.signals["velocity"]))
     k_p, k_d, k_i = frequency**2, 2 * frequency, 0.1 * frequency**3
-    assert np.abs(found.samples.estimate).max() <= (k_p + dt * k_i) * error + k_d * rate + limit
+    assert np.abs(found.signals["estimate"]).max() <= (k_p + dt * k_i) * error + k_d * rate + limit
 
 
 def test_steady_curve_holds_a_force_and_limits_of_an_endless_supply_are_endless():
     plant = hybrid_vehicle(bluerov2_heavy(), t200(dead_zone=0.0))
-    drive = plant.model().own_axes().drive().steady()
+    drive = plant.model().in_body_axes().actuators.quasi_static()
     forces = jnp.linspace(-20.0, 20.0, 8)
     np.testing.assert_allclose(drive.force((), drive.command((), forces, 1.0)), forces, rtol=1e-12)
-    endless = hybrid_vehicle(bluerov2_heavy(), t200(supply=np.inf)).model().own_axes().drive().steady()
+    endless = hybrid_vehicle(bluerov2_heavy(), t200(supply=np.inf)).model().in_body_axes().actuators.quasi_static()
     low, high = endless.range((), 1.0)
     assert (np.asarray(low) == -np.inf).all() and (np.asarray(high) == np.inf).all()
 
@@ -99,20 +99,20 @@ def test_vehicle_comes_to_its_place(motor):
     law = pid(plant.model(), sampling_time=0.02, frequency=1.0, motor=motor)
     found = run(plant, law, [1.0, -1.0, 0.5, 0.0, 0.0, 2.0], duration=40.0, dt=0.02)
     assert int(found.status) == 0
-    np.testing.assert_allclose(found.samples.error[-1], 0.0, atol=0.02)
+    np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=0.02)
 
 
 @pytest.mark.parametrize("feedforward", [True, False])
 def test_pendulum_stands(feedforward):
     pendulum = inverted_pendulum()
     found = run(pendulum, pid(pendulum.model(), frequency=8.0, feedforward=feedforward), [0.1], duration=8.0)
-    assert int(found.status) == 0 and abs(float(found.samples.error[-1, 0])) < 5e-3
+    assert int(found.status) == 0 and abs(float(found.signals["error"][-1, 0])) < 5e-3
 
 
 def test_ball_floats():
     ball = magnetic_levitation()
     found = run(ball, pid(ball.model(), frequency=30.0), [0.010], duration=5.0, dt=1e-3, position=[0.010])
-    assert int(found.status) == 0 and abs(float(found.samples.error[-1, 0])) < 1e-4
+    assert int(found.status) == 0 and abs(float(found.signals["error"][-1, 0])) < 1e-4
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,10 @@ from undertow.core.contracts import AbstractReference, Target
 from undertow.disturbances import none, sinusoid, table, u1
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect
 from undertow.numerics.rotations import rotation_from_euler, wrap_angle
 from undertow.plants import double_integrator, hybrid_vehicle, magnetic_levitation
 from undertow.references import setpoint, sine
-from undertow.sensors import perfect
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2_heavy, odin
 
@@ -25,7 +25,7 @@ TARGET = [2.0, 3.0, 4.0, math.pi / 3, math.pi / 4, 2 * math.pi / 5]
 def tracking(loop):
     """Rms of the error over the second half of 20 s, all axes together; and how the run ended."""
     run = sampled.simulate(loop, duration=20.0, dt=1e-3, record_every=10)
-    late = np.asarray(run.samples.error)[1000:]
+    late = np.asarray(run.signals["error"])[1000:]
     return float(np.sqrt((late**2).mean())), int(run.status), run
 
 
@@ -37,13 +37,13 @@ def test_whole_motor_at_24_volts(speed_sensor, bar):
     rms, status, run = tracking(ClosedLoop(plant, law, setpoint(TARGET), u1(scale=0.3), perfect()))
     print(f"speed_sensor {speed_sensor}: {rms:.3g} m, rad")
     assert status == 0 and rms < bar
-    assert float(jnp.abs(run.samples.voltage).max()) <= 24.0
+    assert float(jnp.abs(run.signals["input"]).max()) <= 24.0
 
 
 def test_table_1_does_not_hold_there():
     plant = hybrid_vehicle(odin(), paper_table3("electromechanical", supply=24.0), ledger=False)
     rms, status, run = tracking(ClosedLoop(plant, rcaf(plant.model()), setpoint(TARGET), u1(scale=0.3), perfect()))
-    at_limit = float(np.asarray(run.samples.saturated)[1000:].mean())
+    at_limit = float(np.asarray(run.signals["saturated"])[1000:].mean())
     assert status != 0 or (rms > 5e-3 and at_limit > 0.5), (rms, status, at_limit)
 
 
@@ -54,8 +54,8 @@ def test_the_estimator_depends_on_neither_controller_nor_limits():
         plant = double_integrator(2, limit=limit)
         law = rcaf(plant.model(), preset="robust", bandwidth=40.0, tracking=tracking, sampling_time=1e-3)
         loop = ClosedLoop(plant, law, setpoint(position), sinusoid([1.0, 2.0], [3.0, 7.0]), perfect())
-        samples = sampled.simulate(loop, duration=3.0, dt=1e-3, record_every=1).samples
-        return np.asarray(samples.modelling_error), np.asarray(samples.estimate - samples.uncertainty)
+        samples = sampled.simulate(loop, duration=3.0, dt=1e-3, record_every=1).signals
+        return np.asarray(samples["modelling_error"]), np.asarray(samples["estimate"] - samples["uncertainty"])
 
     first, second = run(2.0, [0.0, 0.0], math.inf), run(8.0, [3.0, -1.0], 4.0)
     for one, other in zip(first, second, strict=True):
@@ -70,7 +70,7 @@ def test_carried_away_it_comes_back_without_swinging(frequency, recovers):
     push = table([[0.0, 0.0], [2.0, 0.0], [2.01, 4.0], [3.5, 4.0], [3.51, 0.0], [20.0, 0.0]])
     loop = ClosedLoop(plant, law, setpoint([0.0]), push, perfect())
     run = sampled.simulate(loop, duration=20.0, dt=1e-3, record_every=10)
-    error = np.asarray(run.samples.error)[:, 0]
+    error = np.asarray(run.signals["error"])[:, 0]
     assert np.abs(error).max() > 4.0  # m
     overshoot = -error[np.abs(error).argmax() :].min() if error[np.abs(error).argmax()] > 0 else error.max()
     assert (overshoot < 0.02) == recovers, overshoot
@@ -110,10 +110,10 @@ def test_a_somersault_is_uneventful():
     run = sampled.simulate(turned, duration=10.0, dt=1e-2, record_every=1)
     assert int(run.status) == 0
     at = jax.vmap(lambda t: rotation_from_euler(Somersault().at(t).position[3:]))(run.time)
-    rotation = jax.vmap(lambda p: rotation_from_euler(p[3:]))(run.samples.position)
+    rotation = jax.vmap(lambda p: rotation_from_euler(p[3:]))(run.signals["position"])
     apart = jnp.arccos(jnp.clip((jnp.einsum("tij,tij->t", at, rotation) - 1) / 2, -1, 1))
     assert float(apart.max()) < 0.2
-    assert float(jnp.abs(run.samples.position[:, :3]).max()) < 0.2
+    assert float(jnp.abs(run.signals["position"][:, :3]).max()) < 0.2
 
 
 @pytest.mark.parametrize("gap", [0.006, 0.005])
@@ -122,5 +122,5 @@ def test_a_ball_near_the_magnet(gap):
     plant = magnetic_levitation()
     law = rcaf(plant.model(), preset="robust")
     loop = ClosedLoop(plant, law, sine(1e-3, 1.0, gap), none(), perfect())
-    samples = sampled.simulate(loop, duration=10.0, dt=1e-3, record_every=10, position=[gap]).samples
-    assert float(jnp.abs(samples.error[500:]).max()) < 5e-6
+    samples = sampled.simulate(loop, duration=10.0, dt=1e-3, record_every=10, position=[gap]).signals
+    assert float(jnp.abs(samples["error"][500:]).max()) < 5e-6

@@ -9,12 +9,13 @@ from scipy.optimize import linprog
 
 from undertow.analysis.drift import gain_bound
 from undertow.controllers.presets.robust import robust
-from undertow.controllers.robust.allocation import allocate, attained
+from undertow.controllers.reference_filter import ReferenceFilter
 from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.reference_filter import ReferenceFilter
-from undertow.core.contracts import Measurement, Target
+from undertow.controllers.thruster_allocation import allocate, attained
+from undertow.core.contracts import Target
 from undertow.core.errors import BadInput
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.core.measurement import measurement_of_outputs
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.numerics.integrators import rk4
 from undertow.plants import double_integrator, hybrid_vehicle
 from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage, t200
@@ -31,7 +32,7 @@ def test_estimator_poles_are_those_of_continuous_time(damping, dt):
 
     def step(state):
         start = estimator.init(jnp.zeros(1))._replace(rates=state[:1], weights=state[1:, None])
-        after = estimator.advance(start, estimator.look(start, jnp.zeros(1)), jnp.zeros(1), jnp.zeros(1), dt)
+        after = estimator.advance(start, estimator.estimate(start, jnp.zeros(1)), jnp.zeros(1), jnp.zeros(1), dt)
         return jnp.concatenate([after.rates, after.weights[:, 0]])
 
     matrix = np.asarray(jax.jacfwd(step)(jnp.zeros(2)))
@@ -46,7 +47,7 @@ def test_one_step_moves_the_estimate_by_a_given_amount_whatever_the_sets():
     for sets in (1, 3, 7):
         estimator = Estimator(gaussian_sets(sets), bandwidth=30.0, leakage=0.0)
         state = estimator.init(jnp.array([0.2]))
-        seen = estimator.look(state, jnp.zeros(1))
+        seen = estimator.estimate(state, jnp.zeros(1))
         after = estimator.advance(state, seen, jnp.zeros(1), jnp.zeros(1), 1e-3)
         moved.append(float(estimator.fuzzy.output(after.weights, seen.basis)[0]))
     expected = -0.2 * (1 - np.exp(-0.03)) ** 2 / 1e-3
@@ -57,7 +58,7 @@ def test_the_estimate_stays_in_its_box():
     estimator = Estimator(gaussian_sets(5), bandwidth=50.0, bound=3.0)
     state = estimator.init(jnp.zeros(1))
     for _ in range(200):  # a body that stands still under 10 m/s^2: d = -10, more than the box holds
-        seen = estimator.look(state, jnp.zeros(1))
+        seen = estimator.estimate(state, jnp.zeros(1))
         state = estimator.advance(state, seen, jnp.full(1, 10.0), jnp.zeros(1), 1e-2)
         assert abs(float(seen.uncertainty[0])) <= 3.0 * (1 + 1e-15)
     assert float(seen.uncertainty[0]) == pytest.approx(-3.0)
@@ -79,7 +80,9 @@ def test_weights_in_their_box_add_little_damping(bandwidth):
     assert gain_bound(law) == pytest.approx(0.1 * 2 * bandwidth, rel=1e-9)
     narrow = robust(double_integrator(1).model(), bandwidth=bandwidth, reach=(1.0,))
     assert gain_bound(narrow) > 90
-    assert float(law.estimator.fuzzy.gathering()) == pytest.approx(float(narrow.estimator.fuzzy.gathering()))
+    assert float(law.estimator.fuzzy.basis_norm_squared()) == pytest.approx(
+        float(narrow.estimator.fuzzy.basis_norm_squared())
+    )
 
 
 @pytest.mark.parametrize(
@@ -101,7 +104,7 @@ def test_settings_that_contradict_each_other(wrong, name):
 
 # Allocation.
 
-EFFECT = np.asarray(hybrid_vehicle(bluerov2_heavy(), t200()).model().own_axes().effect(None))
+EFFECT = np.asarray(hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes().dynamics.gain(None))
 FULL = np.full(8, 30.0)
 
 
@@ -152,12 +155,12 @@ def test_one_sided_limits():
 # Reference filter.
 
 
-def followed(chosen, at, start, dt, ticks, share=1.0):
-    """Filtered reference at every tick."""
-    model, state, found = double_integrator(1).model(), chosen.init(jnp.asarray([start])), []
-    for k in range(ticks):
-        found.append(np.ravel(chosen.smoothed(state, at(k * dt), model)))
-        state = chosen.advance(state, at(k * dt), model, share, dt)
+def followed(chosen, at, start, dt, steps, share=1.0):
+    """Filtered reference at every step."""
+    coordinates, state, found = double_integrator(1).model().coordinates, chosen.init(jnp.asarray([start])), []
+    for k in range(steps):
+        found.append(np.ravel(chosen.smoothed(state, at(k * dt), coordinates)))
+        state = chosen.advance(state, at(k * dt), coordinates, share, dt)
     return np.array(found)
 
 
@@ -176,7 +179,7 @@ def test_a_jump_dies_out_like_three_equal_poles():
 
 
 def test_a_smooth_reference_passes_as_it_is():
-    """A cubic from rest: all that is known of it at a tick leads to the next without error."""
+    """A cubic from rest: all that is known of it at a step leads to the next without error."""
     at = polynomial(0.3, 0.0, 1.0, 2.0)
     found = followed(ReferenceFilter(2.0), at, 0.3, 0.02, 100)
     np.testing.assert_allclose(found, [np.ravel(at(0.02 * k)) for k in range(100)], atol=1e-11)
@@ -213,12 +216,12 @@ THRUSTERS = {
 
 @pytest.mark.parametrize("name", THRUSTERS)
 def test_a_drive_aims_where_it_was_told_to(name):
-    drive = THRUSTERS[name].drive(4, False)
+    drive = THRUSTERS[name].actuator_model(4, False)
     state = jax.tree.map(lambda leaf: jnp.asarray([20.0, -30.0, 5.0, 0.5]), drive.init())
     wanted = jnp.asarray([9.0, -7.0, 15.0, -4.0])
     volts = drive.command(state, wanted, 40.0)
     assert (jnp.abs(volts) > THRUSTERS[name].dead_zone).all()
-    np.testing.assert_allclose(drive.aim(state, volts, 40.0), wanted, rtol=1e-9)
+    np.testing.assert_allclose(drive.target_of(state, volts, 40.0), wanted, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", THRUSTERS)
@@ -227,7 +230,7 @@ def test_the_range_of_a_drive_is_where_the_supply_ends(name):
     thruster = THRUSTERS[name]
     if name == "electromechanical":
         thruster = paper_table3("shaft", supply=24.0)
-    drive = thruster.drive(4, False)
+    drive = thruster.actuator_model(4, False)
     state = jax.tree.map(lambda leaf: jnp.asarray([20.0, -30.0, 5.0, 0.0]), drive.init())
     if name in ("shaft", "electromechanical"):
         resting = thruster.motor.steady_current(state.speed)
@@ -241,9 +244,9 @@ def test_the_range_of_a_drive_is_where_the_supply_ends(name):
 
 @pytest.mark.parametrize("make", [t200, paper_table3])
 def test_a_predicted_motor_turns_as_the_true_one(make):
-    """Against the electromechanical rung with steps 200 times smaller, over one second of changing voltage."""
+    """Against the electromechanical fidelity with steps 200 times smaller, over one second of changing voltage."""
     thruster = make("electromechanical")
-    drive, dt, fine = thruster.drive(1, False), 5e-3, 200
+    drive, dt, fine = thruster.actuator_model(1, False), 5e-3, 200
     belief, truth = drive.init(), thruster.initial_state(1)
 
     @jax.jit
@@ -270,39 +273,48 @@ def motion(t):
 
 @pytest.fixture(scope="module")
 def body():
-    return hybrid_vehicle(bluerov2_heavy(), t200()).model().own_axes()
+    return hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes()
 
 
 @pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
 def test_rates_and_their_derivative(body, t):
     eta, rate, bend = motion(t)
-    rates = lambda t: body.rates(Measurement(*motion(t)[:2]))
-    np.testing.assert_allclose(body.seen(Measurement(eta, rate), bend), jax.jacfwd(rates)(t), atol=1e-10)
+    coordinates = body.coordinates
+    rates = lambda t: coordinates.velocity(measurement_of_outputs(*motion(t)[:2]))
+    np.testing.assert_allclose(
+        coordinates.acceleration(measurement_of_outputs(eta, rate), bend), jax.jacfwd(rates)(t), atol=1e-10
+    )
 
 
 @pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
 def test_wanted_rates_and_their_derivative_seen_from_a_turning_vehicle(body, t):
     """Both move: the target half as fast, along the same way."""
     target = lambda t: Target(*(m * 0.5**k for k, m in enumerate(motion(0.5 * t + 1.0))))
-    wanted = lambda t: body.wanted(Measurement(*motion(t)[:2]), target(t))
-    np.testing.assert_allclose(wanted(t)[1], jax.jacfwd(lambda t: wanted(t)[0])(t), atol=1e-9)
+    seen = lambda t: measurement_of_outputs(*motion(t)[:2])
+
+    def velocity(t):
+        return body.coordinates.tracking_error(seen(t), target(t)).rate + body.coordinates.velocity(seen(t))
+
+    acceleration = body.coordinates.tracking_error(seen(t), target(t)).acceleration
+    np.testing.assert_allclose(acceleration, jax.jacfwd(velocity)(t), atol=1e-9)
 
 
 def test_on_target_nothing_is_wanted_but_its_own_motion(body):
     eta, rate, bend = motion(0.7)
-    y, r = Measurement(eta, rate), Target(eta, rate, bend)
-    np.testing.assert_allclose(body.error(y, r), 0, atol=1e-15)
-    velocity, acceleration = body.wanted(y, r)
-    np.testing.assert_allclose(velocity, body.rates(y), atol=1e-12)
-    np.testing.assert_allclose(acceleration, body.seen(y, bend), atol=1e-11)
+    y, r = measurement_of_outputs(eta, rate), Target(eta, rate, bend)
+    error, rate, acceleration = body.coordinates.tracking_error(y, r)
+    np.testing.assert_allclose(error, 0, atol=1e-15)
+    np.testing.assert_allclose(rate, 0, atol=1e-12)
+    np.testing.assert_allclose(acceleration, body.coordinates.acceleration(y, bend), atol=1e-11)
 
 
 def test_attitude_errors_go_the_short_way(body):
     """I32: full turns do not matter, and 200 degrees to the right are 160 to the left."""
-    y = Measurement(jnp.zeros(6), jnp.zeros(6))
+    y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
     target = lambda yaw: Target(jnp.zeros(6).at[5].set(yaw), jnp.zeros(6), jnp.zeros(6))
+    error = lambda yaw: body.coordinates.tracking_error(y, target(yaw)).error
     for yaw in RNG.uniform(-3, 3, 20):
-        once, more = body.error(y, target(yaw)), body.error(y, target(yaw + 2 * np.pi))
+        once, more = error(yaw), error(yaw + 2 * np.pi)
         np.testing.assert_allclose(once, more, atol=1e-12)
         np.testing.assert_allclose(once[5], 2 * np.sin(yaw / 2), atol=1e-12)
-    assert float(body.error(y, target(np.radians(200)))[5]) < 0
+    assert float(error(np.radians(200))[5]) < 0

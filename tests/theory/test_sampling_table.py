@@ -1,7 +1,7 @@
 """Section 3.6, the whole table: largest sampling times by closed form, and the nonlinear loop on both sides of each.
 
 The law's own state may be stepped explicitly, semi-implicitly (weights first, then the identification model with the
-new estimate) or exactly; the input may reach the plant one tick late, and the law is told when it does.
+new estimate) or exactly; the input may reach the plant one step late, and the law is told when it does.
 """
 
 import jax.numpy as jnp
@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.none import none
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 
-RHO = float(gaussian_sets(3).gathering())
+RHO = float(gaussian_sets(3).basis_norm_squared())
 LAYOUTS = {"three sets": {"sets": 3}, "one set": {"sets": 1}, "rho = 1/3": {"sets": 3, "adaptation": 100 / (3 * RHO)}}
 # Rule, delay, RAFC -> limits in ms as printed, one per layout.
 TABLE = {
@@ -51,7 +51,7 @@ def law_of(rule, rafc, layout):
 
 
 def tick_matrix(g, dt, rule, delayed):
-    """One tick of (e, e_dot, eps, d_hat, input on its way)."""
+    """One step of (e, e_dot, eps, d_hat, input on its way)."""
     unit = np.eye(5)
     asked = np.array([g.stiffness, g.damping, 0.0, -1.0, 0.0])
     applied = unit[4] if delayed else asked
@@ -68,9 +68,9 @@ def tick_matrix(g, dt, rule, delayed):
 
 def limit(law, rule, delayed):
     """Sampling time, s, at which the spectral radius reaches one."""
-    g = linear.gains(law)
+    g = small_signal.gains(law)
     unstable = lambda dt: bool(np.abs(np.linalg.eigvals(tick_matrix(g, dt, rule, delayed))).max() > 1)
-    return linear.first_crossing(unstable, np.geomspace(1e-3, 3e-2, 61))
+    return small_signal.first_crossing(unstable, np.geomspace(1e-3, 3e-2, 61))
 
 
 @pytest.mark.parametrize("case", TABLE)
@@ -84,15 +84,15 @@ def test_closed_forms(case):
 
 
 def test_without_delay_it_is_the_matrix_of_the_package(table1):
-    for rule in linear.RULES:
-        ours = tick_matrix(linear.gains(table1()), 2e-3, rule, False)
-        np.testing.assert_allclose(ours[:4, :4], linear.sampled_matrix(table1(), 2e-3, rule), atol=1e-12)
+    for rule in small_signal.RULES:
+        ours = tick_matrix(small_signal.gains(table1()), 2e-3, rule, False)
+        np.testing.assert_allclose(ours[:4, :4], small_signal.sampled_matrix(table1(), 2e-3, rule), atol=1e-12)
 
 
 class Stepped(AbstractController):
-    """The law with its input one tick late, its weights stepped before its identification model, or as it is."""
+    """The law with its input one step late, its weights stepped before its identification model, or as it is."""
 
-    model: AbstractModel
+    model: Model
     law: AbstractController
     semi_implicit: bool
     delayed: bool
@@ -101,8 +101,11 @@ class Stepped(AbstractController):
         return self.law.init(y, r), jnp.zeros_like(y.position)
 
     def command(self, z, y, r):
-        asked, telemetry = self.law.command(z[0], y, r)
-        return z[1] if self.delayed else asked, telemetry
+        asked, signals = self.law.command(z[0], y, r)
+        return z[1] if self.delayed else asked, signals
+
+    def signals(self):
+        return self.law.signals()
 
     def advance(self, z, y, r, u_applied, dt):
         asked, _ = self.law.command(z[0], y, r)
@@ -122,7 +125,7 @@ def test_nonlinear_loop_agrees(rule, delayed, rafc, layout):
     loop = ClosedLoop(plant, stepped, setpoint([1e-9]), none(), perfect())
     for factor in (0.97, 1.03):
         dt = factor * limit(law, rule, delayed)
-        samples = sampled.simulate(loop, duration=1500 * dt, dt=dt, record_every=1).samples
-        eps = np.abs(np.asarray(samples.modelling_error))[:, 0]
+        samples = sampled.simulate(loop, duration=1500 * dt, dt=dt, record_every=1).signals
+        eps = np.abs(np.asarray(samples["modelling_error"]))[:, 0]
         first, later = eps[:50].max(), eps[-200:].max()
         assert later < 1e-2 * first if factor < 1 else later > 100 * first, (factor, first, later)

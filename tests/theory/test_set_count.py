@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from undertow.disturbances.sinusoid import sinusoid
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 
 GATHERING = 0.4217  # rho of three sets, the layout matched by all others
@@ -20,7 +20,7 @@ LAYOUTS = {
 
 def matched(layout):
     """gamma that keeps gamma rho at that of Table 1 with three sets."""
-    rho = float(gaussian_sets(layout["sets"], layout["reach"]).gathering())
+    rho = float(gaussian_sets(layout["sets"], layout["reach"]).basis_norm_squared())
     return 100.0 * GATHERING / rho
 
 
@@ -28,10 +28,10 @@ def rms(rails, **choices):
     """Per axis: rms of d_til, rms of e; and the largest |eps|. From rest, so the jump of d at t = 0 counts."""
     loop = rails(2, disturbance=sinusoid(**PROBES), **choices)
     outcome = sampled.simulate(loop, duration=5.0, dt=5e-4, record_every=1)
-    samples = jax.tree.map(np.asarray, outcome.samples)
+    samples = jax.tree.map(np.asarray, outcome.signals)
     root = lambda series: np.sqrt((series**2).mean(0))
-    peak = np.abs(samples.modelling_error).max()
-    return root(samples.estimate - samples.uncertainty), root(samples.error), peak
+    peak = np.abs(samples["modelling_error"]).max()
+    return root(samples["estimate"] - samples["uncertainty"]), root(samples["error"]), peak
 
 
 @pytest.fixture(scope="module")

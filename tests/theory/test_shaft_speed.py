@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.core.contracts import Load
+from undertow.core.contracts import Load, known_acceleration
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
 
-def plant(rung="shaft"):
-    return ut.HybridVehicle(odin(), paper_table3(rung, supply=24.0))
+def plant(fidelity="shaft"):
+    return ut.HybridVehicle(odin(), paper_table3(fidelity, supply=24.0))
 
 
 def left_over(speed_sensor):
@@ -29,7 +29,7 @@ def left_over(speed_sensor):
 
     def d(z):
         acceleration = whole.acceleration(zero, x, volts, Load(jnp.zeros(6), jnp.zeros(6)))
-        return law.model.seen(y, acceleration) - law.known(z, y, volts)
+        return law.model.coordinates.acceleration(y, acceleration) - known_acceleration(law, z, y, volts)
 
     return np.asarray(jax.jit(d)(law.init(y, r)))
 
@@ -42,10 +42,10 @@ def test_the_robust_law_knows_the_thrust_of_propellers_that_report_their_speed()
 def test_the_papers_term_is_refused():
     """Before anything is compiled, and with the way out."""
     model = plant().model(speed_sensor=True)
-    with pytest.raises(ut.BadInput, match=r"speed_sensor` must be false on rung `shaft`.* preset: robust"):
+    with pytest.raises(ut.BadInput, match=r"speed_sensor` must be false on fidelity `shaft`.* preset: robust"):
         ut.simulate(plant(), ut.rcaf(model), ut.references.setpoint([0.0] * 6), duration=0.1)
 
 
 def test_where_there_is_no_speed_the_model_refuses():
-    with pytest.raises(ut.BadInput, match="`speed_sensor` must be false on rung `static`"):
+    with pytest.raises(ut.BadInput, match="`speed_sensor` must be false on fidelity `static`"):
         plant("static").model(speed_sensor=True)

@@ -1,7 +1,7 @@
 """I28, section 3.11: thrusters that lose part of their effect, unannounced, weaken the loop and never turn it round.
 
 eig(G W G+) for every vehicle of rank six; closed loops on ODIN that lose one thruster in mid-flight; and on one axis
-how large a gain error the sampled law bears.
+how large a gain error the sampled law tolerated_status.
 """
 
 import itertools
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis import linear, noise
+from undertow.analysis import noise, small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractPlant
@@ -20,10 +20,10 @@ from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.hybrid_vehicle import HybridVehicle, hybrid_vehicle
 from undertow.plants.linear_plant import linear_plant
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -35,7 +35,7 @@ def matrices():
     for name, part in sorted(catalogue.names("vehicles").items()):
         plant = hybrid_vehicle(part(), paper_table3("ideal"))
         if plant.rank() == 6:
-            yield name, np.asarray(plant.model().body_gain)
+            yield name, np.asarray(plant.model().dynamics.body_gain)
 
 
 def test_eigenvalues_lie_between_the_least_and_the_most_that_is_left():
@@ -104,8 +104,8 @@ class LosesEffect(AbstractPlant):
     def output(self, t, x):
         return self.vehicle.output(t, x)
 
-    def place(self, x):
-        return self.vehicle.place(x)
+    def pose(self, x):
+        return self.vehicle.pose(x)
 
     def admissible(self, x, u):
         return self.vehicle.admissible(x, u)
@@ -113,11 +113,17 @@ class LosesEffect(AbstractPlant):
     def effort(self, x, u):
         return self.vehicle.effort(x, u)
 
+    def diagnostics(self, x, u):
+        return self.vehicle.diagnostics(x, u)
+
+    def signals(self):
+        return self.vehicle.signals()
+
     def inputs(self):
         return self.vehicle.inputs()
 
-    def health(self, x):
-        return self.vehicle.health(x)
+    def status(self, x):
+        return self.vehicle.status(x)
 
     def advice(self):
         return self.vehicle.advice()
@@ -131,7 +137,7 @@ LOAD = np.array([0.3, 0.3, 0.3, 0.1, 0.1, 0.1])  # m/s^2, rad/s^2
 
 
 def amplitudes(law, effect):
-    """Amplitudes of e in the end, from the linearised tick of all six axes coupled by what is left of G G+."""
+    """Amplitudes of e in the end, from the linearised step of all six axes coupled by what is left of G G+."""
     one, unit = noise.steps(law, DT), np.eye(6)
     q = np.exp(1j * FREQUENCY * DT)
     across = lambda row: np.kron(row, unit)  # over (e, e_dot, eps, z) of six axes each
@@ -165,12 +171,12 @@ def test_after_any_single_loss_the_error_is_what_the_linear_loop_predicts(preset
         plant = LosesEffect(vehicle, left, LOSS, vehicle.outputs, vehicle.output_units)
         loop = ClosedLoop(plant, law, setpoint(np.zeros(6)), load, perfect())
         run = sampled.simulate(loop, duration=END, dt=DT, record_every=10)
-        return run.time, jnp.abs(run.samples.error), run.status
+        return run.time, jnp.abs(run.signals["error"]), run.status
 
     lefts = np.concatenate([np.ones((1, 8)), 1 - np.eye(8), 1 - 0.5 * np.eye(8)])
     time, error, status = (np.asarray(found) for found in jax.jit(jax.vmap(flight))(jnp.asarray(lefts)))
     assert (status == 0).all()
-    gain = np.asarray(vehicle.model().body_gain)
+    gain = np.asarray(vehicle.model().dynamics.body_gain)
     predicted = [amplitudes(law, gain * left @ np.linalg.pinv(gain)) for left in lefts]
     found = error[:, time[0] > SETTLED].max(1)
     ratio = found.max(1) / found[0].max()
@@ -185,9 +191,9 @@ def test_a_gain_three_times_too_large(dt, stable):
     plant = linear_plant(((3.0,),))
     law = rcaf(plant.model(gain=((1.0,),)), sets=3)
     loop = ClosedLoop(plant, law, setpoint([1e-6]), none(), perfect())
-    eps = np.abs(np.asarray(sampled.simulate(loop, duration=2.0, dt=dt, record_every=1).samples.modelling_error))
+    eps = np.abs(np.asarray(sampled.simulate(loop, duration=2.0, dt=dt, record_every=1).signals["modelling_error"]))
     assert (eps[-50:].max() < 1e-2 * eps[:20].max()) == stable
-    g = linear.gains(law)
+    g = small_signal.gains(law)
     assert (dt < g.pole / (3 * g.b2)) == stable
     observer = np.array([[1 - g.pole * dt, dt], [-3 * g.b2 * dt, 1.0]])
     assert (np.abs(np.linalg.eigvals(observer)).max() < 1) == stable

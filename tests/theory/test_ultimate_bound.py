@@ -35,9 +35,9 @@ def test_ultimate_error_is_within_the_bound(rails):
     loop = rails(AXES, goal=0.5, disturbance=sinusoid(**signals), compensation_layer=0.5, **gains)
     outcome = sampled.simulate(loop, duration=240.0, dt=4e-3, record_every=5)
     assert int(outcome.status) == 0
-    samples = jax.tree.map(np.asarray, outcome.samples)
+    samples = jax.tree.map(np.asarray, outcome.signals)
     late = np.asarray(outcome.time) > 120.0
-    measured = np.sqrt((samples.error**2 + samples.velocity**2)[late].mean(0))
+    measured = np.sqrt((samples["error"] ** 2 + samples["velocity"] ** 2)[late].mean(0))
     residue = 0.2785 * (gains["layer"] * gains["robust_gain"] + 0.5 * gains["composite"] * gains["compensation_gain"])
     bound = np.sqrt(2 * residue / gains["weight"][:, 0, 0])
     assert (measured <= bound).all(), measured / bound

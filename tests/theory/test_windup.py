@@ -7,15 +7,15 @@ leaves open); RAFC learns from s alone.
 import numpy as np
 import pytest
 
-from undertow.analysis import linear
+from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.sensors.perfect import perfect
 
 LIMITS = (np.inf, 5.0, 3.0, 1.5)  # m/s^2
 SURVIVES = {
@@ -29,7 +29,7 @@ SURVIVES = {
 class FedCommanded(AbstractController):
     """A law that never hears of limits."""
 
-    model: AbstractModel
+    model: Model
     law: AbstractController
 
     def init(self, y, r):
@@ -38,21 +38,24 @@ class FedCommanded(AbstractController):
     def command(self, z, y, r):
         return self.law.command(z, y, r)
 
+    def signals(self):
+        return self.law.signals()
+
     def advance(self, z, y, r, u_applied, dt):
         commanded, _ = self.law.command(z, y, r)
         return self.law.advance(z, y, r, commanded, dt)
 
 
 def step(name, limit, load=1.0):
-    """Error, estimate and s of the step at every tick, on one axis, and the law."""
+    """Error, estimate and s of the step at every step, on one axis, and the law."""
     plant = double_integrator(1, limit)
     choices = {"rafc": {"sets": 3, "composite": 0.0}, "robust": {"preset": "robust"}}.get(name, {"sets": 3})
     law = rcaf(plant.model(), **choices)
     fed = FedCommanded(law.model, law) if name == "commanded" else law
     loop = ClosedLoop(plant, fed, setpoint([2.0]), sinusoid(0.0, 1.0, offset=load), perfect())
-    samples = sampled.simulate(loop, duration=40.0, dt=1e-3, record_every=1).samples
-    error, velocity = np.asarray(samples.error)[:, 0], np.asarray(samples.velocity)[:, 0]
-    return error, np.asarray(samples.estimate)[:, 0], 5 * (error - velocity), law
+    samples = sampled.simulate(loop, duration=40.0, dt=1e-3, record_every=1).signals
+    error, velocity = np.asarray(samples["error"])[:, 0], np.asarray(samples["velocity"])[:, 0]
+    return error, np.asarray(samples["estimate"])[:, 0], 5 * (error - velocity), law
 
 
 @pytest.mark.parametrize("name", SURVIVES)
@@ -94,8 +97,8 @@ def test_static_bias_is_no_bound():
 
 def bound_of(law, load, largest):
     """From d_hat = (b2 d - gamma rho (p + a1) s) / (p^2 + a1 p + b2)."""
-    g = linear.gains(law)
-    damping = linear.observer_damping(law)
+    g = small_signal.gains(law)
+    damping = small_signal.observer_damping(law)
     overshoot = np.exp(-np.pi * damping / np.sqrt(1 - damping**2))
     times = np.linspace(0.0, 60 / g.pole, 200_001)
     decay, swing = g.pole / 2, np.sqrt(g.b2 - g.pole**2 / 4)

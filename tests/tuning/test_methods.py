@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.studies.tuning.certifying import Certificate, refusal
-from undertow.studies.tuning.descent import descend
-from undertow.studies.tuning.journal import Journal, OutOfTime
-from undertow.studies.tuning.objective import Objective
-from undertow.studies.tuning.searching import search
+from undertow.tuning.checkpoint import Checkpoint, OutOfTime
+from undertow.tuning.objective import Objective
+from undertow.tuning.search import descend, search
+from undertow.tuning.stability import Certificate, no_certificate
 
 RNG = np.random.default_rng(4)
 ROOT = RNG.normal(size=(3, 3))
@@ -40,7 +39,7 @@ def stable(point):
 
 
 def objective(tmp_path, bowl, certify=stable, resume=False, budget=1e9):
-    return Objective(bowl, certify, Journal(tmp_path / "j", "bowl", budget, resume), lambda best, evaluations: None)
+    return Objective(bowl, certify, Checkpoint(tmp_path / "j", "bowl", budget, resume), lambda best, evaluations: None)
 
 
 def tune(asked, method, iterations=60):
@@ -84,7 +83,7 @@ def test_nothing_is_accepted_without_certificate(tmp_path, method):
     fenced = lambda point: Certificate((0.9 if point[0] >= 0.5 else 1.01,), ("",))
     asked = objective(tmp_path, Bowl(), fenced)
     best = tune(asked, method)
-    assert asked.refused > 0
+    assert asked.rejected > 0
     assert all(step.point[0] >= 0.5 and step.radius < 1 for step in asked.steps)
     assert best.cost < asked.steps[0].cost
 
@@ -92,7 +91,7 @@ def test_nothing_is_accepted_without_certificate(tmp_path, method):
 @pytest.mark.parametrize("method", ["gradient", "search"])
 @pytest.mark.parametrize("lines", [1, 5, 8])
 def test_resumed_is_the_same_as_uninterrupted(tmp_path, method, lines):
-    """The journal as a kill leaves it: cut off after some lines, and in the middle of the next."""
+    """The checkpoint as a kill leaves it: cut off after some lines, and in the middle of the next."""
     bowl = Bowl()
     whole = objective(tmp_path, bowl)
     tune(whole, method, iterations=6)
@@ -119,16 +118,16 @@ def test_budget_ends_it(tmp_path):
 
 def test_journal_of_something_else(tmp_path):
     with pytest.raises(BadInput, match="unfinished tuning"):
-        Journal(tmp_path / "j", "one", 1.0, resume=True)
-    Journal(tmp_path / "j", "one", 1.0, resume=False)
+        Checkpoint(tmp_path / "j", "one", 1.0, resume=True)
+    Checkpoint(tmp_path / "j", "one", 1.0, resume=False)
     with pytest.raises(BadInput, match="resume"):
-        Journal(tmp_path / "j", "one", 1.0, resume=False)
-    with pytest.raises(BadInput, match="another one"):
-        Journal(tmp_path / "j", "two", 1.0, resume=True)
+        Checkpoint(tmp_path / "j", "one", 1.0, resume=False)
+    with pytest.raises(BadInput, match="given with others"):
+        Checkpoint(tmp_path / "j", "two", 1.0, resume=True)
 
 
-def test_where_nothing_is_certified_the_worst_truth_is_named():
-    said = str(refusal(Certificate((0.9, 1.25, 0.8), ("wu2018", "px4", "px4")), 12))
+def test_where_nothing_is_certified_the_worst_variant_is_named():
+    said = str(no_certificate(Certificate((0.9, 1.25, 0.8), ("wu2018", "px4", "px4")), 12))
     assert "none of 12 points is certified" in said
-    assert "spectral radius of 1.25 with the parameter set px4 as the truth" in said
-    assert "truth" not in str(refusal(Certificate((1.1,), ("",)), 12))
+    assert "spectral radius of 1.25 on the plant variant px4" in said
+    assert "variant" not in str(no_certificate(Certificate((1.1,), ("",)), 12))

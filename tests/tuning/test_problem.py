@@ -5,28 +5,26 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis.linearised.pieces import without
+from undertow.analysis.linearization.jacobians import without
 from undertow.controllers import pid
-from undertow.core.contracts import Load, Place
+from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
 from undertow.disturbances import current, sinusoid, wrench
 from undertow.disturbances.adding import Together
-from undertow.instruments import depth, dvl, imu
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import observer
 from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
 from undertow.scenario.reading import from_data
-from undertow.sensors import navigation
-from undertow.studies.tuning.certifying import Certifier
-from undertow.studies.tuning.descent import descend
-from undertow.studies.tuning.dials import dials, options
-from undertow.studies.tuning.evaluation import Evaluation
-from undertow.studies.tuning.journal import Journal
-from undertow.studies.tuning.objective import Objective
-from undertow.studies.tuning.problem import problem
-from undertow.studies.tuning.scaled import scaled
-from undertow.studies.tuning.searching import search
+from undertow.sensors import depth, dvl, imu
 from undertow.thrusters import t200
+from undertow.tuning.checkpoint import Checkpoint
+from undertow.tuning.evaluator import Evaluation, scaled
+from undertow.tuning.objective import Objective
+from undertow.tuning.problem import problem
+from undertow.tuning.search import descend, search
+from undertow.tuning.stability import Certifier
+from undertow.tuning.tunable_parameters import options, parameters
 from undertow.vehicles import bluerov2_heavy
 
 AXIS = {
@@ -34,7 +32,7 @@ AXIS = {
     "controller": {"kind": "pid", "frequency": 3.0},
     "reference": {"kind": "setpoint", "position": [0.0]},
     "disturbance": {"kind": "sinusoid", "amplitude": 1.0, "frequency": 1.0},
-    "sensor": {"kind": "white_noise", "velocity": 0.01},
+    "navigation": {"kind": "white_noise", "velocity": 0.01},
     "loop": {"duration": 6.0, "dt": 0.02, "record": 0.1},
     "tune": {"parameters": {"frequency": [0.5, 12], "damping": [0.4, 2]}, "train": {"seeds": 2}},
 }
@@ -45,7 +43,7 @@ def axis():
     """The problem, and its programs."""
     found = problem(from_data(AXIS))
     make = lambda point: found.law(found.options(point))
-    return found, Evaluation(found.bench, make, make(found.start), found.train)
+    return found, Evaluation(found.training_loop, make, make(found.start), found.train)
 
 
 def test_slope_equals_finite_differences(axis):
@@ -58,11 +56,11 @@ def test_slope_equals_finite_differences(axis):
 
 def test_both_methods_come_to_the_same_gains(axis, tmp_path):
     found, evaluation = axis
-    certifier = Certifier(found.bench, found.train, evaluation.law(found.start))
+    certifier = Certifier(found.training_loop, found.train, evaluation.law(found.start))
     best = []
     for method in ("gradient", "search"):
-        journal = Journal(tmp_path / method, method, 1e9, False)
-        asked = Objective(evaluation, lambda point: certifier(evaluation.law(point)), journal, lambda *_: None)
+        checkpoint = Checkpoint(tmp_path / method, method, 1e9, False)
+        asked = Objective(evaluation, lambda point: certifier(evaluation.law(point)), checkpoint, lambda *_: None)
         start = found.start
         asked.costs(start[None])
         if method == "gradient":
@@ -103,22 +101,22 @@ def test_parameter_sets_take_turns():
         "loop": {"dt": 0.05, "duration": 2.0, "record": 0.1},
     }
     found = problem(from_data(sea | still))
-    assert found.train.truths == ("vonbenzon2022", "ng2024", "px4") * 2
-    assert found.held_out.truths == ("vonbenzon2022", "wu2018", "gazebo_box_drag") * 4
+    assert found.train.variants == ("vonbenzon2022", "ng2024", "px4") * 2
+    assert found.held_out.variants == ("vonbenzon2022", "wu2018", "gazebo_box_drag") * 4
     masses = np.asarray(found.train.plants.body.mass_matrix)[:3, 0, 0]
     np.testing.assert_allclose(masses, [13.5 + 6.36, 11.5 + 10.77, 13.4 + 1.272])
-    assert [dial.axes for dial in found.dials[:2]] == [(0, 1, 2), (3, 4, 5)]
-    np.testing.assert_allclose(found.bench.sums.input_scale, 16.0)
+    assert [parameter.axes for parameter in found.parameters[:2]] == [(0, 1, 2), (3, 4, 5)]
+    np.testing.assert_allclose(found.training_loop.sums.input_scale, 16.0)
 
 
 def test_slopes_are_taken_without_steps():
     """Rounded readings have no slope: nothing is rounded, nothing else changes."""
-    sensor = navigation([imu(), dvl(), depth()])
+    sensor = observer([imu(), dvl(), depth()])
     plant = hybrid_vehicle(bluerov2_heavy(), t200())
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0] * 6), sinusoid(), sensor)
     smooth = without(loop, ("resolution", "dead_zone"))
     assert float(smooth.plant.thruster.dead_zone) == 0.0 and float(loop.plant.thruster.dead_zone) == 1.2
-    pairs = zip(loop.sensor.instruments, smooth.sensor.instruments, strict=True)
+    pairs = zip(loop.navigation.sensors, smooth.navigation.sensors, strict=True)
     assert [(float(a.sampling.resolution), float(b.sampling.resolution)) for a, b in pairs] == [(0.0, 0.0)] + [
         (1e-3, 0.0)
     ] * 2
@@ -127,7 +125,7 @@ def test_slopes_are_taken_without_steps():
 
 
 def test_dials_and_options():
-    chosen = dials(
+    chosen = parameters(
         {"tracking": (1.0, 100.0), "feedback[0]": (1, 2), "feedback[1]": (3, 4), "rate": (5, 6)},
         [(0, 2), (1,)],
         ["rate"],
@@ -136,9 +134,9 @@ def test_dials_and_options():
     np.testing.assert_allclose(at["tracking"], [10.0, 1.0, 10.0])
     np.testing.assert_allclose(at["feedback"], [[1, 4], [2, 3], [1, 4]])
     np.testing.assert_allclose(at["rate"], 6.0)
-    for dial in chosen:
-        np.testing.assert_allclose(dial.share(dial.value(0.3)), 0.3)
-        assert dial.share(1e9) == 1.0 and dial.share(1e-9) == 0.0
+    for parameter in chosen:
+        np.testing.assert_allclose(parameter.share(parameter.value(0.3)), 0.3)
+        assert parameter.share(1e9) == 1.0 and parameter.share(1e-9) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -156,21 +154,21 @@ def test_dials_and_options():
 )
 def test_ranges_that_cannot_be(ranges, said):
     with pytest.raises(BadInput) as error:
-        dials(ranges, [(0,)])
+        parameters(ranges, [(0,)])
     assert str(error.value) == said
 
 
 def test_one_ode_is_not_what_a_vehicle_runs():
-    ode = {"controller": {"kind": "rcaf"}, "sensor": "perfect", "loop": {"kind": "continuous", "duration": 1.0}}
+    ode = {"controller": {"kind": "rcaf"}, "navigation": "perfect", "loop": {"kind": "continuous", "duration": 1.0}}
     with pytest.raises(BadInput, match=r"^`loop.kind` must be sampled, for gains to be used on a vehicle"):
         problem(from_data(AXIS | ode))
 
 
 def test_disturbance_of_another_size():
     inner = Together((sinusoid(2.0, 1.0), wrench([1.0] * 6), current([0.3, 0.1, 0.0])))
-    place, calm = Place(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)), Load(jnp.ones(6), jnp.zeros(6))
+    place, calm = Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)), Load(jnp.ones(6), jnp.zeros(6))
     half = scaled(inner, 0.5)
-    one, two = (each.at(each.draw(jax.random.PRNGKey(0)), 0.7, place, calm) for each in (inner, half))
+    one, two = (each.at(each.realize(jax.random.PRNGKey(0)), 0.7, place, calm) for each in (inner, half))
     np.testing.assert_allclose(two.acceleration - 1, 0.5 * (one.acceleration - 1))
     np.testing.assert_allclose(two.wrench, 0.5 * one.wrench)
     np.testing.assert_allclose(two.water.velocity, [0.15, 0.05, 0.0])

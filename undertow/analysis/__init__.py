@@ -1,1 +1,1 @@
-"""Analysis: metrics, linear prediction, stability certificate."""
+"""Analysis: metrics, linearisation, stability certificate."""

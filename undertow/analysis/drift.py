@@ -1,17 +1,16 @@
-"""Parameter drift: section 3.8 of the theory page.
+"""Parameter drift: gain added by drifting weights, and time to divergence. Section 3.8 of the theory page.
 
-Weights that differ from set to set make d_hat = z - c eps with c = -xi'(0)^T theta. By the adaptive law c grows with
-the square of eps and never comes back: a gain that adds damping at first, and breaks the sampled loop in the end.
+Weights that differ between sets give d_hat = z - c eps with c = -xi'(0)^T theta. Under the adaptive law c grows with
+the square of eps and never decreases: it adds damping at first, and destabilises the sampled loop in the end.
 """
 
 import numpy as np
-from scipy.integrate import quad
 
 from undertow.analysis.noise import Steps, steps
-from undertow.controllers.law import RCAF
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.controllers.composite_law import RCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.errors import BadInput
-from undertow.fuzzy.tsk import FuzzySystem
+from undertow.estimation.fuzzy_system import FuzzySystem
 
 
 def basis_slope(fuzzy: FuzzySystem) -> np.ndarray:
@@ -21,7 +20,7 @@ def basis_slope(fuzzy: FuzzySystem) -> np.ndarray:
         BadInput: more than one input.
     """
     if fuzzy.inputs != 1:
-        raise BadInput("fuzzy_input", "be error, as only this basis moves with eps", f"of {fuzzy.inputs} inputs")
+        raise BadInput("fuzzy_input", "be error, because only this basis depends on eps", f"of {fuzzy.inputs} inputs")
     centres, widths = np.asarray(fuzzy.centres[0]), np.asarray(fuzzy.widths[0])
     exponent = -((centres / widths) ** 2)
     basis = np.exp(exponent - exponent.max())
@@ -32,14 +31,13 @@ def basis_slope(fuzzy: FuzzySystem) -> np.ndarray:
 
 def gain_of(law: RCAF | RobustRCAF, weights: np.ndarray) -> np.ndarray:
     """c of weights theta (..., rules), 1/s."""
-    return -np.asarray(weights) @ basis_slope(_fuzzy(law))
+    return -np.asarray(weights) @ basis_slope(law.fuzzy)
 
 
 def gain_bound(law: RCAF | RobustRCAF, axis: int = 0) -> float:
     """Largest c, 1/s, while |theta| <= theta_max: theta_max sum |xi'(0)|; zero for one set, infinite without a box."""
-    bound = law.estimator.bound if isinstance(law, RobustRCAF) else law.weights_bound
-    theta_max = np.broadcast_to(np.asarray(bound, dtype=float), len(law.model.angles))[axis]
-    slope = np.abs(basis_slope(_fuzzy(law))).sum()
+    theta_max = np.broadcast_to(np.asarray(law.weights_bound, dtype=float), len(law.model.coordinates.angles))[axis]
+    slope = np.abs(basis_slope(law.fuzzy)).sum()
     return float(theta_max * slope) if slope > 0 else 0.0
 
 
@@ -65,7 +63,7 @@ def drift_rate(law: RCAF | RobustRCAF, dt: float, mean_square: float, axis: int 
 def noise_square(law: RCAF | RobustRCAF, dt: float, velocity: float, gain: float = 0.0, axis: int = 0) -> float:
     """Mean square of eps, (m/s)^2, under white noise of a standard deviation `velocity`, with a gain c in 1/s.
 
-    Of the estimator alone: eps = -(q - 1)^2 / ((q - 1)^2 + p (q - 1) + r) n, q the shift by one tick.
+    Of the estimator alone: eps = -(q - 1)^2 / ((q - 1)^2 + p (q - 1) + r) n, q the shift by one step.
     """
     one = steps(law, dt, axis)
     p, r = one.of_rates + dt * gain, one.of_estimate * dt
@@ -74,6 +72,8 @@ def noise_square(law: RCAF | RobustRCAF, dt: float, velocity: float, gain: float
 
 def time_to_divergence(law: RCAF | RobustRCAF, dt: float, velocity: float, axis: int = 0) -> float:
     """Time, s, in which white velocity noise drives c from zero to `largest_gain`; infinite where it cannot."""
+    from scipy.integrate import quad  # takes longer to import than all a run needs
+
     one, end = steps(law, dt, axis), largest_gain(law, dt, axis)
     rate = _per_square(law, one) * velocity**2
     if rate == 0 or gain_bound(law, axis) < end:
@@ -84,8 +84,4 @@ def time_to_divergence(law: RCAF | RobustRCAF, dt: float, velocity: float, axis:
 
 
 def _per_square(law: RCAF | RobustRCAF, one: Steps) -> float:
-    return one.of_estimate / one.dt / one.gathering * float((basis_slope(_fuzzy(law)) ** 2).sum())
-
-
-def _fuzzy(law: RCAF | RobustRCAF) -> FuzzySystem:
-    return law.estimator.fuzzy if isinstance(law, RobustRCAF) else law.fuzzy
+    return one.of_estimate / one.dt / one.basis_norm_squared * float((basis_slope(law.fuzzy) ** 2).sum())

@@ -1,6 +1,7 @@
-"""The benchmark's metrics, defined once: gathered tick by tick inside the loop, or from a recorded series."""
+"""Metrics of a run, computed step by step inside the loop or from a recorded series."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -9,15 +10,20 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.core.contracts import AbstractPlant
+from undertow.core.errors import BadInput
+from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.param import param
-from undertow.loop.closed_loop import Sample
+from undertow.core.signals import Signal
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
+from undertow.loop.recorded_signals import Signals
 from undertow.loop.sampled import AbstractAccumulator
 
 PerAxis = Float[Array, " n"]
 Scalar = Float[Array, ""]
 
-# Sample times are k * dt in floating point: a window takes its borders in.
+# Sampling times are k * dt in floating point: a window takes its borders in.
 _HAIR = 1e-9  # s
 
 # Share of the way to the last target that the error must leave no more to be settled.
@@ -29,7 +35,7 @@ class MetricsState(NamedTuple):
     """Running sums over a window."""
 
     samples: Scalar  # number of them inside the window
-    squares: dict[str, PerAxis]  # of the signals of _SIGNALS
+    squares: dict[str, PerAxis]  # of the signals of _RMS that are recorded
     largest_error: PerAxis
     input_squares: Scalar
     input_peak: Scalar
@@ -37,7 +43,7 @@ class MetricsState(NamedTuple):
     span: Scalar  # s covered by steps inside the window
     energy: Scalar
     saturated: Scalar
-    weights_peak: Scalar
+    weights_peak: Scalar | None  # None for a law without weights
     bad_readings: Scalar
     settling: "Settling"
     previous: Any  # (t, input, power, inside) of the sample before
@@ -53,15 +59,15 @@ class Settling(NamedTuple):
     last: Scalar  # time of the last sample, s
     resting: Scalar  # 1 while the target stays
 
-    def updated(self, t: Scalar, sample: Sample, counts: Any) -> "Settling":
+    def updated(self, t: Scalar, signals: Signals, counts: Any) -> "Settling":
         """With a sample more, where it counts."""
         first = self.begun == 0
-        start = jnp.where(first, sample.error - sample.target, self.start)
-        rests = first | (sample.target == self.target).all()
-        outside = jnp.abs(sample.error) > _SETTLED * jnp.abs(start + sample.target)
+        start = jnp.where(first, signals["error"] - signals["reference"], self.start)
+        rests = first | (signals["reference"] == self.target).all()
+        outside = jnp.abs(signals["error"]) > _SETTLED * jnp.abs(start + signals["reference"])
         since = jnp.where(rests & ~outside, self.since, t)
         resting = jnp.where(rests, 1.0, 0.0)
-        new = Settling(jnp.ones_like(self.begun), start, sample.target, since, t, resting)
+        new = Settling(jnp.ones_like(self.begun), start, signals["reference"], since, t, resting)
         return Settling(*(jnp.where(counts, now, before) for now, before in zip(new, self, strict=True)))
 
     def times(self) -> np.ndarray:
@@ -74,27 +80,48 @@ class Settling(NamedTuple):
         return np.where((np.abs(self.start + self.target) > _NO_WAY) & (resting > 0), found, np.nan)
 
 
-# Metric name -> the signal whose rms it is.
-_SIGNALS = {
-    "tracking": lambda s: s.error,
-    "estimation": lambda s: s.estimate - s.uncertainty,
-    "uncertainty": lambda s: s.uncertainty,
-    "robust": lambda s: s.robust,
-    "model": lambda s: s.modelling_error,
+# Metric -> the signals that it needs, and what it is the rms of. A law that lacks one has no such metric.
+_RMS: dict[str, tuple[tuple[str, ...], Callable[[Signals], PerAxis]]] = {
+    "error": (("error",), lambda s: s["error"]),
+    "estimation": (("estimate",), lambda s: s["estimate"] - s["uncertainty"]),
+    "uncertainty": (("uncertainty",), lambda s: s["uncertainty"]),
+    "robust": (("robust_term",), lambda s: s["robust_term"]),
+    "model": (("modelling_error",), lambda s: s["modelling_error"]),
 }
+
+# Outputs whose unit is the key make one figure; those of any other unit do only where all outputs have it.
+_GROUPS = {"m": "position", "rad": "attitude"}
+_ALL = "tracking"
+
+
+def output_groups(units: Sequence[str]) -> dict[str, tuple[str, list[int]]]:
+    """Outputs that share a unit: name -> unit and places. Metres and radians never make one number."""
+    found = {
+        name: (unit, [i for i, one in enumerate(units) if one == unit])
+        for unit, name in _GROUPS.items()
+        if unit in units
+    }
+    one_kind = not found and len(set(units)) == 1
+    return {_ALL: (units[0], list(range(len(units))))} if one_kind else found
 
 
 class Metrics(AbstractAccumulator):
-    """All metrics over start <= t <= stop."""
+    """The metrics of every run, over start <= t <= stop.
+
+    Args:
+        start, stop: the window, s.
+        units: of the outputs.
+    """
 
     start: Scalar = param("s", "first time that counts", default=0.0)
     stop: Scalar = param("s", "last time that counts", default=jnp.inf)
+    units: tuple[str, ...] = eqx.field(static=True, default=("m",))
 
-    def init(self, sample: Sample) -> MetricsState:
-        axes, zero = jnp.zeros_like(sample.error), jnp.zeros(())
+    def init(self, signals: Signals) -> MetricsState:
+        axes, zero = jnp.zeros_like(signals["error"]), jnp.zeros(())
         return MetricsState(
             samples=zero,
-            squares=dict.fromkeys(_SIGNALS, axes),
+            squares={name: axes for name, (needed, _) in _RMS.items() if all(one in signals for one in needed)},
             largest_error=axes,
             input_squares=zero,
             input_peak=zero,
@@ -102,82 +129,213 @@ class Metrics(AbstractAccumulator):
             span=zero,
             energy=zero,
             saturated=zero,
-            weights_peak=zero,
+            weights_peak=zero if "weights_peak" in signals else None,
             bad_readings=zero,
             settling=Settling(zero, axes, axes, axes, zero, zero),
-            previous=(zero, jnp.zeros_like(sample.voltage), zero, zero),
+            previous=(zero, jnp.zeros_like(signals["input"]), zero, zero),
         )
 
-    def update(self, state: MetricsState, t: Scalar, sample: Sample) -> MetricsState:
+    def update(self, state: MetricsState, t: Scalar, signals: Signals) -> MetricsState:
         inside = jnp.where((t >= self.start - _HAIR) & (t <= self.stop + _HAIR), 1.0, 0.0)
         last_t, last_input, last_power, last_inside = state.previous
-        power, between = sample.power.sum(), inside * last_inside
-        size, applied = jnp.abs(sample.error), sample.voltage
+        power, between = signals["power"].sum(), inside * last_inside
+        size, applied = jnp.abs(signals["error"]), signals["input"]
+        weights_peak = state.weights_peak
+        if weights_peak is not None:
+            weights_peak = jnp.maximum(weights_peak, inside * signals["weights_peak"])
         return MetricsState(
             samples=state.samples + inside,
-            squares={name: state.squares[name] + inside * pick(sample) ** 2 for name, pick in _SIGNALS.items()},
+            squares={name: sums + inside * _RMS[name][1](signals) ** 2 for name, sums in state.squares.items()},
             largest_error=jnp.maximum(state.largest_error, inside * size),
             input_squares=state.input_squares + inside * (applied**2).mean(),
             input_peak=jnp.maximum(state.input_peak, inside * jnp.abs(applied).max()),
             variation=state.variation + between * jnp.abs(applied - last_input).mean(),
             span=state.span + between * (t - last_t),
             energy=state.energy + between * (t - last_t) * (power + last_power) / 2,
-            saturated=state.saturated + inside * sample.saturated.mean(),
-            weights_peak=jnp.maximum(state.weights_peak, inside * sample.weights_peak),
-            bad_readings=jnp.maximum(state.bad_readings, inside * sample.bad_readings.astype(inside.dtype)),
-            settling=state.settling.updated(t, sample, t <= self.stop + _HAIR),
+            saturated=state.saturated + inside * signals["saturated"].mean(),
+            weights_peak=weights_peak,
+            bad_readings=jnp.maximum(state.bad_readings, inside * signals["bad_readings"].astype(inside.dtype)),
+            settling=state.settling.updated(t, signals, t <= self.stop + _HAIR),
             previous=(t, applied, power, inside),
         )
 
+    def values(self, state: MetricsState) -> dict[str, np.ndarray]:
+        """Metrics by name, of many runs at once where the leaves have leading axes; NaN where one is not defined."""
+        state = jax.tree.map(np.asarray, state)
+        count = np.where(state.samples > 0, state.samples, np.nan)
+        groups = output_groups(self.units)
+        found = {f"{group}_rms": _rms(state.squares["error"][..., axes], count) for group, (_, axes) in groups.items()}
+        found |= {f"{group}_max": state.largest_error[..., axes].max(-1) for group, (_, axes) in groups.items()}
+        found |= {f"{name}_rms": _rms(sums, count) for name, sums in state.squares.items() if name != "error"}
+        found |= {
+            "input_rms": np.sqrt(state.input_squares / count),
+            "input_peak": state.input_peak,
+            "input_variation": state.variation / np.where(state.span > 0, state.span, np.nan),
+            "energy": state.energy,
+            "settling_time": np.fmax.reduce(state.settling.times(), axis=-1),
+            "saturated_fraction": state.saturated / count,
+            "bad_readings": state.bad_readings,
+        }
+        if state.weights_peak is not None:
+            found["weights_peak"] = state.weights_peak
+        return {name: np.where(np.isnan(count), np.nan, value) for name, value in found.items()}
 
-def results(state: MetricsState) -> dict[str, Any]:
-    """Metrics by their names in result files: overall values as numbers, per-axis values as `<name>_axes` lists."""
-    host = jax.tree.map(np.asarray, state)
-    count = max(float(host.samples), 1.0)
-    found: dict[str, Any] = {name: float(value) for name, value in overall(host).items()}
-    for name, squares in host.squares.items():
-        found[f"{name}_rms_axes"] = np.sqrt(squares / count).tolist()
-    found["tracking_max_axes"] = host.largest_error.tolist()
-    if np.isnan(found["settling_time"]):  # what is not defined is not there
-        del found["settling_time"]
-        return found
-    return found | {"settling_time_axes": host.settling.times().tolist()}
-
-
-# Over all axes: name -> value of a state whose leaves may have leading axes, given its number of samples.
-_OVERALL: dict[str, Callable[[MetricsState, Any], Any]] = {
-    **{f"{name}_rms": lambda s, count, name=name: np.sqrt(s.squares[name].mean(-1) / count) for name in _SIGNALS},
-    "tracking_max": lambda s, count: s.largest_error.max(-1),
-    "input_rms": lambda s, count: np.sqrt(s.input_squares / count),
-    "input_peak": lambda s, count: s.input_peak,
-    "input_variation": lambda s, count: np.where(s.span > 0, s.variation / np.where(s.span > 0, s.span, 1.0), 0.0),
-    "weights_peak": lambda s, count: s.weights_peak,
-    "energy": lambda s, count: s.energy,
-    "settling_time": lambda s, count: np.fmax.reduce(s.settling.times(), axis=-1),
-    "saturated_fraction": lambda s, count: s.saturated / count,
-    "bad_readings": lambda s, count: s.bad_readings,
-}
-OVERALL = tuple(_OVERALL)
-
-
-def overall(state: MetricsState) -> dict[str, np.ndarray]:
-    """Metrics over all axes by their names; of many runs at once where the leaves have leading axes."""
-    host = jax.tree.map(np.asarray, state)
-    count = np.maximum(host.samples, 1.0)
-    return {name: value(host, count) for name, value in _OVERALL.items()}
+    def per_axis(self, state: MetricsState) -> dict[str, list[float]]:
+        """Metrics of each output, in its own unit, of one run."""
+        state = jax.tree.map(np.asarray, state)
+        if not state.samples:
+            return {}
+        found = {f"{name}_rms_axes": np.sqrt(sums / state.samples).tolist() for name, sums in state.squares.items()}
+        found["error_max_axes"] = state.largest_error.tolist()
+        settled = state.settling.times()
+        return found if np.isnan(settled).all() else found | {"settling_time_axes": settled.tolist()}
 
 
-def measure(outcome: Outcome, start: float = 0.0, stop: float = float("inf")) -> dict[str, Any]:
+def _rms(squares: np.ndarray, count: np.ndarray) -> np.ndarray:
+    return np.sqrt(squares.mean(-1) / count)
+
+
+class Windowed(AbstractAccumulator):
+    """A metric of somebody's own over start <= t <= stop, s."""
+
+    metric: AbstractMetric
+    start: Scalar = param("s", "first time that counts", default=0.0)
+    stop: Scalar = param("s", "last time that counts", default=jnp.inf)
+
+    def init(self, signals: Signals) -> Any:
+        return self.metric.init(signals)
+
+    def update(self, state: Any, t: Scalar, signals: Signals) -> Any:
+        inside = (t >= self.start - _HAIR) & (t <= self.stop + _HAIR)
+        return jax.tree.map(lambda now, was: jnp.where(inside, now, was), self.metric.update(state, t, signals), state)
+
+
+Gathered = tuple[AbstractAccumulator, ...]
+
+
+def accumulators(plant: AbstractPlant, own: Sequence[AbstractMetric], start: float, stop: float) -> Gathered:
+    """What gathers all metrics of a run of a plant between two times, s; `own` are the scenario's own."""
+    return (Metrics(start, stop, plant.output_units), *(Windowed(metric, start, stop) for metric in own))
+
+
+def results(gathered: Gathered, states: Sequence[Any]) -> dict[str, Any]:
+    """Metrics of one run by their names in result files; those that are not defined are not there.
+
+    Figures as numbers; those of each output, in its own unit, as lists named `<name>_axes`.
+    """
+    found: dict[str, Any] = {}
+    for one, state in zip(gathered, states, strict=True):
+        host = jax.tree.map(np.asarray, state)
+        if isinstance(one, Metrics):
+            found |= one.values(host) | one.per_axis(host)
+        elif isinstance(one, Windowed):
+            found |= one.metric.values(host)
+    plain = {name: value if isinstance(value, list) else float(value) for name, value in found.items()}
+    return {name: value for name, value in plain.items() if isinstance(value, list) or not math.isnan(value)}
+
+
+def results_of_batch(gathered: Gathered, states: Sequence[Any]) -> dict[str, np.ndarray]:
+    """Metrics of many runs, whose states have one leading axis; NaN where one is not defined."""
+    found: dict[str, np.ndarray] = {}
+    for one, state in zip(gathered, states, strict=True):
+        if isinstance(one, Metrics):
+            found |= one.values(state)
+        elif isinstance(one, Windowed):
+            host = jax.tree.map(np.asarray, state)
+            count = len(jax.tree.leaves(host)[0])
+            each = [one.metric.values(jax.tree.map(lambda leaf, i=i: leaf[i], host)) for i in range(count)]
+            found |= {name: np.array([float(run[name]) for run in each]) for name in one.metric.metrics()}
+    return found
+
+
+def measure(
+    outcome: Outcome,
+    plant: AbstractPlant,
+    start: float = 0.0,
+    stop: float = math.inf,
+    own: Sequence[AbstractMetric] = (),
+) -> dict[str, Any]:
     """Metrics of a recorded run over start <= t <= stop, s, at the rate of the record."""
-    samples, kept = outcome.samples, int((np.asarray(outcome.time) <= stop + _HAIR).sum())
+    signals, kept = outcome.signals, int((np.asarray(outcome.time) <= stop + _HAIR).sum())
     if 0 < kept < len(outcome.time):  # what comes later may be no numbers, and none of them times zero is none
         index = np.minimum(np.arange(len(outcome.time)), kept - 1)
-        samples = jax.tree.map(lambda series: np.asarray(series)[index], samples)
-    return results(_over_series(Metrics(start, stop), outcome.time, samples))
+        signals = jax.tree.map(lambda series: np.asarray(series)[index], signals)
+    gathered = accumulators(plant, own, start, stop)
+    return results(gathered, _over_series(gathered, outcome.time, signals))
 
 
 @eqx.filter_jit
-def _over_series(metrics: Metrics, time: Array, samples: Sample) -> MetricsState:
-    first = jax.tree.map(lambda series: series[0], samples)
-    step = lambda state, at: (metrics.update(state, *at), None)
-    return jax.lax.scan(step, metrics.init(first), (time, samples))[0]
+def _over_series(gathered: Gathered, time: Array, signals: Signals) -> tuple[Any, ...]:
+    first = jax.tree.map(lambda series: series[0], signals)
+    step = lambda states, at: (tuple(one.update(s, *at) for one, s in zip(gathered, states, strict=True)), None)
+    return jax.lax.scan(step, tuple(one.init(first) for one in gathered), (time, signals))[0]
+
+
+# In the order of tables. `Metrics` has those up to `bad_readings`; the others are known once a run is over.
+MEANINGS = {
+    "position_rms": Metric("m", "rms of the tracking error x_d - x over the outputs in m"),
+    "attitude_rms": Metric("rad", "rms of the tracking error over the outputs in rad, the short way round"),
+    "tracking_rms": Metric("[axis]", "rms of the tracking error of a plant whose outputs share another unit"),
+    "position_max": Metric("m", "largest tracking error of the outputs in m"),
+    "attitude_max": Metric("rad", "largest tracking error of the outputs in rad"),
+    "tracking_max": Metric("[axis]", "largest tracking error of a plant whose outputs share another unit"),
+    "estimation_rms": Metric("[axis]/s^2", "rms of d_hat - d"),
+    "uncertainty_rms": Metric("[axis]/s^2", "rms of the lumped uncertainty d = x_ddot - F - G u"),
+    "robust_rms": Metric("[axis]/s^2", "rms of the robust term u_r"),
+    "model_rms": Metric("[axis]/s", "rms of the modelling error eps = x_hat_dot - x_dot"),
+    "input_rms": Metric("[input]", "rms of the applied input over all inputs"),
+    "input_peak": Metric("[input]", "largest applied input"),
+    "input_variation": Metric("[input]/s", "total variation of the input per second, mean over inputs (chattering)"),
+    "weights_peak": Metric("[axis]/s^2", "largest |theta|; it shows parameter drift"),
+    "energy": Metric("J", "electrical energy supplied"),
+    # Infinite if it never settles; not defined for a reference that moves until the end.
+    "settling_time": Metric("s", "time after which the reference rests and the error stays within 2 % of the step"),
+    "saturated_fraction": Metric("", "share of the time, mean over inputs, at which an input is saturated"),
+    "bad_readings": Metric("", "number of readings that were not finite, left out or replaced by expected values"),
+    "energy_balance_residual": Metric("", "residual of the energy balance, share of the energy supplied: rounding"),
+    "energy_integration_residual": Metric("", "the same computed from the state: error of the integrator"),
+    "rules": Metric("", "fuzzy rules per axis"),
+}
+
+# Metrics that also come for each output, as `<name>_axes`, in its own unit.
+PER_AXIS = ("error_rms", "error_max", "estimation_rms", "uncertainty_rms", "robust_rms", "model_rms", "settling_time")
+
+
+# Known once a run is over, from its record or its law: campaigns keep no record, and have none of them.
+_AFTERWARDS = ("energy_balance_residual", "energy_integration_residual", "rules")
+
+# Metric -> the signal of the law that it needs, beside the first of each of `_RMS`.
+_NEEDED = {f"{name}_rms": needed[0] for name, (needed, _) in _RMS.items()} | {"weights_peak": "weights_peak"}
+
+
+def meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
+    """Metrics that a run of a loop may have, by name, in the order of tables, with their units for its plant.
+
+    Raises:
+        BadInput: two metrics have the same name.
+    """
+    plant, signals = loop.plant, loop.signals()
+    of_outputs = {f"{group}_{kind}" for group in output_groups(plant.output_units) for kind in ("rms", "max")}
+    other = {f"{group}_{kind}" for group in (*_GROUPS.values(), _ALL) for kind in ("rms", "max")} - of_outputs
+    other |= {name for name, needed in _NEEDED.items() if needed not in signals}
+    found = {name: metric for name, metric in MEANINGS.items() if name not in other}
+    for metric in own:
+        for name, meaning in metric.metrics().items():
+            if name in found:
+                raise BadInput("metrics", "have names of their own", f"a second `{name}`")
+            found[name] = meaning
+    return {name: Metric(_resolved(metric.unit, plant), metric.meaning) for name, metric in found.items()}
+
+
+def gathered_meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
+    """Those of `meanings` that are gathered along a run: what `results_of_batch` gives."""
+    return {name: metric for name, metric in meanings(loop, own).items() if name not in _AFTERWARDS}
+
+
+def _resolved(unit: str, plant: AbstractPlant) -> str:
+    return Signal((), unit, "").unit_for(plant.output_units, plant.input_unit)
+
+
+def for_people(value: float, unit: str) -> tuple[float, str]:
+    """A value and its unit as tables show them: angles in degrees."""
+    return (math.degrees(value), "deg") if unit == "rad" else (value, unit)

@@ -1,7 +1,7 @@
-"""The law in small signal with an actuator that takes time: section 3.9 of the theory page.
+"""Small-signal model of the controller with actuator dynamics: section 3.9 of the theory page.
 
 Per axis, on x_ddot = a with a the acceleration that the actuators give when the law asks for a_c. The
-identification model is told a_c (the voltage that was applied): nobody measures propeller speeds. Masses cancel,
+identification model uses a_c (the applied voltage): no sensor measures propeller speeds. Masses cancel,
 so what follows holds for any vehicle.
 
 All of it is linear about fixed weights. Where these drift apart, d_hat = z - c eps with the gain c of section 3.8
@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from undertow.analysis.linear import Gains, first_crossing, gains
-from undertow.controllers.law import RCAF
+from undertow.analysis.small_signal import Gains, first_crossing, gains
+from undertow.controllers.composite_law import RCAF
 from undertow.thrusters.motor import DCMotor
 
 

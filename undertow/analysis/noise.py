@@ -1,25 +1,24 @@
-"""What white noise on the measurement does to a sampled law: stationary covariances, section 3.7 of the theory page.
+"""Effect of white measurement noise on a sampled controller: stationary covariances, section 3.7 of the theory page.
 
 Per axis, on x_ddot = u + d with an exact model and actuators that obey at once, y = (e, e_dot, eps, z) of the truth
 obeys y+ = A y + B n. d_hat = z - c eps, where c is the gain that drift adds (section 3.8), zero at first. Errors n of
-position and velocity are new at every tick; the law takes y - S n for the truth. Both laws have this form.
+position and velocity are new at every step; the law takes y - S n for the truth. Both laws have this form.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
 
-from undertow.analysis.linear import gains
-from undertow.controllers.law import RCAF
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.analysis.small_signal import gains
+from undertow.controllers.composite_law import RCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.errors import BadInput
 
 _SEEN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0], [0.0, 0.0]])  # S
 
 
 class Steps(NamedTuple):
-    """What one axis of a law does in one tick, in small signal."""
+    """What one axis of a law does in one step, in small signal."""
 
     dt: float  # s
     push: np.ndarray  # (4,): u = push y
@@ -27,7 +26,7 @@ class Steps(NamedTuple):
     of_rates: float  # correction of x_hat_dot per eps
     of_estimate: float  # correction of d_hat per eps, 1/s
     of_tracking: float  # correction of d_hat per s, 1/s
-    gathering: float  # rho = |xi(0)|^2
+    basis_norm_squared: float  # rho = |xi(0)|^2
 
 
 class Deviations(NamedTuple):
@@ -40,15 +39,15 @@ class Deviations(NamedTuple):
 
 
 def steps(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> Steps:
-    """One tick of one axis, sampled every dt seconds.
+    """One step of one axis, sampled every dt seconds.
 
     Raises:
-        BadInput: the paper's law with several steps per tick, or with a `sign` switch.
+        BadInput: the paper's law with several steps per step, or with a `sign` switch.
     """
     if isinstance(law, RobustRCAF):
         return _robust(law, dt, axis)
     if (law.method, law.substeps) != ("euler", 1):
-        raise BadInput("method", "be euler with one step per tick", f"{law.method} with {law.substeps}")
+        raise BadInput("method", "be euler with one step per step", f"{law.method} with {law.substeps}")
     g = gains(law, axis)
     return Steps(
         dt=dt,
@@ -57,12 +56,12 @@ def steps(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> Steps:
         of_rates=dt * g.pole,
         of_estimate=dt * g.b2,
         of_tracking=dt * g.adaptation,
-        gathering=float(law.fuzzy.gathering()),
+        basis_norm_squared=float(law.fuzzy.basis_norm_squared()),
     )
 
 
-def tick_matrices(one: Steps, gain: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """A (4 x 4) and B (4 x 2) of one tick of y, with a gain c in 1/s; columns of B per m and per m/s of error."""
+def step_matrices(one: Steps, gain: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A (4 x 4) and B (4 x 2) of one step of y, with a gain c in 1/s; columns of B per m and per m/s of error."""
     unit, dt = np.eye(4), one.dt
     push = one.push + gain * unit[2]
     seen = np.stack(
@@ -73,7 +72,7 @@ def tick_matrices(one: Steps, gain: float = 0.0) -> tuple[np.ndarray, np.ndarray
             unit[3] - one.of_estimate * unit[2] - one.of_tracking * one.filtered,
         ]
     )
-    # What the plant carries on from one tick to the next it carries on without the errors.
+    # What the plant carries on from one step to the next it carries on without the errors.
     kept = _SEEN + np.outer(unit[0], [0.0, dt])
     return seen, kept - seen @ _SEEN
 
@@ -93,8 +92,10 @@ def deviations(
     Raises:
         BadInput: the sampled law is unstable.
     """
+    from scipy.linalg import solve_discrete_lyapunov  # takes longer to import than all a run needs
+
     one = steps(law, dt, axis)
-    matrix, entry = tick_matrices(one, gain)
+    matrix, entry = step_matrices(one, gain)
     radius = float(np.abs(np.linalg.eigvals(matrix)).max())
     if not radius < 1:
         raise BadInput("law", f"be stable when sampled every {dt:g} s", f"of spectral radius {radius:.4g}")
@@ -122,7 +123,7 @@ def input_rule(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> float:
 
 
 def _robust(law: RobustRCAF, dt: float, axis: int) -> Steps:
-    axes = len(law.model.angles)
+    axes = len(law.model.coordinates.angles)
     at = lambda value, *shape: np.broadcast_to(np.asarray(value, dtype=float), (axes, *shape))[axis]
     filtered = np.append(at(law.lyapunov(), 2, 2)[:, 1], [0.0, 0.0])
     slope = at(law.robust_gain) / at(law.layer)
@@ -134,5 +135,5 @@ def _robust(law: RobustRCAF, dt: float, axis: int) -> Steps:
         of_rates=of_rates,
         of_estimate=of_estimate,
         of_tracking=of_estimate * float(at(law.tracking_share)),
-        gathering=float(law.estimator.fuzzy.gathering()),
+        basis_norm_squared=float(law.estimator.fuzzy.basis_norm_squared()),
     )

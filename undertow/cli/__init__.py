@@ -1,1 +1,1 @@
-"""The command line: commands, nothing else. Nothing heavy is imported before a command runs."""
+"""The commands of `undertow`. No command imports a heavy package before it runs."""

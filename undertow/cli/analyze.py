@@ -1,4 +1,4 @@
-"""`undertow analyze`: what will happen, before anything is run."""
+"""`undertow analyze`: predict closed-loop performance and stability margins."""
 
 from pathlib import Path
 
@@ -11,20 +11,19 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
+from undertow.prediction.predict import predict, summary
+from undertow.prediction.warnings import advice
 from undertow.report.prediction_page import write_prediction
 from undertow.report.prediction_tables import Rows, tables
 from undertow.scenario.build import build
-from undertow.scenario.labelling import to_json
+from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
-from undertow.studies.prediction.doubts import advice
-from undertow.studies.prediction.predict import predict
-from undertow.studies.prediction.summary import summary
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 
 
 def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool) -> int:
-    """Exit code of a prediction whose page went to `out`, or to a folder under runs/ that was free."""
+    """Predict a scenario and write the page to `out`, or to a free folder under runs/; return the exit code."""
     console = wide_console()
     with (
         output_folder(out, Path("runs") / f"{scenario.stem}-prediction") as folder,
@@ -33,16 +32,16 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool)
         built = build(read(scenario, allow_code=allow_code))
         with shares(console) as progress:
             prediction = interruptible(lambda: predict(built, progress))
-        doubts = (*built.advice(), *advice(prediction))
+        warnings = (*built.advice(), *advice(prediction))
         text = to_json(summary(prediction), indent=1) + "\n"
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
-        draft.publish()  # whatever becomes of the figures
-        warn_of(write_prediction(prediction, doubts, draft.path))
+        draft.publish()  # before the figures, which may fail
+        warn_of(write_prediction(prediction, warnings, draft.path))
     for rows in tables(prediction):
         console.print(_table(rows))
     if prediction.why_not:
-        console.print(f"No metrics foretold: {prediction.why_not}.", highlight=False, soft_wrap=True)
-    for sentence in dict.fromkeys(doubts):
+        console.print(f"No metrics are predicted: {prediction.why_not}.", highlight=False, soft_wrap=True)
+    for sentence in dict.fromkeys(warnings):
         typer.echo(f"Advice: {sentence}", err=True)
     console.print(f"Page: {folder / 'prediction.html'}", highlight=False, soft_wrap=True)
     return DONE

@@ -1,4 +1,4 @@
-"""`undertow bench`: how fast it is here."""
+"""`undertow bench`: measure the speed on this machine."""
 
 import json
 from typing import Any
@@ -6,32 +6,32 @@ from typing import Any
 import typer
 from rich.table import Table
 
+from undertow.bench.measure import measure
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
-from undertow.studies.speed.measure import measure
 
 _ROWS = {
-    "single_ns": "one run, in a lane of its own",
-    "single_xla_ns": "one run, by XLA",
-    "batch_float64_one_thread_ns": "many runs on one thread",
-    "batch_float64_ns": "many runs on all threads",
-    "batch_float32_ns": "the same in single precision",
-    "gpu_float64_ns": "on the GPU, a thread each",
-    "gpu_float32_ns": "the same in single precision",
-    "gpu_float32_vmap_ns": "the same by XLA",
+    "single_ns": "one run, SIMD backend",
+    "single_xla_ns": "one run, XLA backend",
+    "batch_float64_one_thread_ns": "batch on one thread",
+    "batch_float64_ns": "batch on all threads",
+    "batch_float32_ns": "batch on all threads, single precision",
+    "gpu_float64_ns": "batch on the GPU",
+    "gpu_float32_ns": "batch on the GPU, single precision",
+    "gpu_float32_vmap_ns": "batch on the GPU, single precision, XLA backend",
     "numpy_ns": "one run in plain NumPy",
 }
-# What each workload is, and what its figures begin with.
+# Title of each workload, and the prefix of its keys.
 _WORKLOADS = {
-    "W1, ODIN with eight whole motors, 1 kHz": "",
-    "W2, BlueROV2 Heavy at sea, 100 Hz": "w2_",
+    "W1, ODIN with eight full motor models, 1 kHz": "",
+    "W2, BlueROV2 Heavy in current and waves, 100 Hz": "w2_",
 }
 
 
 def bench(as_json: bool) -> int:
-    """Measure workloads W1 and W2, and print tables or JSON."""
+    """Measure workloads W1 and W2 and print tables or JSON."""
     console = wide_console()
     if as_json:
         found = interruptible(lambda: measure(lambda what, share: None))
@@ -39,30 +39,37 @@ def bench(as_json: bool) -> int:
         return DONE
     with shares(console) as progress:
         found = interruptible(lambda: measure(progress))
+    if "simd_unavailable" in found:
+        console.print(f"Figures of SIMD batches are left out: {found['simd_unavailable']}.", highlight=False)
     for words, prefix in _WORKLOADS.items():
+        if f"{prefix}steps" not in found:
+            continue
         console.print(_table(words, found, prefix))
+        if f"{prefix}single_compile_s" not in found:
+            continue
         compiling = f"{found[f'{prefix}single_compile_s']:.2g} s for one run"
         if f"{prefix}single_xla_compile_s" in found:
             compiling += f" (XLA {found[f'{prefix}single_xla_compile_s']:.2g} s)"
-        compiling += f", {found[f'{prefix}batch_float64_compile_s']:.2g} s for many"
+        compiling += f", {found[f'{prefix}batch_float64_compile_s']:.2g} s for a batch"
         figures = (
-            f"{found[f'{prefix}operations']} operations per step, tracking rms {found[f'{prefix}tracking_rms']:.6f}"
+            f"{found[f'{prefix}operations']} operations per step, "
+            f"rms of all six errors {found[f'{prefix}tracking_rms']:.6f}"
         )
-        console.print(f"Made ready in {compiling}; {figures}.", highlight=False)
-    first = f"{found['first_cold_s']:.2g} s, {found['first_kept_s']:.2g} s with compiled code from before"
-    console.print(f"From the start of a process to its first result (W1): {first}.", highlight=False)
+        console.print(f"Compile time: {compiling}; {figures}.", highlight=False)
+    first = f"{found['first_cold_s']:.2g} s without cached code, {found['first_kept_s']:.2g} s with it"
+    console.print(f"Time from the start of a process to its first result (W1): {first}.", highlight=False)
     return DONE
 
 
 def _table(words: str, found: dict[str, Any], prefix: str) -> Table:
-    """One workload; ratios to plain NumPy where that was measured, too."""
-    steps = f"{found[f'{prefix}ticks']} steps, {found['lanes']} lanes, {found['threads']} threads"
+    """One workload, with ratios to plain NumPy where that was measured."""
+    steps = f"{found[f'{prefix}steps']} steps, SIMD width {found['simd_width']}, {found['threads']} threads"
     table = Table(title=f"{words}: nanoseconds per step and run ({steps})", title_justify="left", title_style="bold")
-    table.add_column("what")
+    table.add_column("execution")
     table.add_column("ns", justify="right")
     compared = f"{prefix}numpy_ns" in found
     if compared:
-        table.add_column("times NumPy", justify="right")
+        table.add_column("speed-up over NumPy", justify="right")
     for key, row in _ROWS.items():
         if (value := found.get(f"{prefix}{key}")) is not None:
             ratio = (f"{found[f'{prefix}numpy_ns'] / value:.3g}",) if compared else ()

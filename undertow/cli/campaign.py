@@ -1,4 +1,4 @@
-"""`undertow campaign`: thousands of runs, resumable, and what they say."""
+"""`undertow campaign`: run a Monte Carlo study or a parameter sweep, and summarise it."""
 
 import contextlib
 import os
@@ -11,27 +11,29 @@ from typing import NoReturn
 
 import typer
 from rich.console import Console
+from rich.table import Table
 
-from undertow.cli.campaign_folder import check_folder, clear_folder
-from undertow.cli.campaign_short import sentences, table
+from undertow.analysis.metrics import for_people
+from undertow.campaign.campaign_summary import endings, summary
+from undertow.campaign.executors import by_dask, check_cluster, cluster, in_threads
+from undertow.campaign.prepare import Prepared, prepare
+from undertow.campaign.run_campaign import STORE, Executor, Tally, Watch, run_campaign
+from undertow.campaign.store_results import Results, load
+from undertow.campaign.task import build_trial
+from undertow.cli import results_folder
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import Stages, shares
 from undertow.cli.tables import wide_console
 from undertow.core import checks
+from undertow.core.disk import alone
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import write_campaign
-from undertow.scenario.labelling import to_json
+from undertow.report.campaign_tables import by_xla
+from undertow.scenario.finished_run import to_json
+from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
-from undertow.scenario.workshop import Workshop
-from undertow.studies.campaign.clusters import check_cluster, cluster
-from undertow.studies.campaign.conduct import STORE, Engine, Tally, Watch, conduct
-from undertow.studies.campaign.engines import by_dask, in_threads
-from undertow.studies.campaign.prepare import Prepared, prepare
-from undertow.studies.campaign.results import load
-from undertow.studies.campaign.summary import endings, summary
-from undertow.studies.campaign.task import build_trial
 
 
 def campaign(
@@ -43,7 +45,7 @@ def campaign(
     overwrite: bool,
     allow_code: bool,
 ) -> int:
-    """Exit code of a campaign whose results went to `out`, or to a folder under runs/ that was free."""
+    """Run a campaign and write the results to `out`, or to a free folder under runs/; return the exit code."""
     count = os.cpu_count() or 1 if workers is None else workers
     checks.positive("--workers", count)
     if where is not None:
@@ -59,18 +61,18 @@ def campaign(
             typer.echo(f"Advice: {sentence}", err=True)
         if not resume:
             clear_folder(folder)
-        with _engine(where, count) as engine, _live(console) as watch:
+        with _executor(where, count) as executor, _live(console) as watch:
             try:
-                interruptible(lambda: conduct(prepared, folder, engine, watch))
+                interruptible(lambda: run_campaign(prepared, folder, executor, watch))
             except (KeyboardInterrupt, OSError):
                 if (folder / STORE).is_dir():
-                    typer.echo(f"Stopped. `undertow campaign {path} --out {folder} --resume` goes on.", err=True)
+                    typer.echo(f"Stopped. To resume: undertow campaign {path} --out {folder} --resume", err=True)
                 raise
         return _conclude(console, stages, prepared, folder)
 
 
 def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path) -> int:
-    """Write page, summary and the scenarios of the worst trials; show the short of it."""
+    """Write page, summary and the scenarios of the worst trials; print the summary."""
     with stages("summary and page"):
         results = load(folder)
         found = summary(results, prepared.trials)
@@ -83,25 +85,25 @@ def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path
     for sentence in sentences(found):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
-    return DONE if set(found["status"]) <= {"ok"} else RUN_FAILED
+    return DONE if set(found["status"]) <= {"completed"} else RUN_FAILED
 
 
 def refuse_second(argument: Path) -> NoReturn:
-    """A second argument, which only `status` has."""
+    """Reject a second argument, which only `status` takes."""
     raise BadInput(
-        "DIR", "follow the word `status`", str(argument), hint=f"Results go to a folder by `--out {argument}`"
+        "DIR", "follow the word `status`", str(argument), hint=f"To choose the results folder, use `--out {argument}`"
     )
 
 
 def status(folder: Path, options: Sequence[str]) -> int:
-    """How far the campaign in a folder is.
+    """Print the progress of the campaign in a folder.
 
     Args:
-        folder: of the campaign.
-        options: that were given, though there are none.
+        folder: the folder of the campaign.
+        options: options given by mistake; `status` takes none.
     """
     if options:
-        raise BadInput(options[0], "be left out with `status`", "given", hint="undertow campaign status DIR")
+        raise BadInput(options[0], "be left out with `status`", "given", hint="Run: undertow campaign status DIR")
     try:
         results = load(folder)
     except FileNotFoundError:
@@ -115,7 +117,7 @@ def status(folder: Path, options: Sequence[str]) -> int:
 
 
 @contextlib.contextmanager
-def _engine(where: str | None, count: int) -> Iterator[Engine]:
+def _executor(where: str | None, count: int) -> Iterator[Executor]:
     if where is None:
         yield partial(in_threads, threads=count)
         return
@@ -125,7 +127,7 @@ def _engine(where: str | None, count: int) -> Iterator[Engine]:
 
 @contextlib.contextmanager
 def _live(console: Console) -> Iterator[Watch]:
-    """Trials done, how fast, and how long it will take."""
+    """Show the number of finished trials, their rate and the remaining time."""
     begun, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
 
@@ -133,10 +135,10 @@ def _live(console: Console) -> Iterator[Watch]:
             nonlocal first
             first = tally.done if first is None else first
             rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
-            refused = f", {tally.refused} refused" if tally.refused else ""
-            waiting = "compiling" if tally.done < tally.trials else "nothing is missing"
-            said = f"{rate:.3g} per second, {tally.failed} failed{refused}" if tally.done > first else waiting
-            progress(f"{tally.done} of {tally.trials} trials, {said}", tally.done / tally.trials)
+            invalid = f", {tally.invalid} invalid" if tally.invalid else ""
+            waiting = "compiling" if tally.done < tally.trials else "all trials are done"
+            text = f"{rate:.3g} per second, {tally.failed} failed{invalid}" if tally.done > first else waiting
+            progress(f"{tally.done} of {tally.trials} trials, {text}", tally.done / tally.trials)
 
         yield watch
 
@@ -144,9 +146,91 @@ def _live(console: Console) -> Iterator[Watch]:
 def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    workshop = Workshop()
+    part_cache = PartCache()
     for trial in trials:
-        data = build_trial(prepared.trials, workshop, trial).resolved  # with the contents of files that it names
-        data = data | {"steady": data["steady"] | {"every_tick": True}}
+        data = build_trial(prepared.trials, part_cache, trial).resolved  # includes the contents of named files
+        data = data | {"steady": data["steady"] | {"every_step": True}}
         text = f"# Trial {trial} of the campaign.\n{dump(data)}"
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
+
+
+_WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
+
+
+def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
+    """Check that a campaign may be written to a folder.
+
+    Raises:
+        BadInput: the folder cannot be used.
+    """
+    if resume and overwrite:
+        hint = "--resume continues the campaign, --overwrite replaces it"
+        raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
+    if not resume:
+        hint = "Add --resume to continue it, or --overwrite to replace it"
+        results_folder.check_folder(folder, _WRITTEN, STORE, overwrite, hint)
+    elif not (folder / STORE).exists():
+        raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
+
+
+def clear_folder(folder: Path) -> None:
+    """Remove all files of a campaign that is replaced.
+
+    Raises:
+        BadInput: another process is running it.
+    """
+    if not folder.exists():
+        return
+    with alone(folder / STORE):
+        for name in _WRITTEN:
+            target = folder / name
+            shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
+
+
+def table(results: Results, found: dict) -> Table:
+    """One row per combination of the swept values."""
+    table = Table(title="Median [5 %, 95 %] of completed trials", title_justify="left", title_style="bold")
+    swept = list(results.campaign.axes)
+    counts = ("trials", "failed", "invalid") if found["invalid"] else ("trials", "failed")
+    for column in (*swept, *counts, "within"):
+        table.add_column(column)
+    shown = [*results.tracking, "input_rms"]
+    for name in shown:
+        table.add_column(f"{name.replace('_', ' ')}, {for_people(0.0, results.unit(name))[1]}")
+    for one in found["combinations"]:
+        cells = [_spread(one["metrics"].get(name), results.unit(name)) for name in shown]
+        table.add_row(
+            *(one["values"][key] for key in swept), *(str(one[count]) for count in counts), _within(one), *cells
+        )
+    return table
+
+
+def _within(one: dict) -> str:
+    """Share of the trials of a combination that kept to the scenario's criterion of success."""
+    judged = one["success"]["within"] + one["success"]["not_within"]
+    return f"{100 * one['success']['within'] / judged:.1f} %" if judged else "-"
+
+
+def _spread(quantiles: dict | None, unit: str) -> str:
+    if quantiles is None:
+        return "-"
+    low, middle, high = (for_people(value, unit)[0] for value in quantiles.values())
+    return f"{middle:.3g} [{low:.3g}, {high:.3g}]"
+
+
+def sentences(found: dict) -> list[str]:
+    """The numbers of trials by status, and the verdict on each requirement."""
+    ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
+    text = [f"{found['done']} trials: {ended}."]
+    text += [sentence for sentence in (by_xla(found),) if sentence]
+    text += [f"Invalid trials ({one['trials']} with this error): {one['why']}." for one in found["invalid"]]
+    for one in found["combinations"]:
+        of = "".join(f", {key} {value}" for key, value in one["values"].items())
+        for requirement in one["requirements"]:
+            low, high = (100 * bound for bound in requirement["interval"])
+            bound = f"{requirement['metric']} < {requirement['below']:g}"
+            text.append(
+                f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{of}: {requirement['verdict']}; "
+                f"kept by {100 * requirement['kept']:.1f} % (95 % interval {low:.1f} to {high:.1f} %)."
+            )
+    return text

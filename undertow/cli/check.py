@@ -1,4 +1,4 @@
-"""`undertow check`: what is wrong or odd about a vehicle, another part, or a scenario."""
+"""`undertow check`: report errors and warnings for a vehicle, another part, or a scenario."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,16 +6,16 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from undertow.checks import check as checks
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.tables import wide_console
 from undertow.core.errors import BadInput
-from undertow.scenario import checking
 from undertow.scenario.yaml_text import load
 
 
 def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
-    """Print what a check finds and what follows from the numbers; exit code."""
-    report = checking.check(thing, dict(map(_option, options)), allow_code)
+    """Print the findings of a check and the derived quantities; return the exit code."""
+    report = checks.check(thing, dict(map(_option, options)), allow_code)
     console = wide_console()
     for sentence in report.sentences:
         print(sentence)
@@ -30,7 +30,7 @@ def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
 
 
 def _option(text: str) -> tuple[str, Any]:
-    """KEY=VALUE, the value as YAML would read it."""
+    """Split KEY=VALUE and read the value as YAML."""
     key, equals, value = text.partition("=")
     if not equals or not key:
         raise BadInput("--option", "be KEY=VALUE", text)

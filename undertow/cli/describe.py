@@ -1,5 +1,6 @@
-"""`undertow describe`: one part, the scenario file, or the metrics."""
+"""`undertow list` and `undertow describe`: available parts, and one part, the scenario file, metrics or signals."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -7,24 +8,31 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from undertow.analysis.meanings import MEANINGS, PER_AXIS, unit_of
+from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.cli.tables import wide_console
+from undertow.core import catalogue
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.signals import Signal
+from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
+from undertow.scenario.describing import summary
 from undertow.scenario.schema import keys
 
 
 def describe(name: str) -> None:
-    """Print what is known about a part, the keys of a scenario, or the metrics."""
+    """Print the description of a part, the keys of a scenario, the metrics, or the signals of every run."""
     console = wide_console()
     if name == "scenario":
         rows = [(key.path, key.type, _text(key.default), key.meaning) for key in keys()]
         _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
     elif name == "metrics":
         rows = [
-            (key, unit_of(key, "unit of the input"), "yes" if key in PER_AXIS else "", one.meaning)
+            (key, one.unit.replace("[axis]", "[output]"), "yes" if key in PER_AXIS else "", one.meaning)
             for key, one in MEANINGS.items()
         ]
         _show_table(console, "Metrics", ("metric", "unit", "also <metric>_axes", "meaning"), rows)
+    elif name == "signals":
+        _show_signals(console, "Signals of every run; see `undertow describe NAME` for those of a part", RECORDED)
     else:
         for description in describing.describe(name):
             _show_part(console, description)
@@ -39,8 +47,15 @@ def _show_part(console: Console, part: describing.Description) -> None:
     if part.parameters:
         rows = [(p.name, _text(p.value), p.unit, p.symbol, p.meaning, p.source) for p in part.parameters]
         _show_table(console, "Parameters", ("parameter", "value", "unit", "symbol", "meaning", "source"), rows)
+    if part.signals:
+        _show_signals(console, "Signals", part.signals)
     for sentence in part.advice:
         console.print(Text(f"Advice: {sentence}"))
+
+
+def _show_signals(console: Console, title: str, declared: Mapping[str, Signal]) -> None:
+    rows = [(name, ", ".join(("time", *one.dimensions)), one.unit, one.meaning) for name, one in declared.items()]
+    _show_table(console, title, ("signal", "dimensions", "unit", "meaning"), rows)
 
 
 def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
@@ -53,7 +68,7 @@ def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: li
 
 
 def _text(value: Any) -> str:
-    """A value in few characters; diagonal matrices by their diagonal."""
+    """A short text for a value; a diagonal matrix is shown as its diagonal."""
     if isinstance(value, str) or value is None:
         return "none" if value is None else value
     if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
@@ -70,3 +85,15 @@ def _text(value: Any) -> str:
 
 def _row(entries: np.ndarray) -> str:
     return f"({', '.join(f'{entry:.6g}' for entry in entries)})"
+
+
+def list_parts(kind: str | None) -> None:
+    """Print the parts of one kind, or of all kinds, with one line each."""
+    if kind is not None and kind not in catalogue.KINDS:
+        raise BadInput("KIND", "be a kind of part", kind, hint=did_you_mean(kind, catalogue.KINDS))
+    table = Table("kind", "name", "description")
+    for shown in (kind,) if kind else catalogue.KINDS:
+        for name, part in sorted(catalogue.names(shown).items()):
+            table.add_row(shown, name, Text(summary(part)))
+        table.add_section()
+    wide_console().print(table)

@@ -1,4 +1,4 @@
-"""How a command ends: exit codes, and one line on stderr when something is wrong."""
+"""Exit codes, and one line on stderr for an error."""
 
 import os
 import sys
@@ -20,7 +20,7 @@ _BY_SIGNAL = 128  # and the number of the signal
 
 
 def run_guarded(command: Any, arguments: Sequence[str]) -> int:
-    """Exit code of a command; whatever it raises becomes one line on stderr."""
+    """Run a command and return its exit code; any exception becomes one line on stderr."""
     try:
         code = command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
         raise_if_interrupted()
@@ -36,12 +36,12 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
 
 
 def complain(sentence: str) -> None:
-    """Say what is wrong, in one line."""
+    """Print an error on one line of stderr."""
     print("Error: " + " ".join(sentence.split()), file=sys.stderr)
 
 
 def warn_of(sentences: Iterable[str]) -> None:
-    """Say what did not go well, though the command goes on: a line each."""
+    """Print warnings, one line each; the command continues."""
     for sentence in sentences:
         print("Warning: " + " ".join(sentence.split()), file=sys.stderr)
 
@@ -59,5 +59,5 @@ def _explain(error: Exception) -> tuple[int, str]:
     if isinstance(error, OSError):
         at = f" ({error.filename})" if error.filename else ""
         return FILES_FAILED, f"files could not be read or written: {error.strerror or error}{at}"
-    hint = "To see where, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
+    hint = "To see the traceback, run `undertow --traceback ...` or set UNDERTOW_TRACEBACK=1"
     return INTERNAL_ERROR, f"internal error, {type(error).__name__}: {str(error).rstrip('.')}. {hint}"

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a command at once, whatever it is doing: importing, waiting for compiled code, or anything."""
+"""End a command at once on Ctrl-C or SIGTERM, also while modules are imported or compiled code runs."""
 
 import signal
 import threading
@@ -10,16 +10,16 @@ from typing import TypeVar
 Result = TypeVar("Result")
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-_AGAIN = 0.05  # s, until it is looked again whether modules are still being imported
-_LONGEST = 20.0  # s, that an import is waited for: a file of the user's own may never end
+_AGAIN = 0.05  # s, until the next look whether modules are still being imported
+_LONGEST = 20.0  # s, longest wait for an import: a user's file may never end
 
-_asked: list[tuple[int, float]] = []  # the signals that came, and when
+_asked: list[tuple[int, float]] = []  # the signals received, with their times
 
 
 def remember_interrupts() -> None:
-    """From now on Ctrl-C and SIGTERM raise KeyboardInterrupt, and one that compiled code swallows is not forgotten.
+    """Make Ctrl-C and SIGTERM raise KeyboardInterrupt, and remember a signal that compiled code swallows.
 
-    While modules are imported it waits for that: an exception leaves half of them, and compiled ones crash then.
+    During an import the exception waits until it ends: a half-imported compiled module crashes.
     """
     for one in _SIGNALS:
         signal.signal(one, _handler)
@@ -27,7 +27,7 @@ def remember_interrupts() -> None:
 
 
 def interrupted_by() -> int:
-    """Number of the signal that ends this process: that of Ctrl-C unless another one came."""
+    """Number of the signal that ends this process; that of Ctrl-C by default."""
     return _asked[0][0] if _asked else signal.SIGINT
 
 
@@ -54,7 +54,10 @@ def _importing(frame: FrameType | None) -> bool:
 
 
 def interruptible(work: Callable[[], Result]) -> Result:
-    """Result of `work`, or what it raises. It runs in a thread: compiled code does not hear Ctrl-C, waiting does."""
+    """Run `work` in a thread and return its result or raise its exception.
+
+    Compiled code does not react to Ctrl-C; the main thread, which only waits, does.
+    """
     results: list[Result] = []
     errors: list[BaseException] = []
 

@@ -1,4 +1,4 @@
-"""`undertow`: what can be typed. The work is in one file per command, imported when the command runs."""
+"""The command line `undertow`: arguments and help. Each command is in its own file, imported when it runs."""
 
 import os
 import sys
@@ -15,7 +15,10 @@ from undertow.cli.interruptible import remember_interrupts
 from undertow.process import prepare
 
 AllowCode = Annotated[
-    bool, typer.Option("--allow-code", help="Run the Python code that a result file names; a .yaml file's always runs.")
+    bool,
+    typer.Option(
+        "--allow-code", help="Run the Python code that a result file names. Code that a .yaml file names always runs."
+    ),
 ]
 
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -24,12 +27,12 @@ app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, 
 @app.callback(invoke_without_command=True)
 def undertow(
     context: typer.Context,
-    traceback: Annotated[bool, typer.Option("--traceback", help="Show where an error came from.")] = False,
+    traceback: Annotated[bool, typer.Option("--traceback", help="Show the traceback of an error.")] = False,
 ) -> None:
-    """Robust adaptive control of underwater vehicles, from volts to trajectory, that shows its own limits.
+    """Simulate, analyse and tune robust adaptive control of underwater vehicles with voltage-driven thrusters.
 
     Exit codes: 0 done; 1 done, but a run failed; 2 bad input; 3 internal error; 4 files could not be read or written;
-    130 interrupted by Ctrl-C, 143 by SIGTERM.
+    130 interrupted by Ctrl-C; 143 ended by SIGTERM.
     """
     if traceback:
         os.environ["UNDERTOW_TRACEBACK"] = "1"
@@ -40,13 +43,19 @@ def undertow(
 @app.command()
 def reproduce(
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder for the report, made if missing; an earlier one is replaced.")
+        Path,
+        typer.Option(
+            metavar="DIR", help="Folder for the report. It is created if missing; an earlier report is replaced."
+        ),
     ] = Path("reproduction"),
-    quick: Annotated[bool, typer.Option("--quick", help="Leave out sweeps. Accuracy stays.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Skip the parameter sweeps. The other results stay the same.")
+    ] = False,
 ) -> None:
     """Reproduce the paper.
 
-    Computes every figure and table, audits the claims, and writes one HTML page, DIR/report.html.
+    The command computes every figure and table of the paper, checks its claims, and writes one HTML page,
+    DIR/report.html.
     """
     from undertow.cli.reproduce import reproduce
 
@@ -60,23 +69,27 @@ def simulate(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Folder for the results. Default: runs/NAME for NAME.yaml, or runs/NAME-2, ... if taken.",
+            help="Folder for the results. Default: runs/NAME for NAME.yaml, or the next free runs/NAME-2, ...",
         ),
     ] = None,
     overwrite: Annotated[
         bool,
-        typer.Option("--overwrite", help="Replace an earlier result in DIR. Without it, DIR must not hold one."),
+        typer.Option("--overwrite", help="Replace an earlier result in DIR. Without this option that is an error."),
     ] = False,
     prediction: Annotated[
         bool,
-        typer.Option("--prediction/--no-prediction", help="Whether to foretell the steady metrics beside the run."),
+        typer.Option(
+            "--prediction/--no-prediction",
+            help="Also predict the steady-state metrics from the linearised closed loop and compare.",
+        ),
     ] = True,
     allow_code: AllowCode = False,
 ) -> int:
-    """Run one closed loop.
+    """Simulate one scenario.
 
-    Writes run.nc, metrics.json, scenario.yaml and figures/. A result file as SCENARIO repeats its run bit for bit, and
-    says whether it did. Nothing is written unless the whole run was; files of other names in DIR stay as they are.
+    The command writes run.nc, metrics.json, scenario.yaml and figures/ when the run has ended. If SCENARIO is a result
+    file, its run is repeated, and the command reports whether the results are identical bit for bit. Other files in DIR
+    are not changed.
     """
     from undertow.cli.simulate import simulate
 
@@ -85,12 +98,12 @@ def simulate(
 
 @app.command()
 def bench(
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> int:
-    """Measure how fast undertow is here, beside plain NumPy.
+    """Measure the speed of undertow on this machine, compared with plain NumPy.
 
-    Workloads W1 (ODIN with eight whole motors, the paper's law, 1 kHz) and W2 (BlueROV2 Heavy at sea, 100 Hz): some
-    minutes, most of them compiling.
+    The workloads are W1 (ODIN with eight full motor models under the paper's controller, 1 kHz) and W2 (BlueROV2 Heavy
+    in current and waves, 100 Hz). The command takes some minutes, most of them for compiling.
     """
     from undertow.cli.bench import bench
 
@@ -101,23 +114,29 @@ def bench(
 def tune(
     scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME-tuned, or the next.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME-tuned, or the next free one."),
     ] = None,
     method: Annotated[
-        str, typer.Option(metavar="METHOD", help="gradient, or search: without slopes, for what is not smooth.")
+        str,
+        typer.Option(
+            metavar="METHOD", help="gradient (quasi-Newton), or search (differential evolution, for costs not smooth)."
+        ),
     ] = "gradient",
     budget: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Time to take; compiling and a first look are always finished.")
+        float,
+        typer.Option(metavar="SECONDS", help="Time budget. Compiling and the initial design are always completed."),
     ] = 240.0,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with a tuning that was interrupted.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted tuning.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")] = False,
     allow_code: AllowCode = False,
 ) -> int:
-    """Find the gains of a controller.
+    """Tune the gains of a controller.
 
-    Runs the loop with many gains on a training set of seeds, sizes of the disturbance and published parameter sets;
-    judges the best on other runs, and never gives gains without a certificate of stability. Writes tuned.yaml, which
-    `undertow simulate` takes, tuning.json and figures/. The section `tune` of the scenario says more.
+    The command simulates the closed loop with many candidate gains on a training set of seeds, disturbance sizes and
+    published parameter sets, and evaluates the best on held-out runs. It accepts only gains with a certificate of
+    stability. It writes tuned.yaml, a scenario with the gains, tuning.json and figures/. The section `tune` of the
+    scenario has the options.
     """
     from undertow.cli.tune import tune_scenario
 
@@ -134,11 +153,11 @@ def analyze(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier prediction in DIR.")] = False,
     allow_code: AllowCode = False,
 ) -> int:
-    """Predict a closed loop before it is run.
+    """Predict closed-loop performance and stability margins without simulating.
 
-    Linearises the whole loop exactly where it rests: poles over the operating range, how much sampling time, delay,
-    lag and noise it bears, error against frequency, what the actuators can hold. Writes prediction.html,
-    prediction.json and figures/.
+    The command linearises the whole closed loop at its equilibrium and reports the poles over the operating range, the
+    sampling limit, the delay and lag margins, the response to noise and disturbances, and the actuator authority. It
+    writes prediction.html, prediction.json and figures/.
     """
     from undertow.cli.analyze import analyze
 
@@ -147,34 +166,42 @@ def analyze(
 
 @app.command()
 def campaign(
-    campaign: Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="A .yaml file; or the word `status`.")],
-    folder: Annotated[Path | None, typer.Argument(metavar="[DIR]", help="After `status`: of a campaign.")] = None,
+    campaign: Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="A .yaml file, or the word `status`.")],
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="[DIR]", help="After `status`: the folder of a campaign.")
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME, or the next free one."),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Fly what is missing of a campaign in DIR, or further trials.")
+        bool,
+        typer.Option(
+            "--resume",
+            help="Resume the campaign in DIR: run unfinished trials, and new ones if `trials` was increased.",
+        ),
     ] = False,
-    workers: Annotated[int | None, typer.Option(metavar="N", help="Threads or workers. Default: all cores.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", help="Number of threads or workers. Default: all cores.")
+    ] = None,
     cluster: Annotated[
-        str | None, typer.Option(metavar="WHERE", help="Dask: local, slurm, ssh, or the address of a scheduler.")
+        str | None,
+        typer.Option(metavar="WHERE", help="Dask cluster: local, slurm, ssh, or the address of a scheduler."),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier campaign in DIR.")] = False,
     allow_code: AllowCode = False,
 ) -> int:
-    """Fly one scenario thousands of times.
+    """Run a Monte Carlo study or a parameter sweep of one scenario.
 
-    Parameters are drawn or crossed, every trial has a seed of its own. Writes trials.zarr, campaign.html, summary.json,
-    figures/ and the scenarios of the worst trials. Ctrl-C, kill -9 or a full disk lose nothing: --resume goes on.
-    `undertow campaign status DIR` says how far it is.
+    The command writes trials.zarr, campaign.html, summary.json, figures/ and the scenarios of the worst trials. After
+    Ctrl-C, kill -9 or a full disk, --resume continues without loss. `undertow campaign status DIR` prints the progress.
     """
     from undertow.cli import campaign as command
 
     if str(campaign) == "status":
-        told = {"--out": out, "--resume": resume, "--workers": workers, "--cluster": cluster, "--overwrite": overwrite}
-        told["--allow-code"] = allow_code
-        return command.status(folder or Path(), [name for name, value in told.items() if value])
+        given = {"--out": out, "--resume": resume, "--workers": workers, "--cluster": cluster, "--overwrite": overwrite}
+        given["--allow-code"] = allow_code
+        return command.status(folder or Path(), [name for name, value in given.items() if value])
     if folder is not None:
         command.refuse_second(folder)
     return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code)
@@ -184,11 +211,11 @@ def campaign(
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,
 ) -> None:
-    """List what there is.
+    """List the available parts.
 
-    Kinds: vehicles, thrusters, power, plants, controllers, disturbances, references, instruments, sensors.
+    Kinds: vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation.
     """
-    from undertow.cli.list_parts import list_parts
+    from undertow.cli.describe import list_parts
 
     list_parts(kind)
 
@@ -199,14 +226,14 @@ def describe(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A part (see `undertow list`), ./file.py:function, a vehicle file, scenario or metrics.",
+            help="A part (see `undertow list`), ./file.py:function, a vehicle file, scenario, metrics or signals.",
         ),
     ],
 ) -> None:
     """Describe a part.
 
-    Shows its options, its parameters with unit, symbol and source, and advice. `describe scenario` shows the keys of
-    a scenario file, `describe metrics` what is measured.
+    The command shows the options of the part, its parameters with unit, symbol and source, and advice. `describe
+    scenario` shows the keys of a scenario file, `describe metrics` the metrics with their units.
     """
     from undertow.cli.describe import describe
 
@@ -221,14 +248,16 @@ def check(
     ],
     option: Annotated[
         list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Option of the part, e.g. parameters=wu2018; repeatable."),
+        typer.Option(
+            "--option", metavar="KEY=VALUE", help="Option of the part, for example parameters=wu2018. Repeatable."
+        ),
     ] = None,
     allow_code: AllowCode = False,
 ) -> int:
     """Check a vehicle, another part or a scenario.
 
-    Says what is wrong (error) or odd (advice) with it, with the numbers that caused it, and what follows from its
-    numbers. Exit code 2 when there are errors.
+    The command reports errors and advice, each with the numbers that caused it, and quantities derived from the
+    parameters. The exit code is 2 if there are errors.
     """
     from undertow.cli.check import check
 
@@ -237,14 +266,14 @@ def check(
 
 @app.command()
 def version() -> None:
-    """Show versions."""
+    """Show the versions of undertow, its dependencies and Python."""
     from undertow.cli.version import version
 
     version()
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Exit code of `undertow` with these arguments; what it says goes to stdout and stderr."""
+    """Run `undertow` with these arguments and return the exit code; output goes to stdout and stderr."""
     return run_guarded(typer.main.get_command(app), arguments)
 
 
@@ -255,7 +284,7 @@ def main() -> None:
     remember_interrupts()
     prepare()
     code = run(sys.argv[1:])
-    if threading.active_count() > 1:  # one may be in compiled code, or compiling; nothing can stop it gently
+    if threading.active_count() > 1:  # a thread in compiled code, or compiling, cannot be stopped otherwise
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

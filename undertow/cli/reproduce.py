@@ -1,4 +1,4 @@
-"""`undertow reproduce`: the paper, whole."""
+"""`undertow reproduce`: reproduce the paper."""
 
 import json
 from pathlib import Path
@@ -9,10 +9,10 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import Draft, output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
-from undertow.report.reproduction import write
-from undertow.studies.paper import reproduce as study
+from undertow.report.reproduction.report import write
+from undertow.reproduction import reproduce as study
 
-_WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios")
+_WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios", "campaigns")
 
 
 def reproduce(out: Path, quick: bool) -> None:
@@ -31,8 +31,8 @@ def reproduce(out: Path, quick: bool) -> None:
 def _watched(console: Console, draft: Draft, quick: bool) -> Path:
     with shares(console) as progress:
         found = interruptible(lambda: study.reproduce(draft.path, quick, progress))
-        progress("drawing", 0.9)
-        draft.publish()  # whatever becomes of the figures
+        progress("figures and report", 0.9)
+        draft.publish()  # before the figures, which may fail
         return interruptible(lambda: write(found, draft.path))
 
 

@@ -1,4 +1,4 @@
-"""Where results go: nothing half-written is left behind, nothing is silently destroyed, nobody else writes there."""
+"""The results folder of a command: locked while it runs, written completely or not at all, never replaced silently."""
 
 import contextlib
 import itertools
@@ -13,11 +13,11 @@ from undertow.core.errors import BadInput
 
 
 class Draft(NamedTuple):
-    """Results on their way.
+    """Results being written.
 
     Attributes:
-        path: the folder that they are written to.
-        publish: moves what is there to where results go; what is written later can follow.
+        path: the staging folder.
+        publish: moves its contents to the results folder; it may be called again for later files.
     """
 
     path: Path
@@ -26,14 +26,14 @@ class Draft(NamedTuple):
 
 @contextlib.contextmanager
 def output_folder(out: Path | None, default: Path) -> Iterator[Path]:
-    """The folder that a command writes to, for it alone as long as it runs.
+    """The folder that a command writes to, locked while it runs.
 
     Args:
-        out: as the user wants it.
-        default: where nothing is said, this, or the first of default-2, default-3, ... that is free and nobody's.
+        out: the folder given by the user.
+        default: without `out`, this folder or the first of default-2, default-3, ... that is free and not locked.
 
     Raises:
-        BadInput: another process is writing there, or nothing can be written.
+        BadInput: another process is writing there, or the folder cannot be written.
     """
     folder = default if out is None else out
     made = [parent for parent in (folder.parent, *folder.parent.parents) if not parent.exists()]
@@ -51,7 +51,7 @@ def output_folder(out: Path | None, default: Path) -> Iterator[Path]:
 
 
 def is_free(folder: Path) -> bool:
-    """Whether there is no such folder, or nothing in it but what a process left that was killed."""
+    """Whether the folder does not exist, or holds only what a killed process left."""
     if not folder.is_dir():
         return not folder.exists()
     return {path.name for path in folder.iterdir()} <= {_staging_name(folder), lock_of(folder).name}
@@ -81,12 +81,12 @@ def _hold(folder: Path, held: contextlib.ExitStack) -> None:
 
 @contextlib.contextmanager
 def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: bool) -> Iterator[Draft]:
-    """A staging folder whose contents move to `folder` when all has gone well, and vanish otherwise.
+    """A staging folder whose contents move to `folder` on success and are removed otherwise.
 
     Args:
-        folder: where results go, held by `output_folder`; made when missing, parents too.
+        folder: the results folder, locked by `output_folder`; created with its parents if missing.
         names: files and folders that will be written.
-        marker: the one of them by which an earlier result is known.
+        marker: the one of them that identifies an earlier result.
         overwrite: whether an earlier result may be replaced; files of other names always stay.
 
     Raises:
@@ -109,10 +109,10 @@ def check_folder(
     overwrite: bool,
     hint: str = "Add --overwrite to replace it, or choose another folder",
 ) -> None:
-    """Whether results may go to a folder; see `results_folder`, and `hint` for what may be done about an earlier one.
+    """Check that results may be written to a folder; see `results_folder`. `hint` is the remedy for an earlier result.
 
     Raises:
-        BadInput: they may not.
+        BadInput: the folder cannot be used.
     """
     _check_place(folder)
     taken = [name for name in names if (folder / name).exists()]
@@ -141,7 +141,7 @@ def _staging_name(folder: Path) -> str:
 def _stage(folder: Path) -> Path:
     """A hidden folder inside `folder` if that exists, else beside it: on the same disk, so that moving is renaming.
 
-    Its name tells whose it is: what a process left that was killed goes.
+    Its name is fixed, so that the next command removes what a killed process left.
     """
     beside, inside = folder.parent / _staging_name(folder), folder / _staging_name(folder)
     staging = inside if folder.exists() else beside
@@ -156,7 +156,7 @@ def _stage(folder: Path) -> Path:
 
 
 def _publish(staging: Path, folder: Path, names: Sequence[str], marker: str) -> None:
-    """Move everything, the marker last; with a marker, nothing of an earlier result stays."""
+    """Move all files, the marker last. With a marker, remove the rest of an earlier result."""
     settle(staging)
     if folder.exists():
         new = sorted((path.name for path in staging.iterdir()), key=lambda name: name == marker)

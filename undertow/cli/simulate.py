@@ -1,76 +1,89 @@
-"""`undertow simulate`: one closed loop, from a scenario file to figures."""
+"""`undertow simulate`: run one scenario and write its results and figures."""
 
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 import typer
 from rich.console import Console
 
+from undertow.analysis.linearization.response import Comparison, compare_metrics
+from undertow.checks.vehicle_findings import vehicle_warnings
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
-from undertow.cli.foresight import Foresight, beside, in_results, judgement
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import Stages
 from undertow.cli.tables import certificate_table, metrics_table, wide_console
 from undertow.core.status import Status
-from undertow.report.figures import run_drawings, save_all
-from undertow.scenario.build import build
+from undertow.core.user_code import python_says
+from undertow.prediction.operating_point import operating_point, predicted
+from undertow.report.figures import run_plots, save_all
+from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.execute import Executed, execute, save
-from undertow.scenario.labelling import certificate_of, metrics_text
+from undertow.scenario.finished_run import certificate_of, metrics_of, metrics_text
 from undertow.scenario.reading import dump, read
-from undertow.scenario.repetition import Repetition, compare
-from undertow.scenario.vehicle_findings import vehicle_doubts
+from undertow.scenario.reproducibility import Repetition, compare
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
 
+class PredictedMetrics(NamedTuple):
+    """Metrics of the steady window from the linearised loop, or the reason why there are none."""
+
+    metrics: dict[str, float] | None
+    why_not: str
+
+
 def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool) -> int:
-    """Exit code of a run whose results went to `out`, or to a folder under runs/ that was free."""
+    """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
     console = wide_console()
     stages = Stages(console)
     with (
         output_folder(out, Path("runs") / scenario.stem) as folder,
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
     ):
-        executed, foresight = _run(scenario, stages, prediction, allow_code)
+        executed, predicted = _run(scenario, stages, prediction, allow_code)
         with stages("files and figures"):
-            _write(executed, foresight, draft.path)
+            _write(executed, predicted, draft.path)
             repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
-            draft.publish()  # whatever becomes of the figures
-            warn_of(save_all(lambda: run_drawings(executed.dataset), draft.path / "figures").failures)
+            draft.publish()  # before the figures, which may fail
+            warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures").failures)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
-        typer.echo(f"Advice: left to XLA, which is slower, as lanes (docs/lanes.md) lack something: {why}.", err=True)
-    foretold = foresight.metrics if foresight else None
-    unit = executed.built.closed_loop.plant.input_unit
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), unit, foretold))
-    if foresight:
-        console.print(f"{judgement(foresight, executed)}.", highlight=False, soft_wrap=True)
+        typer.echo(f"Advice: the run used backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
+    expected = predicted.metrics if predicted else None
+    known = metrics_of(executed.dataset)
+    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
+    if predicted:
+        console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)
     certificate = certificate_of(executed.dataset)
     if certificate is not None:
         console.print(certificate_table(certificate, executed.built.window()))
-    console.print(f"Status: {executed.status.word}. Results: {folder}", highlight=False, soft_wrap=True)
-    codes = [_judge_ending(executed)] + ([_judge(repetition, console)] if repetition else [])
+    verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
+    console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
+    codes = [_ending_code(executed)] + ([_repetition_code(repetition, console)] if repetition else [])
     return max(codes)
 
 
-def _run(path: Path, stages: Stages, prediction: bool, allow_code: bool) -> tuple[Executed, Foresight | None]:
+def _run(path: Path, stages: Stages, prediction: bool, allow_code: bool) -> tuple[Executed, PredictedMetrics | None]:
     with stages("reading"):
         text = read(path, allow_code=allow_code)
     with stages("building"):
         built = build(text)
-    for sentence in (*built.advice(), *vehicle_doubts(built)):
+    for sentence in (*built.advice(), *vehicle_warnings(built)):
         typer.echo(f"Advice: {sentence}", err=True)
     with stages("compiling, running and predicting" if prediction else "compiling and running"):
-        return interruptible(lambda: beside(lambda: execute(built), built, prediction))
+        return interruptible(lambda: with_prediction(lambda: execute(built), built, prediction))
 
 
-def _write(executed: Executed, foresight: Foresight | None, folder: Path) -> None:
+def _write(executed: Executed, predicted: PredictedMetrics | None, folder: Path) -> None:
     save(executed.dataset, folder / "run.nc")
-    (folder / "metrics.json").write_text(metrics_text(executed.dataset, in_results(foresight)), encoding="utf-8")
+    (folder / "metrics.json").write_text(metrics_text(executed.dataset, in_results(predicted)), encoding="utf-8")
     (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
 
 
-def _judge_ending(executed: Executed) -> int:
+def _ending_code(executed: Executed) -> int:
     if executed.status is Status.OK:
         return DONE
     ended, duration = float(executed.outcome.ended), executed.built.scenario.loop.duration
@@ -79,9 +92,77 @@ def _judge_ending(executed: Executed) -> int:
     return RUN_FAILED
 
 
-def _judge(repetition: Repetition, console: Console) -> int:
+def _repetition_code(repetition: Repetition, console: Console) -> int:
     if repetition.equal or repetition.explained:
         console.print(f"{repetition.sentence}.", highlight=False, soft_wrap=True)
         return DONE
     complain(repetition.sentence)
     return RUN_FAILED
+
+
+Result = TypeVar("Result")
+
+# A measured metric that departs from the predicted one by more than this share is reported.
+_DEPARTS = 0.10
+
+# Peak metrics depend on single moments: shown, not compared.
+_PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
+
+# Measured numbers below this share of the largest predicted one count as zero.
+_NOTHING = 1e-9
+
+
+def with_prediction(work: Callable[[], Result], built: Built, enabled: bool) -> tuple[Result, PredictedMetrics | None]:
+    """Run `work`, and predict the scenario meanwhile in another thread: compiling takes most of the time of both."""
+    if not enabled:
+        return work(), None
+    with ThreadPoolExecutor(1) as other:
+        predicting: Future[PredictedMetrics] = other.submit(_predict, built)
+        return work(), predicting.result()
+
+
+def departures(predicted: PredictedMetrics, executed: Executed) -> list[Comparison]:
+    """Metrics that depart by more than a tenth from the predicted ones."""
+    return [one for one in _compared(predicted, executed) if one.name not in _PEAKS and one.departure > _DEPARTS]
+
+
+def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
+    """One sentence that compares the run with its prediction."""
+    if predicted.metrics is None:
+        return f"No prediction: {predicted.why_not}"
+    if executed.steady is None:
+        return "The prediction is for the steady window, which the run did not reach"
+    departing = departures(predicted, executed)
+    if not departing:
+        return "The run agrees with the prediction: no metric departs by more than 10 %"
+    named = ", ".join(f"{one.name} by {one.departure:.0%}" for one in departing)
+    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed.steady)}"
+
+
+def in_results(predicted: PredictedMetrics | None) -> dict[str, Any]:
+    """Entries of metrics.json."""
+    if predicted is None:
+        return {}
+    return {"predicted": predicted.metrics} | ({"not_predicted": predicted.why_not} if predicted.why_not else {})
+
+
+@in_its_precision
+def _predict(built: Built) -> PredictedMetrics:
+    try:
+        return PredictedMetrics(*predicted(operating_point(built)))
+    except Exception as error:  # a user's part may run and yet not be differentiable
+        return PredictedMetrics(None, f"this loop cannot be linearised: {python_says(error)}")
+
+
+def _compared(predicted: PredictedMetrics, executed: Executed) -> list[Comparison]:
+    if predicted.metrics is None or executed.steady is None:
+        return []
+    largest = max(predicted.metrics.values())
+    return [one for one in compare_metrics(predicted.metrics, executed.steady) if one.measured > _NOTHING * largest]
+
+
+def _because(steady: dict[str, Any]) -> str:
+    limited = steady.get("saturated_fraction", 0.0)
+    if limited > 0:
+        return f". Actuators were saturated {limited:.1%} of the time, which the linear model does not capture"
+    return ". Nonlinear effects matter here: large motions, dead zones, or motors far from their mean speed"

@@ -1,4 +1,4 @@
-"""Live progress: what is being done, and for how long."""
+"""Live progress: the current stage and its elapsed time."""
 
 import contextlib
 import time
@@ -17,14 +17,14 @@ from rich.progress import (
 
 
 class Stages:
-    """Names the stage in progress with its elapsed time, and leaves one line for each that is done."""
+    """Shows the stage in progress with its elapsed time, and leaves one line for each finished stage."""
 
     def __init__(self, console: Console):
         self.console = console
 
     @contextlib.contextmanager
     def __call__(self, name: str) -> Iterator[None]:
-        """One stage; nothing is left of one that fails."""
+        """One stage. A stage that fails leaves no line."""
         started = time.perf_counter()
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
         with Progress(*columns, console=self.console, transient=True, disable=not self.console.is_terminal) as live:
@@ -35,11 +35,11 @@ class Stages:
 
 @contextlib.contextmanager
 def shares(console: Console, remaining: bool = False) -> Iterator[Callable[[str, float], None]]:
-    """To be told what is being done and the share done: a bar, or a line for each where nobody watches.
+    """A function that shows a message and the share done: as a bar on a terminal, as lines elsewhere.
 
     Args:
-        console: where it is shown.
-        remaining: whether to show the time left, too; for work that goes on evenly.
+        console: where to show it.
+        remaining: whether to show the remaining time too; for work that proceeds evenly.
     """
     left = (TextColumn("left"), TimeRemainingColumn()) if remaining else ()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), *left)

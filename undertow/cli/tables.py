@@ -1,21 +1,23 @@
-"""What a run did, as a short table."""
+"""Tables of metrics and of the certificate, for the terminal."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from undertow.analysis.meanings import MEANINGS, unit_of
+from undertow.analysis.metrics import for_people
+from undertow.core.metric import Metric
 
 
 def metrics_table(
     steady: dict[str, Any] | None,
     whole: dict[str, Any],
     window: tuple[float, float],
-    input_unit: str,
+    known: Mapping[str, Metric],
     predicted: dict[str, float] | None = None,
 ) -> Table:
-    """Metrics of the steady window beside those foretold for it and those of the whole run."""
+    """Predicted and measured metrics of the steady window, and the metrics of the whole run."""
     table = Table(title="Metrics", title_justify="left", title_style="bold")
     table.add_column("metric")
     if predicted:
@@ -23,16 +25,17 @@ def metrics_table(
     table.add_column(f"{window[0]:g} to {window[1]:g} s", justify="right")
     table.add_column("whole run", justify="right")
     table.add_column("unit")
-    for name in MEANINGS:
+    for name, metric in known.items():
         if name in whole:
-            foretold = [_number(predicted[name]) if name in predicted else ""] if predicted else []
-            late = _number(steady[name]) if steady and name in steady else "-"
-            table.add_row(name, *foretold, late, _number(whole[name]), unit_of(name, input_unit))
+            said = lambda values, name=name, metric=metric: _number(for_people(values[name], metric.unit)[0])
+            shown = [said(predicted) if name in predicted else ""] if predicted else []
+            late = said(steady) if steady and name in steady else "-"
+            table.add_row(name, *shown, late, said(whole), for_people(0.0, metric.unit)[1])
     return table
 
 
 def certificate_table(certificate: dict[str, Any], window: tuple[float, float]) -> Table:
-    """For which share of the time each hypothesis of the stability proof held, and when it first did not."""
+    """The share of the time for which each hypothesis of the stability proof held, and its first failure."""
     table = Table(title="Certificate: hypotheses of the stability proof", title_justify="left", title_style="bold")
     table.add_column("hypothesis")
     table.add_column(f"{window[0]:g} to {window[1]:g} s", justify="right")
@@ -49,34 +52,34 @@ def certificate_table(certificate: dict[str, Any], window: tuple[float, float]) 
 
 
 def _consequences(certificate: dict[str, Any]) -> list[str]:
-    """What the proof is about, in numbers."""
+    """The quantities of the proof, as sentences."""
     rising = certificate["rising"]
-    said = [
+    sentences = [
         f"{certificate['function']}: {_number(certificate['start'])} at the start, {_number(certificate['end'])} at "
         f"the end; rises at {_share(rising['whole'])} of the steps, {_share(rising['steady'])} of the steady ones."
     ]
     if certificate.get("decay") is not None:
-        said.append(
-            f"Mean 1/2 E^T Q E of the steady window: {_number(certificate['decay'])}; tanh for sign (Remark 5) allows "
-            f"{_number(certificate['residual'])} to stay."
+        sentences.append(
+            f"Mean of 1/2 E^T Q E over the steady window: {_number(certificate['decay'])}; with tanh for sign (Remark "
+            f"5) the proof allows a residual of {_number(certificate['residual'])}."
         )
     if "estimation_within" in certificate:
         kept, allowed = certificate["estimation_within"], certificate["estimation_bound"]
-        said.append(
-            f"|d_hat - d| within what the largest recorded |d_dot| allows (up to "
-            f"{_number(None if None in allowed else max(allowed))}): {_share(kept['steady'])} of the steady window."
+        sentences.append(
+            f"|d_hat - d| is within the bound that follows from the largest recorded |d_dot| (up to "
+            f"{_number(None if None in allowed else max(allowed))}) for {_share(kept['steady'])} of the steady window."
         )
-    return said
+    return sentences
 
 
 def wide_console() -> Console:
-    """Console on stdout; in a pipe lines are long enough for every table."""
+    """Console on stdout; in a pipe its lines are wide enough for every table."""
     console = Console(soft_wrap=False)
     return console if console.is_terminal else Console(width=160)
 
 
 def _share(value: float | None) -> str:
-    """In percent, 100 and 0 only where they are exact."""
+    """A share in percent; 100 and 0 only where they are exact."""
     if value is None:
         return "-"
     if 0 < value < 1:
@@ -85,7 +88,7 @@ def _share(value: float | None) -> str:
 
 
 def _number(value: float | None) -> str:
-    """In four digits; what is not finite is null in JSON, and has none."""
+    """A number in four digits; null in JSON, which stands for an infinite value, is `-`."""
     if value is None:
         return "-"
     return "never" if value == float("inf") else f"{value:.4g}"

@@ -1,4 +1,4 @@
-"""`undertow tune`: gains found by running the loop, certified, and judged on runs that they were not found on."""
+"""`undertow tune`: tune the gains of a controller, with a certificate and an evaluation on held-out runs."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -17,15 +17,15 @@ from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
-from undertow.scenario.labelling import to_json
+from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
-from undertow.studies.tuning.answer import as_data, as_scenario
-from undertow.studies.tuning.journal import has_answers
-from undertow.studies.tuning.objective import Step
-from undertow.studies.tuning.tune import METHODS, Tuned, tune
+from undertow.tuning.checkpoint import has_answers
+from undertow.tuning.objective import Step
+from undertow.tuning.tune import METHODS, Tuned, tune
+from undertow.tuning.tuned_scenario import as_data, as_scenario
 
 _WRITTEN = ("tuned.yaml", "tuning.json", "figures")
-_JOURNAL = "tuning.jsonl"
+_CHECKPOINT = "tuning.jsonl"
 
 
 def tune_scenario(
@@ -37,7 +37,7 @@ def tune_scenario(
     overwrite: bool,
     allow_code: bool,
 ) -> int:
-    """Exit code of a tuning whose results went to `out`, or to a folder under runs/ that was free."""
+    """Tune a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
     checks.choice("--method", method, METHODS)
     checks.positive("--budget", budget, "s")
     console = wide_console()
@@ -45,16 +45,16 @@ def tune_scenario(
     with (
         output_folder(_unfinished(first) if resume and out is None else out, first) as folder,
         results_folder(folder, _WRITTEN, "tuning.json", overwrite) as draft,
-        _kept(folder) as journal,
+        _checkpoint(folder) as checkpoint,
     ):
         with _live(console, budget) as (say, watch):
-            run = lambda: tune(text, journal, method=method, budget=budget, resume=resume, say=say, watch=watch)
+            run = lambda: tune(text, checkpoint, method=method, budget=budget, resume=resume, say=say, watch=watch)
             found = interruptible(run)
         data = as_data(found)
         (draft.path / "tuned.yaml").write_text(as_scenario(found), encoding="utf-8")
         (draft.path / "tuning.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
-        draft.publish()  # whatever becomes of the figure
-        journal.unlink()
+        draft.publish()  # before the figure, which may fail
+        checkpoint.unlink()
         warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures").failures)
     console.print(_table(found))
     for line in _sentences(found):
@@ -64,25 +64,25 @@ def tune_scenario(
 
 
 def _unfinished(first: Path) -> Path:
-    """Where the last unfinished tuning is."""
-    begun = [path.parent for path in first.parent.glob(f"{first.name}*/{_JOURNAL}")]
-    return max(begun, key=lambda path: (path / _JOURNAL).stat().st_mtime, default=first)
+    """The folder of the last unfinished tuning."""
+    begun = [path.parent for path in first.parent.glob(f"{first.name}*/{_CHECKPOINT}")]
+    return max(begun, key=lambda path: (path / _CHECKPOINT).stat().st_mtime, default=first)
 
 
 @contextlib.contextmanager
-def _kept(folder: Path) -> Iterator[Path]:
-    """The journal, which stays when a tuning is interrupted after its first answer, and only then."""
+def _checkpoint(folder: Path) -> Iterator[Path]:
+    """The checkpoint, kept only when a tuning is interrupted after its first evaluation."""
     existed = folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
-    journal = folder / _JOURNAL
-    before = journal.exists()
+    checkpoint = folder / _CHECKPOINT
+    before = checkpoint.exists()
     try:
-        yield journal
+        yield checkpoint
     except BaseException as error:
-        if isinstance(error, KeyboardInterrupt) and has_answers(journal):
-            typer.echo(f"Interrupted. `undertow tune ... --out {folder} --resume` goes on.", err=True)
+        if isinstance(error, KeyboardInterrupt) and has_answers(checkpoint):
+            typer.echo(f"Interrupted. To resume: undertow tune ... --out {folder} --resume", err=True)
         elif not before:
-            journal.unlink(missing_ok=True)
+            checkpoint.unlink(missing_ok=True)
             if not existed:
                 with contextlib.suppress(OSError):
                     folder.rmdir()
@@ -91,7 +91,7 @@ def _kept(folder: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], None], Callable[[Step, int], None]]]:
-    """What is being done, the best cost so far, and how much of the budget is left."""
+    """Show the current stage, the best cost so far and the remaining budget."""
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[left]}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
         task = live.add_task("reading", total=budget, left="")
@@ -103,7 +103,7 @@ def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], Non
 
         def watch(best: Step, evaluations: int) -> None:
             left = max(0.0, budget - best.elapsed)
-            line = f"{evaluations} runs of gains, best cost {best.cost:.4g}, spectral radius {best.radius:.5f}"
+            line = f"{evaluations} evaluations, best cost {best.cost:.4g}, spectral radius {best.radius:.5f}"
             live.update(task, description=line, completed=best.elapsed, left=f"{left:.0f} s left at most")
             if not console.is_terminal:
                 console.print(line, markup=False, highlight=False)
@@ -113,9 +113,9 @@ def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], Non
 
 def _table(found: Tuned) -> Table:
     table = Table(title="Cost, mean over runs", title_justify="left", title_style="bold")
-    for column in ("gains", "training", "held out", "tracking", "effort", "variation", "lost", "spectral radius"):
+    for column in ("gains", "training", "held out", "tracking", "effort", "variation", "failure", "spectral radius"):
         table.add_column(column, justify="left" if column == "gains" else "right")
-    for one in found.judged:
+    for one in found.evaluated:
         parts = [f"{float(part.mean()):.4g}" for part in one.held_out]
         table.add_row(
             one.name, f"{one.train_cost:.4g}", f"{one.held_out_cost:.4g}", *parts, f"{one.certificate.worst:.5f}"
@@ -124,21 +124,21 @@ def _table(found: Tuned) -> Table:
 
 
 def _sentences(found: Tuned) -> list[str]:
-    given, *_, tuned = found.judged
+    given, *_, tuned = found.evaluated
     options = ", ".join(f"{name} {_short(value)}" for name, value in (tuned.options or {}).items())
-    ending = "ended by itself" if found.finished else "ended by its budget"
+    ending = "the search has converged" if found.finished else "the time budget is used up"
     if found.searched == 0:
-        ending += " before the search began: only the given gains and some all over their ranges were tried"
+        ending += ", and only the initial design (the given gains and points spread over their ranges) was evaluated"
     return [
         f"Tuned: {options}",
-        f"Held-out cost {given.held_out_cost / tuned.held_out_cost:.3g} times smaller than with the given gains; "
-        f"{found.evaluations} gains tried, {found.refused} refused for want of a certificate; "
-        f"{found.elapsed:.0f} s, {ending}.",
+        f"The held-out cost is {given.held_out_cost / tuned.held_out_cost:.3g} times smaller than with the given "
+        f"gains. {found.evaluations} evaluations, {found.rejected} rejected without a certificate, {found.elapsed:.0f} "
+        f"s; {ending}.",
     ]
 
 
 def _short(value: Any) -> str:
-    """Gains of axes that share them, once."""
+    """Gains as text; equal gains of several axes are shown once."""
     if not isinstance(value, list):
         return f"{value:g}"
     rows = [_short(entry) if isinstance(entry, list) else f"{entry:g}" for entry in value]

@@ -1,4 +1,4 @@
-"""`undertow version`."""
+"""`undertow version`: show versions."""
 
 import importlib.metadata
 import platform
@@ -7,7 +7,7 @@ import typer
 
 
 def version() -> None:
-    """Versions of undertow, of what it computes with, and of Python."""
+    """Print the versions of undertow, its dependencies and Python."""
     for package in ("undertow", "jax", "jaxlib", "equinox", "diffrax", "numpy", "xarray"):
         typer.echo(f"{package} {importlib.metadata.version(package)}")
     typer.echo(f"python {platform.python_version()}")

@@ -1,6 +1,6 @@
-"""Controllers: they know a model, never the plant."""
+"""Controllers. They use a nominal model, never the plant. A new one: docs/your-own-controller.md, `adrc.py`."""
 
-from undertow.controllers.law import RCAF as RCAF
+from undertow.controllers.composite_law import RCAF as RCAF
 from undertow.core.catalogue import publish
 
 __getattr__ = publish(__name__)

@@ -1,11 +1,11 @@
-"""How fast a law may be: bandwidths that track best within stated stability margins, at a price on chattering.
+"""Rules for bandwidths: the least tracking error within stated stability margins, with a cost on chattering.
 
 One axis, x_ddot = f + d with f behind a first-order actuator, sampled, with noise on the measured velocity. A law is
 two transfer functions from position and velocity to its input. The rule tries a grid of bandwidths and takes the one
 of least cost E = rms(e) / 0.05 + 0.05 (variation of the input per second, as a share of its limit), the cost that
 `undertow tune` minimises, among those that keep every margin of `MARGINS`; where none keeps them all, the slowest.
 Masses enter through the authority of the actuators only. Frequencies are those of the sampled loop; the actuator is
-taken as continuous. Damping is 1, the integral of a PID a tenth, whatever else is asked of the law.
+assumed continuous. The rule assumes damping 1, and a tenth for the integral of a PID.
 """
 
 import functools
@@ -17,12 +17,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel, Measurement
-from undertow.core.drive import AbstractDrive, Forces
-from undertow.numerics.linear import matvec
+from undertow.core.actuator_model import AbstractActuatorModel, Forces
+from undertow.core.contracts import Model
+from undertow.numerics.linear_algebra import matvec
 
-# Largest sensitivity |1 / (1 + L)| that is allowed with a lag that is so many times the nominal one, an actuator that
-# is slower than the model by so many sampling times, and so many sampling times of delay that the law does not know.
+# Largest sensitivity |1 / (1 + L)| allowed with a factor on the nominal lag, an additional lag of the actuator and an
+# unknown delay, both in sampling times.
 MARGINS = (
     # lag factor, added lag / T, added delay / T, largest sensitivity
     (1.0, 0.0, 0.0, 2.5),
@@ -32,37 +32,37 @@ MARGINS = (
     (1.0, 0.0, 4.0, 5.0),
     (1.0, 2.0, 3.0, 5.0),
 )
-UNKNOWN_LAG = 6.0  # sampling times, of an actuator of which nothing is known: it must not matter
+UNKNOWN_LAG = 6.0  # sampling times; assumed for an actuator of unknown lag
 
-# What one metre or radian of error costs against the variation of the input: the scales of `undertow tune`.
+# Weights of an error of one metre or radian and of the variation of the input, as in `undertow tune`.
 _ERROR_SCALE, _VARIATION_PRICE = 0.05, 0.05
 
-_FASTEST = 0.35  # share of the sampling rate: what is faster is shaped by sampling
-_TRACKING_SHARES = (0.25, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the estimator's bandwidth, for the tracking error
-_ACTUATOR_SHARES = (0.0, 1.5, 3.0)  # times these two, for actuators that are made faster than they are
+_FASTEST = 0.35  # share of the sampling rate; faster loops are dominated by sampling
+_TRACKING_SHARES = (0.25, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # tracking bandwidth over the estimator's
+_ACTUATOR_SHARES = (0.0, 1.5, 3.0)  # bandwidth of the actuator loop over those two
 _SLOWEST, _CANDIDATES, _FREQUENCIES = 0.02, 32, 100
 _SWELL = 1.0  # rad/s
-_AT_ONCE = 32  # candidates whose margins are looked at together
-_UNLIMITED = 1e9  # N, or whatever unit a force has
+_AT_ONCE = 32  # candidates whose margins are computed together
+_UNLIMITED = 1e9  # N, or the unit of the force
 _INTEGRATORS = 3  # of L: two of the plant, one of the estimator or the integral
 
 
 class Axis(NamedTuple):
-    """What a rule knows of one axis.
+    """Data of one axis for the rule.
 
     Attributes:
         sampling_time: s.
-        lag: nominal time constant of the actuators, s; None where nothing is known of them.
-        quickest: rate, 1/s, at which they can be made to follow.
-        delay: that the law knows of and nothing makes up for, s.
+        lag: nominal time constant of the actuators, s; None where it is unknown.
+        max_bandwidth: largest bandwidth of the actuator loop, 1/s.
+        delay: known delay that is not compensated, s.
         velocity_noise: standard deviation at each sampling time, m/s or rad/s.
-        load_rate: how fast loads wander, m/s^2 per sqrt(s) or rad/s^2 per sqrt(s).
+        load_rate: random walk of the loads, m/s^2 per sqrt(s) or rad/s^2 per sqrt(s).
         authority: largest acceleration of the actuators, m/s^2 or rad/s^2; infinite without a limit.
     """
 
     sampling_time: float
     lag: float | None
-    quickest: float
+    max_bandwidth: float
     delay: float
     velocity_noise: float
     load_rate: float
@@ -70,12 +70,12 @@ class Axis(NamedTuple):
 
     @property
     def response_time(self) -> float:
-        """Of the axis to its input, s: one sampling time, the known delay and the nominal lag."""
+        """Response time of the axis to its input, s: one sampling time, the known delay and the nominal lag."""
         return self.sampling_time + self.delay + (self.lag or 0.0)
 
 
 class Bandwidths(NamedTuple):
-    """Rates in rad/s and 1/s, the inner loop first."""
+    """Bandwidths in rad/s and 1/s, the inner loop first."""
 
     actuators: float
     bandwidth: float
@@ -83,25 +83,25 @@ class Bandwidths(NamedTuple):
 
 
 class Law(NamedTuple):
-    """From position and velocity to the input, at given frequencies: arrays (candidates, frequencies)."""
+    """Transfer functions from position and velocity to the input: arrays (candidates, frequencies)."""
 
     of_position: np.ndarray
     of_velocity: np.ndarray
 
 
 def axes_of(
-    model: AbstractModel,
+    model: Model,
     sampling_time: float,
     delay: float,
     velocity_noise,
     load_rate,
 ) -> list[Axis]:
-    """What the rule knows of each axis of a model.
+    """Data of each axis of a model for the rule.
 
     Args:
         model: of the controller, in the coordinates of the law.
         sampling_time: s.
-        delay: that the law knows of and nothing makes up for, s.
+        delay: known delay that is not compensated, s.
         velocity_noise: one number or one per axis, m/s and rad/s.
         load_rate: one number or one per axis, m/s^2 per sqrt(s) and rad/s^2 per sqrt(s).
 
@@ -112,42 +112,43 @@ def axes_of(
     checks.not_negative("delay", delay, "s")
     checks.not_negative("velocity_noise", velocity_noise, "m/s, rad/s")
     checks.positive("load_rate", load_rate)
-    axes = len(model.angles)
-    with jax.ensure_compile_time_eval():  # a law may be made inside a compiled function; its bandwidths are numbers
-        drive, still = model.drive(), jnp.zeros(axes)
-        known = drive.time_constant()
+    axes = len(model.coordinates.angles)
+    with jax.ensure_compile_time_eval():  # bandwidths are numbers even where a law is made inside a compiled function
+        actuators, still = model.actuators, jnp.zeros(axes)
+        known = actuators.time_constant()
         lag = None if known is None else float(jnp.max(known))
-        quickest = float(drive.quickest(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
-        reached = np.asarray(matvec(jnp.abs(model.effect(Measurement(still, still))), largest_forces(drive)))
+        max_bandwidth = float(actuators.max_bandwidth(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
+        reached = np.asarray(
+            matvec(jnp.abs(model.dynamics.gain(model.coordinates.measurement(still, still))), largest_forces(actuators))
+        )
     authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
     rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
-    common = (float(sampling_time), lag, quickest, float(delay))
+    common = (float(sampling_time), lag, max_bandwidth, float(delay))
     return [Axis(*common, *row) for row in rows]
 
 
 def alike(values: Sequence[float]):
-    """One number for all axes where they have the same."""
+    """One number where all axes have the same value."""
     return values[0] if len(set(values)) == 1 else jnp.asarray(values, dtype=float)
 
 
-def largest_forces(drive: AbstractDrive) -> Forces:
-    """Force that each actuator can hold in its better direction; a very large number where there is no limit."""
-    held = drive.steady()
+def largest_forces(actuators: AbstractActuatorModel) -> Forces:
+    """Largest steady force of each actuator in its stronger direction; a very large number where there is no limit."""
+    held = actuators.quasi_static()
     low, high = held.range(held.init(), jnp.ones(()))
     return jnp.minimum(jnp.maximum(-low, high), _UNLIMITED)
 
 
 @functools.lru_cache(maxsize=4096)
 def robust_bandwidths(axis: Axis) -> Bandwidths:
-    """Bandwidths of preset `robust`: an estimator of order two, state feedback, actuators that are driven."""
+    """Bandwidths of preset `robust`: an estimator of order two, state feedback and controlled actuators."""
     bandwidth, share, faster = (grid.ravel()[:, None] for grid in np.meshgrid(*_robust_grid(axis), indexing="ij"))
-    # Actuators at their limits follow with their own lag, whatever is asked of them: the damping, which looks ahead by
-    # 2 / tracking, must look beyond it.
+    # Actuators at their limits follow with their own lag. The damping predicts by 2 / tracking, which must exceed it.
     tracking = np.minimum(share * bandwidth, 1 / axis.response_time if np.isfinite(axis.authority) else np.inf)
     bandwidth = np.minimum(bandwidth, tracking / _TRACKING_SHARES[0])
     natural = 1 / axis.lag if axis.lag else 0.0
-    actuators = np.minimum(np.maximum(faster * np.maximum(bandwidth, tracking), natural), axis.quickest)
+    actuators = np.minimum(np.maximum(faster * np.maximum(bandwidth, tracking), natural), axis.max_bandwidth)
     best = _best(axis, lambda s: _robust(axis, s, actuators, bandwidth, tracking), bandwidth)
     return Bandwidths(*(float(rate[best, 0]) for rate in (actuators, bandwidth, tracking)))
 
@@ -169,7 +170,7 @@ def _robust_grid(axis: Axis) -> tuple[np.ndarray, ...]:
 
 
 def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking) -> Law:
-    """The law of `controllers/robust` from y to u: sampled estimator, actuators as in `LaggedDrive`."""
+    """The law of `controllers/robust` from y to u: sampled estimator, actuators as in `LaggedActuator`."""
     dt, z = axis.sampling_time, np.exp(s * axis.sampling_time)
     decay = np.exp(-bandwidth * dt)
     of_rates, of_estimate = 2 - 2 * decay, (1 - decay) ** 2 / dt
@@ -177,7 +178,7 @@ def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking) -> Law:
     by_velocity, by_force = of_estimate * (z - 1) / poles, -dt * of_estimate / poles  # d_hat
     if axis.lag:
         kept, lead = np.exp(-dt / axis.lag), axis.lag * actuators
-        force = (1 - kept) * lead / (z - kept - (1 - kept) * (1 - lead))  # per force that is asked for
+        force = (1 - kept) * lead / (z - kept - (1 - kept) * (1 - lead))  # per commanded force
         given = (1 - lead) * force + lead
     else:
         force = given = np.ones_like(z)
@@ -207,25 +208,25 @@ def _best(axis: Axis, law: Callable[[np.ndarray], Law], rates: np.ndarray) -> in
 
 
 def _cost(axis: Axis, frequency: np.ndarray, from_y: Law, held: np.ndarray, open_loop: np.ndarray) -> np.ndarray:
-    """Predicted cost of each candidate, with actuators as the law takes them."""
+    """Predicted cost of each candidate, with the nominal actuators of the law."""
     s, dt = 1j * frequency, axis.sampling_time
     actuator = 1 / (1 + s * (axis.lag or 0.0))
     sensitivity = 1 / (1 + open_loop * actuator)
     rms = lambda transfer: np.sqrt(np.trapezoid(np.abs(transfer) ** 2, frequency, axis=-1) / np.pi)
-    # A random walk, and a swell as large as what the walk covers in one of its periods.
+    # A random walk, and a swell with the amplitude of the walk in one of its periods.
     swell = _at(_SWELL, frequency, np.abs(sensitivity / s**2)) * np.sqrt(2 * np.pi / _SWELL)
     by_load = axis.load_rate * np.hypot(rms(sensitivity / s**3), swell)
     noise = axis.velocity_noise * np.sqrt(dt)
     by_noise = noise * rms(from_y.of_velocity * held * actuator * sensitivity / s**2)
-    # Mean size of a normal step from one sampling time to the next: sqrt(2 / pi) of its deviation.
+    # Mean size of a normal step from one sampling time to the next: sqrt(2 / pi) of its standard deviation.
     variation = np.sqrt(2 / np.pi) / dt * noise * rms((1 - np.exp(-s * dt)) * from_y.of_velocity * sensitivity)
     return np.hypot(by_load, by_noise) / _ERROR_SCALE + _VARIATION_PRICE * variation / axis.authority
 
 
-def _at(wanted: float, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _at(point: float, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values at one frequency, linear in its logarithm."""
-    above = np.clip(np.searchsorted(frequency, wanted), 1, len(frequency) - 1)
-    share = np.clip(np.log(wanted / frequency[above - 1]) / np.log(frequency[above] / frequency[above - 1]), 0, 1)
+    above = np.clip(np.searchsorted(frequency, point), 1, len(frequency) - 1)
+    share = np.clip(np.log(point / frequency[above - 1]) / np.log(frequency[above] / frequency[above - 1]), 0, 1)
     return (1 - share) * values[..., above - 1] + share * values[..., above]
 
 

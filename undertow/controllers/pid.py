@@ -1,4 +1,4 @@
-"""PID control as a marine engineer would set it up: the baseline that other laws have to beat."""
+"""PID control as marine engineers design it: the baseline of comparisons."""
 
 from typing import Any, NamedTuple
 
@@ -9,14 +9,15 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
-from undertow.controllers.robust.allocation import allocate, attained
-from undertow.controllers.robust.reference_filter import FilterState, ReferenceFilter
+from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.reference_filter import FilterState, ReferenceFilter
+from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractModel, Measurement, Target, Telemetry
-from undertow.core.drive import AbstractDrive
+from undertow.core.actuator_model import AbstractActuatorModel
+from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
 
@@ -26,33 +27,33 @@ MOTORS = ("steady", "computed")
 class PIDState(NamedTuple):
     """State z of the law."""
 
-    integral: PerAxis  # what the integral asks for, m/s^2, rad/s^2
-    drive: Any  # what is believed of the actuators
+    integral: PerAxis  # acceleration of the integral, m/s^2, rad/s^2
+    actuators: Any  # estimated state of the actuators
     filter: FilterState | None
 
 
 class Plan(NamedTuple):
-    """All that is decided at one instant."""
+    """Decisions of one instant."""
 
-    drive: Any
+    actuators: Any
     error: PerAxis  # m, rad
-    forces: Float[Array, " m"]  # that would give what is wanted
+    forces: Float[Array, " m"]  # for the desired acceleration, without limits
 
 
-class PID(AbstractController):
+class PID(AbstractInformedController):
     """a = a_d + k_p e + k_d e_dot + integral of k_i e, in the model's own axes; forces within limits; no windup.
 
     Raises:
         BadInput: a gain of the wrong sign, or an integral too strong for a stable loop: k_i < k_p k_d (Routh).
     """
 
-    model: AbstractModel
+    model: Model
     filter: ReferenceFilter | None
     proportional: Float[Array, "..."] = param("1/s^2", "acceleration per error", symbol="k_p")
-    integral: Float[Array, "..."] = param("1/s^3", "its rate per error", symbol="k_i")
+    integral: Float[Array, "..."] = param("1/s^3", "rate of the acceleration per error", symbol="k_i")
     derivative: Float[Array, "..."] = param("1/s", "acceleration per error of the rates", symbol="k_d")
-    actuator_rate: Float[Array, ""] = param("1/s", "how fast actuators are made to follow", symbol="lambda")
-    direction: Float[Array, ""] = param("", "what departing from the wanted direction costs beside losing size")
+    actuator_rate: Float[Array, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda")
+    direction: Float[Array, ""] = param("", "cost of a departure from the desired direction relative to a loss of size")
     feedforward: bool = eqx.field(static=True, default=True)
     motor: str = eqx.field(static=True, default="steady")
 
@@ -62,7 +63,7 @@ class PID(AbstractController):
         for name in ("proportional", "derivative", "actuator_rate", "direction"):
             checks.positive(name, getattr(self, name))
         for name in ("proportional", "integral", "derivative"):
-            checks.per_axis(name, getattr(self, name), len(self.model.angles))
+            checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
         most = self.proportional * self.derivative
         if not isinstance(most, Tracer) and np.any(np.asarray(self.integral >= most)):
             worst = np.asarray(self.integral / most).max()
@@ -70,65 +71,55 @@ class PID(AbstractController):
 
     def init(self, y: Measurement, r: Target) -> PIDState:
         smoothing = None if self.filter is None else self.filter.init(y.position)
-        return PIDState(jnp.zeros_like(y.position), self._drive().init(), smoothing)
+        return PIDState(jnp.zeros_like(y.position), self._actuators().init(), smoothing)
 
     def command(self, z: PIDState, y: Measurement, r: Target):
-        plan, drive, effect = self._plan(z, y, r), self._drive(), self.model.effect(y)
-        forces = allocate(effect, plan.forces, *drive.range(plan.drive, self.actuator_rate), self.direction)
-        none = jnp.zeros_like(y.position)
-        telemetry = Telemetry(
-            estimate=-z.integral,
-            robust=none,
-            modelling_error=none,
-            predicted_position=y.position,
-            predicted_velocity=self.model.rates(y),
-            weights=jnp.zeros((y.position.shape[0], 0)),
-            books={"attained_share": attained(effect, plan.forces, forces)},
-        )
-        return drive.command(plan.drive, forces, self.actuator_rate), telemetry
+        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.dynamics.gain(y)
+        forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, self.actuator_rate), self.direction)
+        signals = {"estimate": -z.integral, "attained_share": attained(effect, plan.forces, forces)}
+        return actuators.command(plan.actuators, forces, self.actuator_rate), signals
 
     def advance(self, z: PIDState, y: Measurement, r: Target, u_applied, dt) -> PIDState:
-        """What limits take away is taken from the integral, too: back-calculation, Astrom and Murray (2008), 10.4.
+        """Anti-windup of the integral by back-calculation, Astrom and Murray (2008), 10.4.
 
-        Its time constant is the geometric mean of those of integral and derivative, or one tick where that is longer.
+        Its time constant is the geometric mean of those of integral and derivative, or one step where that is longer.
         """
-        plan, drive, effect = self._plan(z, y, r), self._drive(), self.model.effect(y)
-        heading = lambda u: drive.aim(plan.drive, u, self.actuator_rate)
-        asked, going = heading(drive.command(plan.drive, plan.forces, self.actuator_rate)), heading(u_applied)
+        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.dynamics.gain(y)
+        heading = lambda u: actuators.target_of(plan.actuators, u, self.actuator_rate)
+        asked, going = heading(actuators.command(plan.actuators, plan.forces, self.actuator_rate)), heading(u_applied)
         back = jnp.minimum(jnp.sqrt(self.integral / self.derivative), 1 / dt) * matvec(effect, going - asked)
         share = attained(effect, asked, going)
         return PIDState(
             integral=z.integral + dt * (self.integral * plan.error + back),
-            drive=drive.advance(plan.drive, u_applied, dt),
-            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model, share, dt),
+            actuators=actuators.advance(plan.actuators, u_applied, dt),
+            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model.coordinates, share, dt),
         )
 
-    def known(self, z: PIDState, y: Measurement, u_applied) -> PerAxis:
-        drive = self._drive()
-        given = drive.force(drive.heard(z.drive, y.actuator), u_applied)
-        return self._drift(y) + matvec(self.model.effect(y), given)
+    def known_acceleration(self, z: PIDState, y: Measurement, u_applied) -> PerAxis:
+        actuators = self._actuators()
+        given = actuators.force(actuators.update_from_report(z.actuators, y.actuator), u_applied)
+        return self._drift(y) + matvec(self.model.dynamics.gain(y), given)
 
-    def columns(self):
-        return {"attained_share": ("share of the wanted acceleration that the actuators can give", "1")}
+    def signals(self):
+        return ESTIMATE | ATTAINED_SHARE
 
-    def _drive(self) -> AbstractDrive:
-        drive = self.model.drive()
-        return drive.steady() if self.motor == "steady" else drive
+    def _actuators(self) -> AbstractActuatorModel:
+        actuators = self.model.actuators
+        return actuators.quasi_static() if self.motor == "steady" else actuators
 
     def _drift(self, y: Measurement) -> PerAxis:
-        return self.model.drift(y) if self.feedforward else jnp.zeros_like(y.position)
+        return self.model.dynamics.drift(y) if self.feedforward else jnp.zeros_like(y.position)
 
     def _plan(self, z: PIDState, y: Measurement, r: Target) -> Plan:
-        model = self.model
-        target = r if self.filter is None else self.filter.smoothed(z.filter, r, model)
-        velocity, acceleration = model.wanted(y, target)
-        error, rate = model.error(y, target), velocity - model.rates(y)
+        dynamics, coordinates, _ = self.model
+        target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)
+        error, rate, acceleration = coordinates.tracking_error(y, target)
         demand = acceleration + self.proportional * error + self.derivative * rate + z.integral - self._drift(y)
-        return Plan(self._drive().heard(z.drive, y.actuator), error, model.spread(y, demand))
+        return Plan(self._actuators().update_from_report(z.actuators, y.actuator), error, dynamics.invert(y, demand))
 
 
 def pid(
-    model: AbstractModel,
+    model: Model,
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
@@ -144,33 +135,32 @@ def pid(
     actuator_rate=None,
     direction=1.0,
 ) -> PID:
-    """PID with acceleration as its output: pole placement, Fossen (2021), ch. 15. Body axes and quaternions.
+    """PID with acceleration as output, by pole placement, Fossen (2021), ch. 15. Body axes and quaternions.
 
     Args:
-        model: what the controller may know, from `plant.model()`.
-        sampling_time: of the loop, s; a scenario gives it.
+        model: nominal model, from `plant.model()`.
+        sampling_time: that of the loop, s; a scenario sets it.
         velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario's sensor gives it.
-        load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s); counts where there is noise only.
-        delay: of measurement and input together, s.
+            or one per axis; a scenario sets it from its navigation.
+        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
+        delay: that of measurement and input together, s.
         frequency: natural frequency w of the closed loop without its integral, rad/s; one number or one per axis. None:
-            by the rule of preset `robust`, the one of least predicted cost that keeps the margins of
-            `controllers/bandwidths.py`.
-        damping: its damping ratio.
+            as in preset `robust`, the one of least predicted cost that keeps the margins of `bandwidths.py`.
+        damping: damping ratio of the closed loop without its integral.
         integral_share: k_i = share w k_p with k_p = w^2; a tenth is Fossen's. 0 for PD.
         gains: (k_p, k_i, k_d) instead of these three, 1/s^2, 1/s^3 and 1/s; one triple or one per axis.
-        feedforward: whether weight, buoyancy, drag and whatever else the model knows are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is made up for.
-        reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of the natural
-            frequency, 2 at most; 0 for no filter.
-        actuator_rate: with motor = computed, how fast it is made to follow, 1/s; None: 0.15 per sampling time.
-        direction: what departing from the wanted direction costs, where limits bind, beside losing size.
+        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
+        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: half of the natural frequency, 2 at
+            most; 0 for no filter.
+        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
+        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     checks.positive("sampling_time", sampling_time, "s")
-    model = model.own_axes()
+    model = model.in_body_axes()
     if gains is None:
         if frequency is None:
             axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
@@ -181,7 +171,7 @@ def pid(
         w, zeta, share = (jnp.asarray(value, dtype=float) for value in (frequency, damping, integral_share))
         proportional, integral, derivative = w**2, share * w**3, 2 * zeta * w
     else:
-        checks.per_axis("gains", gains, len(model.angles), (3,))
+        checks.per_axis("gains", gains, len(model.coordinates.angles), (3,))
         proportional, integral, derivative = jnp.moveaxis(jnp.asarray(gains, dtype=float), -1, 0)
     if reference_frequency is None:
         reference_frequency = jnp.minimum(jnp.sqrt(proportional) / 2, 2.0)

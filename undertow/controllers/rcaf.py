@@ -1,22 +1,23 @@
-"""The controller, ready to use: a preset of the robust composite adaptive fuzzy law, and what is chosen differently."""
+"""The robust composite adaptive fuzzy controller: a preset and changed options."""
 
 from typing import Any
 
 from undertow.controllers.presets.paper import paper
 from undertow.controllers.presets.robust import robust
 from undertow.core import checks
-from undertow.core.contracts import AbstractController, AbstractModel
+from undertow.core.contracts import AbstractController, Model
+from undertow.core.runtime import double_outside_runs
 
-PRESETS = {"paper": paper, "robust": robust}
+PRESETS = {"paper": double_outside_runs(paper), "robust": double_outside_runs(robust)}
 
 
-def rcaf(model: AbstractModel, *, preset: str = "paper", **options: Any) -> AbstractController:
+def rcaf(model: Model, *, preset: str = "paper", **options: Any) -> AbstractController:
     """Robust composite adaptive fuzzy controller.
 
     Args:
-        model: what the controller may know, from `plant.model()`.
-        preset: `paper`, every default of which is Table 1, or `robust`, the sound version for real vehicles.
-        options: of the preset; see `undertow.controllers.presets`.
+        model: nominal model, from `plant.model()`.
+        preset: `paper`, with the defaults of Table 1, or `robust`, the robust variant for real vehicles.
+        options: those of the preset; see `undertow.controllers.presets`.
 
     Raises:
         BadInput: no such preset, or a value is out of its range.

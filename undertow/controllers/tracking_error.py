@@ -1,11 +1,11 @@
-"""How far the plant is from its target, in the coordinates of the model: what every law here feeds back."""
+"""Tracking error in the coordinates of the law, and the filtered error s."""
 
 from typing import Any, NamedTuple
 
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel, Measurement, Target
+from undertow.core.contracts import AbstractCoordinates, Measurement, Target
 
 PerAxis = Float[Array, " n"]
 Feedback = Float[Array, "*n 2"]
@@ -13,7 +13,7 @@ Matrices = Float[Array, "*n 2 2"]
 
 
 class Tracking(NamedTuple):
-    """E of Eq. (19), and what follows from it."""
+    """E of Eq. (19), the filtered error and the acceleration of the target."""
 
     error: PerAxis  # e, m, rad
     rate: PerAxis  # m/s, rad/s
@@ -25,15 +25,20 @@ class Tracking(NamedTuple):
         return gains[..., 0] * self.error + gains[..., 1] * self.rate
 
 
-def tracking(model: AbstractModel, lyapunov: Matrices, y: Measurement, r: Target) -> Tracking:
+def tracking(coordinates: AbstractCoordinates, lyapunov: Matrices, y: Measurement, r: Target) -> Tracking:
     """Errors of a measurement against a target, with P of Eq. (21)."""
-    velocity, acceleration = model.wanted(y, r)
-    error, rate = model.error(y, r), velocity - model.rates(y)
+    error, rate, acceleration = coordinates.tracking_error(y, r)
     return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
 
 
+def demanded_acceleration(coordinates: AbstractCoordinates, gains: Feedback, y: Measurement, r: Target) -> PerAxis:
+    """x_ddot_d + K^T E, m/s^2 and rad/s^2: the acceleration that state feedback demands."""
+    error, rate, acceleration = coordinates.tracking_error(y, r)
+    return acceleration + gains[..., 0] * error + gains[..., 1] * rate
+
+
 def check_gains(feedback: Feedback, weight: Matrices, per_axis: dict[str, Any], axes: int) -> None:
-    """Whether K, Q and other gains fit the axes, and K and Q what Eq. (21) asks of them.
+    """Check that K, Q and other gains fit the axes, and that K and Q satisfy Eq. (21).
 
     Raises:
         BadInput: one of them does not.

@@ -1,3 +1,1 @@
-"""Contracts, parameters, status codes, errors and the catalogue: what every other folder stands on."""
-
-from undertow.core import runtime as runtime
+"""Contracts, parameters, status codes, errors and the catalogue: the base of every other folder."""

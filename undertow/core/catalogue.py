@@ -1,8 +1,8 @@
-"""Finding parts: a vehicle, thruster, plant, controller, ... is one file, and no list names it.
+"""Catalogue of parts: each vehicle, thruster, plant, controller, ... is one file, and there is no list of them.
 
-A module of a part folder whose name is also the name of a callable inside it *is* a part: `vehicles/odin.py`
-with `def odin()`. Parts from elsewhere are named `./my_rov.py:my_rov`, or come as Python entry points of the
-group `undertow.<kind>`.
+A module of a part folder whose name is also the name of a callable inside it is a part: `vehicles/odin.py`
+with `def odin()`. Other parts are named `./my_rov.py:my_rov`, or come as Python entry points of the group
+`undertow.<kind>`.
 """
 
 import functools
@@ -17,7 +17,8 @@ from types import ModuleType
 from typing import Any
 
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.core.foreign import MODULE_PREFIX, python_says
+from undertow.core.runtime import double_outside_runs
+from undertow.core.user_code import MODULE_PREFIX, python_says
 
 KINDS = (
     "vehicles",
@@ -27,22 +28,27 @@ KINDS = (
     "controllers",
     "disturbances",
     "references",
-    "instruments",
     "sensors",
+    "navigation",
 )
+
+# Key of a scenario -> kind of its part.
+KIND_OF = {"plant": "plants", "controller": "controllers", "reference": "references"}
+KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation", "metrics": "metrics"}
 
 Part = Callable[..., Any]
 
 
 @functools.cache
 def collect(package: ModuleType) -> dict[str, Part]:
-    """Parts that the modules of a package define, by name."""
+    """Parts that the modules of a package define, by name; outside of a run they are made in double precision."""
     parts = {}
     for info in pkgutil.iter_modules(package.__path__):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
         part = getattr(module, info.name, None)
         if callable(part):
-            parts[info.name] = part
+            parts[info.name] = double_outside_runs(part)
+            setattr(module, info.name, parts[info.name])
     return parts
 
 
@@ -60,13 +66,13 @@ def publish(package_name: str) -> Callable[[str], Any]:
 
 def names(kind: str) -> dict[str, Part]:
     """All parts of a kind: shipped ones and those of installed entry points."""
-    parts = collect(importlib.import_module(f"undertow.{kind}"))
+    parts = collect(importlib.import_module(f"undertow.{kind}")) if kind in KINDS else {}
     return parts | {entry.name: entry.load() for entry in _entry_points(f"undertow.{kind}")}
 
 
 @functools.cache
 def _entry_points(group: str) -> tuple[importlib.metadata.EntryPoint, ...]:
-    # Reads a file of every installed package: too slow to be done for each trial of a campaign.
+    # Cached, because it reads a file of every installed package: too slow for each trial of a campaign.
     return tuple(importlib.metadata.entry_points(group=group))
 
 
@@ -80,8 +86,21 @@ def find(kind: str, name: str, folder: Path | None = None) -> Part:
         return _from_file(name, folder or Path())
     parts = names(kind)
     if name not in parts:
-        raise BadInput("name", f"be a part in {kind}", name, hint=did_you_mean(name, parts))
+        hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
+        raise BadInput("name", f"be a part in {kind}", name, hint=hint)
     return parts[name]
+
+
+@functools.lru_cache
+def _module(path: Path, contents: bytes) -> ModuleType:
+    """A file as a module, loaded once per content, so that two parts from it have the same class."""
+    spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ImportError("not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where annotations of the file are looked up
+    spec.loader.exec_module(module)
+    return module
 
 
 def _from_file(name: str, folder: Path) -> Part:
@@ -89,13 +108,8 @@ def _from_file(name: str, folder: Path) -> Part:
     path = (folder / path_text).resolve()
     if not path.is_file():
         raise BadInput("name", "name an existing file", path_text)
-    spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise BadInput("name", "name a Python file", path_text)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where annotations of the file are looked up
     try:
-        spec.loader.exec_module(module)
+        module = _module(path, path.read_bytes())
     except (Exception, SystemExit) as error:
         raise BadInput("name", "name a file that Python can run", f"{path_text}: {python_says(error)}") from error
     part = getattr(module, attribute, None)

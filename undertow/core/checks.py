@@ -1,4 +1,4 @@
-"""Checks of parameter values at construction. Traced values pass: they were checked when they were numbers."""
+"""Checks of parameter values at construction. Traced values pass: their numbers were checked before tracing."""
 
 from typing import Any
 
@@ -9,22 +9,22 @@ from undertow.core.errors import BadInput
 
 
 def positive(name: str, value: Any, unit: str = "", finite: bool = True) -> None:
-    """Every entry > 0, and finite unless told otherwise."""
+    """Check that every entry is > 0, and finite unless `finite` is False."""
     _each(name, value, lambda x: (x > 0) & (np.isfinite(x) | (not finite)), "be positive", unit)
 
 
 def not_negative(name: str, value: Any, unit: str = "", finite: bool = True) -> None:
-    """Every entry >= 0, and finite unless told otherwise."""
+    """Check that every entry is >= 0, and finite unless `finite` is False."""
     _each(name, value, lambda x: (x >= 0) & (np.isfinite(x) | (not finite)), "be zero or positive", unit)
 
 
 def finite(name: str, value: Any, unit: str = "") -> None:
-    """Every entry finite."""
+    """Check that every entry is finite."""
     _each(name, value, np.isfinite, "be a finite number", unit)
 
 
 def length(name: str, value: Any, expected: int, what: str) -> None:
-    """One-dimensional, with `expected` entries."""
+    """Check that a value is one-dimensional with `expected` entries."""
     shape = np.shape(value)
     if shape != (expected,):
         got = f"{shape[0]} long" if len(shape) == 1 else f"of shape {shape}" if shape else f"one number, {value}"
@@ -32,7 +32,7 @@ def length(name: str, value: Any, expected: int, what: str) -> None:
 
 
 def per_axis(name: str, value: Any, axes: int, entry: tuple[int, ...] = ()) -> None:
-    """One entry of shape `entry`, or one such entry per axis."""
+    """Check that a value is one entry of shape `entry`, or one such entry per axis."""
     shape = np.shape(value)
     if shape not in (entry, (axes, *entry)):
         what = "one number" if not entry else f"one entry of shape {entry}"
@@ -40,13 +40,13 @@ def per_axis(name: str, value: Any, axes: int, entry: tuple[int, ...] = ()) -> N
 
 
 def choice(name: str, value: Any, allowed: tuple[str, ...]) -> None:
-    """One of the allowed words."""
+    """Check that a value is one of the allowed words."""
     if value not in allowed:
         raise BadInput(name, f"be one of {', '.join(allowed)}", value)
 
 
 def hurwitz(name: str, feedback: Any) -> None:
-    """Gains (k1, k2), one pair or one per axis, that make s^2 + k2 s + k1 stable."""
+    """Check that gains (k1, k2), one pair or one per axis, make s^2 + k2 s + k1 stable."""
     if isinstance(feedback, Tracer):
         return
     finite(name, feedback)
@@ -61,7 +61,7 @@ def hurwitz(name: str, feedback: Any) -> None:
 
 
 def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
-    """Square matrix, or a stack of them, symmetric with positive eigenvalues."""
+    """Check that a square matrix, or each of a stack, is symmetric with positive eigenvalues."""
     shape = np.shape(matrix)
     if isinstance(matrix, Tracer):
         return

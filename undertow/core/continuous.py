@@ -1,4 +1,4 @@
-"""Laws written in continuous time, sampled here once for all of them."""
+"""Base class of laws written in continuous time; it samples them."""
 
 import abc
 
@@ -11,7 +11,7 @@ from undertow.numerics.integrators import METHODS
 
 
 class AbstractContinuousController(AbstractController):
-    """A law given by `command` and dz/dt = `flow`: exactly the paper's equations.
+    """A law given by `command` and dz/dt = `flow`, as in the paper's equations.
 
     The continuous loop integrates `flow` together with the plant as one ODE. The sampled loop holds y, r and u
     over one sampling time and takes `substeps` steps of `method`.
@@ -26,10 +26,10 @@ class AbstractContinuousController(AbstractController):
 
     @abc.abstractmethod
     def project(self, z: PyTree) -> PyTree:
-        """z moved back to where it must stay, after a step of finite length; z itself if it may be anywhere."""
+        """z projected onto its admissible set after a finite step; z itself where it has no bounds."""
 
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
-        """State one sampling time later, y, r and u held."""
+        """State one sampling time later, with y, r and u held."""
         step = METHODS[self.method]
         start = jnp.zeros(())
         for _ in range(self.substeps):

@@ -11,10 +11,11 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
-from undertow.core.arrays import as_array
-from undertow.core.drive import AbstractDrive, DirectDrive
+from undertow.core.actuator_model import AbstractActuatorModel, Forces
+from undertow.core.runtime import double_outside_runs
+from undertow.core.signals import Signal
 from undertow.core.status import Status
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 Time = Float[Array, ""]
 Outputs = Float[Array, " n"]
@@ -22,24 +23,37 @@ Inputs = Float[Array, " m"]
 Gain = Float[Array, "n m"]
 
 
+class BodyMotion(NamedTuple):
+    """Attitude and velocity of a body in forms that have no singularity."""
+
+    attitude: Float[Array, "4"]  # unit quaternion, body -> world
+    rotation: Float[Array, "3 3"]  # the same as a matrix
+    nu: Float[Array, "6"]  # m/s, rad/s, body axes
+
+
 class Measurement(NamedTuple):
-    """What is measured of a plant: y; the state X of Eq. (18)."""
+    """Measured outputs y of a plant: the state X of Eq. (18).
+
+    The outputs of a body hold its attitude as Euler angles, as people and the paper's law use it; `body` holds the
+    same pose and velocity without them. `undertow.core.measurement` converts each into the other.
+    """
 
     position: Outputs  # m, rad
     velocity: Outputs  # m/s, rad/s
-    actuator: Any = None  # whatever else the actuators report; None when nothing
+    actuator: Any = None  # report of the actuators; None where there is none
+    body: BodyMotion | None = None  # None for a plant that is not a body in space
 
 
 class Target(NamedTuple):
-    """What is wanted of a plant: r (position, velocity, acceleration)."""
+    """Reference r of a plant: desired position, velocity and acceleration."""
 
     position: Outputs
     velocity: Outputs
     acceleration: Outputs
 
 
-class Place(NamedTuple):
-    """Where a body is and how it moves, for loads that depend on it. World axes north, east, down."""
+class Pose(NamedTuple):
+    """Position, attitude and velocity of a body, for loads that depend on them. World axes north, east, down."""
 
     position: Float[Array, "3"]  # m
     rotation: Float[Array, "3 3"]  # body -> world
@@ -47,23 +61,23 @@ class Place(NamedTuple):
 
 
 class Water(NamedTuple):
-    """How the water moves where the body is, as if the body were not there. World axes."""
+    """Undisturbed motion of the water at the position of the body. World axes."""
 
     velocity: Float[Array, "3"]  # m/s
     acceleration: Float[Array, "3"]  # m/s^2
 
 
-class Factors(NamedTuple):
-    """By how much the true body differs from the one the controller was told: factors, 1 for not at all."""
+class ModelScaling(NamedTuple):
+    """Factors of the true body relative to the nominal model; 1 for no mismatch."""
 
     mass: Float[Array, ""]  # on M, and with it on C
     damping: Float[Array, ""]  # on D
     restoring: Float[Array, ""]  # on g
-    thrust: Float[Array, ""]  # on what every thruster gives
+    thrust: Float[Array, ""]  # on the thrust of every thruster
 
 
 class Payload(NamedTuple):
-    """A point mass carried along."""
+    """A point mass that the body carries."""
 
     mass: Float[Array, ""]  # kg
     weight: Float[Array, ""]  # N, in water
@@ -71,38 +85,28 @@ class Payload(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What the surroundings do to a plant. Loads add; None and () stand for nothing and cost nothing."""
+    """Effect of the environment on a plant. Loads add; None and () stand for no load and cost no computation."""
 
     acceleration: Outputs  # lumped, added to x_ddot; m/s^2, rad/s^2
     wrench: Outputs  # w_d of Eq. (2), on the left side: it opposes; N, N m (body axes for a vehicle)
     water: Water | None = None
-    factors: Factors | None = None
+    scaling: ModelScaling | None = None
     payloads: tuple[Payload, ...] = ()
 
 
 class Effort(NamedTuple):
-    """What driving the actuators costs."""
+    """Cost of driving the actuators."""
 
-    power: Inputs  # electrical power drawn, W
+    power: Inputs  # electrical power, W
     saturated: Inputs  # 1 where an input is at its limit, else 0
 
 
-class Telemetry(NamedTuple):
-    """What a controller lets one look at. Nothing here is carried."""
+class AbstractDynamics(eqx.Module):
+    """Nominal dynamics of a plant: F and G of x_ddot = F + G f + d. Eq. (17).
 
-    estimate: Outputs  # d_hat, m/s^2, rad/s^2
-    robust: Outputs  # u_r
-    modelling_error: Outputs  # eps, m/s, rad/s
-    predicted_position: Outputs  # x_hat
-    predicted_velocity: Outputs
-    weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2; no columns when nothing is learnt
-    books: dict[str, Array] | None = None  # scalars that this law alone has to tell, by name
-
-
-class AbstractModel(eqx.Module):
-    """What a controller may know of a plant: x_ddot = F + G u (+ d, unknown). Eq. (17)."""
-
-    angles: eqx.AbstractVar[tuple[bool, ...]]  # which outputs are angles, to be compared modulo 2 pi
+    x_ddot is the rate of the velocity in the coordinates, and f the force of the actuators; where these are
+    a `DirectActuator` of gain 1, f is the input u.
+    """
 
     @abc.abstractmethod
     def drift(self, y: Measurement) -> Outputs:
@@ -110,59 +114,68 @@ class AbstractModel(eqx.Module):
 
     @abc.abstractmethod
     def gain(self, y: Measurement) -> Gain:
-        """G, per unit of input."""
+        """G, acceleration per force."""
 
     @abc.abstractmethod
-    def invert(self, y: Measurement, acceleration: Outputs) -> Inputs:
-        """u with G u = acceleration as nearly as the plant allows: G# of Eqs. (22)-(27)."""
+    def invert(self, y: Measurement, acceleration: Outputs) -> Forces:
+        """Smallest f that gives the acceleration, or the nearest to it: G# of Eqs. (22)-(27)."""
 
-    def drive(self) -> AbstractDrive:
-        """What stands between input and force; G is per unit of input unless a model says otherwise."""
-        return DirectDrive()
 
-    def effect(self, y: Measurement) -> Gain:
-        """Acceleration per force of the drive: x_ddot = F + effect force + d."""
-        return self.gain(y)
+class TrackingError(NamedTuple):
+    """Tracking error in the coordinates of a law, E of Eq. (19), and the acceleration of the target."""
 
-    def spread(self, y: Measurement, acceleration: Outputs) -> Inputs:
-        """Smallest forces of the drive with effect force = acceleration, as nearly as possible."""
-        return self.invert(y, acceleration)
+    error: Outputs  # e, m, rad
+    rate: Outputs  # velocity of the target less that of the plant, m/s, rad/s
+    acceleration: Outputs  # of the target, m/s^2, rad/s^2
 
-    # The coordinates of the law. They are the outputs themselves unless a model has better ones, such as body axes.
 
-    def error(self, y: Measurement, r: Target) -> Outputs:
-        """How far the target is, m and rad."""
-        return self.difference(r.position, y.position)
+class AbstractCoordinates(eqx.Module):
+    """Coordinates in which a law computes the tracking error: the outputs themselves, or body axes."""
 
-    def rates(self, y: Measurement) -> Outputs:
-        """Velocity, m/s and rad/s."""
-        return y.velocity
+    angles: eqx.AbstractVar[tuple[bool, ...]]  # which outputs are angles, compared modulo 2 pi
+    tolerated_status: eqx.AbstractVar[tuple[Status, ...]]  # of the plant, with which a run continues
 
-    def outward(self, y: Measurement, rates: Outputs) -> Outputs:
-        """Velocity of the outputs for given `rates`, or any small motion likewise."""
-        return rates
+    @abc.abstractmethod
+    def measurement(self, position: Outputs, velocity: Outputs, actuator: Any = None) -> Measurement:
+        """Measurement with given outputs and their rates."""
 
-    def wanted(self, y: Measurement, r: Target) -> tuple[Outputs, Outputs]:
-        """Velocity of the target and its time derivative."""
-        return r.velocity, r.acceleration
+    @abc.abstractmethod
+    def tracking_error(self, y: Measurement, r: Target) -> TrackingError:
+        """Tracking errors; those of angles in [-pi, pi)."""
 
-    def seen(self, y: Measurement, acceleration: Outputs) -> Outputs:
-        """Time derivative of `rates` for a second derivative of the outputs."""
-        return acceleration
+    @abc.abstractmethod
+    def velocity(self, y: Measurement) -> Outputs:
+        """Velocity of the plant, m/s and rad/s."""
 
-    def bears(self) -> tuple[Status, ...]:
-        """Conditions of the plant under which a run goes on, because these coordinates are not touched by them."""
-        return ()
+    @abc.abstractmethod
+    def acceleration(self, y: Measurement, acceleration: Outputs) -> Outputs:
+        """Rate of `velocity` that belongs to a second derivative of the outputs."""
 
-    def own_axes(self) -> "AbstractModel":
-        """This model in the coordinates that suit the plant best; itself where there are no better ones."""
-        return self
+    @abc.abstractmethod
+    def output_velocity(self, y: Measurement, velocity: Outputs) -> Outputs:
+        """Velocity of the outputs that belongs to a velocity, or any small motion, in these coordinates."""
+
+    @abc.abstractmethod
+    def in_body_axes(self, dynamics: Any) -> "Model | None":
+        """Model with `dynamics` expressed in body axes; None for a plant that has none."""
 
     def difference(self, target: Outputs, actual: Outputs) -> Outputs:
-        """target - actual, angles the short way round."""
+        """target - actual of outputs; differences of angles in [-pi, pi)."""
         turn = 2 * jnp.pi * jnp.asarray(self.angles, dtype=float)
         raw = target - actual
         return raw - turn * jnp.round(raw / (2 * jnp.pi))
+
+
+class Model(NamedTuple):
+    """Nominal model of a plant, as the controller uses it: dynamics, coordinates and actuators."""
+
+    dynamics: AbstractDynamics
+    coordinates: AbstractCoordinates
+    actuators: AbstractActuatorModel
+
+    def in_body_axes(self) -> "Model":
+        """The same model in body axes; itself where the plant has none."""
+        return self.coordinates.in_body_axes(self.dynamics) or self
 
 
 class AbstractPlant(eqx.Module):
@@ -171,6 +184,11 @@ class AbstractPlant(eqx.Module):
     outputs: eqx.AbstractVar[tuple[str, ...]]  # names of the n outputs
     output_units: eqx.AbstractVar[tuple[str, ...]]
     input_unit: eqx.AbstractVar[str]
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        if "model" in vars(cls):  # its numbers are made before any run, as those of the plant are
+            cls.model = double_outside_runs(cls.model)
 
     @abc.abstractmethod
     def initial_state(self, position: Outputs | None = None, velocity: Outputs | None = None) -> PyTree:
@@ -182,132 +200,159 @@ class AbstractPlant(eqx.Module):
 
     @abc.abstractmethod
     def output(self, t: Time, x: PyTree) -> Measurement:
-        """y, without error."""
+        """y without measurement error."""
 
     @abc.abstractmethod
     def acceleration(self, t: Time, x: PyTree, u: Inputs, d: Load) -> Outputs:
         """x_ddot of the outputs, m/s^2 and rad/s^2."""
 
     @abc.abstractmethod
-    def place(self, x: PyTree) -> Place | None:
-        """Where the body is; None for plants that are not bodies in water."""
+    def pose(self, x: PyTree) -> Pose | None:
+        """Pose of the body; None for plants that are not bodies in water."""
 
     @abc.abstractmethod
     def admissible(self, x: PyTree, u: Inputs) -> Inputs:
-        """What reaches the actuators when u is commanded in state x (limits)."""
+        """Input that is applied when u is commanded in state x (limits)."""
 
     @abc.abstractmethod
     def effort(self, x: PyTree, u: Inputs) -> Effort:
-        """What applying u costs."""
+        """Cost of applying u."""
 
     @abc.abstractmethod
     def inputs(self) -> int:
         """Number m of inputs."""
 
     @abc.abstractmethod
-    def health(self, x: PyTree) -> Array:
-        """Status code of a state; `Status.OK` as long as it means anything."""
+    def status(self, x: PyTree) -> Array:
+        """Status code of a state; `Status.OK` while the state is valid."""
 
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:
-        """What a user should know before running this plant; each with the numbers that caused it."""
+        """Advice before this plant is run, each sentence with the numbers that caused it."""
 
     @abc.abstractmethod
-    def model(self) -> AbstractModel:
-        """What a controller is told of this plant; keyword arguments with defaults are the scenario's `model`."""
+    def model(self) -> Model:
+        """Nominal model for the controller; keyword arguments with defaults are the scenario's `model`."""
 
-    def books(self, x: PyTree, u: Inputs) -> dict[str, Array]:
-        """Scalars that this plant alone has and that are worth recording, by name."""
-        return {}
+    @abc.abstractmethod
+    def diagnostics(self, x: PyTree, u: Inputs) -> dict[str, Array]:
+        """Values of the signals that this plant declares, by name."""
 
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of `books`."""
-        return {}
+    @abc.abstractmethod
+    def signals(self) -> dict[str, Signal]:
+        """Declarations of the signals of `diagnostics`, by name; {} for none."""
 
     def no_load(self) -> Load:
-        """Load of calm surroundings."""
+        """Load where the environment does not act."""
         zero = jnp.zeros(len(self.outputs))
         return Load(zero, zero)
 
 
 class AbstractController(eqx.Module):
-    """A law. `command` before `advance`: the input leaves first, and adaptation sees what was applied."""
+    """A control law. `command` comes before `advance`, so that adaptation uses the input that was applied."""
 
-    model: eqx.AbstractVar[AbstractModel]
+    model: eqx.AbstractVar[Model]
 
     @abc.abstractmethod
     def init(self, y: Measurement, r: Target) -> PyTree:
         """State z before the first measurement is used."""
 
     @abc.abstractmethod
-    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, Telemetry]:
-        """Input u, and what one may look at."""
+    def command(self, z: PyTree, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
+        """Input u, and the values of the declared signals by name, which are recorded only.
+
+        A signal `estimate` is the law's estimate of d; it is used where a reading is not finite.
+        """
 
     @abc.abstractmethod
     def advance(self, z: PyTree, y: Measurement, r: Target, u_applied: Inputs, dt: Time) -> PyTree:
         """State one sampling time later."""
 
-    def known(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
-        """F + G u: what the law takes for granted of the acceleration; d is all the rest."""
-        return self.model.drift(y) + matvec(self.model.gain(y), u_applied)
+    @abc.abstractmethod
+    def signals(self) -> dict[str, Signal]:
+        """Declarations of the signals of `command`, by name; {} for none."""
 
-    def columns(self) -> dict[str, tuple[str, str]]:
-        """Meaning and unit of each entry of the telemetry's `books`."""
-        return {}
+
+class AbstractInformedController(AbstractController):
+    """A law that models more of the acceleration than F + G u, such as the dynamics of its motors."""
+
+    @abc.abstractmethod
+    def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+        """The acceleration that the law models; d is the rest."""
+
+
+def known_acceleration(law: AbstractController, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+    """The acceleration that a law models: F + G u unless it defines its own."""
+    if isinstance(law, AbstractInformedController):
+        return law.known_acceleration(z, y, u_applied)
+    return law.model.dynamics.drift(y) + matvec(law.model.dynamics.gain(y), u_applied)
 
 
 class AbstractDisturbance(eqx.Module):
-    """A load drawn once from a key; afterwards a function of time."""
+    """A load that is sampled once from a key and is a function of time afterwards."""
 
     @abc.abstractmethod
-    def draw(self, key: PRNGKeyArray) -> PyTree:
+    def realize(self, key: PRNGKeyArray) -> PyTree:
         """Path: everything random about one realisation."""
 
     @abc.abstractmethod
-    def at(self, path: PyTree, t: Time, place: Place | None, calm: Load) -> Load:
-        """`calm`, which is what the surroundings do without this disturbance, with it added, at time t."""
+    def at(self, realization: PyTree, t: Time, pose: Pose | None, load: Load) -> Load:
+        """The load with this disturbance added to `load`, that of the others, at time t."""
 
     @abc.abstractmethod
     def jumps(self, duration: float) -> tuple[float, ...]:
-        """Times in (0, duration) at which the load is not smooth."""
+        """Times in (0, duration), s, at which the load is not smooth."""
 
 
 class AbstractReference(eqx.Module):
-    """What to follow."""
+    """Desired motion as a function of time."""
 
     @abc.abstractmethod
     def at(self, t: Time) -> Target:
-        """Wanted position, velocity and acceleration at time t."""
-
-    def beginning_at(self, position: Outputs) -> "AbstractReference":
-        """This reference for a plant that starts at a position; itself unless it leaves open where it begins."""
-        return self
+        """Desired position, velocity and acceleration at time t."""
 
 
-class AbstractSensor(eqx.Module):
-    """What stands between the truth and the measurement."""
-
-    smooth: eqx.AbstractVar[bool]  # whether it has no memory and changes smoothly with the truth, as one ODE needs
+class AbstractOpenReference(AbstractReference):
+    """A reference whose start is not given."""
 
     @abc.abstractmethod
-    def draw(self, key: PRNGKeyArray) -> PyTree:
+    def starting_at(self, position: Outputs) -> AbstractReference:
+        """This reference for a plant that starts at a position."""
+
+
+def starting_at(reference: AbstractReference, position: Outputs) -> AbstractReference:
+    """A reference for a plant that starts at a position; itself unless its start is not given."""
+    return reference.starting_at(position) if isinstance(reference, AbstractOpenReference) else reference
+
+
+class AbstractNavigation(eqx.Module):
+    """Navigation filter: it makes the measurement from the true state."""
+
+    smooth: eqx.AbstractVar[bool]  # no memory, and smooth in the true state, as one ODE needs
+
+    @abc.abstractmethod
+    def realize(self, key: PRNGKeyArray) -> PyTree:
         """Path: everything random about one realisation."""
 
     @abc.abstractmethod
-    def init(self, path: PyTree, truth: Measurement) -> PyTree:
-        """State at t = 0: what it remembers; () for nothing."""
+    def init(self, realization: PyTree, truth: Measurement) -> PyTree:
+        """State at t = 0; () for a filter without memory."""
 
     @abc.abstractmethod
-    def measure(self, path: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
-        """Measurement at time t, and the state after it."""
+    def measure(self, realization: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
+        """Measurement at time t and the state after it."""
 
-    def ignored(self, state: PyTree) -> Int[Array, ""]:
-        """Readings so far that were no numbers, and that it has left out."""
-        return jnp.zeros((), dtype=int)
 
+class AbstractInformedNavigation(AbstractNavigation):
+    """A navigation filter that reports its noise and the readings that it ignored."""
+
+    @abc.abstractmethod
     def velocity_noise(self, dt: float) -> Array:
-        """What a law is told of it: standard deviation of white noise, new at every tick of dt (s), on velocities.
+        """Nominal standard deviation of white noise on the velocities, new at every step of dt (s).
 
-        One number or one per output, m/s and rad/s; zero where nothing is known.
+        One number or one per output, m/s and rad/s; zero where it is unknown.
         """
-        return as_array(0.0)
+
+    @abc.abstractmethod
+    def ignored(self, state: PyTree) -> Int[Array, ""]:
+        """Number of readings so far that were ignored because they were not finite."""

@@ -1,4 +1,4 @@
-"""Files that outlast others and power cuts: one process at a time writes to a place; what is done is on the disk."""
+"""Safe writing: one process at a time writes to a path, and what is written survives a power cut."""
 
 import contextlib
 import fcntl
@@ -10,38 +10,38 @@ from undertow.core.errors import BadInput
 
 
 class InUse(BadInput):
-    """Another process is writing there."""
+    """Another process is writing to the path."""
 
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Be the only process that writes to a file or folder; the lock goes with the process, however it ends.
+    """Lock a file or folder for writing by this process only; the lock is released however the process ends.
 
     Args:
-        path: what is written to; it need not exist, the folder that it is in must.
+        path: file or folder to write; it need not exist, but its parent folder must.
 
     Raises:
-        InUse: another process is writing there.
-        OSError: nothing can be written there.
+        InUse: another process is writing to it.
+        OSError: it cannot be written to.
     """
     lock = lock_of(path)
     handle = _locked(lock, path)
     try:
         yield
     finally:
-        lock.unlink(missing_ok=True)  # while it is held: whoever waits for it sees that the file is another one
+        lock.unlink(missing_ok=True)  # while it is held: a waiting process sees that its file was replaced
         os.close(handle)
 
 
 def lock_of(path: Path) -> Path:
-    """The file that is locked: beside what it guards; inside where nothing can be written beside."""
+    """The lock file: beside the path, or inside it where the parent folder cannot be written to."""
     path = path.resolve()
     name = f".{path.name}.lock"
     return path / name if path.is_dir() and not os.access(path.parent, os.W_OK) else path.with_name(name)
 
 
 def settle(path: Path) -> None:
-    """Wait until a file, or all that is in a folder, is on the disk: a power cut after this takes nothing of it."""
+    """Wait until a file, or everything in a folder, is on the disk and survives a power cut."""
     if path.is_dir():
         for inner in path.iterdir():
             settle(inner)
@@ -49,7 +49,7 @@ def settle(path: Path) -> None:
 
 
 def sync(path: Path) -> None:
-    """The same for one file, or for the names in a folder."""
+    """Wait until one file, or the names in a folder, are on the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -70,7 +70,7 @@ def _locked(lock: Path, path: Path) -> int:
         except BaseException:
             os.close(handle)
             raise
-        os.close(handle)  # of a file that its owner has removed meanwhile
+        os.close(handle)  # its owner has removed the file meanwhile
 
 
 def _same(handle: int, lock: Path) -> bool:

@@ -1,24 +1,24 @@
-"""Errors in one grammar: what, must be what, but is what, what to try.
+"""Errors in one form: the value, what it must be, what it is, and the remedy.
 
     Error: `plant.thruster.resistance` must be positive, but is -1.2 ohm (scenario.yaml, line 14)
 
-Advice is not an error: parts that have some to give have a method `advice()`, and the run goes on.
+Advice is not an error: a part returns it from its method `advice()`, and the run continues.
 """
 
 import difflib
 from collections.abc import Iterable
 
-_LONGEST = 200  # characters of what something is
+_LONGEST = 200  # characters of a value in a message
 
 
 class BadInput(ValueError):
-    """Something the user gave cannot be used. One line; the command line turns it into exit code 2.
+    """A value that the user gave cannot be used. One line; the command line turns it into exit code 2.
 
     Args:
         name: key path or argument, as the user wrote it.
-        must: what it must be, completing "must ...".
-        got: what it is.
-        hint: what to try, a full sentence.
+        must: what it must be, completing "must ..."; "" where an action failed.
+        got: what it is; or which action failed, and why.
+        hint: the remedy, a full sentence.
         where: file and line, when known.
     """
 
@@ -30,10 +30,14 @@ class BadInput(ValueError):
         got = "" if self.got is None else f", but is {_one_line(self.got)}"
         where = f" ({self.where})" if self.where else ""
         hint = f". {self.hint}" if self.hint else ""
+        if not self.must:
+            failed = _one_line(self.got)
+            said = f"`{_one_line(self.name)}`: {failed}" if self.name else failed[:1].upper() + failed[1:]
+            return f"{said}{where}{hint}"
         return f"`{_one_line(self.name)}` must {self.must}{got}{where}{hint}"
 
     def at(self, prefix: str = "", where: str = "") -> "BadInput":
-        """Same complaint, seen from further out: with a key prefix and a place in a file."""
+        """The same error with a key prefix and a location in a file."""
         name = f"{prefix}.{self.name}" if prefix and self.name else prefix or self.name
         return BadInput(name, self.must, self.got, hint=self.hint, where=where or self.where)
 
@@ -45,7 +49,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Sentence naming the nearest known word; nothing when none is near."""
+    """Sentence naming the nearest known word; empty when none is near."""
     near = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.6)
     return f"Did you mean `{near[0]}`?" if near else ""
 

@@ -1,4 +1,4 @@
-"""Parameters that know their unit, symbol, meaning and source; declared once, used everywhere."""
+"""Declaration of a parameter with its unit, symbol, meaning and source."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -28,6 +28,7 @@ def param(
     symbol: str = "",
     source: str = "",
     default: Any = dataclasses.MISSING,
+    range: tuple[float, float] | None = None,
 ) -> Any:
     """Field of an `eqx.Module` that holds an array.
 
@@ -39,8 +40,9 @@ def param(
         symbol: letter in the literature.
         source: where the default comes from; a part's own `sources` takes precedence.
         default: value when none is given.
+        range: bounds between which `undertow tune` searches, on a logarithmic scale; None if it is not tuned.
     """
-    metadata = {"unit": unit, "meaning": meaning, "symbol": symbol, "source": source}
+    metadata = {"unit": unit, "meaning": meaning, "symbol": symbol, "source": source, "range": range}
     extra = {} if default is dataclasses.MISSING else {"default": default}
     return eqx.field(converter=as_array, metadata=metadata, **extra)
 
@@ -60,16 +62,23 @@ def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]
         else:
             value = getattr(part, field.name)
         if "unit" in field.metadata:
-            meta = dict(field.metadata)
+            meta = field.metadata
             own = sources.get(field.name, sources.get("*", "")) or meta["source"]
             shown = value if isinstance(value, str) else np.asarray(value).tolist()
             yield Parameter(name, shown, meta["unit"], meta["meaning"], meta["symbol"], own)
         elif isinstance(value, eqx.Module):
             yield from parameters(value, f"{name}.")
         elif isinstance(value, tuple):
+            fields = getattr(value, "_fields", None)
             for i, member in enumerate(value):
                 if isinstance(member, eqx.Module):
-                    yield from parameters(member, f"{name}[{i}].")
+                    yield from parameters(member, f"{name}.{fields[i]}." if fields else f"{name}[{i}].")
+
+
+def tuning_ranges(part: eqx.Module) -> dict[str, tuple[float, float]]:
+    """Bounds of the parameters of a part that are declared with a `range`, by name."""
+    declared = {field.name: field.metadata.get("range") for field in dataclasses.fields(part)}
+    return {name: bounds for name, bounds in declared.items() if bounds is not None}
 
 
 def _freeze(sources: Mapping[str, str] | tuple) -> tuple:

@@ -1,47 +1,59 @@
-"""How JAX is set up for undertow: precision, device, and one compiled function per closed loop.
+"""Precision and device of a run: set while it runs, in the thread that computes it only.
 
-Imported first by `undertow.core`; must run before JAX touches a device to have its full effect.
+Importing undertow changes no setting of JAX. A part that is made outside of a run holds double precision, whatever
+`jax_enable_x64` is; a run converts its parts to its own precision.
 """
 
-import os
+import functools
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
-from typing import Any
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextvars import ContextVar
+from typing import Any, ParamSpec, TypeVar
 
 import jax
 
-# XLA compiles the body of a small `while` loop into one plain function instead of a list of kernels to be
-# dispatched one by one. Its own limit (1 kB of loop state) is below a vehicle with its thrusters; with the limit
-# raised, one tick of the closed loop takes a quarter of the time.
-_ONE_FUNCTION_PER_LOOP = "xla_cpu_small_while_loop_byte_threshold=100000000"
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+# Precision of the run that this thread computes; None outside of a run.
+_stated: ContextVar[str | None] = ContextVar("undertow_precision", default=None)
 
 
-def configure() -> None:
-    """Double precision unless JAX_ENABLE_X64 says otherwise; closed loops compiled whole."""
-    if "JAX_ENABLE_X64" not in os.environ:
-        jax.config.update("jax_enable_x64", True)
-    flags = os.environ.get("XLA_FLAGS", "")
-    if "xla_backend_extra_options" not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_extra_options={_ONE_FUNCTION_PER_LOOP}".strip()
+@contextmanager
+def in_precision(precision: str) -> Iterator[None]:
+    """Context in which JAX uses float64 or float32, in this thread only."""
+    outside = _stated.set(precision)
+    try:
+        with jax.enable_x64(precision == "float64"):
+            yield
+    finally:
+        _stated.reset(outside)
 
 
-def in_precision(precision: str) -> AbstractContextManager[Any]:
-    """What JAX makes inside, in this thread, is float64 or float32; other threads, and what comes after, are not."""
-    return jax.enable_x64(precision == "float64")
+def double_outside_runs(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """Wrap a function that makes parts: double precision outside of a run, the precision of the run inside."""
+
+    @functools.wraps(function)
+    def made(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
+        if _stated.get() is not None or jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+            return function(*arguments, **options)
+        with in_precision("float64"):
+            return function(*arguments, **options)
+
+    return made
 
 
 def workers(count: int) -> ThreadPoolExecutor:
-    """Threads that compute in the precision of the one that asks for them."""
+    """Threads that compute in the precision of the calling thread."""
     double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
-    return ThreadPoolExecutor(count, initializer=lambda: jax.enable_x64(double).__enter__())
+    precision = "float64" if double else "float32"
+    return ThreadPoolExecutor(count, initializer=lambda: in_precision(precision).__enter__())
 
 
 def on_processor() -> AbstractContextManager[Any]:
-    """What JAX does inside, it does on this machine's processor: thousands of small things, slow on a GPU."""
+    """Context in which JAX uses the CPU: thousands of small operations are slow on a GPU."""
     try:
         return jax.default_device(jax.devices("cpu")[0])
-    except RuntimeError:  # JAX_PLATFORMS leaves it out
+    except RuntimeError:  # JAX_PLATFORMS excludes it
         return nullcontext()
-
-
-configure()

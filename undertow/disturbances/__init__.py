@@ -1,4 +1,4 @@
-"""Disturbances: drawn once from a key, then functions of time. One file each."""
+"""Disturbances: sampled once from a key, then functions of time. One file each."""
 
 from undertow.core.catalogue import publish
 

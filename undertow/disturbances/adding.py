@@ -1,4 +1,4 @@
-"""How loads add up."""
+"""Sum of loads."""
 
 from typing import Any
 
@@ -6,63 +6,66 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractDisturbance, Factors, Load, Payload, Place, Water
+from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling, Payload, Pose, Water
 from undertow.core.errors import BadInput
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross
 
 Vector3 = Float[Array, "3"]
 
 
 class Together(AbstractDisturbance):
-    """Several disturbances at once, each with randomness of its own."""
+    """Several disturbances at once, each with a random key of its own."""
 
     members: tuple[AbstractDisturbance, ...]
 
-    def draw(self, key) -> tuple[Any, ...]:
-        return tuple(member.draw(jax.random.fold_in(key, i)) for i, member in enumerate(self.members))
+    def realize(self, key) -> tuple[Any, ...]:
+        keys = jax.random.split(key, len(self.members))
+        return tuple(member.realize(own) for member, own in zip(self.members, keys, strict=True))
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        for member, own in zip(self.members, path, strict=True):
-            calm = member.at(own, t, place, calm)
-        return calm
+    def at(self, realization, t, pose, load: Load) -> Load:
+        for member, own in zip(self.members, realization, strict=True):
+            load = member.at(own, t, pose, load)
+        return load
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return tuple(sorted({t for member in self.members for t in member.jumps(duration)}))
 
 
-def body_of(place: Place | None) -> Place:
-    """The place of a body in water.
+def body_of(pose: Pose | None) -> Pose:
+    """The pose of a body in water.
 
     Raises:
-        BadInput: the plant is none.
+        BadInput: the plant is not one.
     """
-    if place is None:
+    if pose is None:
         raise BadInput("disturbance", "act on a body in water", "used with another plant", hint="Use kind: sinusoid")
-    return place
+    return pose
 
 
-def with_water(calm: Load, place: Place | None, velocity: Vector3, acceleration: Vector3) -> Load:
-    """Water that also moves with a velocity (m/s) and accelerates (m/s^2), world axes."""
-    body_of(place)
-    before = calm.water or Water(jnp.zeros(3), jnp.zeros(3))
-    return calm._replace(water=Water(before.velocity + velocity, before.acceleration + acceleration))
+def with_water(load: Load, pose: Pose | None, velocity: Vector3, acceleration: Vector3) -> Load:
+    """Load with an added velocity (m/s) and acceleration (m/s^2) of the water, world axes."""
+    body_of(pose)
+    before = load.water or Water(jnp.zeros(3), jnp.zeros(3))
+    return load._replace(water=Water(before.velocity + velocity, before.acceleration + acceleration))
 
 
-def with_force(calm: Load, place: Place | None, force: Vector3, point: Vector3) -> Load:
-    """A force (N, world axes) that also pulls at a point of the body (m, body axes)."""
-    pull = matvec(body_of(place).rotation.T, force)
-    return calm._replace(wrench=calm.wrench - jnp.concatenate([pull, cross(point, pull)]))
+def with_force(load: Load, pose: Pose | None, force: Vector3, point: Vector3) -> Load:
+    """Load with an added force (N, world axes) at a point of the body (m, body axes)."""
+    pull = matvec(body_of(pose).rotation.T, force)
+    return load._replace(wrench=load.wrench - jnp.concatenate([pull, cross(point, pull)]))
 
 
-def with_factors(calm: Load, place: Place | None, factors: Factors) -> Load:
-    """A body that also differs by these factors."""
-    body_of(place)
-    product = factors if calm.factors is None else Factors(*(a * b for a, b in zip(calm.factors, factors, strict=True)))
-    return calm._replace(factors=product)
+def with_scaling(load: Load, pose: Pose | None, scaling: ModelScaling) -> Load:
+    """Load with the factors of the body multiplied by these."""
+    body_of(pose)
+    product = (
+        scaling if load.scaling is None else ModelScaling(*(a * b for a, b in zip(load.scaling, scaling, strict=True)))
+    )
+    return load._replace(scaling=product)
 
 
-def with_payload(calm: Load, place: Place | None, payload: Payload) -> Load:
-    """A body that also carries this."""
-    body_of(place)
-    return calm._replace(payloads=(*calm.payloads, payload))
+def with_payload(load: Load, pose: Pose | None, payload: Payload) -> Load:
+    """Load with an added payload of the body."""
+    body_of(pose)
+    return load._replace(payloads=(*load.payloads, payload))

@@ -1,4 +1,4 @@
-"""A constant current, the same everywhere."""
+"""A constant, uniform current."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -10,7 +10,7 @@ from undertow.disturbances.adding import with_water
 
 
 class Current(AbstractDisturbance):
-    """Water that moves with one velocity."""
+    """Water of constant, uniform velocity."""
 
     velocity: Float[Array, "3"] = param("m/s", "velocity of the water: north, east, down", symbol="v_c")
 
@@ -18,18 +18,18 @@ class Current(AbstractDisturbance):
         checks.length("velocity", self.velocity, 3, "north, east, down")
         checks.finite("velocity", self.velocity, "m/s")
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        return with_water(calm, place, self.velocity, jnp.zeros(3))
+    def at(self, realization, t, pose, load: Load) -> Load:
+        return with_water(load, pose, self.velocity, jnp.zeros(3))
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()
 
 
 def current(velocity=(0.5, 0.0, 0.0)) -> Current:
-    """Constant current; the vehicle feels its velocity through the water. Fossen (2021), ch. 10.3.
+    """Constant current; drag depends on the velocity relative to the water. Fossen (2021), ch. 10.3.
 
     Args:
         velocity: of the water over ground, m/s: north, east, down.

@@ -1,4 +1,4 @@
-"""A current that wanders: a first-order Gauss-Markov process on each axis."""
+"""A random current: a first-order Gauss-Markov process on each axis."""
 
 import equinox as eqx
 import jax
@@ -18,7 +18,7 @@ _LONGEST = 1_000_000  # samples of a realisation
 class GaussMarkovCurrent(AbstractDisturbance):
     """mean + process of a standard deviation and a correlation time, sampled every `step` for `span`.
 
-    The samples follow the process exactly; in between the velocity is linear, after `span` it stays.
+    The samples follow the process exactly; the velocity is linear between them and constant after `span`.
 
     Raises:
         BadInput: a time not positive, a deviation negative, too many samples.
@@ -37,23 +37,23 @@ class GaussMarkovCurrent(AbstractDisturbance):
         checks.not_negative("deviation", self.deviation, "m/s")
         checks.positive("correlation_time", self.correlation_time, "s")
 
-    def draw(self, key) -> Float[Array, "samples 3"]:
+    def realize(self, key) -> Float[Array, "samples 3"]:
         """Deviations from the mean, m/s: x_k+1 = q x_k + sqrt(1 - q^2) sigma n_k with q = exp(-step/time)."""
         kept = jnp.exp(-self.step / self.correlation_time)
         fresh = jnp.sqrt(-jnp.expm1(-2 * self.step / self.correlation_time))
         noise = jax.random.normal(key, (self.samples, 3), dtype=self.mean.dtype)
-        # Steps x -> kept x + news add up in any order, so that all of them take as long as a few.
+        # Steps x -> kept x + news are associative, so that a parallel scan computes them.
         news = (fresh * noise).at[0].set(noise[0])
         after = lambda first, second: (first[0] * second[0], first[1] * second[0] + second[1])
         return self.deviation * jax.lax.associative_scan(after, (jnp.full((self.samples, 1), kept), news))[1]
 
-    def at(self, path, t, place, calm: Load) -> Load:
+    def at(self, realization, t, pose, load: Load) -> Load:
         index = jnp.clip(t / self.step, 0.0, self.samples - 1.0)
         before = jnp.minimum(index.astype(int), self.samples - 2)
         share = index - before.astype(index.dtype)
-        change = path[before + 1] - path[before]
+        change = realization[before + 1] - realization[before]
         slope = jnp.where(t < self.step * (self.samples - 1), change / self.step, 0.0)
-        return with_water(calm, place, self.mean + path[before] + share * change, slope)
+        return with_water(load, pose, self.mean + realization[before] + share * change, slope)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         times = float(self.step) * np.arange(1, self.samples)
@@ -63,13 +63,13 @@ class GaussMarkovCurrent(AbstractDisturbance):
 def gauss_markov_current(
     mean=(0.3, 0.0, 0.0), deviation=(0.1, 0.1, 0.0), correlation_time=60.0, span: float = 600.0, step: float = 0.5
 ) -> GaussMarkovCurrent:
-    """Current that wanders about a mean, as in Fossen (2021), ch. 10.3; another one for every seed.
+    """Random current about a mean, as in Fossen (2021), ch. 10.3; different for every seed.
 
     Args:
         mean: m/s: north, east, down.
         deviation: standard deviation of each, m/s.
         correlation_time: s.
-        span: how long it wanders, s; then it stays.
+        span: duration of the process, s; the current is constant afterwards.
         step: time between samples, s.
     """
     checks.positive("step", step, "s")

@@ -1,16 +1,16 @@
-"""Calm water."""
+"""No disturbance."""
 
 from undertow.core.contracts import AbstractDisturbance, Load
 
 
 class NoDisturbance(AbstractDisturbance):
-    """Nothing at all."""
+    """Still water and no load."""
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        return calm
+    def at(self, realization, t, pose, load: Load) -> Load:
+        return load
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

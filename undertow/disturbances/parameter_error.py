@@ -1,4 +1,4 @@
-"""A vehicle that is not quite what its data sheet says."""
+"""Parameter errors of the nominal model: the true vehicle differs from it."""
 
 import jax
 import jax.numpy as jnp
@@ -7,16 +7,16 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractDisturbance, Factors, Load
+from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.disturbances.adding import with_factors
+from undertow.disturbances.adding import with_scaling
 
 _RANGES = ("mass", "damping", "restoring", "thrust")
 
 
 class ParameterError(AbstractDisturbance):
-    """Factors on M, D, g and thrust of the true vehicle, each drawn uniformly from a range; the model keeps 1.
+    """Factors on M, D, g and thrust of the true vehicle, each uniformly distributed in a range; the model keeps 1.
 
     Raises:
         BadInput: a range that is not low <= high, or a mass not positive.
@@ -36,25 +36,25 @@ class ParameterError(AbstractDisturbance):
                 raise BadInput(name, "be (lowest, highest)", np.asarray(span).tolist())
         checks.positive("mass", self.mass)
 
-    def draw(self, key) -> Factors:
+    def realize(self, key) -> ModelScaling:
         shares = jax.random.uniform(key, (4,), dtype=self.mass.dtype)
         low, high = jnp.stack([getattr(self, name) for name in _RANGES]).T
-        return Factors(*(low + shares * (high - low)))
+        return ModelScaling(*(low + shares * (high - low)))
 
-    def at(self, path: Factors, t, place, calm: Load) -> Load:
-        return with_factors(calm, place, path)
+    def at(self, realization: ModelScaling, t, pose, load: Load) -> Load:
+        return with_scaling(load, pose, realization)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()
 
 
 def parameter_error(mass=(0.9, 1.1), damping=(0.7, 1.3), restoring=(0.9, 1.1), thrust=(0.9, 1.1)) -> ParameterError:
-    """True vehicle that differs from the one the controller was told; another one for every seed.
+    """True vehicle that differs from the nominal model; different for every seed.
 
     Args:
         mass: lowest and highest factor on M (and C); equal for a fixed error.
         damping: likewise on D.
         restoring: likewise on g.
-        thrust: likewise on what every thruster gives.
+        thrust: likewise on the thrust of every thruster.
     """
     return ParameterError(mass, damping, restoring, thrust)

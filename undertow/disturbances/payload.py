@@ -15,7 +15,7 @@ from undertow.disturbances.adding import with_payload
 class PickedUp(AbstractDisturbance):
     """A point mass that is part of the vehicle from `start` to `stop`: its weight, its inertia, its moments.
 
-    It is taken up and left at the vehicle's velocity: no impulse.
+    It has the vehicle's velocity when it is picked up and put down, so there is no impulse.
 
     Raises:
         BadInput: mass negative, heavier in water than in air, or stop not after start.
@@ -40,12 +40,12 @@ class PickedUp(AbstractDisturbance):
             if not float(self.start) < float(self.stop):
                 raise BadInput("stop", f"be later than start ({float(self.start):g} s)", f"{float(self.stop):g} s")
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
+    def at(self, realization, t, pose, load: Load) -> Load:
         held = jnp.where((t >= self.start) & (t < self.stop), 1.0, 0.0)
-        return with_payload(calm, place, contracts.Payload(held * self.mass, held * self.weight, self.point))
+        return with_payload(load, pose, contracts.Payload(held * self.mass, held * self.weight, self.point))
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         times = np.array([float(self.start), float(self.stop)])

@@ -1,4 +1,4 @@
-"""Sinusoids and steps that are other ones for every seed: suite U1 by chance."""
+"""Random sinusoids and steps, different for every seed: a random counterpart of suite U1."""
 
 import equinox as eqx
 import jax
@@ -10,15 +10,16 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import param
+from undertow.numerics.random_keys import keys_for
 
 _SINUSOIDS = 3  # per axis
 
 
 class RandomSuite(AbstractDisturbance):
-    """On each axis three sinusoids of random frequency and phase, and levels of random size, each held for a while.
+    """On each axis three sinusoids of random frequency and phase, and random levels, each held for a time.
 
     Raises:
-        BadInput: a size negative, a frequency or `hold` not positive, or frequencies the wrong way round.
+        BadInput: a size negative, a frequency or `hold` not positive, or `fastest` below `slowest`.
     """
 
     amplitude: Float[Array, "..."] = param("m/s^2, rad/s^2", "rms of the sinusoids together")
@@ -36,22 +37,22 @@ class RandomSuite(AbstractDisturbance):
             checks.positive(name, getattr(self, name), "rad/s")
         checks.positive("hold", self.hold, "s")
 
-    def draw(self, key):
+    def realize(self, key):
         """Frequencies (rad/s, logarithmically uniform) and phases (rad) per axis, and levels (m/s^2, rad/s^2)."""
-        of_rates, of_phases, of_levels = jax.random.split(key, 3)
+        keys = keys_for(key, "rates", "phases", "levels")
         shape, dtype = (self.axes, _SINUSOIDS), self.slowest.dtype
-        octave = jax.random.uniform(of_rates, shape, dtype=dtype)
+        octave = jax.random.uniform(keys["rates"], shape, dtype=dtype)
         rates = self.slowest * (self.fastest / self.slowest) ** octave
-        phases = 2 * jnp.pi * jax.random.uniform(of_phases, shape, dtype=dtype)
-        return rates, phases, self.step * jax.random.normal(of_levels, (self.levels, self.axes), dtype=dtype)
+        phases = 2 * jnp.pi * jax.random.uniform(keys["phases"], shape, dtype=dtype)
+        return rates, phases, self.step * jax.random.normal(keys["levels"], (self.levels, self.axes), dtype=dtype)
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        if calm.acceleration.shape != (self.axes,):
-            raise BadInput("axes", f"be {calm.acceleration.shape[0]}, as the plant has", self.axes)
-        rates, phases, levels = path
+    def at(self, realization, t, pose, load: Load) -> Load:
+        if load.acceleration.shape != (self.axes,):
+            raise BadInput("axes", f"be {load.acceleration.shape[0]}, as the plant has", self.axes)
+        rates, phases, levels = realization
         swing = np.sqrt(2 / _SINUSOIDS) * jnp.sin(rates * t + phases).sum(-1)
         index = jnp.clip(jnp.floor(t / self.hold), 0, self.levels - 1).astype(int)
-        return calm._replace(acceleration=calm.acceleration + self.amplitude * swing + levels[index])
+        return load._replace(acceleration=load.acceleration + self.amplitude * swing + levels[index])
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         times = float(self.hold) * np.arange(1, self.levels)
@@ -67,15 +68,15 @@ def random_suite(
     span: float = 60.0,
     axes: int = 6,
 ) -> RandomSuite:
-    """Lumped accelerations that are large, sudden and fast, as suite U1, but other ones for every seed.
+    """Lumped accelerations that are large, sudden and fast, as suite U1, but different for every seed.
 
     Args:
         amplitude: rms of the three sinusoids of an axis together, m/s^2 and rad/s^2; one number or one per axis.
-        slowest: lowest frequency, rad/s; frequencies are drawn logarithmically uniform.
+        slowest: lowest frequency, rad/s; the logarithm of the frequency is uniformly distributed.
         fastest: highest frequency, rad/s.
         step: standard deviation of the levels, m/s^2 and rad/s^2; one number or one per axis.
         hold: time for which a level is held, s.
-        span: time after which the level stays, s.
+        span: time after which the level is constant, s.
         axes: number of outputs of the plant.
     """
     checks.positive("hold", hold, "s")

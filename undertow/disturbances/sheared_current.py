@@ -14,12 +14,12 @@ from undertow.disturbances.adding import body_of, with_water
 
 
 class ShearedCurrent(AbstractDisturbance):
-    """Horizontal velocities at some depths, linear in between, held above and below.
+    """Horizontal velocities at given depths, linear in between, constant above and below.
 
-    The water is taken as uniform over the vehicle, with the velocity at its origin.
+    The water is assumed uniform over the vehicle, with the velocity at its origin.
 
     Raises:
-        BadInput: depths that do not increase, or velocities that do not belong to them.
+        BadInput: depths that do not increase, or another number of velocities.
     """
 
     depths: Float[Array, " k"] = param("m", "depths, increasing")
@@ -37,13 +37,13 @@ class ShearedCurrent(AbstractDisturbance):
         if not isinstance(self.depths, Tracer) and not (np.diff(np.asarray(self.depths)) > 0).all():
             raise BadInput("depths", "increase", np.asarray(self.depths).tolist())
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        down = body_of(place).position[2]
+    def at(self, realization, t, pose, load: Load) -> Load:
+        down = body_of(pose).position[2]
         north, east = jax.vmap(jnp.interp, in_axes=(None, None, 1))(down, self.depths, self.velocities)
-        return with_water(calm, place, jnp.stack([north, east, jnp.zeros_like(north)]), jnp.zeros(3))
+        return with_water(load, pose, jnp.stack([north, east, jnp.zeros_like(north)]), jnp.zeros(3))
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

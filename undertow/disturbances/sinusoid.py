@@ -1,4 +1,4 @@
-"""A constant plus a sinusoid on every axis: the probe for frequency and amplitude."""
+"""A constant plus a sinusoid on every axis, to test frequency and amplitude."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -15,12 +15,12 @@ class Sinusoid(AbstractDisturbance):
     offset: Float[Array, "..."] = param("m/s^2, rad/s^2", "constant part")
     phase: Float[Array, "..."] = param("rad", "phase at t = 0")
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
+    def at(self, realization, t, pose, load: Load) -> Load:
         signal = self.offset + self.amplitude * jnp.sin(self.frequency * t + self.phase)
-        return calm._replace(acceleration=calm.acceleration + signal)
+        return load._replace(acceleration=load.acceleration + signal)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

@@ -13,7 +13,7 @@ from undertow.core.param import param
 
 
 class Table(AbstractDisturbance):
-    """Samples of the lumped acceleration, linear in between, held before the first and after the last.
+    """Samples of the lumped acceleration, linear in between, constant before the first and after the last.
 
     Raises:
         BadInput: fewer than two samples, not finite, or times that do not increase.
@@ -31,16 +31,16 @@ class Table(AbstractDisturbance):
             if not (steps > 0).all():
                 raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        axes = calm.acceleration.shape[0]
+    def at(self, realization, t, pose, load: Load) -> Load:
+        axes = load.acceleration.shape[0]
         if self.samples.shape[1] != 1 + axes:
             raise BadInput("samples", f"have columns t, d1..d{axes}", f"a table of {self.samples.shape[1]} columns")
         times, values = self.samples[:, 0], self.samples[:, 1:]
         signal = jax.vmap(jnp.interp, in_axes=(None, None, 1))(t, times, values)
-        return calm._replace(acceleration=calm.acceleration + signal)
+        return load._replace(acceleration=load.acceleration + signal)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

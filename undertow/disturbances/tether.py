@@ -1,4 +1,4 @@
-"""A cable to the surface: slack, or pulling like a spring."""
+"""A cable to a fixed point: slack, or elastic under tension."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -7,7 +7,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.param import param
 from undertow.disturbances.adding import body_of, with_force
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 
 _TINY = 1e-9  # m
 
@@ -15,14 +15,14 @@ _TINY = 1e-9  # m
 class Tether(AbstractDisturbance):
     """Straight elastic cable from a fixed point to the vehicle, with the drag of half its length on the vehicle.
 
-    Its inertia, weight and catenary are left out; the drag takes the water at rest.
+    Its inertia, weight and catenary are neglected; its drag assumes water at rest.
 
     Raises:
         BadInput: length or stiffness not positive, drag negative.
     """
 
     anchor: Float[Array, "3"] = param("m", "fixed end, world axes")
-    point: Float[Array, "3"] = param("m", "where it holds the vehicle, body axes")
+    point: Float[Array, "3"] = param("m", "attachment on the vehicle, body axes")
     length: Float[Array, ""] = param("m", "length without load", symbol="l_0")
     stiffness: Float[Array, ""] = param("N/m", "tension per extension", symbol="k")
     drag: Float[Array, ""] = param("N s^2/m^3", "drag per length and speed squared, rho C_d d / 2")
@@ -35,18 +35,18 @@ class Tether(AbstractDisturbance):
         checks.positive("stiffness", self.stiffness, "N/m")
         checks.not_negative("drag", self.drag, "N s^2/m^3")
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        body = body_of(place)
+    def at(self, realization, t, pose, load: Load) -> Load:
+        body = body_of(pose)
         span = self.anchor - body.position - matvec(body.rotation, self.point)
         distance = jnp.sqrt((span**2).sum() + _TINY**2)
         tension = self.stiffness * jnp.maximum(distance - self.length, 0.0)
         speed = jnp.sqrt((body.velocity**2).sum() + _TINY**2)
         hanging = jnp.minimum(distance, self.length)
         force = tension * span / distance - 0.5 * self.drag * hanging * speed * body.velocity
-        return with_force(calm, place, force, self.point)
+        return with_force(load, pose, force, self.point)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()
@@ -57,8 +57,8 @@ def tether(anchor=(0.0, 0.0, -5.0), point=(0.0, 0.0, 0.0), length=20.0, stiffnes
 
     Args:
         anchor: fixed end, m: north, east, down.
-        point: where it holds the vehicle, m: forward, starboard, down.
-        length: without load, m.
+        point: attachment on the vehicle, m: forward, starboard, down.
+        length: length without load, m.
         stiffness: N of tension per m of extension.
         drag: N per m of cable and (m/s)^2; 4 for a cable of 7.6 mm with C_d 1.03.
     """

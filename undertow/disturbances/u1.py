@@ -1,4 +1,4 @@
-"""Suite U1: large, sudden, fast; one signal per axis, as the paper's Fig. 7 describes them. U2 repeats it."""
+"""Suite U1: large, sudden and fast; one signal per axis, after the paper's Fig. 7. U2 repeats it."""
 
 import math
 
@@ -12,7 +12,7 @@ from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 
-# Arguments of the seven sines, rate t + sweep t^2 (rad/s, rad/s^2): one vector, so that they cost little more than one.
+# Arguments of the seven sines, rate t + sweep t^2 (rad/s, rad/s^2): one vector, which costs little more than one sine.
 _RATES = np.array([1.0, 2.0, 20.0, 0.5, np.pi / 2, 3.0, 0.0])
 _SWEEPS = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25])
 
@@ -21,13 +21,13 @@ class SuiteU1(AbstractDisturbance):
     """Six lumped accelerations: steps on a swell, high frequency, square wave, pulse, ramp and reset, chirp."""
 
     scale: Float[Array, ""] = param("", "factor on all six", default=1.0)
-    period: float = eqx.field(static=True, default=math.inf)  # s, after which it begins again
+    period: float = eqx.field(static=True, default=math.inf)  # s, after which it repeats
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        if calm.acceleration.shape != (6,):
+    def at(self, realization, t, pose, load: Load) -> Load:
+        if load.acceleration.shape != (6,):
             raise BadInput("disturbance", "fit the plant", "u1, which has 6 axes", hint="Use kind: table")
         if self.period < math.inf:
             t = t - self.period * jnp.floor(t / self.period)
@@ -42,7 +42,7 @@ class SuiteU1(AbstractDisturbance):
                 2 * chirp,
             ]
         )
-        return calm._replace(acceleration=calm.acceleration + self.scale * signals)
+        return load._replace(acceleration=load.acceleration + self.scale * signals)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         once = min(duration, self.period)

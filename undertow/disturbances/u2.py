@@ -1,8 +1,8 @@
-"""Suite U2: U1 again and again, for long runs."""
+"""Suite U2: U1 repeated, for long runs."""
 
 from undertow.disturbances.u1 import SuiteU1
 
-_PERIOD = 20.0  # s, for which U1 is made: its chirp sweeps on for ever
+_PERIOD = 20.0  # s, the duration for which U1 is made: its chirp never stops sweeping
 
 
 def u2(scale: float = 1.0) -> SuiteU1:

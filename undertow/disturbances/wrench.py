@@ -10,20 +10,20 @@ from undertow.core.param import param
 
 
 class ConstantWrench(AbstractDisturbance):
-    """On the left side of Eq. (2), so a positive force opposes motion ahead."""
+    """w_d is on the left side of Eq. (2), so a positive surge force opposes forward motion."""
 
     value: Float[Array, " n"] = param("N, N m", "force and moment", symbol="w_d")
 
     def __check_init__(self):
         checks.finite("value", self.value)
 
-    def draw(self, key) -> tuple[()]:
+    def realize(self, key) -> tuple[()]:
         return ()
 
-    def at(self, path, t, place, calm: Load) -> Load:
-        if np.shape(self.value) != calm.wrench.shape:
-            raise BadInput("value", f"have {calm.wrench.shape[0]} entries", f"of shape {np.shape(self.value)}")
-        return calm._replace(wrench=calm.wrench + self.value)
+    def at(self, realization, t, pose, load: Load) -> Load:
+        if np.shape(self.value) != load.wrench.shape:
+            raise BadInput("value", f"have {load.wrench.shape[0]} entries", f"of shape {np.shape(self.value)}")
+        return load._replace(wrench=load.wrench + self.value)
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()

@@ -1,1 +1,1 @@
-"""Loops: sampled (a scan) and continuous (one ODE), and what they record."""
+"""Closed loops: sampled (a scan) and continuous (one ODE), and their recording."""

@@ -1,82 +1,63 @@
-"""The five roles around one loop, and what is written down about an instant."""
+"""The closed loop of plant, controller, reference, disturbance and navigation, and its signals at an instant."""
 
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
+from jaxtyping import Array, Int, PRNGKeyArray, PyTree
 
 from undertow.core.arrays import as_array
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
+    AbstractInformedNavigation,
+    AbstractNavigation,
     AbstractPlant,
     AbstractReference,
-    AbstractSensor,
     Inputs,
     Load,
     Measurement,
     Outputs,
     Target,
-    Telemetry,
     Time,
+    known_acceleration,
+    starting_at,
 )
+from undertow.core.errors import BadInput
+from undertow.core.measurement import completed
+from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
+from undertow.loop.recorded_signals import RECORDED, Signals
+from undertow.numerics.random_keys import keys_for
 
 
-class Sample(NamedTuple):
-    """Everything worth keeping of one instant; names as they stand in result files."""
+class MeasurementState(NamedTuple):
+    """State of measuring."""
 
-    position: Outputs
-    velocity: Outputs
-    measured_position: Outputs  # what the controller was told
-    measured_velocity: Outputs
-    target: Outputs
-    error: Outputs
-    uncertainty: Outputs  # d = x_ddot - F - G V, measured, never assumed; holds Delta of Eq. (3) and all else
-    estimate: Outputs
-    robust: Outputs
-    modelling_error: Outputs
-    predicted_position: Outputs
-    predicted_velocity: Outputs
-    weights: Float[Array, "n rules"]  # theta
-    weights_peak: Float[Array, ""]  # max |theta|
-    voltage: Inputs  # applied
-    command: Inputs  # asked for
-    power: Inputs
-    saturated: Inputs
-    bad_readings: Int[Array, ""]  # so far
-    books: dict[str, Array]  # what this plant alone has to tell, by name
-
-
-class Heard(NamedTuple):
-    """What is remembered of measurements."""
-
-    sensor: PyTree  # state of the sensor
-    expected: Expected | None  # None for a smooth sensor, whose readings are numbers wherever the truth is
+    navigation: PyTree  # its state
+    expected: Expected | None  # None for smooth navigation, whose readings are finite where the truth is
 
 
 class Decision(NamedTuple):
-    """What the controller makes of an instant."""
+    """Measurement, target and input of the controller at an instant."""
 
     y: Measurement
     r: Target
     command: Inputs
     applied: Inputs
-    telemetry: Telemetry
-    heard: Any  # Heard afterwards; () where nothing is remembered
+    signals: Signals  # that the controller declares
+    measuring: Any  # MeasurementState afterwards; () where there is none
 
 
 class ClosedLoop(eqx.Module):
-    """Plant, controller, reference, disturbance and sensor, ready to be run by either loop."""
+    """Plant, controller, reference, disturbance and navigation, ready to be run by either loop."""
 
     plant: AbstractPlant
     controller: AbstractController
     reference: AbstractReference
     disturbance: AbstractDisturbance
-    sensor: AbstractSensor
+    navigation: AbstractNavigation
 
     def outputs_at_start(self, position: Any, velocity: Any) -> tuple[Outputs, Outputs]:
         """Outputs at t = 0 as arrays, zero where None: one compiled program serves every start."""
@@ -84,101 +65,120 @@ class ClosedLoop(eqx.Module):
         made = lambda given: as_array(zero if given is None else given)
         return made(position), made(velocity)
 
-    def beginning_at(self, position: Any) -> "ClosedLoop":
+    def starting_at(self, position: Any) -> "ClosedLoop":
         """This loop with its reference beginning where the plant does; at zero where None."""
         start, _ = self.outputs_at_start(position, None)
-        reference = self.reference.beginning_at(start)
-        return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.sensor)
+        reference = starting_at(self.reference, start)
+        return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.navigation)
 
-    def draw(self, key: PRNGKeyArray) -> "Drawn":
-        """Draw everything random once."""
-        of_disturbance, of_sensor = jax.random.split(key)
-        return Drawn(self, self.disturbance.draw(of_disturbance), self.sensor.draw(of_sensor))
+    def signals(self) -> dict[str, Signal]:
+        """Declarations of everything that is recorded of this loop, by name.
+
+        Raises:
+            BadInput: two parts declare a signal of the same name.
+        """
+        found = dict(RECORDED)
+        for part in (self.plant, self.controller):
+            for name, signal in part.signals().items():
+                if name in found:
+                    raise BadInput(name, "be the name of one signal only", f"declared again by {type(part).__name__}")
+                found[name] = signal
+        return found
+
+    def realize(self, key: PRNGKeyArray) -> "Realization":
+        """Sample everything random once."""
+        keys = keys_for(key, "disturbance", "navigation")
+        disturbance = self.disturbance.realize(keys["disturbance"])
+        return Realization(self, disturbance, self.navigation.realize(keys["navigation"]))
 
 
-class Drawn(NamedTuple):
-    """A closed loop whose random parts have been drawn: from here on everything is a function of time."""
+class Realization(NamedTuple):
+    """A closed loop whose random parts have been sampled: everything else is a function of time."""
 
     loop: ClosedLoop
-    disturbance_path: PyTree
-    sensor_path: PyTree
+    disturbance_realization: PyTree
+    navigation_realization: PyTree
 
     def start(self, position: Outputs | None = None, velocity: Outputs | None = None) -> tuple[PyTree, PyTree]:
         """States of plant and controller at t = 0, from the outputs there."""
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
-        y, _ = self._read(zero, self.loop.plant.output(zero, x), self.listen(x))
+        y, _ = self._read(zero, self.loop.plant.output(zero, x), self.initial_measuring(x))
         return x, self.loop.controller.init(y, self.loop.reference.at(zero))
 
-    def listen(self, x: PyTree) -> Heard:
-        """What is remembered of measurements at t = 0."""
-        zero, sensor = jnp.zeros(()), self.loop.sensor
+    def initial_measuring(self, x: PyTree) -> MeasurementState:
+        """State of measuring at t = 0."""
+        zero, navigation = jnp.zeros(()), self.loop.navigation
         truth = self.loop.plant.output(zero, x)
-        state = sensor.init(self.sensor_path, truth)
-        if sensor.smooth is True:  # traced in a part whose field is not static; guarded then
-            return Heard(state, None)
-        y, _ = sensor.measure(self.sensor_path, state, zero, truth)
-        return Heard(state, at_start(self.loop.controller.model, truth, y))
+        state = navigation.init(self.navigation_realization, truth)
+        if navigation.smooth is True:  # where the field is not static it is traced, and treated as False
+            return MeasurementState(state, None)
+        y, _ = navigation.measure(self.navigation_realization, state, zero, truth)
+        return MeasurementState(state, at_start(self.loop.controller.model.coordinates, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
-        """What the surroundings do to the plant at time t."""
+        """Load of the environment on the plant at time t."""
         plant = self.loop.plant
-        return self.loop.disturbance.at(self.disturbance_path, t, plant.place(x), plant.no_load())
+        return self.loop.disturbance.at(self.disturbance_realization, t, plant.pose(x), plant.no_load())
 
-    def decide(self, t: Time, x: PyTree, z: PyTree, heard: Any = ()) -> Decision:
-        """Measure, compare, command, limit; `heard` of a sensor with a memory, and where readings may be no numbers."""
-        y, heard = self._read(t, self.loop.plant.output(t, x), heard)
+    def decide(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Decision:
+        """Measure, compute the command and limit it; `measuring` is that of the previous step."""
+        y, measuring = self._read(t, self.loop.plant.output(t, x), measuring)
         r = self.loop.reference.at(t)
-        command, telemetry = self.loop.controller.command(z, y, r)
-        return Decision(y, r, command, self.loop.plant.admissible(x, command), telemetry, heard)
+        command, signals = self.loop.controller.command(z, y, r)
+        return Decision(y, r, command, self.loop.plant.admissible(x, command), signals, measuring)
 
-    def _read(self, t: Time, truth: Measurement, heard: Any) -> tuple[Measurement, Any]:
-        """What the law is given, and what is remembered afterwards."""
-        measure = self.loop.sensor.measure
-        if not isinstance(heard, Heard):
-            return measure(self.sensor_path, heard, t, truth)
-        y, state = measure(self.sensor_path, heard.sensor, t, truth)
-        if heard.expected is None:
-            return y, Heard(state, None)
-        y, expected = heard.expected.repaired(self.loop.controller.model, y)
-        return y, Heard(state, expected)
+    def _read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
+        """Measurement for the law, and the state of measuring afterwards."""
 
-    def sample(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Sample:
-        """What is written down about time t. Errors are those of the truth, not of the measurement."""
+        def measure(realization, state, t, truth):
+            y, state = self.loop.navigation.measure(realization, state, t, truth)
+            return completed(y, truth), state
+
+        if not isinstance(measuring, MeasurementState):
+            return measure(self.navigation_realization, measuring, t, truth)
+        y, state = measure(self.navigation_realization, measuring.navigation, t, truth)
+        if measuring.expected is None:
+            return y, MeasurementState(state, None)
+        y, expected = measuring.expected.repaired(self.loop.controller.model.coordinates, y)
+        return y, MeasurementState(state, expected)
+
+    def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
+        """All recorded signals of time t. Errors are those of the true state, not of the measurement."""
         plant, controller = self.loop.plant, self.loop.controller
         truth = plant.output(t, x)
-        y, r, command, applied, telemetry, heard = decision
+        y, r, command, applied, of_controller, measuring = decision
         acceleration = plant.acceleration(t, x, applied, self.load(t, x))
         effort = plant.effort(x, applied)
-        return Sample(
-            position=truth.position,
-            velocity=truth.velocity,
-            measured_position=y.position,
-            measured_velocity=y.velocity,
-            target=r.position,
-            error=controller.model.difference(r.position, truth.position),
-            uncertainty=controller.model.seen(truth, acceleration) - controller.known(z, truth, applied),
-            estimate=telemetry.estimate,
-            robust=telemetry.robust,
-            modelling_error=telemetry.modelling_error,
-            predicted_position=telemetry.predicted_position,
-            predicted_velocity=telemetry.predicted_velocity,
-            weights=telemetry.weights,
-            weights_peak=jnp.abs(telemetry.weights).max(initial=0.0),
-            voltage=applied,
-            command=command,
-            power=effort.power,
-            saturated=effort.saturated,
-            bad_readings=self._bad_readings(heard),
-            books=plant.books(x, applied) | (telemetry.books or {}),
-        )
+        of_plant = plant.diagnostics(x, applied)
+        check_declared(plant, of_plant)
+        check_declared(controller, of_controller)
+        recorded = {
+            "position": truth.position,
+            "velocity": truth.velocity,
+            "measured_position": y.position,
+            "measured_velocity": y.velocity,
+            "reference": r.position,
+            "error": controller.model.coordinates.difference(r.position, truth.position),
+            "uncertainty": controller.model.coordinates.acceleration(truth, acceleration)
+            - known_acceleration(controller, z, truth, applied),
+            "input": applied,
+            "commanded_input": command,
+            "power": effort.power,
+            "saturated": effort.saturated,
+            "bad_readings": self._bad_readings(measuring),
+        }
+        return recorded | of_plant | of_controller
 
-    def _bad_readings(self, heard: Any) -> Int[Array, ""]:
-        """Readings so far that were no numbers: left out by the sensor, or replaced for the law."""
-        if not isinstance(heard, Heard) or heard.expected is None:
+    def _bad_readings(self, measuring: Any) -> Int[Array, ""]:
+        """Number of readings so far that were not finite: ignored by the navigation, or replaced for the law."""
+        if not isinstance(measuring, MeasurementState) or measuring.expected is None:
             return jnp.zeros((), dtype=int)
-        return heard.expected.replaced + self.loop.sensor.ignored(heard.sensor)
+        navigation, replaced = self.loop.navigation, measuring.expected.replaced
+        if not isinstance(navigation, AbstractInformedNavigation):
+            return replaced
+        return replaced + navigation.ignored(measuring.navigation)
 
-    def look(self, t: Time, x: PyTree, z: PyTree, heard: Any = ()) -> Sample:
-        """`sample` of the decision taken at time t."""
-        return self.sample(t, x, z, self.decide(t, x, z, heard))
+    def record(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Signals:
+        """Signals of the decision taken at time t."""
+        return self.signals(t, x, z, self.decide(t, x, z, measuring))

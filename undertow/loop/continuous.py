@@ -1,21 +1,54 @@
-"""The continuous loop: plant and law as one ODE, the paper's own setting."""
+"""The continuous loop: plant and law as one ODE, as in the paper."""
 
 import math
 from typing import Any, cast
 
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.errors import BadInput
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.one_ode import blamed, flow
-from undertow.loop.outcome import Outcome, going
-from undertow.loop.recording import instant, keep_sound, record
+from undertow.core.status import Status
+from undertow.loop.closed_loop import ClosedLoop, Realization
+from undertow.loop.outcome import Ending, Outcome, going, status_of
+from undertow.loop.readings import all_finite
+from undertow.loop.recording import freeze_on_failure, instant, record
 from undertow.numerics.integrators import rk4_compact
+
+
+@jax.jit  # traced once, although an integrator calls it in several places
+def flow(t: Float[Array, ""], state: tuple[PyTree, PyTree], realization: Realization) -> tuple[PyTree, PyTree]:
+    """Rates of plant state x and controller state z at time t; NaN where the command is not finite."""
+    x, z = state
+    controller = cast(AbstractContinuousController, realization.loop.controller)
+    decision = realization.decide(t, x, z)
+    x_rate = realization.loop.plant.dynamics(t, x, decision.applied, realization.load(t, x))
+    commanded = jnp.isfinite(decision.command).all()  # limits and dead zones would hide a NaN
+    x_rate = jax.tree.map(lambda rate: jnp.where(commanded, rate, jnp.nan), x_rate)
+    return x_rate, controller.flow(z, decision.y, decision.r, decision.applied)
+
+
+def blamed(
+    ending: Ending, realization: Realization, t: Float[Array, ""], state: tuple[PyTree, PyTree], dt: Any
+) -> Ending:
+    """The ending of a run that stopped with some states at `t` (s); it names a command that is its cause.
+
+    The command is evaluated at the stages of the Runge-Kutta step of dt (s) that failed: start, middle and end.
+    """
+    rate = flow(t, state, realization)
+    for share in (0.0, 0.5, 1.0):
+        there = t + share * dt
+        ahead = jax.tree.map(lambda now, change, share=share: now + share * dt * change, state, rate)
+        at = ahead if share else state
+        blame = ending.blamed(realization.decide(there, *at).command, there)
+        # A state that a load made non-finite makes every command non-finite.
+        ending = Ending(*(jnp.where(all_finite(at), new, old) for new, old in zip(blame, ending, strict=True)))
+    return ending
 
 
 def simulate(
@@ -32,7 +65,7 @@ def simulate(
     """Integrate plant and law together.
 
     Args:
-        loop: the five roles; the controller must be written in continuous time.
+        loop: closed loop; the controller must be written in continuous time.
         duration: s; with fixed steps rounded to whole ones.
         record_step: time between records, s; with fixed steps a multiple of dt.
         key: for everything random; None for key 0.
@@ -41,21 +74,21 @@ def simulate(
         tolerances: relative and absolute, for adaptive steps that meet every jump, instead of fixed ones.
 
     Returns:
-        Outcome; records after a failure repeat the last sound state.
+        Outcome; records after a failure repeat the last valid state.
 
     Raises:
         BadInput: duration, record_step or dt not positive, or as `check`.
     """
     check(loop)
-    loop = loop.beginning_at(position)
-    # As many records as fit; what a division of whole multiples leaves over does not count.
+    loop = loop.starting_at(position)
+    # As many records as fit; the rounding error of dividing whole multiples does not count.
     records = math.floor(duration / record_step * (1 + 1e-9)) if 0 < duration < math.inf and record_step > 0 else 0
     if records < 1:
         raise BadInput("duration", f"be at least one record ({record_step:g} s)", f"{duration:g} s")
     key = jax.random.PRNGKey(0) if key is None else key
     start = loop.outputs_at_start(position, velocity)
     if tolerances is not None:
-        from undertow.loop.adaptive import solve
+        from undertow.loop.continuous import solve
 
         times = jnp.asarray(np.arange(records + 1) * record_step, dtype=float)
         until = jnp.maximum(times[-1], duration)
@@ -69,14 +102,14 @@ def simulate(
 
 
 def check(loop: ClosedLoop) -> None:
-    """Whether a closed loop can be one ODE.
+    """Check that a closed loop can be one ODE.
 
     Raises:
-        BadInput: a law that exists only sampled, or a sensor that is not smooth.
+        BadInput: the law exists only sampled, or the navigation is not smooth.
     """
     for obstacle, what in (
         (not isinstance(loop.controller, AbstractContinuousController), "controller, which exists only sampled"),
-        (not loop.sensor.smooth, "sensor, whose noise is new at every sample"),
+        (not loop.navigation.smooth, "navigation, whose noise is new at every sample"),
     ):
         if obstacle:
             raise BadInput("kind", f"be sampled with this {what}", "continuous")
@@ -84,15 +117,62 @@ def check(loop: ClosedLoop) -> None:
 
 @eqx.filter_jit
 def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, int]) -> Outcome:
-    ticks, every = plan
-    drawn, controller = loop.draw(key), cast(AbstractContinuousController, loop.controller)
+    steps, every = plan
+    realization, controller = loop.realize(key), cast(AbstractContinuousController, loop.controller)
 
-    def tick(carry, k):
+    def control_step(carry, k):
         state, ending = carry
         t = instant(k, dt)
-        x, z = rk4_compact(lambda s, state: flow(s, state, drawn), t, state, dt)
-        return keep_sound(loop, state, (x, controller.project(z)), ending, t, dt)
+        x, z = rk4_compact(lambda s, state: flow(s, state, realization), t, state, dt)
+        return freeze_on_failure(loop, state, (x, controller.project(z)), ending, t, dt)
 
-    (final, ending), (time, samples) = record(drawn, tick, (drawn.start(*start), going()), dt, ticks, every)
-    ending = blamed(ending, drawn, ending.time - dt, final, dt)  # where the step that failed began
-    return Outcome(time, samples, (), final, *ending.until(instant(ticks, dt)))
+    (final, ending), (time, samples) = record(
+        realization, control_step, (realization.start(*start), going()), dt, steps, every
+    )
+    ending = blamed(ending, realization, ending.time - dt, final, dt)  # start of the step that failed
+    return Outcome(time, samples, (), final, *ending.until(instant(steps, dt)))
+
+
+_MAX_STEPS = 2**20
+_FIRST_STEP = 1e-4  # s; the integrator adapts it
+
+
+@eqx.filter_jit
+def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
+    """Integrate from `start` to `until` (s) with records at `times` (s); arguments as in `continuous.simulate`."""
+    realization = loop.realize(key)
+    # One flat vector, so that the integrator's arithmetic is compiled once, not once per leaf of the state.
+    flat, unravel = ravel_pytree(realization.start(*start))
+
+    def flat_flow(t, flat, realization):
+        return ravel_pytree(flow(t, unravel(flat), realization))[0]
+
+    def is_not_finite(t, y, args, **_):
+        return status_of(args.loop, *unravel(y)) != int(Status.OK)
+
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(flat_flow),
+        diffrax.Tsit5(),
+        t0=0.0,
+        t1=until,
+        dt0=_FIRST_STEP,
+        y0=flat,
+        args=realization,
+        saveat=diffrax.SaveAt(subs=(diffrax.SubSaveAt(ts=times), diffrax.SubSaveAt(t1=True))),
+        stepsize_controller=diffrax.ClipStepSizeController(diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=jumps),
+        event=diffrax.Event(is_not_finite),
+        max_steps=_MAX_STEPS,
+        throw=False,
+    )
+    (states, final), (_, ended) = cast(tuple[Any, Any], solution.ys), cast(tuple[Any, Any], solution.ts)
+    code = status_of(loop, *unravel(final[0]))
+    out_of_steps = (solution.result != diffrax.RESULTS.successful) & (code == int(Status.OK))
+    status = jnp.where(out_of_steps, int(Status.STEPS_EXHAUSTED), code)
+    last = jnp.maximum(jnp.isfinite(states).all(axis=1).sum() - 1, 0)  # unsaved records are infinite
+    index = jnp.minimum(jnp.arange(times.shape[0]), last)
+    samples = jax.lax.map(lambda at: realization.record(at[0], *unravel(at[1])), (times[index], states[index]))
+    valid = jnp.where(status == int(Status.OK), final[0], states[last])
+    ending = blamed(
+        going()._replace(status=status, time=ended[0]), realization, ended[0], unravel(final[0]), _FIRST_STEP
+    )
+    return Outcome(times, samples, (), unravel(valid), *ending)

@@ -1,4 +1,4 @@
-"""What a loop hands back, and how failure travels through compiled code."""
+"""Result of a loop, and how compiled code reports failure."""
 
 from typing import Any, NamedTuple
 
@@ -7,23 +7,24 @@ from jaxtyping import Array, Float, Int, PyTree
 
 from undertow.core.contracts import Inputs
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop, Sample
-from undertow.loop.readings import all_sound
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.readings import all_finite
+from undertow.loop.recorded_signals import Signals
 
 
 class Ending(NamedTuple):
-    """How and when a run ended; it goes on while the status is OK."""
+    """How and when a run ended; it continues while the status is OK."""
 
     status: Int[Array, ""]  # a Status code
     time: Float[Array, ""]  # s; when it failed
-    input: Int[Array, ""]  # number, from 1, of the first input that was commanded to be no number; 0 for none
+    input: Int[Array, ""]  # number, from 1, of the first commanded input that is not finite; 0 for none
 
     def until(self, end: Any) -> "Ending":
-        """That of a run that was to last until `end` (s)."""
+        """The ending with time `end` (s) if the run has not failed."""
         return self._replace(time=jnp.where(self.status == int(Status.OK), end, self.time))
 
     def blamed(self, command: Inputs, t: Any) -> "Ending":
-        """With the cause named if the run failed at `t` (s) by a command that is no number."""
+        """The ending with the cause if the run failed at `t` (s) by a command that is not finite."""
         failed = (self.status == int(Status.NOT_FINITE)) | (self.status == int(Status.STEPS_EXHAUSTED))
         wrong = wrong_input(command)
         by_command = Ending(jnp.asarray(int(Status.COMMAND_NOT_FINITE)), jnp.asarray(t, dtype=float), wrong)
@@ -31,39 +32,39 @@ class Ending(NamedTuple):
 
 
 def going() -> Ending:
-    """Of a run that begins."""
+    """Ending of a run that begins."""
     return Ending(jnp.asarray(int(Status.OK)), jnp.zeros(()), jnp.zeros((), dtype=int))
 
 
 class Outcome(NamedTuple):
-    """One run: what was recorded, what was accumulated, how it ended."""
+    """One run: recorded signals, accumulated statistics and ending."""
 
     time: Float[Array, " records"]  # s
-    samples: Sample  # one entry per record, the end included
+    signals: Signals  # one entry per record, the end included
     accumulated: Any  # final states of the accumulators
     final: Any  # states (x, z) of plant and controller at the end
     status: Int[Array, ""]  # a Status code
     ended: Float[Array, ""]  # s; when it failed, else the duration
-    input: Int[Array, ""]  # number, from 1, of the first input that was commanded to be no number; 0 for none
+    input: Int[Array, ""]  # number, from 1, of the first commanded input that is not finite; 0 for none
 
     def sentence(self) -> str:
-        """How the run ended, for people."""
+        """How the run ended, in a sentence."""
         status, said = Status(int(self.status)), ""
         if status is Status.COMMAND_NOT_FINITE:
             said = f" It is input {int(self.input)}, at {float(self.ended):.6g} s."
         return status.sentence + said
 
 
-def health(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
-    """Status code of an instant; what the controller's model can bear is no failure."""
-    code = loop.plant.health(x)
-    for borne in loop.controller.model.bears():
-        code = jnp.where(code == int(borne), int(Status.OK), code)
-    return jnp.where(all_sound((x, z)), code, int(Status.NOT_FINITE))
+def status_of(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:
+    """Status code of an instant; a status that the coordinates of the controller's model tolerate is no failure."""
+    code = loop.plant.status(x)
+    for tolerated in loop.controller.model.coordinates.tolerated_status:
+        code = jnp.where(code == int(tolerated), int(Status.OK), code)
+    return jnp.where(all_finite((x, z)), code, int(Status.NOT_FINITE))
 
 
 def wrong_input(command: Inputs) -> Int[Array, ""]:
-    """Number, from 1, of the first input that is no number; 0 for none."""
+    """Number, from 1, of the first input that is not finite; 0 for none."""
     numbers = jnp.arange(1, command.shape[0] + 1)
     first = jnp.where(jnp.isfinite(command), command.shape[0] + 1, numbers).min()
     return jnp.where(first > command.shape[0], 0, first)

@@ -1,4 +1,4 @@
-"""Readings that are no numbers: the law goes on with what it has reason to expect in their place."""
+"""Readings that are not finite: the law gets expected values in their place."""
 
 from typing import Any, NamedTuple
 
@@ -6,50 +6,68 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Int
 
-from undertow.core.contracts import AbstractController, AbstractModel, Inputs, Measurement, Outputs, Telemetry, Time
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractCoordinates,
+    Inputs,
+    Measurement,
+    Outputs,
+    Time,
+    known_acceleration,
+)
+from undertow.core.measurement import with_outputs
 
 
-def sound(numbers: Array) -> Bool[Array, "..."]:
-    """Which numbers have a square, as laws and metrics need it; a filter may grow for long before it overflows."""
+def is_finite(numbers: Array) -> Bool[Array, "..."]:
+    """Which numbers have a finite square, which laws and metrics need."""
     if not jnp.issubdtype(numbers.dtype, jnp.floating):
         return jnp.isfinite(numbers)
     return jnp.abs(numbers) < jnp.sqrt(jnp.finfo(numbers.dtype).max)
 
 
-def all_sound(tree: Any) -> Bool[Array, ""]:
-    """Whether all numbers of a tree are sound."""
-    return jnp.stack([sound(leaf).all() for leaf in jax.tree.leaves(tree)]).all()
+def all_finite(tree: Any) -> Bool[Array, ""]:
+    """Whether all numbers of a tree pass `is_finite`."""
+    return jnp.stack([is_finite(leaf).all() for leaf in jax.tree.leaves(tree)]).all()
 
 
 class Expected(NamedTuple):
-    """What the next measurement should be, by the law's own knowledge: x_ddot = F + G u + d_hat.
+    """Expected next measurement, by the law's own model: x_ddot = F + G u + d_hat.
 
-    A law that gets this in place of a reading neither learns from it nor forgets: its identification model, which goes
-    on by the same equation, departs from it by no more than from the last reading.
+    A law that gets this in place of a reading does not adapt to it: its identification model follows the same
+    equation, so that its error stays that of the last reading.
     """
 
     position: Outputs  # m, rad
     rates: Outputs  # in the coordinates of the model, m/s, rad/s
     actuator: Any  # as reported last
-    replaced: Int[Array, ""]  # readings so far of which something was replaced
+    replaced: Int[Array, ""]  # readings so far with a replaced entry
 
-    def repaired(self, model: AbstractModel, y: Measurement) -> tuple[Measurement, "Expected"]:
-        """The measurement, each entry that is no number replaced by what is expected of it; and the count."""
-        known = Measurement(self.position, self.rates, self.actuator)
-        known = known._replace(velocity=model.outward(known, self.rates))
-        whole = jax.tree.map(lambda read, own: jnp.where(sound(read), read, own), y, known)
-        return whole, self._replace(replaced=self.replaced + jnp.where(all_sound(y), 0, 1))
+    def repaired(self, coordinates: AbstractCoordinates, y: Measurement) -> tuple[Measurement, "Expected"]:
+        """Measurement with expected values in place of entries that are not finite, and the state with the count."""
+        own = lambda read, expected: jnp.where(is_finite(read), read, expected)
+        actuator = jax.tree.map(own, y.actuator, self.actuator)
+
+        def repaired():
+            still = coordinates.measurement(self.position, jnp.zeros_like(self.position))
+            velocity = coordinates.output_velocity(still, self.rates)
+            outputs = own(y.position, self.position), own(y.velocity, velocity)
+            return with_outputs(y, *outputs)._replace(actuator=actuator)
+
+        finite = all_finite((y.position, y.velocity))
+        whole = jax.lax.cond(finite, lambda: y._replace(actuator=actuator), repaired)
+        return whole, self._replace(replaced=self.replaced + jnp.where(all_finite(y), 0, 1))
 
     def after(
-        self, law: AbstractController, z: Any, y: Measurement, telemetry: Telemetry, applied: Inputs, dt: Time
+        self, law: AbstractController, z: Any, y: Measurement, estimate: Outputs | None, applied: Inputs, dt: Time
     ) -> "Expected":
-        """A sampling time later, with an input applied."""
-        acceleration = law.known(z, y, applied) + telemetry.estimate
-        rates = law.model.rates(y) + dt * acceleration
+        """One sampling time later, with an input applied; `estimate` is d_hat of a law that has one."""
+        known = known_acceleration(law, z, y, applied)
+        acceleration = known if estimate is None else known + estimate
+        rates = law.model.coordinates.velocity(y) + dt * acceleration
         return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)
 
 
-def at_start(model: AbstractModel, truth: Measurement, y: Measurement) -> Expected:
-    """Before the first reading `y` the law knows where it was put: the truth, and actuators at rest unless reported."""
-    actuator = jax.tree.map(lambda read: jnp.where(sound(read), read, jnp.zeros_like(read)), y.actuator)
-    return Expected(truth.position, model.rates(truth), actuator, jnp.zeros((), dtype=int))
+def at_start(coordinates: AbstractCoordinates, truth: Measurement, y: Measurement) -> Expected:
+    """Expected value of the first reading `y`: the true state, and actuators at rest unless reported."""
+    actuator = jax.tree.map(lambda read: jnp.where(is_finite(read), read, jnp.zeros_like(read)), y.actuator)
+    return Expected(truth.position, coordinates.velocity(truth), actuator, jnp.zeros((), dtype=int))

@@ -1,4 +1,4 @@
-"""Ticking and recording: what the fixed-step loops have in common."""
+"""Control steps and recording, which the fixed-step loops have in common."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,34 +9,40 @@ from jaxtyping import Array, Float, Int
 
 from undertow.core.contracts import Inputs
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
-from undertow.loop.outcome import Ending, health, wrong_input
+from undertow.loop.closed_loop import ClosedLoop, Realization
+from undertow.loop.outcome import Ending, status_of, wrong_input
+from undertow.loop.recorded_signals import Signals
 
 
 def record(
-    drawn: Drawn, tick: Callable[[Any, Int[Array, ""]], Any], carry: Any, dt: Float[Array, ""], ticks: int, every: int
-) -> tuple[Any, tuple[Float[Array, " records"], Sample]]:
-    """Run `ticks` ticks and look at every `every`-th instant, the first included.
+    realization: Realization,
+    control_step: Callable[[Any, Int[Array, ""]], Any],
+    carry: Any,
+    dt: Float[Array, ""],
+    steps: int,
+    every: int,
+) -> tuple[Any, tuple[Float[Array, " records"], Signals]]:
+    """Run `steps` steps and record every `every`-th instant, the first included.
 
     Args:
-        drawn: what is run.
-        tick: carry and number of the tick -> carry one tick later.
-        carry: what goes from tick to tick; the states (x, z, ...) first.
-        dt: time between ticks, s.
-        ticks: how many.
-        every: ticks per record.
+        realization: closed loop to run.
+        control_step: carry and number k of the control step -> carry one step later.
+        carry: carried between control steps; the states (x, z, ...) first.
+        dt: time between steps, s.
+        steps: how many.
+        every: steps per record.
     """
 
     def block(carry, first):
-        """Record, then run to the next record, or to the end."""
-        t, until = instant(first, dt), jnp.minimum(first + every, ticks)
-        sample = drawn.look(t, *carry[0])
-        return jax.lax.fori_loop(first, until, lambda k, c: tick(c, k), carry), (t, sample)
+        """Record, then run to the next record or to the end."""
+        t, until = instant(first, dt), jnp.minimum(first + every, steps)
+        sample = realization.record(t, *carry[0])
+        return jax.lax.fori_loop(first, until, lambda k, c: control_step(c, k), carry), (t, sample)
 
-    return jax.lax.scan(block, carry, jnp.arange(0, ticks + 1, every))
+    return jax.lax.scan(block, carry, jnp.arange(0, steps + 1, every))
 
 
-def keep_sound(
+def freeze_on_failure(
     loop: ClosedLoop,
     old: Any,
     new: Any,
@@ -45,26 +51,26 @@ def keep_sound(
     dt: Float[Array, ""],
     command: Inputs | None = None,
 ) -> tuple[Any, Ending]:
-    """States (x, z, ...) after a tick from t to t + dt: the new ones, or for ever the old ones once something is wrong.
+    """States (x, z, ...) at t + dt: the new ones, or the last valid ones after a failure.
 
     Args:
-        loop: the five roles.
+        loop: closed loop.
         old, new: states before and after.
         ending: of the run so far.
         t, dt: s.
-        command: of the tick, where a command that is no number ends the run.
+        command: of the control step, where a command that is not finite ends the run.
     """
-    code, time, wrong = health(loop, *new[:2]), t + dt, jnp.zeros((), dtype=int)
+    code, time, wrong = status_of(loop, *new[:2]), t + dt, jnp.zeros((), dtype=int)
     if command is not None:
         wrong = wrong_input(command)
         code = jnp.where(wrong > 0, int(Status.COMMAND_NOT_FINITE), code)
         time = jnp.where(wrong > 0, t, time)
     failing = (ending.status == int(Status.OK)) & (code != int(Status.OK))
     ending = Ending(*(jnp.where(failing, now, was) for now, was in zip((code, time, wrong), ending, strict=True)))
-    sound = ending.status == int(Status.OK)
-    return jax.tree.map(lambda n, o: jnp.where(sound, n, o), new, old), ending
+    valid = ending.status == int(Status.OK)
+    return jax.tree.map(lambda n, o: jnp.where(valid, n, o), new, old), ending
 
 
-def instant(tick: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:
-    """Time of a tick, s."""
-    return jnp.asarray(tick, dtype=float) * dt
+def instant(control_step: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:
+    """Time of a control step, s."""
+    return jnp.asarray(control_step, dtype=float) * dt

@@ -1,4 +1,4 @@
-"""The sampled loop: the controller at its own rate, the plant in between, compiled as one scan."""
+"""The sampled loop: controller steps with the plant integrated between them, compiled as one scan."""
 
 import abc
 from functools import partial
@@ -11,21 +11,22 @@ from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
-from undertow.loop.closed_loop import ClosedLoop, Drawn, Sample
+from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.outcome import Outcome, going
-from undertow.loop.recording import instant, keep_sound, record
+from undertow.loop.recorded_signals import Signals
+from undertow.loop.recording import freeze_on_failure, instant, record
 from undertow.numerics.integrators import METHODS
 
 
 class AbstractAccumulator(eqx.Module):
-    """Statistics gathered inside the loop, so that a long run need not keep its series."""
+    """Statistics accumulated inside the loop, so that a long run need not keep its series."""
 
     @abc.abstractmethod
-    def init(self, sample: Sample) -> PyTree:
-        """State before the first sample; `sample` gives the shapes."""
+    def init(self, signals: Signals) -> PyTree:
+        """State before the first sample; `signals` gives the shapes."""
 
     @abc.abstractmethod
-    def update(self, state: PyTree, t: Float[Array, ""], sample: Sample) -> PyTree:
+    def update(self, state: PyTree, t: Float[Array, ""], signals: Signals) -> PyTree:
         """State with one more sample."""
 
 
@@ -45,86 +46,86 @@ def simulate(
     """Run a closed loop with the input held over each sampling time.
 
     Args:
-        loop: the five roles.
-        duration: s; rounded to whole ticks.
+        loop: closed loop.
+        duration: s; rounded to whole steps.
         dt: sampling time of the controller, s.
         key: for everything random; None for key 0.
         position, velocity: outputs at t = 0; None for zero.
-        record_every: ticks per record; 0 keeps no series, only what is accumulated.
-        accumulators: statistics over every tick.
-        method, substeps: integration of the plant within one tick, rk4 or euler.
+        record_every: steps per record; 0 keeps only accumulated statistics, no series.
+        accumulators: statistics over every control step.
+        method, substeps: integration of the plant within one control step, rk4 or euler.
 
     Returns:
-        Outcome. A failed run keeps its last sound state; nothing is raised.
+        Outcome. A failed run keeps its last valid state; nothing is raised.
 
     Raises:
         BadInput: duration or dt not positive, or duration shorter than one record.
     """
-    ticks, loop = ticks_of(duration, dt, record_every), loop.beginning_at(position)
+    steps, loop = steps_of(duration, dt, record_every), loop.starting_at(position)
     key = jax.random.PRNGKey(0) if key is None else key
     start = loop.outputs_at_start(position, velocity)
-    plan = (ticks, record_every, method, substeps)
+    plan = (steps, record_every, method, substeps)
     return _run(loop, key, start, jnp.asarray(dt, dtype=float), accumulators, plan)
 
 
-def ticks_of(duration: float, dt: float, record_every: int) -> int:
-    """Ticks of a run; for arguments and errors see `simulate`."""
+def steps_of(duration: float, dt: float, record_every: int) -> int:
+    """Number of control steps of a run; for arguments and errors see `simulate`."""
     if not (0 < dt < float("inf")):
         raise BadInput("dt", "be positive", f"{dt:g} s")
-    ticks = round(duration / dt) if 0 < duration < float("inf") else 0
-    if ticks < max(1, record_every):
+    steps = round(duration / dt) if 0 < duration < float("inf") else 0
+    if steps < max(1, record_every):
         raise BadInput("duration", f"be at least one record ({max(1, record_every) * dt:g} s)", f"{duration:g} s")
-    return ticks
+    return steps
 
 
 @eqx.filter_jit
 def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) -> Outcome:
-    ticks, record_every, method, substeps = plan
-    drawn = loop.draw(key)
-    carry = begin(drawn, start, accumulators)
-    one = partial(tick, drawn, accumulators, dt, METHODS[method], substeps)
+    steps, record_every, method, substeps = plan
+    realization = loop.realize(key)
+    carry = begin(realization, start, accumulators)
+    one = partial(control_step, realization, accumulators, dt, METHODS[method], substeps)
     if record_every == 0:
-        carry = jax.lax.fori_loop(0, ticks, lambda k, c: one(c, k), carry)
-        blank = jax.eval_shape(drawn.look, dt, *carry[0])
+        carry = jax.lax.fori_loop(0, steps, lambda k, c: one(c, k), carry)
+        blank = jax.eval_shape(realization.record, dt, *carry[0])
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
     else:
-        carry, (time, samples) = record(drawn, one, carry, dt, ticks, record_every)
+        carry, (time, samples) = record(realization, one, carry, dt, steps, record_every)
     final, gathered, ending = carry
-    return Outcome(time, samples, gathered, final[:2], *ending.until(ticks * dt))
+    return Outcome(time, samples, gathered, final[:2], *ending.until(steps * dt))
 
 
-def begin(drawn: Drawn, start: tuple[Outputs, Outputs], accumulators) -> PyTree:
-    """What goes from tick to tick, as it is before the first one."""
-    x, z = drawn.start(*start)
-    states = (x, z, drawn.listen(x))
-    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(drawn.look, jnp.zeros(()), *states))
+def begin(realization: Realization, start: tuple[Outputs, Outputs], accumulators) -> PyTree:
+    """Carry before the first control step."""
+    x, z = realization.start(*start)
+    states = (x, z, realization.initial_measuring(x))
+    blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(realization.record, jnp.zeros(()), *states))
     gathered = tuple(a.init(blank) for a in accumulators)
     return (states, gathered, going())
 
 
-def tick(drawn: Drawn, accumulators, dt, step, substeps: int, carry, k):
-    """Command, move the plant with the input held, then let the controller learn from what was applied."""
-    (x, z, heard), gathered, ending = carry
-    loop, t = drawn.loop, instant(k, dt)
-    decision = drawn.decide(t, x, z, heard)
+def control_step(realization: Realization, accumulators, dt, integrate, substeps: int, carry, k):
+    """Command, integrate the plant with the input held, then advance the controller with the applied input."""
+    (x, z, measuring), gathered, ending = carry
+    loop, t = realization.loop, instant(k, dt)
+    decision = realization.decide(t, x, z, measuring)
     if accumulators:
-        sample = drawn.sample(t, x, z, decision)
-        gathered = tuple(a.update(g, t, sample) for a, g in zip(accumulators, gathered, strict=True))
-    motion, h = partial(_motion, drawn, decision.applied), dt / substeps
+        signals = realization.signals(t, x, z, decision)
+        gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
+    motion, h = partial(_motion, realization, decision.applied), dt / substeps
     if substeps == 1:
-        new_x = step(motion, t, x, h)
+        new_x = integrate(motion, t, x, h)
     else:
-        new_x = jax.lax.fori_loop(0, substeps, lambda i, x: step(motion, t + instant(i, h), x, h), x)
+        new_x = jax.lax.fori_loop(0, substeps, lambda i, x: integrate(motion, t + instant(i, h), x, h), x)
     y, law = decision.y, loop.controller
     new_z = law.advance(z, y, decision.r, decision.applied, dt)
-    remembered = decision.heard
+    remembered = decision.measuring
     if remembered.expected is not None:
-        expected = remembered.expected.after(law, z, y, decision.telemetry, decision.applied, dt)
+        expected = remembered.expected.after(law, z, y, decision.signals.get("estimate"), decision.applied, dt)
         remembered = remembered._replace(expected=expected)
     new = (new_x, new_z, remembered)
-    state, ending = keep_sound(loop, (x, z, heard), new, ending, t, dt, decision.command)
+    state, ending = freeze_on_failure(loop, (x, z, measuring), new, ending, t, dt, decision.command)
     return state, gathered, ending
 
 
-def _motion(drawn: Drawn, applied, t, x):
-    return drawn.loop.plant.dynamics(t, x, applied, drawn.load(t, x))
+def _motion(realization: Realization, applied, t, x):
+    return realization.loop.plant.dynamics(t, x, applied, realization.load(t, x))

@@ -1,1 +1,1 @@
-"""Rotations, integrators, inverses, Lyapunov, smoothing: mathematics without vehicles."""
+"""Mathematics without vehicles: rotations, integrators, inverses, Lyapunov equations, smoothing."""

@@ -1,4 +1,4 @@
-"""The smallest value of a strictly convex quadratic inside a box, by an exact active set.
+"""Strictly convex quadratic programme with bounds, by an exact active-set method.
 
 Small enough for a control loop (about ten variables): every step solves one symmetric system by elimination
 without pivots, written as rank-one updates, so that nothing leaves the compiled loop.
@@ -10,14 +10,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from undertow.numerics.elimination import inverse_symmetric, solve_symmetric
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import inverse_symmetric, matvec, solve_symmetric
 
 Vector = Float[Array, " n"]
 
-# Steps per variable before it is left as it is: feasible, but not yet the best. Random problems take 1 to 2.
+# Most steps per variable; the result is feasible even then, but not optimal. Random problems take 1 to 2.
 _STEPS = 4
-_SLIGHT = 1e-12  # of the size of the gradient: a multiplier of the wrong sign by less than this is rounding
+_SLIGHT = 1e-12  # of the gradient's norm: a multiplier of the wrong sign below this is rounding
 
 
 class _Search(NamedTuple):
@@ -31,7 +30,7 @@ class _Search(NamedTuple):
 def box_minimum(matrix: Float[Array, "n n"], linear: Vector, low: Vector, high: Vector) -> Vector:
     """x between low and high with the smallest x^T H x / 2 - c^T x. Nocedal and Wright (2006), section 16.5.
 
-    It may be differentiated: variables at a bound move with it, the others by the linear system that they solve.
+    Differentiable: variables at a bound follow the bound, the others the linear system that they solve.
 
     Args:
         matrix: H, symmetric, positive definite.
@@ -60,12 +59,12 @@ def _derivative(primals, tangents):
 
 
 def _among(free: Bool[Array, " n"], matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
-    """The matrix of the free variables, in a system that leaves the others alone."""
+    """Matrix of the free variables; the identity for the others."""
     return jnp.where(free[:, None] & free, matrix, jnp.eye(matrix.shape[0]))
 
 
 def _step(matrix, linear, low, high, search: _Search) -> _Search:
-    """To the minimum over the free variables, or as far as the first bound; then the worst bound is let go."""
+    """Step to the minimum over the free variables or to the first bound; at a minimum, release the worst bound."""
     x, free, step, _ = search
     held = jnp.where(free, 0.0, x)
     target = jnp.where(
@@ -79,6 +78,6 @@ def _step(matrix, linear, low, high, search: _Search) -> _Search:
     x = jnp.clip(x, low, high)
     gradient = matvec(matrix, x) - linear
     pull = jnp.where(x >= high, gradient, jnp.where(x <= low, -gradient, 0.0))
-    pull = jnp.where(free | (low >= high), 0.0, pull)  # how much a bound holds back
+    pull = jnp.where(free | (low >= high), 0.0, pull)  # multiplier of each active bound
     worst = (jnp.arange(x.shape[0]) == pull.argmax()) & (pull.max() > _SLIGHT * jnp.abs(linear).max())
     return _Search(x, (free & ~hit) | (worst & reached), step + 1, reached & ~worst.any())

@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
-# Stage times are drawn into the step by this share of it. A disturbance or reference that jumps exactly at a
-# step boundary is then seen from the inside on both sides, and the jump is met instead of smeared.
+# Stage times are moved into the step by this share of it. A disturbance or reference that jumps exactly at a
+# step boundary is then evaluated on the inner side in both steps, and the jump is not smeared.
 _INWARD = 1e-9
 
 Field = Callable[[Array, PyTree], PyTree]
@@ -28,7 +28,7 @@ def rk4(field: Field, t: Float[Array, ""], y: PyTree, dt: Float[Array, ""]) -> P
 
 
 def rk4_compact(field: Field, t: Float[Array, ""], y: PyTree, dt: Float[Array, ""]) -> PyTree:
-    """Same step as `rk4` with its stages in a loop: compiled four times as fast, runs a little slower."""
+    """The step of `rk4` with its stages in a loop: it compiles four times as fast and runs slightly slower."""
 
     def stage(carry, row):
         slope, change = carry

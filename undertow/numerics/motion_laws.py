@@ -1,4 +1,4 @@
-"""Motion laws: how far along a path one is at a time, and exact rates of a motion.
+"""Motion laws: distance along a path as a function of time, and exact derivatives of a motion.
 
 Source: Biagiotti and Melchiorri (2008), "Trajectory Planning for Automatic Machines and Robots", ch. 2 and 3.
 """
@@ -14,7 +14,7 @@ Curve = Callable[[Array], Array]
 
 
 def quintic(x: Float[Array, "..."]) -> Float[Array, "..."]:
-    """From 0 at x = 0 to 1 at x = 1, held outside; no velocity or acceleration at either end, so C2 everywhere."""
+    """From 0 at x = 0 to 1 at x = 1, constant outside; zero velocity and acceleration at both ends, so C2."""
     x = jnp.clip(x, 0.0, 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
@@ -26,10 +26,10 @@ def rounded_ramp(t: Scalar, height: Scalar, slope: Scalar, rounding: Scalar) -> 
     shorter than its corners the slope stays below `slope`.
 
     Args:
-        t: time, or whatever the ramp is a function of.
-        height: what is reached.
+        t: time, or another argument of the ramp.
+        height: final value.
         slope: slope in the middle.
-        rounding: t that a corner takes.
+        rounding: length of a corner, in the unit of t.
     """
     apart = height / slope  # between the corners
 

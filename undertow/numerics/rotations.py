@@ -1,4 +1,4 @@
-"""Attitude: quaternions inside, Euler angles at the border.
+"""Attitude: quaternions for computation, Euler angles for input and output.
 
 Convention of Fossen (2021), "Handbook of Marine Craft Hydrodynamics and Motion Control", ch. 2: body axes
 x forward, y starboard, z down; world axes north, east, down; Euler angles (roll, pitch, yaw) in the order
@@ -13,14 +13,14 @@ Vector6 = Float[Array, "6"]
 Matrix3 = Float[Array, "3 3"]
 Quaternion = Float[Array, "4"]
 
-# Permutation symbol: (a x b)_i = e_ijk a_j b_k. As one product it stays one operation for the compiler.
+# Permutation symbol: (a x b)_i = e_ijk a_j b_k. One product is one operation for the compiler.
 _LEVI_CIVITA = (
     ((0, 0, 0), (0, 0, 1), (0, -1, 0)),
     ((0, 0, -1), (0, 0, 0), (1, 0, 0)),
     ((0, 1, 0), (-1, 0, 0), (0, 0, 0)),
 )
 
-# cos(pitch) is kept from vanishing by this much, so that a body passing through the vertical stays finite.
+# Smallest magnitude of cos(pitch), so that a body passing through the vertical stays finite.
 _SMALLEST_COSINE = 1e-12
 
 
@@ -61,15 +61,23 @@ def euler_rate_matrix(angles: Vector3) -> Matrix3:
 
 def quaternion_from_euler(angles: Vector3) -> Quaternion:
     """Unit quaternion of (roll, pitch, yaw)."""
-    (sr, sp, sy), (cr, cp, cy) = jnp.sin(angles / 2), jnp.cos(angles / 2)
-    return jnp.stack(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
+    return _quaternion_from_halves(jnp.sin(angles / 2), jnp.cos(angles / 2))
+
+
+def turning_from_euler(angles: Vector3, rates: Vector3, accelerations: Vector3) -> tuple[Quaternion, Vector3, Vector3]:
+    """Attitude, body rates (rad/s) and their time derivative of a motion in (roll, pitch, yaw), at any pitch.
+
+    Body rates are T^-1 times the rates of the angles. T^-1 has no singularity, and T is not formed.
+    """
+    sines, cosines = jnp.sin(angles / 2), jnp.cos(angles / 2)
+    (sr, sp, _), (cr, cp, _) = 2 * sines * cosines, cosines**2 - sines**2
+    roll_rate, pitch_rate, yaw_rate = rates
+    to_body = lambda roll, pitch, yaw: (roll - sp * yaw, cr * pitch + cp * sr * yaw, cp * cr * yaw - sr * pitch)
+    p, q, r = to_body(*rates)
+    p_dot, q_dot, r_dot = to_body(*accelerations)
+    both = pitch_rate * yaw_rate
+    turning = (p_dot - cp * both, q_dot + roll_rate * r - sp * sr * both, r_dot - roll_rate * q - sp * cr * both)
+    return _quaternion_from_halves(sines, cosines), jnp.stack([p, q, r]), jnp.stack(turning)
 
 
 def rotation_from_quaternion(q: Quaternion) -> Matrix3:
@@ -87,9 +95,9 @@ def euler_from_rotation(rotation: Matrix3) -> Vector3:
 
 
 def quaternion_rate(q: Quaternion, omega: Vector3) -> Quaternion:
-    """Time derivative of q at body rates omega (rad/s), with a pull back to unit length.
+    """Time derivative of q at body rates omega (rad/s), with a correction towards unit length.
 
-    The pull (one per second) vanishes on the unit sphere; it keeps the length from drifting over hours.
+    The correction (rate 1/s) vanishes at unit length; it prevents a drift of the length over hours.
     """
     w, x, y, z = q
     p, r, s = omega
@@ -98,9 +106,9 @@ def quaternion_rate(q: Quaternion, omega: Vector3) -> Quaternion:
 
 
 def attitude_error(target: Quaternion, actual: Quaternion) -> Vector3:
-    """Rotation vector part sign(q0) 2 q_v of actual -> target, in body axes, the short way round.
+    """Attitude error sign(q0) 2 q_v of the rotation actual -> target, at most half a turn, in body axes.
 
-    Both signs of either quaternion give the same answer: no unwinding.
+    Both signs of either quaternion give the same result, so there is no unwinding.
     """
     w0, v0 = actual[0], actual[1:]
     w1, v1 = target[0], target[1:]
@@ -110,10 +118,9 @@ def attitude_error(target: Quaternion, actual: Quaternion) -> Vector3:
 
 
 class Kinematics:
-    """Jacobian J of Eq. (1), eta_dot = J nu, and its relatives, without ever forming a 6 x 6 matrix.
+    """Jacobian J of Eq. (1), eta_dot = J nu, its inverse and its rate, without forming a 6 x 6 matrix.
 
-    Made from the rotation alone: the third row of R is (-sin pitch, cos pitch sin roll, cos pitch cos roll),
-    so neither sines nor cosines are needed.
+    Only the rotation is needed: its third row is (-sin pitch, cos pitch sin roll, cos pitch cos roll).
 
     Args:
         rotation: body -> world, shape (3, 3).
@@ -158,7 +165,7 @@ class Kinematics:
         )
 
     def rate_term(self, nu: Vector6) -> Vector6:
-        """J_dot nu (m/s^2, rad/s^2): the part of Eq. (4) that Remark 2 calls unknown. It is pure kinematics."""
+        """J_dot nu (m/s^2, rad/s^2): the term of Eq. (4) that Remark 2 calls unknown. It is known kinematics."""
         velocity, omega = nu[:3], nu[3:]
         across = self.sin_roll * omega[1] + self.cos_roll * omega[2]
         pitch_rate = self.cos_roll * omega[1] - self.sin_roll * omega[2]
@@ -195,5 +202,18 @@ def _rotation_from_quaternion_parts(w: Array, x: Array, y: Array, z: Array) -> M
             jnp.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]),
             jnp.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]),
             jnp.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]),
+        ]
+    )
+
+
+def _quaternion_from_halves(sines: Vector3, cosines: Vector3) -> Quaternion:
+    """From sines and cosines of half of (roll, pitch, yaw)."""
+    (sr, sp, sy), (cr, cp, cy) = sines, cosines
+    return jnp.stack(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
         ]
     )

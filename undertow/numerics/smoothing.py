@@ -1,4 +1,4 @@
-"""The switching function of the robust terms, sharp or smooth (Remark 5)."""
+"""The switching function of the robust terms, discontinuous or smooth (Remark 5)."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float

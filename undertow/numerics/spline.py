@@ -1,4 +1,4 @@
-"""The cubic spline through given points that starts and ends at rest.
+"""Cubic spline through given points that starts and ends at rest.
 
 Source: de Boor (2001), "A Practical Guide to Splines", rev. ed., ch. IV, complete cubic spline interpolation: the
 slopes at the points solve a tridiagonal system; between two points the curve is the cubic Hermite polynomial.
@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 
 def clamped_slopes(knots: Float[np.ndarray, " k"], values: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k n"]:
-    """Slopes at the knots, zero at both ends, that make the second derivative continuous. Not for compiled code.
+    """Slopes at the knots, zero at both ends, that make the second derivative continuous; computed with NumPy.
 
     Args:
         knots: increasing.
@@ -33,10 +33,10 @@ def clamped_slopes(knots: Float[np.ndarray, " k"], values: Float[np.ndarray, "k 
 def spline(
     t: Float[Array, ""], knots: Float[Array, " k"], values: Float[Array, "k n"], slopes: Float[Array, "k n"]
 ) -> tuple[Float[Array, " n"], Float[Array, " n"], Float[Array, " n"]]:
-    """Value, first and second derivative at t; held before the first knot and after the last.
+    """Value, first and second derivative at t; constant before the first knot and after the last.
 
     Args:
-        t: where.
+        t: argument.
         knots: increasing.
         values: one row per knot.
         slopes: first derivatives, one row per knot.

@@ -1,4 +1,4 @@
-"""n independent axes x_ddot = u + d: the plant on which the theory of the law can be read off."""
+"""n independent axes x_ddot = u + d: the simplest plant, on which the theory of the law is exact."""
 
 from typing import NamedTuple
 
@@ -7,10 +7,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.drive import DirectDrive
+from undertow.core.actuator_model import DirectActuator
+from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
+from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import param
 from undertow.core.status import Status
+from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero
 
 _ENVELOPE = 1e6
 
@@ -22,27 +24,21 @@ class AxisState(NamedTuple):
     velocity: Float[Array, " n"]
 
 
-class DoubleIntegratorModel(AbstractModel):
+class UnitMasses(AbstractDynamics):
     """F = 0, G = I."""
-
-    actuator: DirectDrive
-    angles: tuple[bool, ...] = eqx.field(static=True)
-
-    def drive(self) -> DirectDrive:
-        return self.actuator
 
     def drift(self, y: Measurement):
         return jnp.zeros_like(y.position)
 
     def gain(self, y: Measurement):
-        return jnp.eye(len(self.angles))
+        return jnp.eye(y.position.shape[0])
 
     def invert(self, y: Measurement, acceleration):
         return acceleration
 
 
-class DoubleIntegrator(AbstractPlant):
-    """Unit masses on rails, pushed by accelerations; optionally limited to +-limit m/s^2."""
+class DoubleIntegrator(AbstractMechanism):
+    """Unit masses on independent axes; inputs are accelerations, optionally limited to +-limit m/s^2."""
 
     limit: Float[Array, ""] = param("m/s^2", "largest input")
     outputs: tuple[str, ...] = eqx.field(static=True)
@@ -53,8 +49,8 @@ class DoubleIntegrator(AbstractPlant):
         checks.not_negative("limit", self.limit, finite=False)
 
     def initial_state(self, position=None, velocity=None) -> AxisState:
-        zero = jnp.zeros(self.inputs())
-        return AxisState(zero if position is None else position, zero if velocity is None else velocity)
+        n = len(self.outputs)
+        return AxisState(given_or_zero(position, n), given_or_zero(velocity, n))
 
     def dynamics(self, t, x: AxisState, u, d: Load) -> AxisState:
         return AxisState(x.velocity, self.acceleration(t, x, u, d))
@@ -65,30 +61,20 @@ class DoubleIntegrator(AbstractPlant):
     def acceleration(self, t, x: AxisState, u, d: Load):
         return u + d.acceleration - d.wrench
 
-    def place(self, x: AxisState) -> None:
-        return None
+    def limits(self):
+        return both_ways(self.limit, len(self.outputs))
 
-    def admissible(self, x: AxisState, u):
-        return jnp.clip(u, -self.limit, self.limit)
+    def power(self, x: AxisState, u):
+        return u * x.velocity
 
-    def effort(self, x: AxisState, u) -> Effort:
-        return Effort(power=u * x.velocity, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
-
-    def inputs(self) -> int:
-        return len(self.outputs)
-
-    def health(self, x: AxisState) -> Array:
+    def status(self, x: AxisState) -> Array:
         far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
-    def advice(self) -> tuple[str, ...]:
-        return ()
-
-    def model(self) -> DoubleIntegratorModel:
+    def model(self) -> Model:
         """The exact model."""
-        return DoubleIntegratorModel(
-            actuator=DirectDrive(low=-self.limit, high=self.limit), angles=(False,) * self.inputs()
-        )
+        coordinates = OutputCoordinates(angles=(False,) * len(self.outputs))
+        return Model(UnitMasses(), coordinates, DirectActuator(1.0, *self.limits()))
 
 
 def double_integrator(axes: int = 1, limit: float = float(jnp.inf)) -> DoubleIntegrator:

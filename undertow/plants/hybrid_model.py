@@ -1,21 +1,93 @@
-"""What a controller may know of a vehicle with thrusters: F and G of Eq. (17), and how to invert G."""
+"""Nominal model of a vehicle with thrusters: F, G and the inverse of G, Eq. (17)."""
+
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractModel, Measurement
-from undertow.numerics.inverses import partial_inverse, pseudo_inverse, regularised_sharp
-from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import kinematics_from_euler
-from undertow.plants.body_model import BodyModel
+from undertow.core.contracts import AbstractCoordinates, AbstractDynamics, Measurement, Model, Target, TrackingError
+from undertow.core.coordinates import AbstractOutputCoordinates
+from undertow.core.measurement import body_of, measurement_of_outputs
+from undertow.core.status import Status
+from undertow.numerics.linear_algebra import matvec, partial_inverse, pseudo_inverse, regularised_sharp
+from undertow.numerics.rotations import (
+    Kinematics,
+    attitude_error,
+    cross,
+    rotation_from_quaternion,
+    turning_from_euler,
+)
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.body import Body
 
+Vector6 = Float[Array, "6"]
 
-class HybridModel(AbstractModel):
-    """x_ddot = F + G V + d, Eq. (17), in Euler angles; valid for |pitch| < 90 deg."""
+EULER_ANGLES = (False, False, False, True, True, True)
+
+
+class BodyDynamics(AbstractDynamics):
+    """nu_dot = F + M^-1 B f + d with f the thrusts, N: section X5 of the theory. J and J_dot do not appear."""
+
+    body: Body
+    acceleration_per_thrust: Float[Array, "6 N"]  # M^-1 B
+    allocation: Float[Array, "N 6"]  # inverse of M^-1 B; accelerations that the thrusters cannot give are ignored
+
+    def drift(self, y: Measurement) -> Vector6:
+        own = body_of(y)
+        return self.body.free_acceleration(own.nu, own.rotation[2])
+
+    def gain(self, y: Measurement) -> Float[Array, "6 N"]:
+        return self.acceleration_per_thrust
+
+    def invert(self, y: Measurement, acceleration: Vector6) -> Float[Array, " N"]:
+        return matvec(self.allocation, acceleration)
+
+
+class BodyCoordinates(AbstractCoordinates):
+    """Errors in body axes: position (m), attitude as a rotation vector (rad) of at most half a turn; velocity nu."""
+
+    angles: tuple[bool, ...] = eqx.field(static=True, default=EULER_ANGLES)
+    tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=(Status.PITCH_SINGULAR,))
+
+    def measurement(self, position: Vector6, velocity: Vector6, actuator: Any = None) -> Measurement:
+        return measurement_of_outputs(position, velocity, actuator)
+
+    def tracking_error(self, y: Measurement, r: Target) -> TrackingError:
+        """Target relative to the vehicle in body axes: error, velocity and the time derivative of the velocity."""
+        own = body_of(y)
+        to_body = own.rotation.T
+        attitude, rate, turning = turning_from_euler(r.position[3:], r.velocity[3:], r.acceleration[3:])
+        between = to_body @ rotation_from_quaternion(attitude)
+        rate, turning = matvec(between, rate), matvec(between, turning)
+        velocity = matvec(to_body, r.velocity[:3])
+        acceleration = matvec(to_body, r.acceleration[:3]) - cross(own.nu[3:], velocity)
+        there = matvec(to_body, r.position[:3] - y.position[:3])
+        return TrackingError(
+            error=jnp.concatenate([there, attitude_error(attitude, own.attitude)]),
+            rate=jnp.concatenate([velocity, rate]) - own.nu,
+            acceleration=jnp.concatenate([acceleration, turning - cross(own.nu[3:], rate)]),
+        )
+
+    def velocity(self, y: Measurement) -> Vector6:
+        return body_of(y).nu
+
+    def acceleration(self, y: Measurement, acceleration: Vector6) -> Vector6:
+        """nu_dot that belongs to an acceleration of the outputs."""
+        own = body_of(y)
+        kinematics = Kinematics(own.rotation)
+        return kinematics.to_body(acceleration - kinematics.rate_term(own.nu))
+
+    def output_velocity(self, y: Measurement, velocity: Vector6) -> Vector6:
+        return Kinematics(body_of(y).rotation).to_world(velocity)
+
+    def in_body_axes(self, dynamics: AbstractDynamics) -> None:
+        return None
+
+
+class HybridDynamics(AbstractDynamics):
+    """x_ddot = F + G V + d, Eq. (17), in Euler angles; valid for |pitch| < 90 deg. The forces f are voltages."""
 
     body: Body
     thruster: AbstractThruster
@@ -26,12 +98,11 @@ class HybridModel(AbstractModel):
     rank: int = eqx.field(static=True)
     speed_sensor: bool = eqx.field(static=True)
     rate_term: bool = eqx.field(static=True)
-    angles: tuple[bool, ...] = eqx.field(static=True, default=(False, False, False, True, True, True))
 
     def drift(self, y: Measurement) -> Float[Array, "6"]:
         """F of Eq. (17): J M^-1 (-C nu - D nu - g), with J M^-1 B phi if speeds are measured."""
-        kinematics = kinematics_from_euler(y.position[3:])
-        nu = kinematics.to_body(y.velocity)
+        moving = body_of(y)
+        kinematics, nu = Kinematics(moving.rotation), moving.nu
         own = self.body.free_acceleration(nu, kinematics.rotation[2])
         if self.speed_sensor:
             phi = self.thruster.speed_term(y.actuator)
@@ -42,29 +113,38 @@ class HybridModel(AbstractModel):
 
     def gain(self, y: Measurement) -> Float[Array, "6 N"]:
         """G = J M^-1 B alpha of Eq. (17); equal to M_J^-1 J^-T B alpha."""
-        return jax.vmap(kinematics_from_euler(y.position[3:]).to_world, in_axes=1, out_axes=1)(self.body_gain)
+        return jax.vmap(Kinematics(body_of(y).rotation).to_world, in_axes=1, out_axes=1)(self.body_gain)
 
     def invert(self, y: Measurement, acceleration: Float[Array, "6"]) -> Float[Array, " N"]:
         """V = G# acceleration, Eq. (23).
 
-        At rank 6 the inverse has a closed form, G+ = (B alpha)+ M J^-1 with a constant first factor: nothing
-        is factorised in the loop. Below rank 6 it is the Moore-Penrose inverse, and with a regularisation Eq. (27).
+        At rank 6 the inverse has a closed form, G+ = (B alpha)+ M J^-1 with a constant first factor, so that the loop
+        factorises nothing. Below rank 6 it is the Moore-Penrose inverse, and with a regularisation Eq. (27).
         """
         if self.regularisation is not None:
             return matvec(regularised_sharp(self.gain(y), self.regularisation), acceleration)
         if self.rank < 6:
             return matvec(pseudo_inverse(self.gain(y)), acceleration)
-        wrench = matvec(self.body.mass_matrix, kinematics_from_euler(y.position[3:]).to_body(acceleration))
+        wrench = matvec(self.body.mass_matrix, Kinematics(body_of(y).rotation).to_body(acceleration))
         return matvec(self.allocation, wrench)
 
-    def own_axes(self) -> BodyModel:
-        """The same knowledge in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
-        count, effect = self.thruster_matrix.shape[1], self.body.inverse_mass_matrix @ self.thruster_matrix
-        alike = 1 / jnp.sqrt(jnp.diagonal(self.body.mass_matrix))  # accelerations of the same kinetic energy
-        return BodyModel(
-            body=self.body,
-            thrusters=self.thruster.drive(count, self.speed_sensor),
-            acceleration_per_thrust=effect,
-            allocation=partial_inverse(effect, alike, self.rank),
-            thrust_per_volt=jnp.broadcast_to(self.thruster.voltage_gain(), (count,)),
+
+class EulerCoordinates(AbstractOutputCoordinates):
+    """North, east, down and Euler angles, as in the paper."""
+
+    angles: tuple[bool, ...] = eqx.field(static=True, default=EULER_ANGLES)
+    tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=())
+
+    def measurement(self, position, velocity, actuator: Any = None) -> Measurement:
+        return measurement_of_outputs(position, velocity, actuator)
+
+    def in_body_axes(self, dynamics: HybridDynamics) -> Model:
+        """The same model in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
+        body, matrix = dynamics.body, dynamics.thruster_matrix
+        effect = body.inverse_mass_matrix @ matrix
+        alike = 1 / jnp.sqrt(jnp.diagonal(body.mass_matrix))  # accelerations of equal kinetic energy
+        return Model(
+            BodyDynamics(body, effect, partial_inverse(effect, alike, dynamics.rank)),
+            BodyCoordinates(),
+            dynamics.thruster.actuator_model(matrix.shape[1], dynamics.speed_sensor),
         )

@@ -1,4 +1,6 @@
-"""The vehicle together with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
+"""The vehicle with its thrusters: the paper's MIMO hybrid dynamical system, Eqs. (1)-(20)."""
+
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -8,41 +10,73 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Place
+from undertow.core.actuator_model import DirectActuator
+from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Model, Pose
 from undertow.core.errors import BadInput
-from undertow.numerics.linear import matvec
-from undertow.numerics.rotations import (
-    Kinematics,
-    euler_from_rotation,
-    quaternion_rate,
-    rotation_from_quaternion,
-)
-from undertow.plants.hybrid_model import HybridModel
-from undertow.plants.hybrid_power import HybridPower, has_motor
-from undertow.plants.hybrid_state import VehicleState, state_at
+from undertow.core.measurement import measurement_of_pose
+from undertow.core.runtime import double_outside_runs
+from undertow.core.status import Status
+from undertow.numerics.linear_algebra import matvec
+from undertow.numerics.rotations import Kinematics, quaternion_from_euler, quaternion_rate, rotation_from_quaternion
+from undertow.plants.hybrid_model import EulerCoordinates, HybridDynamics
+from undertow.plants.hybrid_power import HybridPower, PowerState, has_motor
 from undertow.plants.reachability import open_loop_advice
 from undertow.power import ESC, Battery
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.alteration import altered
-from undertow.vehicles.body import Body
-from undertow.vehicles.moving_water import seen_from_water
+from undertow.vehicles.body import Body, seen_from_water
 from undertow.vehicles.vehicle import Vehicle
 
-_FREEDOMS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+_ENVELOPE = 1e3  # m, m/s, rad/s; far above the values of any vehicle
+
+
+class VehicleState(NamedTuple):
+    """State of body, thrusters and power. The attitude is a quaternion: no singularity, no trigonometry."""
+
+    position: Float[Array, "3"]  # m, world
+    attitude: Float[Array, "4"]  # unit quaternion, body -> world
+    nu: Float[Array, "6"]  # m/s, rad/s, body
+    thrusters: Any
+    power: PowerState = PowerState()  # battery and ledger
+
+    def pose(self) -> Pose:
+        """Pose and velocity of the body."""
+        rotation = rotation_from_quaternion(self.attitude)
+        return Pose(self.position, rotation, matvec(rotation, self.nu[:3]))
+
+    def status(self) -> Array:
+        """Status code: OK if Euler angles are defined and all values are within the plausible range."""
+        third_row = rotation_from_quaternion(self.attitude)[2]
+        near_vertical = third_row[1] ** 2 + third_row[2] ** 2 < 1e-6
+        far = (jnp.abs(self.position) > _ENVELOPE).any() | (jnp.abs(self.nu) > _ENVELOPE).any()
+        code = jnp.where(near_vertical, int(Status.PITCH_SINGULAR), int(Status.OK))
+        return jnp.where(far, int(Status.DIVERGED), code)
+
+
+def state_at(position: Any, velocity: Any, thrusters: Any, power: PowerState) -> VehicleState:
+    """State with given outputs and rates of outputs, in Euler angles; zero where None."""
+    position = jnp.zeros(6) if position is None else position
+    velocity = jnp.zeros(6) if velocity is None else velocity
+    attitude = quaternion_from_euler(position[3:])
+    nu = Kinematics(rotation_from_quaternion(attitude)).to_body(velocity)
+    return VehicleState(position[:3], attitude, nu, thrusters, power)
+
+
+_DOF_NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 class HybridVehicle(AbstractPlant):
     """x = (north, east, down, roll, pitch, yaw) driven by thruster voltages.
 
-    On the rungs `ideal` and `static` a prescribed acceleration load is the whole of d, J_dot nu included
-    (Remark 2); on the others the body moves as it does and the load is added to x_ddot.
+    At the fidelities `ideal` and `static` a prescribed acceleration load is all of d, J_dot nu included (Remark 2); at
+    the others J_dot nu is part of the dynamics, and the load is added to x_ddot.
 
     Args:
         vehicle: hull and thruster layout.
-        thruster: what turns volts into thrust.
-        battery: what feeds the thrusters; None for the thruster's supply.
-        esc: speed controllers before them; None for none.
-        ledger: whether to keep account of the thrusters' energy along the run; None wherever there is a motor.
+        thruster: model of every thruster.
+        battery: power supply of the thrusters; None for the thruster's own supply.
+        esc: electronic speed controllers; None for none.
+        ledger: whether to integrate the energies of the thrusters; None for yes where there is a motor.
     """
 
     vehicle: Vehicle
@@ -54,6 +88,7 @@ class HybridVehicle(AbstractPlant):
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True)
 
+    @double_outside_runs
     def __init__(
         self,
         vehicle: Vehicle,
@@ -86,13 +121,7 @@ class HybridVehicle(AbstractPlant):
         )
 
     def output(self, t, x: VehicleState) -> Measurement:
-        kinematics = Kinematics(rotation_from_quaternion(x.attitude))
-        angles = euler_from_rotation(kinematics.rotation)
-        return Measurement(
-            position=jnp.concatenate([x.position, angles]),
-            velocity=kinematics.to_world(x.nu),
-            actuator=self.thruster.report(x.thrusters),
-        )
+        return measurement_of_pose(x.position, x.attitude, x.nu, self.thruster.report(x.thrusters))
 
     def acceleration(self, t, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
         kinematics = Kinematics(rotation_from_quaternion(x.attitude))
@@ -100,11 +129,13 @@ class HybridVehicle(AbstractPlant):
         return kinematics.to_world(nu_rate) + kinematics.rate_term(x.nu)
 
     def _body_acceleration(self, kinematics: Kinematics, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
-        """nu_dot of Eq. (2): thrust (6), the body's own motion, and the loads."""
-        body = altered(self.body, d.factors, d.payloads)
+        """nu_dot of Eq. (2): thrust of Eq. (6), dynamics of the body, and the loads."""
+        body = altered(self.body, d.scaling, d.payloads)
         thrust = self.thruster.thrust(x.thrusters, u)
-        if d.factors is not None:
-            thrust = d.factors.thrust * thrust
+        if d.scaling is not None:
+            if d.scaling.thrust.shape not in ((), thrust.shape):
+                raise BadInput("thrusters", f"be {thrust.size}, as the vehicle has", d.scaling.thrust.size)
+            thrust = d.scaling.thrust * thrust
         wrench = matvec(self.thruster_matrix, thrust) - d.wrench
         prescribed = d.acceleration
         if self.thruster.has_prescribed_acceleration:
@@ -113,8 +144,8 @@ class HybridVehicle(AbstractPlant):
         own = body.free_acceleration(seen.nu, seen.down) + seen.rate
         return own + body.accelerate(wrench) + kinematics.to_body(prescribed)
 
-    def place(self, x: VehicleState) -> Place:
-        return x.place()
+    def pose(self, x: VehicleState) -> Pose:
+        return x.pose()
 
     def admissible(self, x: VehicleState, u):
         return self.power.admissible(self.thruster, x.thrusters, x.power, u)
@@ -123,23 +154,23 @@ class HybridVehicle(AbstractPlant):
         limited = self.power.saturated(self.thruster, x.thrusters, x.power, u)
         return Effort(self.thruster.electrical_power(x.thrusters, u), limited.astype(u.dtype))
 
-    def books(self, x: VehicleState, u):
-        return self.power.books(self.thruster, x.thrusters, x.power, u)
+    def diagnostics(self, x: VehicleState, u):
+        return self.power.diagnostics(self.thruster, x.thrusters, x.power, u)
 
-    def columns(self):
-        return self.power.columns()
+    def signals(self):
+        return self.power.signals()
 
     def inputs(self) -> int:
         return self.vehicle.thrusters
 
-    def health(self, x: VehicleState) -> Array:
-        return x.health()
+    def status(self, x: VehicleState) -> Array:
+        return x.status()
 
     def advice(self) -> tuple[str, ...]:
-        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _FREEDOMS)
+        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _DOF_NAMES)
 
     def rank(self) -> int:
-        """Rank of the thruster matrix; that of G too, wherever J is regular."""
+        """Rank of the thruster matrix, which is that of G where J is regular."""
         if isinstance(self.thruster_matrix, Tracer):
             return min(6, self.inputs())
         return int(np.linalg.matrix_rank(np.asarray(self.thruster_matrix), tol=1e-9))
@@ -152,8 +183,8 @@ class HybridVehicle(AbstractPlant):
         regularisation: float | None = None,
         vehicle: Vehicle | None = None,
         thruster: AbstractThruster | None = None,
-    ) -> HybridModel:
-        """What a controller may know of this plant.
+    ) -> Model:
+        """Nominal model of this plant for the controller.
 
         Args:
             speed_sensor: whether phi of Eq. (15) is known from propeller-speed sensors (Example 1) or left in d.
@@ -167,32 +198,33 @@ class HybridVehicle(AbstractPlant):
                 vehicle with another number of thrusters.
         """
         nominal = self.thruster if thruster is None else thruster
-        told = self if vehicle is None else HybridVehicle(vehicle, nominal)
-        if told.inputs() != self.inputs():
-            raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{told.inputs()}")
+        known = self if vehicle is None else HybridVehicle(vehicle, nominal)
+        if known.inputs() != self.inputs():
+            raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{known.inputs()}")
         if regularisation is not None:
             checks.positive("regularisation", regularisation)
         if speed_sensor:
             still = nominal.report(nominal.initial_state(self.inputs()))
             if still is None:  # thrusters without a speed to measure complain here, not in the loop
                 nominal.speed_term(still)
-        gain, allocation = _static(told.body.inverse_mass_matrix, told.thruster_matrix, nominal.voltage_gain())
-        return HybridModel(
-            body=told.body,
+        gain, allocation = _static(known.body.inverse_mass_matrix, known.thruster_matrix, nominal.voltage_gain())
+        dynamics = HybridDynamics(
+            body=known.body,
             thruster=nominal,
-            thruster_matrix=told.thruster_matrix,
+            thruster_matrix=known.thruster_matrix,
             body_gain=gain,
             allocation=allocation,
-            rank=told.rank(),
+            rank=known.rank(),
             regularisation=regularisation,
             speed_sensor=speed_sensor,
             rate_term=rate_term,
         )
+        return Model(dynamics, EulerCoordinates(), DirectActuator())
 
 
 @jax.jit
 def _static(inverse_mass, thruster_matrix, voltage_gain):
-    """What volts do to a body at rest, and the volts of least norm for a wrench; voltage gain of all or of each."""
+    """Acceleration per volt at rest, and minimum-norm voltages per wrench; one voltage gain for all or one each."""
     per_volt = thruster_matrix * voltage_gain
     return inverse_mass @ per_volt, jnp.linalg.pinv(per_volt)
 

@@ -7,19 +7,20 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.drive import DirectDrive
+from undertow.core.actuator_model import DirectActuator
+from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
+from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import param
 from undertow.core.status import Status
-from undertow.plants.nominal import as_told
+from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
 
-_FLAT = 0.01  # rad short of 90 deg, where the force has all but lost its grip: G is 1 % of what it is upright
+_FLAT = 0.01  # rad short of 90 deg, where the force has nearly no effect: G is 1 % of its upright value
 
 _WANG = "Wang 1993, as in the codes that go with Liu's textbooks"
 
 
-class CartPole(eqx.Module):
-    """Cart and uniform pole: angle_ddot = f + b u, the cart's own motion eliminated. Wang 1993.
+class CartPole(AbstractDynamics):
+    """Cart and uniform pole: angle_ddot = f + b u, with the motion of the cart eliminated. Wang 1993.
 
     Raises:
         BadInput: a constant is not positive.
@@ -35,22 +36,29 @@ class CartPole(eqx.Module):
             checks.positive(name, getattr(self, name))
 
     def inertia(self, angle):
-        """Torque on the pole per angular acceleration while the cart gives way, kg m^2."""
+        """Torque on the pole per angular acceleration with a free cart, kg m^2."""
         share = self.pole_mass / (self.cart_mass + self.pole_mass)
         return self.pole_mass * self.half_length**2 * (4 / 3 - share * jnp.cos(angle) ** 2)
 
-    def gain(self, angle):
+    def lever(self, angle):
         """b, angular acceleration per force, 1/(kg m)."""
         arm = self.pole_mass * self.half_length * jnp.cos(angle)
         return arm / (self.cart_mass + self.pole_mass) / self.inertia(angle)
 
-    def drift(self, angle, rate):
-        """f, rad/s^2: weight, less what swinging pushes the cart away."""
+    def drift(self, y: Measurement):
+        """f, rad/s^2: weight, less the effect of the pole's swing on the cart."""
+        angle = y.position
         weight = self.pole_mass * self.gravity * self.half_length * jnp.sin(angle) / self.inertia(angle)
-        return weight - self.gain(angle) * self.swing(angle, rate)
+        return weight - self.lever(angle) * self.swing(angle, y.velocity)
+
+    def gain(self, y: Measurement):
+        return self.lever(y.position)[:, None]
+
+    def invert(self, y: Measurement, acceleration):
+        return acceleration / self.lever(y.position)
 
     def swing(self, angle, rate):
-        """Horizontal force that the swinging pole takes from the cart, N."""
+        """Horizontal force of the swinging pole on the cart, N."""
         return self.pole_mass * self.half_length * rate**2 * jnp.sin(angle)
 
     def cart_acceleration(self, angle, rate, angle_acceleration, force):
@@ -60,35 +68,15 @@ class CartPole(eqx.Module):
 
 
 class PendulumState(NamedTuple):
-    """Angle from upright (rad), its rate (rad/s), and the speed of the cart (m/s), which nobody controls."""
+    """Angle from upright (rad), its rate (rad/s), and the speed of the cart (m/s), which is not controlled."""
 
     angle: Float[Array, "1"]
     rate: Float[Array, "1"]
     cart_speed: Float[Array, "1"]
 
 
-class InvertedPendulumModel(AbstractModel):
-    """F = f, G = b of the cart and pole that the controller was told of."""
-
-    cart_pole: CartPole
-    actuator: DirectDrive
-    angles: tuple[bool, ...] = eqx.field(static=True, default=(True,))
-
-    def drive(self) -> DirectDrive:
-        return self.actuator
-
-    def drift(self, y: Measurement):
-        return self.cart_pole.drift(y.position, y.velocity)
-
-    def gain(self, y: Measurement):
-        return self.cart_pole.gain(y.position)[:, None]
-
-    def invert(self, y: Measurement, acceleration):
-        return acceleration / self.cart_pole.gain(y.position)
-
-
-class InvertedPendulum(AbstractPlant):
-    """The angle of a pole, moved by a force on its cart; the force turns the pole towards positive angles."""
+class InvertedPendulum(AbstractMechanism):
+    """Angle of a pole on a cart; a positive force on the cart turns the pole towards positive angles."""
 
     cart_pole: CartPole
     limit: Float[Array, ""] = param("N", "largest force")
@@ -97,8 +85,7 @@ class InvertedPendulum(AbstractPlant):
     input_unit: str = eqx.field(static=True, default="N")
 
     def initial_state(self, position=None, velocity=None) -> PendulumState:
-        zero = jnp.zeros(1)
-        return PendulumState(zero if position is None else position, zero if velocity is None else velocity, zero)
+        return PendulumState(given_or_zero(position, 1), given_or_zero(velocity, 1), jnp.zeros(1))
 
     def dynamics(self, t, x: PendulumState, u, d: Load) -> PendulumState:
         turning = self.acceleration(t, x, u, d)
@@ -108,40 +95,31 @@ class InvertedPendulum(AbstractPlant):
         return Measurement(x.angle, x.rate)
 
     def acceleration(self, t, x: PendulumState, u, d: Load):
-        own = self.cart_pole.drift(x.angle, x.rate) + self.cart_pole.gain(x.angle) * u
+        own = self.cart_pole.drift(Measurement(x.angle, x.rate)) + self.cart_pole.lever(x.angle) * u
         return own + d.acceleration - d.wrench / self.cart_pole.inertia(x.angle)
 
-    def place(self, x: PendulumState) -> None:
-        return None
+    def limits(self):
+        return both_ways(self.limit, 1)
 
-    def admissible(self, x: PendulumState, u):
-        return jnp.clip(u, -self.limit, self.limit)
+    def power(self, x: PendulumState, u):
+        return u * x.cart_speed
 
-    def effort(self, x: PendulumState, u) -> Effort:
-        return Effort(power=u * x.cart_speed, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
-
-    def inputs(self) -> int:
-        return 1
-
-    def health(self, x: PendulumState) -> Array:
+    def status(self, x: PendulumState) -> Array:
         flat = (jnp.abs(x.angle) > jnp.pi / 2 - _FLAT).any()
         return jnp.where(flat, int(Status.OUT_OF_RANGE), int(Status.OK))
 
-    def advice(self) -> tuple[str, ...]:
-        return ()
-
     def model(
         self, *, cart_mass: float | None = None, pole_mass: float | None = None, half_length: float | None = None
-    ) -> InvertedPendulumModel:
-        """What a controller is told of this plant; what is not given is the truth.
+    ) -> Model:
+        """Nominal model for the controller; parameters that are not given have their true values.
 
         Args:
             cart_mass: kg.
             pole_mass: kg.
             half_length: half the length of the pole, m.
         """
-        told = as_told(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
-        return InvertedPendulumModel(cart_pole=told, actuator=DirectDrive(low=-self.limit, high=self.limit))
+        cart_pole = nominal(self.cart_pole, cart_mass=cart_mass, pole_mass=pole_mass, half_length=half_length)
+        return Model(cart_pole, OutputCoordinates(angles=(True,)), DirectActuator(1.0, *self.limits()))
 
 
 def inverted_pendulum(
@@ -151,7 +129,7 @@ def inverted_pendulum(
     gravity: float = 9.8,
     limit: float = float("inf"),
 ) -> InvertedPendulum:
-    """Pole on a cart, angle 0 upright, force in. Defaults are Wang's; a run ends where the pole lies flat.
+    """Pole on a cart, angle 0 upright, driven by a force. Defaults are Wang's; a run ends when the pole lies flat.
 
     Args:
         cart_mass: kg.

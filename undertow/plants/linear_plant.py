@@ -8,15 +8,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.drive import DirectDrive
+from undertow.core.actuator_model import DirectActuator
+from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
+from undertow.core.coordinates import OutputCoordinates
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.core.status import Status
-from undertow.numerics.inverses import pseudo_inverse
-from undertow.numerics.linear import matvec
-from undertow.plants.nominal import as_told
-from undertow.plants.reachability import open_loop_advice
+from undertow.numerics.linear_algebra import matvec, pseudo_inverse
+from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
 
 _ENVELOPE = 1e6
 
@@ -25,7 +24,7 @@ class LinearSystem(eqx.Module):
     """The three matrices.
 
     Raises:
-        BadInput: shapes that do not go together, or entries that are not finite.
+        BadInput: shapes that do not match, or entries that are not finite.
     """
 
     gain: Float[Array, "n m"] = param("m/s^2", "acceleration per input", symbol="G")
@@ -54,16 +53,11 @@ class LinearState(NamedTuple):
     velocity: Float[Array, " n"]
 
 
-class LinearModel(AbstractModel):
-    """The matrices that the controller was told of; G# is the Moore-Penrose inverse, whatever the rank."""
+class LinearDynamics(AbstractDynamics):
+    """Dynamics with nominal matrices; G# is the Moore-Penrose inverse for any rank."""
 
     system: LinearSystem
     allocation: Float[Array, "m n"]  # G+; constant, so nothing is factorised in the loop
-    actuator: DirectDrive
-    angles: tuple[bool, ...] = eqx.field(static=True)
-
-    def drive(self) -> DirectDrive:
-        return self.actuator
 
     def drift(self, y: Measurement):
         return self.system.drift(y.position, y.velocity)
@@ -75,8 +69,8 @@ class LinearModel(AbstractModel):
         return matvec(self.allocation, acceleration)
 
 
-class LinearPlant(AbstractPlant):
-    """Coupled axes pushed by inputs of no unit; what lies outside the range of G stays in open loop."""
+class LinearPlant(AbstractMechanism):
+    """Coupled axes with inputs without unit; directions outside the range of G stay in open loop."""
 
     system: LinearSystem
     limit: Float[Array, ""] = param("1", "largest input")
@@ -88,8 +82,8 @@ class LinearPlant(AbstractPlant):
         checks.not_negative("limit", self.limit, finite=False)
 
     def initial_state(self, position=None, velocity=None) -> LinearState:
-        zero = jnp.zeros(len(self.outputs))
-        return LinearState(zero if position is None else position, zero if velocity is None else velocity)
+        n = len(self.outputs)
+        return LinearState(given_or_zero(position, n), given_or_zero(velocity, n))
 
     def dynamics(self, t, x: LinearState, u, d: Load) -> LinearState:
         return LinearState(x.velocity, self.acceleration(t, x, u, d))
@@ -101,29 +95,19 @@ class LinearPlant(AbstractPlant):
         own = self.system.drift(x.position, x.velocity) + matvec(self.system.gain, u)
         return own + d.acceleration - d.wrench
 
-    def place(self, x: LinearState) -> None:
-        return None
+    def limits(self):
+        return both_ways(self.limit, self.system.gain.shape[1])
 
-    def admissible(self, x: LinearState, u):
-        return jnp.clip(u, -self.limit, self.limit)
+    def power(self, x: LinearState, u):
+        """Power given to unit masses: u_j times the velocity along column j of G."""
+        return u * matvec(self.system.gain.T, x.velocity)
 
-    def effort(self, x: LinearState, u) -> Effort:
-        """Power given to unit masses: u_j times the velocity that it works along."""
-        power = u * matvec(self.system.gain.T, x.velocity)
-        return Effort(power, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
-
-    def inputs(self) -> int:
-        return self.system.gain.shape[1]
-
-    def health(self, x: LinearState) -> Array:
+    def status(self, x: LinearState) -> Array:
         far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
-    def advice(self) -> tuple[str, ...]:
-        return open_loop_advice("the gain matrix", self.system.gain, self.outputs)
-
-    def model(self, *, gain=None, position_term=None, velocity_term=None) -> LinearModel:
-        """What a controller is told of this plant; what is not given is the truth.
+    def model(self, *, gain=None, position_term=None, velocity_term=None) -> Model:
+        """Nominal model for the controller; parameters that are not given have their true values.
 
         Args:
             gain: G, as many rows and columns as the true one.
@@ -131,17 +115,14 @@ class LinearPlant(AbstractPlant):
             velocity_term: H, 1/s.
 
         Raises:
-            BadInput: another shape than the truth.
+            BadInput: a shape differs from the true one.
         """
-        told = as_told(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
-        if told.gain.shape != self.system.gain.shape:
-            raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{told.gain.shape}")
-        return LinearModel(
-            system=told,
-            allocation=pseudo_inverse(told.gain),
-            actuator=DirectDrive(low=-self.limit, high=self.limit),
-            angles=(False,) * len(self.outputs),
-        )
+        system = nominal(self.system, gain=gain, position_term=position_term, velocity_term=velocity_term)
+        if system.gain.shape != self.system.gain.shape:
+            raise BadInput("gain", f"have shape {self.system.gain.shape}, as the plant has", f"{system.gain.shape}")
+        coordinates = OutputCoordinates(angles=(False,) * len(self.outputs))
+        dynamics = LinearDynamics(system, pseudo_inverse(system.gain))
+        return Model(dynamics, coordinates, DirectActuator(1.0, *self.limits()))
 
 
 def linear_plant(
@@ -151,8 +132,8 @@ def linear_plant(
 
     Args:
         gain: G, one row per output, m/s^2 per unit of input.
-        position_term: F, 1/s^2, negative where it pulls back; None for zero.
-        velocity_term: H, 1/s, negative where it brakes; None for zero.
+        position_term: F, 1/s^2, negative for a restoring term; None for zero.
+        velocity_term: H, 1/s, negative for damping; None for zero.
         limit: largest |u|.
     """
     n = len(gain) if np.ndim(gain) else 0

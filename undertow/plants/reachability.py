@@ -1,4 +1,4 @@
-"""Which accelerations no input can give: the directions outside the range of a gain matrix."""
+"""Directions of acceleration that no input can give: those outside the range of a gain matrix."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ def open_loop_advice(what: str, gain, names: Sequence[str]) -> tuple[str, ...]:
     """One sentence when some combinations of the outputs cannot be controlled, none otherwise.
 
     Args:
-        what: that whose rank it is, to begin the sentence with.
+        what: name of the matrix, which begins the sentence.
         gain: G (n x m), or any matrix with the same range.
         names: of the n outputs.
     """
@@ -29,7 +29,7 @@ def open_loop_advice(what: str, gain, names: Sequence[str]) -> tuple[str, ...]:
 def lost_directions(gain: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "k n"]:
     """Rows of length 1 that span the left null space of G: along them x_ddot = F + d, whatever u is.
 
-    It is found by the singular value decomposition; of its many bases the one with most zeros is given, for reading.
+    Found by singular value decomposition; the basis with the most zeros is returned, because it reads best.
     """
     left, sizes, _ = np.linalg.svd(gain)
     rank = int((sizes > _ZERO * sizes.max(initial=0.0)).sum())

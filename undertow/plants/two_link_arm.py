@@ -7,13 +7,88 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractModel, AbstractPlant, Effort, Load, Measurement
-from undertow.core.drive import DirectDrive
+from undertow.core import checks
+from undertow.core.actuator_model import DirectActuator
+from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
+from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import param
 from undertow.core.status import Status
-from undertow.numerics.linear import matvec
-from undertow.plants.arm_links import Links
-from undertow.plants.nominal import as_told
+from undertow.numerics.linear_algebra import matvec
+from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
+
+_BOOK = "Slotine and Li 1991, Example 9.1"
+
+
+class Links(AbstractDynamics):
+    """Rigid links: mass matrix, Coriolis matrix, weight and energy. Slotine and Li 1991, section 9.1.
+
+    The outer link carries a load: its centre of mass need not lie on the line through its joint.
+
+    Raises:
+        BadInput: a mass, length or inertia is not positive, or the offset or gravity is not finite.
+    """
+
+    inner_mass: Float[Array, ""] = param("kg", "mass of the inner link", symbol="m_1", source=_BOOK)
+    inner_length: Float[Array, ""] = param("m", "joint to joint", symbol="l_1", source=_BOOK)
+    inner_centre: Float[Array, ""] = param("m", "shoulder to centre of mass", symbol="l_c1", source=_BOOK)
+    inner_inertia: Float[Array, ""] = param("kg m^2", "about its centre of mass", symbol="I_1", source=_BOOK)
+    outer_mass: Float[Array, ""] = param("kg", "mass of outer link and load", symbol="m_e", source=_BOOK)
+    outer_centre: Float[Array, ""] = param("m", "elbow to their centre of mass", symbol="l_ce", source=_BOOK)
+    outer_inertia: Float[Array, ""] = param("kg m^2", "about their centre of mass", symbol="I_e", source=_BOOK)
+    outer_offset: Float[Array, ""] = param("rad", "its lag behind the link", symbol="delta_e", source=_BOOK)
+    gravity: Float[Array, ""] = param("m/s^2", "gravity in the plane of motion; 0 for a horizontal arm", symbol="g")
+
+    def __check_init__(self):
+        for name in ("inner", "outer"):
+            for what in ("mass", "centre", "inertia"):
+                checks.positive(f"{name}_{what}", getattr(self, f"{name}_{what}"))
+        checks.positive("inner_length", self.inner_length)
+        checks.finite("outer_offset", self.outer_offset)
+        checks.finite("gravity", self.gravity)
+
+    def _coupling(self) -> Float[Array, ""]:
+        return self.outer_mass * self.inner_length * self.outer_centre
+
+    def mass_matrix(self, q: Float[Array, "2"]) -> Float[Array, "2 2"]:
+        """M(q), kg m^2: symmetric, positive definite."""
+        coupling = self._coupling() * jnp.cos(q[1] - self.outer_offset)
+        outer = self.outer_inertia + self.outer_mass * self.outer_centre**2
+        inner = self.inner_inertia + self.inner_mass * self.inner_centre**2 + self.outer_mass * self.inner_length**2
+        return jnp.array([[inner + outer + 2 * coupling, outer + coupling], [outer + coupling, outer]])
+
+    def inverse_mass_matrix(self, q: Float[Array, "2"]) -> Float[Array, "2 2"]:
+        """M(q)^-1, 1/(kg m^2)."""
+        (a, b), (_, c) = self.mass_matrix(q)
+        return jnp.array([[c, -b], [-b, a]]) / (a * c - b * b)
+
+    def coriolis_matrix(self, q: Float[Array, "2"], rate: Float[Array, "2"]) -> Float[Array, "2 2"]:
+        """C(q, q_dot), N m s, chosen so that M_dot - 2 C is skew-symmetric."""
+        h = self._coupling() * jnp.sin(q[1] - self.outer_offset)
+        return jnp.array([[-h * rate[1], -h * (rate[0] + rate[1])], [h * rate[0], 0.0]])
+
+    def weight(self, q: Float[Array, "2"]) -> Float[Array, "2"]:
+        """g(q), N m; angles from the horizontal."""
+        outer = self.outer_mass * self.outer_centre * jnp.cos(q[0] + q[1] - self.outer_offset)
+        inner = (self.inner_mass * self.inner_centre + self.outer_mass * self.inner_length) * jnp.cos(q[0])
+        return self.gravity * jnp.stack([inner + outer, outer])
+
+    def energy(self, q: Float[Array, "2"], rate: Float[Array, "2"]) -> Float[Array, ""]:
+        """Kinetic and potential energy, J."""
+        outer = self.outer_mass * self.outer_centre * jnp.sin(q[0] + q[1] - self.outer_offset)
+        inner = (self.inner_mass * self.inner_centre + self.outer_mass * self.inner_length) * jnp.sin(q[0])
+        return rate @ matvec(self.mass_matrix(q), rate) / 2 + self.gravity * (inner + outer)
+
+    def drift(self, y: Measurement) -> Float[Array, "2"]:
+        """-M^-1 (C q_dot + g), rad/s^2."""
+        own = matvec(self.coriolis_matrix(y.position, y.velocity), y.velocity) + self.weight(y.position)
+        return -matvec(self.inverse_mass_matrix(y.position), own)
+
+    def gain(self, y: Measurement) -> Float[Array, "2 2"]:
+        return self.inverse_mass_matrix(y.position)
+
+    def invert(self, y: Measurement, acceleration: Float[Array, "2"]) -> Float[Array, "2"]:
+        return matvec(self.mass_matrix(y.position), acceleration)
+
 
 _ENVELOPE = 1e3  # rad, rad/s
 
@@ -25,28 +100,8 @@ class ArmState(NamedTuple):
     rate: Float[Array, "2"]
 
 
-class TwoLinkArmModel(AbstractModel):
-    """F = -M^-1 (C q_dot + g), G = M^-1 of the links that the controller was told of."""
-
-    links: Links
-    actuator: DirectDrive
-    angles: tuple[bool, ...] = eqx.field(static=True, default=(True, True))
-
-    def drive(self) -> DirectDrive:
-        return self.actuator
-
-    def drift(self, y: Measurement):
-        return self.links.drift(y.position, y.velocity)
-
-    def gain(self, y: Measurement):
-        return self.links.inverse_mass_matrix(y.position)
-
-    def invert(self, y: Measurement, acceleration):
-        return matvec(self.links.mass_matrix(y.position), acceleration)
-
-
-class TwoLinkArm(AbstractPlant):
-    """Shoulder and elbow, turned by torques; the elbow is measured from the inner link."""
+class TwoLinkArm(AbstractMechanism):
+    """Shoulder and elbow driven by torques; the elbow angle is relative to the inner link."""
 
     links: Links
     limit: Float[Array, ""] = param("N m", "largest torque")
@@ -55,8 +110,7 @@ class TwoLinkArm(AbstractPlant):
     input_unit: str = eqx.field(static=True, default="N m")
 
     def initial_state(self, position=None, velocity=None) -> ArmState:
-        zero = jnp.zeros(2)
-        return ArmState(zero if position is None else position, zero if velocity is None else velocity)
+        return ArmState(given_or_zero(position, 2), given_or_zero(velocity, 2))
 
     def dynamics(self, t, x: ArmState, u, d: Load) -> ArmState:
         return ArmState(x.rate, self.acceleration(t, x, u, d))
@@ -66,39 +120,30 @@ class TwoLinkArm(AbstractPlant):
 
     def acceleration(self, t, x: ArmState, u, d: Load):
         turned = matvec(self.links.inverse_mass_matrix(x.angle), u - d.wrench)
-        return self.links.drift(x.angle, x.rate) + turned + d.acceleration
+        return self.links.drift(self.output(t, x)) + turned + d.acceleration
 
-    def place(self, x: ArmState) -> None:
-        return None
+    def limits(self):
+        return both_ways(self.limit, 2)
 
-    def admissible(self, x: ArmState, u):
-        return jnp.clip(u, -self.limit, self.limit)
+    def power(self, x: ArmState, u):
+        return u * x.rate
 
-    def effort(self, x: ArmState, u) -> Effort:
-        return Effort(power=u * x.rate, saturated=(jnp.abs(u) >= self.limit).astype(u.dtype))
-
-    def inputs(self) -> int:
-        return 2
-
-    def health(self, x: ArmState) -> Array:
+    def status(self, x: ArmState) -> Array:
         far = (jnp.abs(x.angle) > _ENVELOPE).any() | (jnp.abs(x.rate) > _ENVELOPE).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
-    def advice(self) -> tuple[str, ...]:
-        return ()
-
     def model(
         self, *, outer_mass: float | None = None, outer_centre: float | None = None, outer_offset: float | None = None
-    ) -> TwoLinkArmModel:
-        """What a controller is told of this plant; what is not given is the truth.
+    ) -> Model:
+        """Nominal model for the controller; parameters that are not given have their true values.
 
         Args:
             outer_mass: of outer link and load, kg.
             outer_centre: from the elbow to their centre of mass, m.
-            outer_offset: by how far that centre lags behind the link, rad.
+            outer_offset: angle by which that centre lags behind the link, rad.
         """
-        told = as_told(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
-        return TwoLinkArmModel(links=told, actuator=DirectDrive(low=-self.limit, high=self.limit))
+        links = nominal(self.links, outer_mass=outer_mass, outer_centre=outer_centre, outer_offset=outer_offset)
+        return Model(links, OutputCoordinates(angles=(True, True)), DirectActuator(1.0, *self.limits()))
 
 
 def two_link_arm(
@@ -113,7 +158,7 @@ def two_link_arm(
     gravity: float = 9.81,
     limit: float = math.inf,
 ) -> TwoLinkArm:
-    """Planar arm with two joints, angles from the horizontal, torques in. Defaults are those of Slotine and Li 1991.
+    """Planar arm with two joints, angles from the horizontal, driven by torques. Defaults: Slotine and Li 1991.
 
     Args:
         inner_mass: kg.

@@ -1,4 +1,4 @@
-"""Power: what stands between a battery and the thrusters, and the books about it. One file per part."""
+"""Power supply of the thrusters: battery, electronic speed controllers and energy balance. One file per part."""
 
 from undertow.core.catalogue import publish
 from undertow.power.battery import Battery as Battery

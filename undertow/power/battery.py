@@ -16,17 +16,17 @@ from undertow.core.param import param
 Scalar = Float[Array, ""]
 
 _HALVINGS = 30  # of the interval in which the voltage limit is sought: 20 V / 2^30 is 20 nV
-_KNEE = 1e-12  # of E^2; keeps the gradient finite where the most power is drawn
+_KNEE = 1e-12  # share of E^2; keeps the gradient finite at the largest power
 
 
 class Battery(eqx.Module):
     """E(q) in series with R, feeding lossless converters. Its state is the charge drawn q, C (A s).
 
-    The converters take a power P, whatever the voltage: v^2 - E v + R P = 0 for the voltage v of the bus. More than
-    E^2 / (4 R) cannot be drawn. An empty battery is not cut off: its voltage falls on along the same line.
+    The converters take a power P at any voltage: v^2 - E v + R P = 0 for the voltage v of the bus. The largest power
+    is E^2 / (4 R). An empty battery is not cut off: its voltage continues to fall along the same line.
 
     Raises:
-        BadInput: a value that is not positive (resistance: negative), or an empty battery with more volts than a full.
+        BadInput: a value that is not positive (resistance: negative), or the empty voltage above the full one.
     """
 
     full_voltage: Scalar = param("V", "open-circuit voltage when full", symbol="E_1")
@@ -43,46 +43,46 @@ class Battery(eqx.Module):
             must = f"be at most the full voltage ({float(self.full_voltage):g} V)"
             raise BadInput("empty_voltage", must, f"{float(self.empty_voltage):g} V")
 
-    def state_of_charge(self, drawn: Scalar) -> Scalar:
+    def state_of_charge(self, charge: Scalar) -> Scalar:
         """1 when full, 0 when empty."""
-        return 1 - drawn / (3600 * self.capacity)
+        return 1 - charge / (3600 * self.capacity)
 
-    def open_circuit_voltage(self, drawn: Scalar) -> Scalar:
+    def open_circuit_voltage(self, charge: Scalar) -> Scalar:
         """E, V, linear in the state of charge."""
-        return self.empty_voltage + (self.full_voltage - self.empty_voltage) * self.state_of_charge(drawn)
+        return self.empty_voltage + (self.full_voltage - self.empty_voltage) * self.state_of_charge(charge)
 
-    def bus_voltage(self, drawn: Scalar, power: Scalar) -> Scalar:
+    def bus_voltage(self, charge: Scalar, power: Scalar) -> Scalar:
         """v, V, while the converters take a power in W: the larger root; E / 2 from E^2 / (4 R) on."""
-        emf = self.open_circuit_voltage(drawn)
+        emf = self.open_circuit_voltage(charge)
         under_root = emf**2 - 4 * self.resistance * power
         return (emf + jnp.sqrt(jnp.maximum(under_root, _KNEE * emf**2))) / 2
 
-    def current(self, drawn: Scalar, power: Scalar) -> Scalar:
+    def current(self, charge: Scalar, power: Scalar) -> Scalar:
         """dq/dt = P / v, A."""
-        return power / self.bus_voltage(drawn, power)
+        return power / self.bus_voltage(charge, power)
 
-    def loss(self, drawn: Scalar, power: Scalar) -> Scalar:
-        """Heat in the battery, W: E i - P, which is R i^2 wherever the power can be drawn."""
-        return self.open_circuit_voltage(drawn) * self.current(drawn, power) - power
+    def loss(self, charge: Scalar, power: Scalar) -> Scalar:
+        """Heat in the battery, W: E i - P, which is R i^2 up to the largest power."""
+        return self.open_circuit_voltage(charge) * self.current(charge, power) - power
 
-    def energy(self, drawn: Scalar) -> Scalar:
-        """Energy that has left the cells when a charge has been drawn: the integral of E dq, J."""
-        return drawn * (self.full_voltage + self.open_circuit_voltage(drawn)) / 2
+    def energy(self, charge: Scalar) -> Scalar:
+        """Energy that the cells have given with a charge: the integral of E dq, J."""
+        return charge * (self.full_voltage + self.open_circuit_voltage(charge)) / 2
 
-    def allows(self, drawn: Scalar, voltage: Scalar, power: Scalar) -> Array:
-        """Whether a power can be taken, in W, with at least this voltage left on the bus."""
-        emf = self.open_circuit_voltage(drawn)
+    def allows(self, charge: Scalar, voltage: Scalar, power: Scalar) -> Array:
+        """Whether a power, in W, leaves at least this voltage on the bus."""
+        emf = self.open_circuit_voltage(charge)
         lowest = jnp.maximum(voltage, emf / 2)
         return self.resistance * power <= lowest * (emf - lowest)
 
-    def limit(self, drawn: Scalar, power_at: Callable[[Scalar], Scalar], top: Scalar) -> Scalar:
-        """Largest voltage up to `top` that the battery can give to loads that take power_at(voltage).
+    def limit(self, charge: Scalar, power_at: Callable[[Scalar], Scalar], top: Scalar) -> Scalar:
+        """Largest voltage up to `top` that the battery can give to loads of power_at(voltage).
 
-        Found by halving, on its safe side: load and bus voltage belong together, and neither is known before the other.
+        Found by bisection, rounded down, because load and bus voltage depend on each other.
         """
 
         def possible(voltage):
-            return self.allows(drawn, voltage, power_at(voltage))
+            return self.allows(charge, voltage, power_at(voltage))
 
         def halve(_, bounds):
             low, high = bounds
@@ -97,12 +97,12 @@ class Battery(eqx.Module):
 def battery(
     full_voltage: float = 16.8, empty_voltage: float = 13.2, resistance: float = 0.02, capacity: float = 18.0
 ) -> Battery:
-    """A lithium battery of four cells in series (4.2 V to 3.3 V each), 18 A h: the usual one of a small vehicle.
+    """A lithium battery of four cells in series (4.2 V to 3.3 V each), 18 A h, as usual for a small vehicle.
 
     Args:
         full_voltage: open-circuit voltage when full, V.
         empty_voltage: open-circuit voltage when empty, V; linear in between.
-        resistance: internal resistance with leads, ohm; 20 mohm is a guess, not a data sheet's.
+        resistance: internal resistance with leads, ohm; 20 mohm is an assumption, not from a data sheet.
         capacity: charge from full to empty, A h.
     """
     return Battery(full_voltage, empty_voltage, resistance, capacity)

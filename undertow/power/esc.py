@@ -1,4 +1,4 @@
-"""An electronic speed controller: pulses of whole microseconds in, a share of the bus voltage out."""
+"""Electronic speed controller: pulses of whole microseconds in, a share of the bus voltage out."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,15 +12,15 @@ PerThruster = Float[Array, " N"]
 
 
 class ESC(eqx.Module):
-    """Duty = (pulse - neutral) / span, V = duty times bus voltage; no loss, and nothing inside the dead band.
+    """Duty = (pulse - neutral) / span, V = duty times bus voltage; no loss, and no output inside the dead band.
 
     Raises:
         BadInput: neutral, span or resolution not positive, dead band negative.
     """
 
     neutral: Scalar = param("us", "pulse that means stop")
-    span: Scalar = param("us", "from stop to full voltage, either way")
-    dead_band: Scalar = param("us", "distance from neutral up to which nothing turns")
+    span: Scalar = param("us", "from stop to full voltage in either direction")
+    dead_band: Scalar = param("us", "distance from neutral up to which the output is zero")
     resolution: Scalar = param("us", "step of the pulses")
 
     def __check_init__(self):
@@ -29,7 +29,7 @@ class ESC(eqx.Module):
         checks.not_negative("dead_band", self.dead_band, "us")
 
     def pulse(self, voltage: PerThruster, bus: Scalar, limited: Array | bool = False) -> PerThruster:
-        """Pulse, us, that asks for a voltage in V: within the span, rounded; towards neutral where there is no more."""
+        """Pulse, us, for a voltage in V: within the span, rounded; towards neutral where the voltage is limited."""
         steps = self.neutral / self.resolution + self.span / self.resolution * jnp.clip(voltage / bus, -1.0, 1.0)
         inward = jnp.where(voltage < 0, jnp.ceil(steps), jnp.floor(steps))
         return self.resolution * jnp.where(limited, inward, jnp.round(steps))
@@ -42,12 +42,12 @@ class ESC(eqx.Module):
 
 
 def esc(neutral: float = 1500.0, span: float = 400.0, dead_band: float = 25.0, resolution: float = 1.0) -> ESC:
-    """Speed controllers as hobby electronics has them. Rounding makes steps: use it with the sampled loop.
+    """Speed controllers with servo pulses. Rounding is discontinuous: use them with the sampled loop.
 
     Args:
         neutral: pulse that means stop, us.
-        span: from stop to full voltage, either way, us.
-        dead_band: distance from neutral up to which nothing turns, us; the T200's table at 20 V says 24 to 28.
+        span: from stop to full voltage in either direction, us.
+        dead_band: distance from neutral up to which the output is zero, us; 24 to 28 in the T200's table at 20 V.
         resolution: step of the pulses, us.
     """
     return ESC(neutral, span, dead_band, resolution)

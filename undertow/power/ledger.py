@@ -1,12 +1,11 @@
-"""The energy ledger: where every joule came from and went, integrated along the run beside the plant.
+"""The energy ledger: the energy balance of the thrusters, integrated along the run with the plant.
 
-Two numbers say whether it closes.
+Two numbers show whether it closes.
 
-    books   source + conversion - copper - friction - water - stored, all of them integrated. The rates cancel at every
-            instant, so what is left is rounding: it says that the equations conserve energy.
-    defect  the same with the energy that is in windings and rotors at that instant (and, with a battery, the energy
-            that its cells have lost) in place of the integrals: it holds the error of the integrator as well, which
-            falls with the step.
+    residual  source + conversion - copper - friction - water - stored, all integrated. The rates cancel at every
+              instant, so the residual is rounding if the equations conserve energy.
+    defect    the same with the present energy of windings and rotors (and, with a battery, the energy that its cells
+              have lost) in place of the integrals: it includes the error of the integrator, which falls with the step.
 """
 
 import math
@@ -31,22 +30,22 @@ class Ledger(NamedTuple):
     copper: JoulePerThruster  # R I^2 of the windings
     friction: JoulePerThruster  # k_f Om^2
     water: JoulePerThruster  # Q Om, given to the water
-    conversion: JoulePerThruster  # (k_t - k_e) I Om: out of nothing, unless k_t = k_e
-    stored: JoulePerThruster  # gone into windings and rotors
+    conversion: JoulePerThruster  # (k_t - k_e) I Om: created energy unless k_t = k_e
+    stored: JoulePerThruster  # stored in windings and rotors
     battery: Joule  # heat in the battery
 
     def total(self) -> "Ledger":
         """All thrusters together."""
         return jax.tree.map(jnp.sum, self)
 
-    def books(self) -> JoulePerThruster:
-        """What the integrated columns leave over, J."""
+    def residual(self) -> JoulePerThruster:
+        """Residual of the integrated columns, J."""
         return self.source + self.conversion - self.spent() - self.stored
 
     def defect(self, stored: JoulePerThruster, cells: Joule | None) -> JoulePerThruster:
-        """What is left over against the state itself, J: stored energy now, and energy that left the cells."""
-        drawn = self.source if cells is None else cells - self.battery
-        return drawn + self.conversion - self.spent() - stored
+        """Residual against the state itself, J: present stored energy, and energy that left the cells."""
+        supplied = self.source if cells is None else cells - self.battery
+        return supplied + self.conversion - self.spent() - stored
 
     def spent(self) -> JoulePerThruster:
         """Copper, friction and water, J."""
@@ -59,11 +58,11 @@ COLUMNS = {
     "energy_copper": "heat in the windings",
     "energy_friction": "heat in bearings and seals",
     "energy_water": "work of the propellers on the water",
-    "energy_conversion": "energy out of nothing: (k_t - k_e) I Om, and what rung `ideal` leaves out",
-    "energy_stored": "energy gone into windings and rotors",
+    "energy_conversion": "created energy: (k_t - k_e) I Om, and what fidelity `ideal` neglects",
+    "energy_stored": "energy stored in windings and rotors",
     "energy_battery": "heat in the battery",
-    "energy_books": "what these leave over: rounding, where the equations conserve energy",
-    "energy_defect": "what is left over against the state itself: error of the integrator",
+    "energy_residual": "residual of these: rounding where the equations conserve energy",
+    "energy_integration_error": "residual against the state itself: error of the integrator",
 }
 
 
@@ -76,14 +75,15 @@ def columns(ledger: Ledger, stored: Joule, cells: Joule | None) -> dict[str, Jou
     """Entries of COLUMNS at one instant, of all thrusters together."""
     total = ledger.total()
     kept = {f"energy_{name}": value for name, value in total._asdict().items()}
-    return kept | {"energy_books": total.books(), "energy_defect": total.defect(stored, cells)}
+    return kept | {"energy_residual": total.residual(), "energy_integration_error": total.defect(stored, cells)}
 
 
 def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.inf) -> dict[str, float]:
-    """How far the books of a recorded run close between two times, s; {} without a ledger.
+    """How well the energy balance of a recorded run closes between two times, s; {} without a ledger.
 
     Returns:
-        Largest change of `books` and of `defect` since the start, as shares of the energy drawn until the stop.
+        Largest change of the residual and of the integration error since the start, as shares of the energy supplied
+        until the stop.
     """
     if "energy_source" not in recorded:
         return {}
@@ -94,6 +94,6 @@ def closure(recorded: Mapping[Any, Any], start: float = 0.0, stop: float = math.
         values = np.asarray(recorded[f"energy_{name}"])[inside]
         return np.abs(values - values[:1])
 
-    drawn = change("source")[-1:].sum()
-    share = lambda name: float(change(name).max() / drawn) if drawn else 0.0
-    return {f"energy_{name}_share": share(name) for name in ("books", "defect")}
+    supplied = change("source")[-1:].sum()
+    share = lambda name: float(change(name).max() / supplied) if supplied else 0.0
+    return {"energy_balance_residual": share("residual"), "energy_integration_residual": share("integration_error")}

@@ -1,4 +1,4 @@
-"""References: what to follow. One file each."""
+"""References: the desired motion. One file each."""
 
 from undertow.core.catalogue import publish
 

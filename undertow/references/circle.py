@@ -1,4 +1,4 @@
-"""A circle in the horizontal plane: the simplest moving reference."""
+"""A circle in the horizontal plane."""
 
 import equinox as eqx
 import jax.numpy as jnp

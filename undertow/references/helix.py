@@ -1,4 +1,4 @@
-"""A helix about a vertical axis: a circle that sinks."""
+"""A helix about a vertical axis: a circle with growing depth."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float

@@ -1,4 +1,4 @@
-"""A lawn mower: parallel legs with half circles between them, which is how a sea floor is surveyed."""
+"""A lawn-mower pattern: parallel legs with half circles between them, as in surveys of the seabed."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -11,7 +11,7 @@ from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.motion_laws import rounded_ramp, with_rates
 
-# Yaw along the path turns at a rate that jumps where an arc begins; its corners are rounded over this share of the arc.
+# The rate of yaw along the path jumps where an arc begins; yaw is rounded over this share of the arc.
 _ROUNDING = 0.25
 
 
@@ -61,7 +61,7 @@ class LawnMower(AbstractReference):
         return Target(*with_rates(pose, t))
 
     def _yaw(self, covered: Float[Array, ""]) -> Float[Array, ""]:
-        """C2 in the distance covered: clockwise through every other half circle, back through the rest."""
+        """Yaw, C2 in the distance covered: clockwise in every other half circle, counterclockwise in the rest."""
         arc = jnp.pi * self.spacing / 2
         rounding = _ROUNDING * arc
         turns = np.arange(self.count - 1.0)
@@ -85,7 +85,7 @@ def lawn_mower(
         spacing: between legs, m; the half circles have half of it as radius.
         count: number of legs.
         speed: between start and stop, m/s.
-        ramp: time to reach the speed and time to stop, s. The whole takes path length / speed + ramp.
+        ramp: time to reach the speed and time to stop, s. The duration is path length / speed + ramp.
         depth: m below the origin.
         heading: yaw, `fixed` at zero, or `along` the path (within 5 degrees where a half circle begins or ends, so
             that its rate does not jump).

@@ -19,8 +19,8 @@ class Line(AbstractReference):
     """From `start` to `goal`, C2, at rest before and after; level, yaw zero or along the line.
 
     Raises:
-        BadInput: speed or ramp not positive, points that are not three finite entries, no way to go, or no heading
-            because the way is vertical.
+        BadInput: speed or ramp not positive, points that are not three finite entries, equal points, or an undefined
+            heading because the line is vertical.
     """
 
     goal: Float[Array, "3"] = param("m", f"where it ends: {_AXES}")

@@ -1,4 +1,4 @@
-"""A Lissajous figure: every axis swings on its own, so that all of them are excited."""
+"""A Lissajous figure: a sinusoid of its own on every axis, so that all axes are excited."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float

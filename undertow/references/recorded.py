@@ -12,14 +12,14 @@ from undertow.numerics.spline import clamped_slopes, spline
 
 
 class Recorded(AbstractReference):
-    """The C2 cubic spline through samples of the position, at rest at both ends, held before and after.
+    """The C2 cubic spline through samples of the position, at rest at both ends, constant before and after.
 
     Raises:
         BadInput: fewer than two samples, not finite, or times that do not increase.
     """
 
     samples: Float[Array, "rows columns"] = param("s, then m or rad", "rows (t, p1, p2, ...)")
-    velocities: Float[Array, "rows n"] = param("m/s, rad/s", "velocity at each row, found from all of them")
+    velocities: Float[Array, "rows n"] = param("m/s, rad/s", "velocity at each row, computed from all rows")
 
     def __init__(self, samples):
         rows = np.asarray(samples, dtype=float)
@@ -39,10 +39,10 @@ class Recorded(AbstractReference):
 def recorded(samples) -> Recorded:
     """Positions replayed from rows (t, p1, p2, ...); in a scenario, `file: d.csv` gives them (header t,d1,d2,...).
 
-    Smooth in between (C2), at rest and held before the first row and after the last; acceleration jumps there.
+    C2 in between, at rest before the first row and after the last; the acceleration jumps there.
 
     Args:
-        samples: rows of time (s) and one value per output (m, rad). Angles are numbers like any other: they pass
-            through +-pi without a jump of 2 pi.
+        samples: rows of time (s) and one value per output (m, rad). Angles are continuous: they pass through +-pi
+            without a jump of 2 pi.
     """
     return Recorded(samples)

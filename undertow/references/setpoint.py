@@ -1,4 +1,4 @@
-"""A fixed goal, at once or reached smoothly."""
+"""A fixed goal, reached by a step or a smooth transition."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -7,21 +7,21 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.arrays import as_array
-from undertow.core.contracts import AbstractReference, Target
+from undertow.core.contracts import AbstractOpenReference, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.motion_laws import quintic, with_rates
 
 
 class Transition(eqx.Module):
-    """The way to a goal: a straight line in all outputs, along the quintic at rest at both ends.
+    """Transition to a goal: a straight line in all outputs with the quintic motion law.
 
     Raises:
         BadInput: not finite, or a negative settling time.
     """
 
     settling: Float[Array, ""] = param("s", "time of the transition; 0 for a step")
-    # Position at t = 0, m and rad; None for where the plant starts.
+    # Position at t = 0, m and rad; None for the initial position of the plant.
     start: Float[Array, " n"] | None = eqx.field(
         converter=lambda at: None if at is None else as_array(at), default=None
     )
@@ -32,7 +32,7 @@ class Transition(eqx.Module):
             checks.finite("start", self.start)
 
     def to(self, goal, t) -> Target:
-        """Target at time t on the way to a goal."""
+        """Target at time t of the transition to a goal."""
         smooth = self.settling > 0
         duration = jnp.where(smooth, self.settling, 1.0)
         share, rate, second = with_rates(lambda t: jnp.where(smooth, quintic(t / duration), 1.0), t)
@@ -41,14 +41,14 @@ class Transition(eqx.Module):
         return Target((1 - share) * start + share * goal, change * rate, change * second)
 
 
-class Setpoint(AbstractReference):
-    """The same position for ever, at rest; or from the end of a transition on.
+class Setpoint(AbstractOpenReference):
+    """A constant position, from the start or from the end of a transition.
 
     Raises:
         BadInput: not finite, or a transition with another number of outputs.
     """
 
-    position: Float[Array, " n"] = param("m, rad", "wanted position", symbol="x_d")
+    position: Float[Array, " n"] = param("m, rad", "desired position", symbol="x_d")
     transition: Transition | None = None
 
     def __check_init__(self):
@@ -64,7 +64,7 @@ class Setpoint(AbstractReference):
         zero = jnp.zeros_like(self.position)
         return Target(self.position, zero, zero)
 
-    def beginning_at(self, position):
+    def starting_at(self, position):
         if self.transition is None or self.transition.start is not None:
             return self
         return Setpoint(self.position, Transition(self.transition.settling, position))
@@ -73,17 +73,17 @@ class Setpoint(AbstractReference):
 def setpoint(position, settling: float = 0.0, start=None) -> Setpoint:
     """Go to a position and stay.
 
-    A step asks for more than the motors have, so they saturate. A transition that takes its time does not, and its
-    velocity and acceleration are known to the law beforehand.
+    A step saturates the motors. A slow enough transition does not, and the law knows its velocity and acceleration in
+    advance.
 
     Args:
         position: one entry per output, m and rad.
         settling: time of the transition from `start`, s; 0 for a step. Its largest velocity is 1.875 times
             distance / settling, its largest acceleration 5.77 times distance / settling^2.
-        start: position at t = 0, one entry per output, m and rad; None for where the plant starts. A step has no use
-            for it.
+        start: position at t = 0, one entry per output, m and rad; None for the initial position of the plant. A
+            step ignores it.
     """
-    # Without a transition compiled loops know that the goal never moves.
+    # Without a transition the goal is a constant of the compiled loop.
     if not isinstance(settling, Tracer) and settling == 0:
         return Setpoint(position)
     return Setpoint(position, Transition(settling, start))

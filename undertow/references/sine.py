@@ -1,4 +1,4 @@
-"""A sinusoid on every output: what textbook plants are asked to follow."""
+"""A sinusoid on every output, the usual reference of textbook plants."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,7 +14,7 @@ class Sine(AbstractReference):
     """offset + amplitude sin(frequency t + phase) on each of n outputs.
 
     Raises:
-        BadInput: not finite, or numbers of entries that do not go together.
+        BadInput: not finite, or numbers of entries that do not match.
     """
 
     amplitude: Float[Array, " n"] = param("m, rad", "amplitude")
@@ -39,12 +39,12 @@ class Sine(AbstractReference):
 
 
 def sine(amplitude=0.1, frequency=1.0, offset=0.0, phase=0.0) -> Sine:
-    """Every output swings about its middle; as many outputs as the longest argument has entries.
+    """Every output oscillates about its middle; the longest argument sets the number of outputs.
 
     Args:
         amplitude: one number or one per output, m and rad.
         frequency: likewise, rad/s.
-        offset: middle of the swing, likewise, m and rad.
+        offset: middle of the oscillation, likewise, m and rad.
         phase: at t = 0, likewise, rad.
     """
     return Sine(amplitude, frequency, offset, phase)

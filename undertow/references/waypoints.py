@@ -12,15 +12,15 @@ from undertow.numerics.spline import clamped_slopes, spline
 
 
 class Waypoints(AbstractReference):
-    """The C2 cubic spline through the waypoints over straight distance / speed; at rest and held before and after.
+    """The C2 cubic spline through the waypoints over straight distance / speed; at rest before and after.
 
     Raises:
         BadInput: points that are not two or more finite rows of three, two equal ones in a row, speed not positive,
-            unknown heading, or none because the way is vertical.
+            unknown heading, or an undefined one because the path is vertical.
     """
 
     path: Float[Array, "rows 7"] = param("m, then m and rad", "rows (straight distance from the first, six outputs)")
-    slopes: Float[Array, "rows 6"] = param("1, rad/m", "change per distance at each row, found from all of them")
+    slopes: Float[Array, "rows 6"] = param("1, rad/m", "change per distance at each row, computed from all rows")
     speed: Float[Array, ""] = param("m/s", "mean speed from one waypoint to the next")
 
     def __init__(self, points, speed, heading: str = "fixed"):
@@ -52,15 +52,16 @@ def waypoints(points, speed: float = 0.5, heading: str = "fixed") -> Waypoints:
 
     Args:
         points: rows (north, east, down), m.
-        speed: mean speed from one waypoint to the next, m/s. From rest and to rest it is exceeded by about half.
-        heading: yaw, `fixed` at zero, or `along` the way: at a waypoint halfway between the directions to it and
-            from it, at either end the direction of the way, smooth in between.
+        speed: mean speed from one waypoint to the next, m/s. The largest speed of the first and the last
+            segment is about 1.5 times as large.
+        heading: yaw, `fixed` at zero, or `along` the path: at a waypoint it bisects the directions of its segments, at
+            either end it is the direction of the segment, smooth in between.
     """
     return Waypoints(points, speed, heading)
 
 
 def _bisectors(points: Float[np.ndarray, "rows 3"]) -> Float[np.ndarray, " rows"]:
-    """Yaw at every waypoint, continuous (rad). Where the way is vertical it keeps the yaw it had."""
+    """Yaw at every waypoint, continuous (rad). Where the path is vertical the yaw is kept."""
     north, east = np.diff(points[:, :2], axis=0).T
     level = np.flatnonzero((north != 0) | (east != 0))
     if not level.size:

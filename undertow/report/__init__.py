@@ -1,1 +1,1 @@
-"""Report: figures and one self-contained page."""
+"""Figures and self-contained HTML pages."""

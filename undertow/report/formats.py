@@ -1,9 +1,10 @@
-"""Numbers, units, prose and verdicts as a reader sees them."""
+"""Numbers, units, text and verdicts as HTML."""
 
 import math
 import re
 from typing import Any
 
+from undertow.report.mathml import with_symbols
 from undertow.report.page import Html, join, tag, text
 
 _DIGITS = 3
@@ -11,7 +12,7 @@ _KINDS = {"holds": "holds", "fails": "fails", "open": "open"}
 
 
 def number(value: Any, digits: int = _DIGITS) -> Html:
-    """A number with so many digits; powers of ten are written out, and a dash stands for none."""
+    """A number with the given digits; powers of ten are written out, and a dash stands for a missing number."""
     if value is None:
         return Html("&ndash;")
     if isinstance(value, float) and not math.isfinite(value):
@@ -30,10 +31,16 @@ def percent(value: float | None) -> Html:
 
 
 def prose(content: Any) -> Html:
-    """Plain text with powers raised (m/s^2), one-letter indices lowered (k_e) and `code` set as code."""
-    marked = re.sub(r"\^(-?\d)", r"<sup>\1</sup>", text(content))
-    marked = re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked)
-    return Html(re.sub(r"`([^`]+)`", r"<code>\1</code>", marked))
+    """Plain text with formulas and symbols typeset, powers of units raised (m/s^2) and `code` set as code."""
+    parts = []
+    for number, part in enumerate(re.split(r"`([^`]+)`", content)) if not isinstance(content, Html) else ():
+        parts.append(tag("code", part) if number % 2 else _typeset(part))
+    return join(*parts) if parts else text(content)
+
+
+def _typeset(plain: str) -> Html:
+    marked = re.sub(r"\^(-?\d)", r"<sup>\1</sup>", with_symbols(plain))
+    return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked))
 
 
 def unit(value: str) -> Html:
@@ -47,19 +54,19 @@ def kind(verdict: str) -> str:
 
 
 def chip(verdict: str) -> Html:
-    """A verdict in one or two words, coloured; the word says it too."""
+    """A verdict in one or two words, coloured."""
     word = {"partly": "holds if", "holds": "holds", "fails": "fails", "open": "open"}[kind(verdict)]
     return tag("span", word, class_=f"chip {kind(verdict)}")
 
 
 def condition(verdict: str) -> str:
-    """What a verdict depends on: what follows its first words."""
+    """The condition of a verdict: the text after `holds if`."""
     return verdict.removeprefix("holds if").strip() if kind(verdict) == "partly" else ""
 
 
 def ending(entry: dict[str, Any]) -> str:
-    """How a run ended, and when if it ended early."""
-    word, when = str(entry.get("status", "ok")).replace("_", " "), entry.get("diverged_at")
+    """Status of a run, with the time if it ended early."""
+    word, when = str(entry.get("status", "completed")).replace("_", " "), entry.get("diverged_at")
     return word if when is None else f"{word} at {when:.3g} s"
 
 
@@ -69,5 +76,5 @@ def round_time(seconds: float) -> str:
 
 
 def _minus(value: str) -> str:
-    """With a true minus."""
+    """With a typographic minus sign."""
     return value.replace("-", "\u2212")

@@ -55,7 +55,7 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
 
 
 def figure(svg: str, name: str, alternative: str, caption: Any) -> Html:
-    """A drawing with its caption; drawn from the page itself, at no less than a readable size."""
+    """A figure with its caption, embedded in the page."""
     data = base64.b64encode(svg.encode()).decode()
     image = Html(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(alternative)}">')
     return tag(
@@ -64,7 +64,7 @@ def figure(svg: str, name: str, alternative: str, caption: Any) -> Html:
 
 
 def section(identity: str, title: str, *content: Any) -> Html:
-    """A part of the page with a heading that can be linked to."""
+    """A section of the page with a heading that links can point to."""
     return tag("section", tag("h2", title), *content, id=identity)
 
 

@@ -1,43 +1,43 @@
-"""The page of `undertow analyze`: what will happen, before anything is run."""
+"""The page of `undertow analyze`: closed-loop performance and stability margins."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from undertow.report.figures.prediction import prediction_drawings
+from undertow.prediction.predict import Prediction
+from undertow.report.figures.prediction import prediction_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import bullets, document, figure, section, table, tag
 from undertow.report.prediction_tables import Rows, tables
-from undertow.studies.prediction.predict import Prediction
 
 _CAPTIONS = {
-    "poles": "Poles that control can move, of the sampled loop as rates, motors and coupling included; both axes are "
-    "linear near zero and logarithmic beyond.",
-    "frequency": "Gains from a disturbance on one axis to the error on the same axis, under the mean load.",
-    "actuators": "Forces that the loads along the reference demand of each actuator, as if there were no limits.",
+    "poles": "Controllable closed-loop poles of the sampled loop as continuous-time poles, with motors and coupling. "
+    "Both axes are linear near zero and logarithmic beyond.",
+    "frequency": "Gain from a disturbance on one axis to the error on the same axis, under the mean load.",
+    "actuators": "Forces that each actuator must give under the loads along the reference, without limits.",
 }
 
 
 def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path) -> list[str]:
-    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`; what could not be drawn, in sentences.
+    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`; return sentences on failures.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    saved = save_all(lambda: prediction_drawings(prediction), folder / "figures")
-    drawn = [tag("p", prose(sentence)) for sentence in saved.failures]
+    saved = save_all(lambda: prediction_plots(prediction), folder / "figures")
+    figures = [tag("p", prose(sentence)) for sentence in saved.failures]
     for name, vector in saved.vectors.items():
-        said = _CAPTIONS[name]
-        drawn.append(figure(vector.read_text(encoding="utf-8"), name, said, said))
-    title = prediction.ground.built.scenario.description or "a closed loop"
-    doubts = [tag("h2", "Advice"), bullets([prose(sentence) for sentence in advice])] if advice else []
+        caption = _CAPTIONS[name]
+        figures.append(figure(vector.read_text(encoding="utf-8"), name, caption, caption))
+    title = prediction.operating_point.built.scenario.description or "a closed loop"
+    warnings = [tag("h2", "Advice"), bullets([prose(sentence) for sentence in advice])] if advice else []
     page = document(
         f"Prediction: {title}",
-        tag("h1", "Before anything is run"),
+        tag("h1", "Prediction from the linearised closed loop"),
         tag("p", prose(title), class_="lead"),
-        *doubts,
+        *warnings,
         *(_section(number, rows) for number, rows in enumerate(tables(prediction))),
-        section("drawn", "Figures", *drawn),
+        section("figures", "Figures", *figures),
         tag("p", prose(LEFT_OUT), class_="small"),
     )
     (folder / "prediction.html").write_text(page, encoding="utf-8")
@@ -45,9 +45,9 @@ def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path
 
 
 LEFT_OUT = (
-    "Linearised about rest: limits, dead zones, pulses of speed controllers and large motions are left out, and a "
-    "moving reference counts as one at rest under the loads that moving brings. `undertow simulate` says what departs "
-    "by more than 10 %."
+    "The loop is linearised at its equilibrium. Saturation, dead zones, pulses of speed controllers and large motions "
+    "are left out, and a moving reference is treated as one at rest under the loads that the motion causes. `undertow "
+    "simulate` reports metrics that depart by more than 10 %."
 )
 
 

@@ -1,16 +1,16 @@
-"""What `undertow analyze` predicts, as rows of plain text: for a terminal and for a page."""
+"""Tables of `undertow analyze` as rows of plain text, for the terminal and for the page."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from undertow.analysis.meanings import unit_of
-from undertow.studies.prediction.predict import Prediction
+from undertow.analysis.metrics import for_people
+from undertow.prediction.predict import Prediction
 
 
 class Rows(NamedTuple):
-    """One table: title, heads of its columns, rows; what it means in a sentence."""
+    """One table: title, column titles, rows, and a sentence that explains it."""
 
     title: str
     head: tuple[str, ...]
@@ -19,8 +19,8 @@ class Rows(NamedTuple):
 
 
 def tables(prediction: Prediction) -> list[Rows]:
-    """All tables, the most important first; empty ones left out."""
-    made = (_points, _margins, _estimators, _errors, _noise, _closed_forms, _reach, _metrics)
+    """All tables, the most important first, without empty ones."""
+    made = (_points, _margins, _estimators, _errors, _noise, _closed_forms, _authority, _metrics)
     return [table for make in made if (table := make(prediction)).rows]
 
 
@@ -31,32 +31,32 @@ def _points(prediction: Prediction) -> Rows:
             f"{point.used:.0%}" if point.used else "-",
             _pole(point.poles[0]) if len(point.poles) else "-",
             f"{point.radius:.6f}",
-            ("stable" if point.radius < 1 else "unstable") if point.found else "not held",
+            ("stable" if point.radius < 1 else "unstable") if point.found else "no equilibrium",
         )
         for point in prediction.points
     ]
     return Rows(
-        "Poles over the operating range",
-        ("of loads smaller", "input used", "rightmost pole, 1/s", "spectral radius", "verdict"),
+        "Controllable closed-loop poles over the operating range",
+        ("load quantile", "input used", "rightmost pole, 1/s", "spectral radius", "verdict"),
         rows,
-        "The whole loop, linearised exactly where it rests under loads along the reference; fuzzy weights held.",
+        "The whole loop, linearised at its equilibrium under loads along the reference, with constant fuzzy weights.",
     )
 
 
 def _margins(prediction: Prediction) -> Rows:
-    known, dt = prediction.margins, prediction.ground.linear.dt
+    known, dt = prediction.margins, prediction.operating_point.linear.dt
     rows = [
-        ("sampling time, these gains", _time(known["sampling_time"]), f"now {_time(dt)}"),
-        ("delay from law to actuators", _time(known["delay"]), "unknown to the law"),
-        ("further first-order lag", _time(known["lag"]), "unknown to the law"),
-        ("effect of the input, smallest", _number(known["gain_low"]), "of what the law takes it for"),
-        ("effect of the input, largest", _number(known["gain_high"]), "likewise"),
+        ("sampling limit at these gains", _time(known["sampling_time"]), f"sampling time {_time(dt)}"),
+        ("delay margin, controller to actuators", _time(known["delay"]), "beyond the nominal model"),
+        ("margin of an additional first-order lag", _time(known["lag"]), "beyond the nominal model"),
+        ("gain margin, decreasing", _number(known["gain_low"]), "of the nominal effect of the input"),
+        ("gain margin, increasing", _number(known["gain_high"]), "of the nominal effect of the input"),
     ]
     return Rows(
-        "How much the loop bears before it is unstable",
-        ("", "at most", ""),
+        "Robustness margins",
+        ("margin", "limit", "remark"),
         rows,
-        "At the operating point nearest to instability.",
+        "At the operating point closest to instability.",
     )
 
 
@@ -67,14 +67,14 @@ def _estimators(prediction: Prediction) -> Rows:
     ]
     return Rows(
         "Estimator",
-        ("axis", "bandwidth w_o, rad/s", "damping", "|d_hat - d| per |d_dot|, s"),
+        ("axis", "bandwidth, rad/s", "damping", "|d_hat - d| per |d_dot|, s"),
         rows,
-        "Closed forms of the law alone, with an exact model and actuators that obey at once.",
+        "Closed forms of the controller alone, with an exact nominal model and ideal actuators.",
     )
 
 
 def _errors(prediction: Prediction) -> Rows:
-    frequency, names = prediction.frequency, prediction.ground.built.closed_loop.plant.outputs
+    frequency, names = prediction.frequency, prediction.operating_point.built.closed_loop.plant.outputs
     rows = []
     for i, name in enumerate(names):
         error, missed = prediction.error[:, i], prediction.estimation[:, i]
@@ -85,29 +85,29 @@ def _errors(prediction: Prediction) -> Rows:
                 name,
                 *at,
                 f"{_number(error.max())} at {_number(frequency[error.argmax()])} rad/s",
-                f"{_number(worse[0])} rad/s" if worse.size else "nowhere",
+                f"{_number(worse[0])} rad/s" if worse.size else "none",
             )
         )
     return Rows(
         "Error per unit of disturbance",
-        ("axis", "at 0.1 rad/s, s^2", "at 1 rad/s", "at 10 rad/s", "most", "estimate worse than none from"),
+        ("axis", "at 0.1 rad/s, s^2", "at 1 rad/s", "at 10 rad/s", "maximum", "estimate increases the error above"),
         rows,
         "|e| per |d|, m per m/s^2 or rad per rad/s^2, under the mean load.",
     )
 
 
 def _noise(prediction: Prediction) -> Rows:
-    noise, unit = prediction.noise, prediction.ground.built.closed_loop.plant.input_unit
+    noise, unit = prediction.noise, prediction.operating_point.built.closed_loop.plant.input_unit
     rows = [
-        (f"input, {unit} per cm/s or 0.01 rad/s", _number(0.01 * noise.of_input.max())),
-        ("estimate, m/s^2 or rad/s^2 per the same", _number(0.01 * noise.of_estimate.max())),
-        ("velocity noise that fills the input (3 sigma), m/s or rad/s", _number(noise.largest)),
+        (f"input, {unit}, for 1 cm/s or 0.01 rad/s of noise", _number(0.01 * noise.of_input.max())),
+        ("estimate, m/s^2 or rad/s^2, for the same noise", _number(0.01 * noise.of_estimate.max())),
+        ("velocity noise at which 3 sigma of the input reach its limit, m/s or rad/s", _number(noise.largest)),
     ]
     return Rows(
         "White noise on measured velocities",
-        ("", "standard deviation"),
+        ("quantity", "standard deviation"),
         rows,
-        "From the discrete Lyapunov equation of the sampled loop; new at every tick.",
+        "From the discrete Lyapunov equation of the sampled loop, with independent noise at every control step.",
     )
 
 
@@ -116,44 +116,50 @@ def _closed_forms(prediction: Prediction) -> Rows:
         (form.meaning, _pole(form.expected), _pole(form.nearest), f"{form.departure:.2g}") for form in prediction.forms
     ]
     return Rows(
-        "Closed forms beside the whole loop",
-        ("pole", "closed form, 1/s", "nearest of the whole loop, 1/s", "apart, share"),
+        "Closed forms compared with the whole loop",
+        ("pole", "closed form, 1/s", "nearest pole of the whole loop, 1/s", "relative difference"),
         rows,
-        "What motors, coupling and sampling add to the theory's small model.",
+        "The differences show the effect of motors, coupling and sampling.",
     )
 
 
-def _reach(prediction: Prediction) -> Rows:
-    reach = prediction.reach
-    finite = np.isfinite(reach.high).any()
+def _authority(prediction: Prediction) -> Rows:
+    authority = prediction.authority
+    finite = np.isfinite(authority.high).any()
     rows = [
-        ("demand held whole, share of the time", f"{reach.held:.0%}"),
-        ("smallest share of a demand", f"{reach.share.min():.0%}"),
-        ("largest force that one actuator is asked for", _number(float(reach.demand.max()))),
+        ("share of the time in which the demand is met", f"{authority.held:.0%}"),
+        ("smallest share of a demand that is met", f"{authority.share.min():.0%}"),
+        ("largest force demanded from one actuator", _number(float(authority.demand.max()))),
         (
-            "it can give, forward / reverse",
-            f"{_number(reach.high.min())} / {_number(-reach.low.max())}" if finite else "-",
+            "largest force available, forward / reverse",
+            f"{_number(authority.high.min())} / {_number(-authority.low.max())}" if finite else "-",
         ),
     ]
     return Rows(
-        "Actuators", ("", ""), rows, "Forces settled at the limits of the input, against what the loads demand."
+        "Actuator authority",
+        ("quantity", "value"),
+        rows,
+        "Steady forces at the limits of the input, compared with those that the loads demand.",
     )
 
 
 def _metrics(prediction: Prediction) -> Rows:
-    of_input = prediction.ground.built.closed_loop.plant.input_unit
-    rows = [(name, _number(value), unit_of(name, of_input)) for name, value in (prediction.metrics or {}).items()]
+    known = prediction.operating_point.built.known_metrics()
+    rows = []
+    for name, value in (prediction.metrics or {}).items():
+        shown, unit = for_people(value, known[name].unit)
+        rows.append((name, _number(shown), unit))
     return Rows(
-        "Metrics foretold for the steady window",
+        "Predicted metrics of the steady window",
         ("metric", "predicted", "unit"),
         rows,
-        "The linearised loop driven by the disturbance and the sensor's errors along the reference; "
-        "`undertow simulate` puts the measured ones beside them.",
+        "The linearised loop, driven by the disturbance and the errors of the navigation filter along the reference. "
+        "`undertow simulate` shows the measured metrics beside these.",
     )
 
 
 def _together(rows: Sequence[tuple]) -> list[tuple]:
-    """Axes with the same numbers in one row."""
+    """One row for axes with equal numbers."""
     joined: dict[tuple, list[str]] = {}
     for axis, *numbers in rows:
         joined.setdefault(tuple(numbers), []).append(axis)

@@ -1,1 +1,1 @@
-"""Scenario files: schema, reading, building."""
+"""Scenario files: schema, reading, building and running."""

@@ -1,4 +1,4 @@
-"""From a scenario to a closed loop ready to run."""
+"""Build the closed loop of a scenario."""
 
 import functools
 from collections.abc import Callable, Mapping
@@ -6,28 +6,33 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
+from undertow.analysis.metrics import meanings
+from undertow.analysis.success import criterion_of
 from undertow.core import runtime
-from undertow.core.contracts import AbstractDisturbance
+from undertow.core.arrays import in_present_precision
+from undertow.core.catalogue import KIND_OF
+from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation
+from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.scenario import parts
-from undertow.scenario.fitting import check_fit, check_times, placed, rounded_times
+from undertow.scenario import factory
+from undertow.scenario.consistency import check_fit, check_times, placed, rounded_times
+from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
-from undertow.scenario.stepping import step_advice
-from undertow.scenario.workshop import Workshop
+from undertow.scenario.step_size import step_advice
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
-_TOLD_APART = 2**24  # whole numbers that float32 holds
+_EXACT_INTEGERS = 2**24  # consecutive whole numbers that float32 represents
 
 
 def in_its_precision(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """A function of a scenario (its first argument, read or built) that computes in the precision it names."""
+    """Decorator: compute a function of a scenario (its first argument, read or built) in the scenario's precision."""
 
     @functools.wraps(function)
     def computed(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
@@ -45,57 +50,72 @@ class Built(NamedTuple):
     closed_loop: ClosedLoop
     scenario: Scenario
     resolved: dict[str, Any]  # the scenario with every default filled in
+    metrics: tuple[AbstractMetric, ...]  # the scenario's own
 
     @in_its_precision
     def advice(self) -> tuple[str, ...]:
-        """What is odd about it, though it can be run."""
+        """Warnings about a scenario that can be run."""
         (start, _), end = self.window(), self.scenario.loop.duration
-        late = f"the steady window starts at {start:g} s, the run ends at {end:g} s: no steady metrics"
+        late = f"there are no steady metrics: the steady window starts at {start:g} s, and the run ends at {end:g} s"
         plant = self.closed_loop.plant
         fast = step_advice(plant.thruster, self.scenario.loop) if isinstance(plant, HybridVehicle) else ()
-        loop, ticks = self.scenario.loop, self.scenario.loop.duration / self.scenario.loop.dt
+        loop, steps = self.scenario.loop, self.scenario.loop.duration / self.scenario.loop.dt
         times = rounded_times(loop)
-        if self.scenario.precision == "float32" and loop.method != "adaptive" and ticks > _TOLD_APART:
-            times += (f"float32 tells no instants apart beyond {_TOLD_APART} steps, {_TOLD_APART * loop.dt:.6g} s",)
+        if self.scenario.precision == "float32" and loop.method != "adaptive" and steps > _EXACT_INTEGERS:
+            limit = f"{_EXACT_INTEGERS} steps, {_EXACT_INTEGERS * loop.dt:.6g} s"
+            times += (f"float32 cannot distinguish instants beyond {limit}",)
         return plant.advice() + fast + times + ((late,) if start >= end else ())
+
+    def known_metrics(self) -> dict[str, Metric]:
+        """Metrics that its runs may have, by name, with their units."""
+        return meanings(self.closed_loop, self.metrics)
+
+    def criterion(self) -> dict[str, float]:
+        """What success is judged by: metric -> what it must stay below in the steady window."""
+        return criterion_of(self.scenario.success, self.known_metrics())
 
     def window(self) -> tuple[float, float]:
         """Start and stop of the steady metrics, s."""
         return self.scenario.steady.of_run(self.scenario.loop.duration)
 
 
-def build(source: Text | Mapping[str, Any], workshop: Workshop | None = None) -> Built:
-    """Objects described by a scenario, made on the processor: the same bits whether or not there is a GPU.
+def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None) -> Built:
+    """Build the objects of a scenario on the CPU, so that the result does not depend on a GPU.
+
+    They are made in double precision and then converted to the one that the scenario names.
 
     Args:
         source: a scenario as read from a file, or as Python data.
-        workshop: where many similar scenarios are built, so that what they share is made once.
+        part_cache: cache of parts that several similar scenarios share.
 
     Raises:
-        BadInput: anything wrong with it, with key path and place.
+        BadInput: the scenario is invalid; the error names key path and location.
     """
     text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
-    with runtime.on_processor(), runtime.in_precision(scenario.precision):
-        return _build(text, scenario, workshop or Workshop())
+    with runtime.on_processor():
+        with runtime.in_precision("float64"):
+            built = _build(text, scenario, part_cache or PartCache())
+        with runtime.in_precision(scenario.precision):
+            return built._replace(closed_loop=in_present_precision(built.closed_loop))
 
 
-def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
+def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     resolved = scenario.model_dump(include={"description", "loop", "initial", "seed", "precision"})
 
     start, stop = scenario.steady.of_run(scenario.loop.duration)
-    resolved["steady"] = {"start": start, "stop": stop, "every_tick": scenario.steady.every_tick}
+    resolved["steady"] = {"start": start, "stop": stop, "every_step": scenario.steady.every_step}
 
-    circumstances: dict[str, Any] = {"sampling_time": scenario.loop.dt}
+    context: dict[str, Any] = {"sampling_time": scenario.loop.dt}
 
     def make(key: str, given: tuple = ()) -> Any:
         part, resolved[key] = one(key, key, getattr(scenario, key), given)
         return part
 
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
-        told = {"part": part.model_dump(), "circumstances": circumstances}
-        new = lambda: parts.make(f"{key}s", told["part"], text.folder, given, circumstances)
-        return placed(text, where, lambda: workshop.part(where, told, given, new))
+        described = {"part": part.model_dump(), "context": context}
+        new = lambda: factory.make(KIND_OF[key], described["part"], text.folder, given, context)
+        return placed(text, where, lambda: part_cache.part(where, described, given, new))
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):
@@ -105,16 +125,23 @@ def _build(text: Text, scenario: Scenario, workshop: Workshop) -> Built:
         return Together(tuple(member for member, _ in pairs))
 
     plant = make("plant")
-    known = lambda: parts.call(plant.model, scenario.model, folder=text.folder)
-    model, resolved["model"] = placed(text, "model", lambda: workshop.part("model", scenario.model, (plant,), known))
-    sensor = make("sensor")
-    circumstances["velocity_noise"] = np.asarray(sensor.velocity_noise(scenario.loop.dt)).tolist()
+    known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
+    model, resolved["model"] = placed(text, "model", lambda: part_cache.part("model", scenario.model, (plant,), known))
+    navigation = make("navigation")
+    noise = isinstance(navigation, AbstractInformedNavigation) and navigation.velocity_noise(scenario.loop.dt)
+    context["velocity_noise"] = np.asarray(noise, dtype=float).tolist()
     controller = make("controller", (model,))
-    loop = ClosedLoop(plant, controller, make("reference"), disturbance(), sensor)
-    resolved["sensor"] = resolved.pop("sensor")  # in the order of the scenario
+    loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
+    resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario
     if scenario.loop.kind == "continuous":
         placed(text, "loop", lambda: continuous.check(loop))
     check_times(text, scenario.loop, scenario.steady)
     shape = (loop, [value and len(value) for _, value in scenario.initial])
-    workshop.check_once(shape, lambda: check_fit(text, loop, scenario.initial))
-    return Built(loop.beginning_at(scenario.initial.position), scenario, resolved)
+    part_cache.check_once(shape, lambda: check_fit(text, loop, scenario.initial))
+    several = [one("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
+    if several:
+        resolved["metrics"] = [description for _, description in several]
+    built = Built(loop.starting_at(scenario.initial.position), scenario, resolved, tuple(part for part, _ in several))
+    placed(text, "controller.signals", loop.signals)
+    criterion = placed(text, "success", built.criterion)
+    return built._replace(resolved=resolved | {"success": criterion})

@@ -1,4 +1,4 @@
-"""Samples from CSV: columns t, d1, d2, ... with a header."""
+"""Samples from a CSV file with the columns t, d1, d2, ..."""
 
 import csv
 import math

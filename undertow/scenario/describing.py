@@ -1,4 +1,4 @@
-"""What can be said about a part without running it: for `undertow list`, `undertow describe` and the docs."""
+"""Descriptions of parts without running them, for `undertow list`, `undertow describe` and the docs."""
 
 import inspect
 import re
@@ -11,12 +11,14 @@ import equinox as eqx
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.param import Parameter, parameters
-from undertow.scenario import parts
+from undertow.core.signals import Signal
+from undertow.plants.double_integrator import double_integrator
+from undertow.scenario import factory
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 
 
 class Option(NamedTuple):
-    """One argument of a part, as it stands in a scenario."""
+    """One option of a part, as written in a scenario."""
 
     name: str
     default: Any  # "required" when there is none
@@ -32,10 +34,11 @@ class Description(NamedTuple):
     options: tuple[Option, ...]
     parameters: tuple[Parameter, ...]
     advice: tuple[str, ...]
+    signals: dict[str, Signal]  # that it records
 
 
 def describe(name: str) -> tuple[Description, ...]:
-    """Every part of that name; kinds are separate, so there may be more than one.
+    """All parts of a name; several kinds can have a part of the same name.
 
     Args:
         name: of a part, `kind/name` for one kind only, `./file.py:function`, or a vehicle file.
@@ -45,20 +48,20 @@ def describe(name: str) -> tuple[Description, ...]:
     """
     if is_vehicle_file(name):
         found = read_vehicle(Path(name), what="NAME")
-        return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), ()),)
+        return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), (), {}),)
     if ".py:" in name:
         try:
             return (_describe("", name, catalogue.find("", name)),)
         except BadInput as error:
             raise BadInput("NAME", error.must, error.got, hint=error.hint) from error.__cause__
-    wanted, _, short = name.rpartition("/")
-    kinds = [kind for kind in catalogue.KINDS if wanted in ("", kind)]
+    given, _, short = name.rpartition("/")
+    kinds = [kind for kind in catalogue.KINDS if given in ("", kind)]
     known = {kind: catalogue.names(kind) for kind in kinds}
     named = [(kind, known[kind][short]) for kind in kinds if short in known[kind]]
     found = tuple(one for kind, part in named for one in _presets(kind, short, part))
     if not found:
         every = {part for parts_of_kind in known.values() for part in parts_of_kind}
-        raise BadInput("NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "metrics"}))
+        raise BadInput("NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "metrics", "signals"}))
     return found
 
 
@@ -69,7 +72,7 @@ def summary(part: Any) -> str:
 
 def _presets(kind: str, name: str, part: Any) -> tuple[Description, ...]:
     """The part, or each of its presets."""
-    presets = parts.presets_of(part)
+    presets = factory.presets_of(part)
     if not presets:
         return (_describe(kind, name, part),)
     each = []
@@ -92,15 +95,26 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
         options=_options(kind, part),
         parameters=tuple(parameters(shown)) if described else (),
         advice=advise(),
+        signals=_signals(kind, description or name, instance),
     )
 
 
 def _instance(kind: str, name: Any, part: Any) -> Any:
-    """The part with all its defaults; None when it cannot be made of them."""
+    """The part with all its defaults; None where it has required options."""
     try:
-        return parts.make(kind, name, Path())[0] if kind else part()
+        return factory.make(kind, name, Path())[0] if kind else part()
     except Exception:
         return None
+
+
+def _signals(kind: str, name: Any, instance: Any) -> dict[str, Signal]:
+    """What the part records beside what every run does; of a law, as it is made for one axis."""
+    if kind == "controllers":
+        try:
+            instance = factory.make(kind, name, Path(), (double_integrator().model(),))[0]
+        except Exception:
+            return {}
+    return getattr(instance, "signals", dict)()
 
 
 def _prose(part: Any) -> str:
@@ -113,15 +127,15 @@ def _options(kind: str, part: Any) -> tuple[Option, ...]:
     options = []
     for name, parameter in inspect.signature(part).parameters.items():
         default = "required" if parameter.default is inspect.Parameter.empty else parameter.default
-        if name in parts.INNER:
-            default = parts.inner_default(name, parameter)
+        if name in factory.INNER:
+            default = factory.inner_default(name, parameter)
         if not (kind == "controllers" and name == "model"):  # comes from the plant, not from the user
             options.append(Option(name, default, meanings.get(name, "")))
     return tuple(options)
 
 
 def _meanings(text: str) -> dict[str, str]:
-    """Argument -> its line(s) in the `Args:` section of a docstring; `a, b: ...` speaks of both."""
+    """Argument -> its text in the `Args:` section of a docstring; `a, b: ...` describes both."""
     section = re.search(r"^Args:\n((?:[ \t]+.*\n?|\n)*)", text, re.MULTILINE)
     found: dict[str, str] = {}
     names: list[str] = []

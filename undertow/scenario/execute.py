@@ -1,4 +1,4 @@
-"""Running a scenario: outcome, metrics and a dataset that can repeat itself."""
+"""Run a scenario: outcome, metrics and a dataset from which the run can be repeated."""
 
 import os
 import tempfile
@@ -10,20 +10,21 @@ import jax
 import numpy as np
 import xarray as xr
 
-from undertow.analysis.metrics import Metrics
+from undertow.analysis.metrics import accumulators
+from undertow.analysis.success import Success
 from undertow.core import runtime
 from undertow.core.status import Status
-from undertow.lanes.errors import Unsupported
-from undertow.loop import continuous, in_lanes, sampled
+from undertow.loop import continuous, sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
+from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
+from undertow.scenario.finished_run import Measuring, label
 from undertow.scenario.foreign_code import code_hashes
-from undertow.scenario.labelling import label
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Initial, Loop
-from undertow.scenario.stepping import step_failure
+from undertow.scenario.step_size import step_failure
 
 
 class Executed(NamedTuple):
@@ -32,19 +33,20 @@ class Executed(NamedTuple):
     built: Built
     outcome: Outcome
     status: Status
-    steady: dict[str, Any] | None  # metrics over the steady window; None when the run did not last
+    steady: dict[str, Any] | None  # metrics over the steady window; None when the run ended early
     whole: dict[str, Any]
+    success: Success | None  # None without a criterion
     dataset: xr.Dataset
 
 
 def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
-    """Run a scenario, on the processor: one run has nothing that a GPU could do beside it.
+    """Run a scenario on the CPU: a single run has no work for a GPU.
 
     Args:
         source: a scenario, read, as data or built.
 
     Raises:
-        BadInput: anything wrong with it.
+        BadInput: the scenario is invalid.
     """
     with runtime.on_processor():
         return _execute(source if isinstance(source, Built) else build(source))
@@ -53,7 +55,8 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
 @in_its_precision
 def _execute(built: Built) -> Executed:
     scenario, text = built.scenario, dump(built.resolved)
-    gathered = (Metrics(*built.window()),) if scenario.steady.every_tick else ()
+    plant = built.closed_loop.plant
+    gathered = accumulators(plant, built.metrics, *built.window()) if scenario.steady.every_step else ()
     outcome, left_to_xla = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
     why = step_failure(built.closed_loop, scenario.loop, outcome)
     attributes = (
@@ -67,7 +70,8 @@ def _execute(built: Built) -> Executed:
             "seed": scenario.seed,
         }
     )
-    finished = label(built.closed_loop, outcome, built.window(), scenario.loop.dt, attributes)
+    how = Measuring(built.window(), scenario.loop.dt, built.metrics, built.criterion(), gathered)
+    finished = label(built.closed_loop, outcome, how, attributes)
     return Executed(built, outcome, *finished)
 
 
@@ -78,17 +82,18 @@ def run_loop(
     seed: int,
     accumulators: tuple[sampled.AbstractAccumulator, ...] = (),
 ) -> tuple[Outcome, dict[str, str]]:
-    """Run a closed loop as `loop:` and `initial:` of a scenario say; `accumulators` for a sampled one.
+    """Run a closed loop with the keys `loop` and `initial` of a scenario; `accumulators` are for a sampled loop.
 
     Returns:
-        The outcome; and attribute `left_to_xla` of its dataset, the reason, where lanes were asked for in vain.
+        The outcome, in NumPy arrays; and attribute `left_to_xla` of its dataset, the reason why the SIMD backend could
+        not be used.
     """
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
-    common: dict[str, Any] = {"duration": settings.duration, "key": jax.random.PRNGKey(seed), **place}
+    common: dict[str, Any] = {"duration": settings.duration, "key": key_of_seed(seed), **place}
     if settings.kind == "continuous":
         adaptive = (settings.rtol, settings.atol) if settings.method == "adaptive" else None
         outcome = continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
-        return jax.block_until_ready(outcome), {}
+        return jax.device_get(outcome), {}
     common |= {
         "dt": settings.dt,
         "record_every": round(settings.record / settings.dt),
@@ -97,12 +102,12 @@ def run_loop(
         "accumulators": accumulators,
     }
     lacking = {}
-    if settings.engine == "lanes":
+    if settings.backend == "simd":
         try:
-            return in_lanes.simulate(loop, **common), {}
-        except Unsupported as error:
+            return simd_batch.simulate(loop, **common), {}
+        except simd_batch.Unsupported as error:
             lacking = {"left_to_xla": str(error)}
-    return jax.block_until_ready(sampled.simulate(loop, **common)), lacking
+    return jax.device_get(sampled.simulate(loop, **common)), lacking
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

@@ -1,7 +1,7 @@
-"""Python code that a scenario names: whose it is, and whether what a result names may run.
+"""Python code that a scenario names: its owner, and whether the code named by a result file may run.
 
-A scenario file that the user names may run the code that it names, as a script would. A result file was perhaps made by
-somebody else, and opening it is not asking for code to be run.
+A scenario file that the user names may run the code that it names, as a script would. A result file may come from
+somebody else, and opening it must not run code unasked.
 """
 
 import json
@@ -16,51 +16,51 @@ _MARK = ".py:"  # as in ./my_rov.py:my_rov, see `undertow.core.catalogue`
 
 
 def check_allowed(data: Mapping[str, Any], result: Path, recorded: str | None, what: str, allowed: bool) -> None:
-    """That the code that the scenario of a result names may run.
+    """Check that the code named by the scenario of a result may run.
 
     Args:
         data: the scenario.
-        result: the file that it stands in.
+        result: the result file.
         recorded: hashes of the code of that run, as `code_hashes` gave them.
         what: the argument or key that names the result, for messages.
-        allowed: whether the user said so.
+        allowed: whether the user allowed it.
 
     Raises:
-        BadInput: there is such code, and nobody said so.
+        BadInput: there is such code, and the user has not allowed it.
     """
     named = dict(_named(data))
     if allowed or not named:
         return
     known = changed(recorded, data, result.parent)
-    said = [_said(key, name, result.parent, known) for key, name in named.items()]
-    hint = f"{'. '.join(said)}. Read it; to run it, add --allow-code (in Python: allow_code=True)"
-    raise BadInput(what, "be without Python code of its own", f"{result}, a file of {_owner(result)}", hint=hint)
+    files = [_described(key, name, result.parent, known) for key, name in named.items()]
+    hint = f"{'. '.join(files)}. Read it; to run it, add --allow-code (in Python: allow_code=True)"
+    raise BadInput(what, "not name Python code", f"{result}, a file of {_owner(result)}", hint=hint)
 
 
 def code_hashes(data: Mapping[str, Any], folder: Path) -> str:
-    """SHA-256 of every file of code that a scenario names, by path, as JSON; what those files import is not among them.
+    """SHA-256 of every code file that a scenario names, by path, as JSON; without the files that these import.
 
     Args:
         data: the scenario.
-        folder: where relative paths start.
+        folder: folder of relative paths.
     """
     files = sorted({_file(name, folder) for _, name in _named(data)})
     return json.dumps({str(path): file_hash(path) for path in files})
 
 
 def changed(recorded: str | None, data: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
-    """Files of code that have other contents than those that ran; none where that is not known.
+    """Code files that have changed since the run; empty where that is unknown.
 
     Args:
-        recorded: what `code_hashes` gave then.
+        recorded: result of `code_hashes` at the time of the run.
         data: the scenario.
-        folder: where relative paths start.
+        folder: folder of relative paths.
     """
     before, now = json.loads(recorded or "{}"), json.loads(code_hashes(data, folder))
     return tuple(Path(path) for path in now if path in before and before[path] != now[path])
 
 
-def _said(key: str, name: str, folder: Path, known: tuple[Path, ...]) -> str:
+def _described(key: str, name: str, folder: Path, known: tuple[Path, ...]) -> str:
     path = _file(name, folder)
     if not path.exists():
         return f"`{key}` names {name}, a file that does not exist"
@@ -80,7 +80,7 @@ def _owner(path: Path) -> str:
 
 
 def _named(node: Any, path: str = "") -> Iterator[tuple[str, str]]:
-    """Key path and text of everything that could name code."""
+    """Key path and text of every value that names code."""
     if isinstance(node, str) and _MARK in node and path != "description":
         yield path, node
     elif isinstance(node, Mapping):

@@ -1,4 +1,4 @@
-"""Where a result comes from: versions, machine class, code of others; and the sums that say whether it is as it was."""
+"""Provenance of a result: versions, machine class, code files; and checksums that reveal changes."""
 
 import hashlib
 import importlib.metadata
@@ -15,13 +15,13 @@ import xarray as xr
 
 _PACKAGES = ("undertow", "jax", "jaxlib", "equinox", "diffrax", "numpy")
 
-# Attributes of a result that are results themselves; those in JSON are claims one by one.
+# Attributes of a result that are results themselves; those in JSON are compared one by one.
 _CLAIMED = ("status", "ended", "certificate")
 _CLAIMED_EACH = "metrics"
 
 
 def versions() -> dict[str, str]:
-    """Versions of what computes, and the class of machine it ran on."""
+    """Versions of the software, and the class of the machine."""
     found = {f"version_{name}": importlib.metadata.version(name) for name in _PACKAGES}
     device = jax.devices()[0]
     return found | {
@@ -36,9 +36,9 @@ def text_hash(text: str) -> str:
 
 
 def claims(dataset: xr.Dataset) -> dict[str, str]:
-    """Everything that a run claims, with a SHA-256 each: columns, status, and metrics one by one as `metrics.whole...`.
+    """SHA-256 of every result of a run: columns, status, and each metric as `metrics.whole...`.
 
-    Equal if and only if the run repeated bit for bit. Versions, machine and words are no claims.
+    They are equal if and only if the runs are identical bit for bit. Versions, machine and texts are not included.
     """
     found = {str(name): _of_values(dataset[name].variable) for name in dataset.variables}
     found |= {name: _of_words(dataset.attrs[name]) for name in _CLAIMED if name in dataset.attrs}
@@ -47,14 +47,14 @@ def claims(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def content_hash(dataset: xr.Dataset) -> str:
-    """SHA-256 of all that a run claims: equal if and only if it repeated bit for bit."""
+    """SHA-256 of all results of a run: equal if and only if the runs are identical bit for bit."""
     return text_hash(json.dumps(claims(dataset), sort_keys=True))
 
 
 def checksum(dataset: xr.Dataset) -> str:
-    """SHA-256 of a whole result, units and scenario included: its attribute `checksum`, unless it was changed since.
+    """SHA-256 of a whole result, including units and scenario; equal to its attribute `checksum` if it is unchanged.
 
-    It tells damage and edits; it is no signature, as whoever changes a file on purpose can write another one.
+    It reveals damage and edits. It is not a signature: whoever changes a file on purpose can compute another one.
     """
     attributes = {"": {key: value for key, value in dataset.attrs.items() if key != "checksum"}}
     attributes |= {str(name): dict(variable.attrs) for name, variable in dataset.variables.items()}

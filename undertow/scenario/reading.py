@@ -1,4 +1,4 @@
-"""Reading scenario files: YAML 1.2 with line numbers, or the scenario inside a result file."""
+"""Read scenario files: YAML 1.2 with line numbers, or the scenario inside a result file."""
 
 import io
 import re
@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import xarray as xr
-from ruamel.yaml import YAML
 
 from undertow.core.errors import BadInput
-from undertow.core.foreign import python_says
+from undertow.core.user_code import python_says
 from undertow.scenario.foreign_code import check_allowed
 from undertow.scenario.provenance import checksum
-from undertow.scenario.yaml_text import Path_, load
+
+Path_ = tuple[str | int, ...]
 
 
 class Text(NamedTuple):
-    """A scenario as read: plain data, and where each key stands."""
+    """A scenario as read: plain data, and the line of each key."""
 
     data: dict[str, Any]
     name: str  # file name for messages; "" when not from a file
@@ -25,7 +25,7 @@ class Text(NamedTuple):
     lines: dict[Path_, int]  # key path -> line, from 1
 
     def where(self, path: Path_) -> str:
-        """Place of a key, or of the nearest enclosing one, for messages."""
+        """Location of a key, or of the nearest enclosing one, for messages."""
         while path and path not in self.lines:
             path = path[:-1]
         if not self.name:
@@ -69,6 +69,8 @@ def read(path: Path, what: str = "SCENARIO", allow_code: bool = False) -> Text:
 
 def dump(data: Mapping[str, Any]) -> str:
     """Data as YAML text that reads back to the same data."""
+    from ruamel.yaml import YAML
+
     stream = io.StringIO()
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
@@ -108,6 +110,8 @@ def parse(text: str, name: str, folder: Path, what: str) -> Text:
     Raises:
         BadInput: malformed.
     """
+    from undertow.scenario.yaml_text import load  # what it imports adds filters of warnings to the process
+
     data, lines = load(text, name, what)
     if not isinstance(data, dict):
         got = "empty" if data is None else "a list" if isinstance(data, list) else f"a single {type(data).__name__}"

@@ -1,4 +1,4 @@
-"""What a scenario file may say. Validated before anything is built or compiled."""
+"""Keys of a scenario file, their defaults and their checks. Validated before anything is built or compiled."""
 
 import re
 import typing
@@ -30,7 +30,7 @@ class Part(BaseModel):
 
 
 NamedPart = Annotated[Part, _named()]
-# Tags tell pydantic which of the two is meant, so that it complains about that one only.
+# Tags select one of the two for pydantic, so that it reports errors about that one only.
 _ONE, _SEVERAL = "(one part)", "(several parts)"
 OneOrMore = Annotated[
     Annotated[NamedPart, Tag(_ONE)] | Annotated[list[NamedPart], Tag(_SEVERAL)],
@@ -40,44 +40,51 @@ Numbers = list[float]
 
 
 class Strict(BaseModel):
-    """Keys that are not known, and values of other types, are refused."""
+    """A mapping that rejects unknown keys and values of other types."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class Loop(Strict):
-    """How the closed loop is run."""
+    """Settings of the closed-loop simulation."""
 
-    kind: Literal["sampled", "continuous"] = Field("sampled", description="a scan at dt, or one ODE")
-    duration: float = Field(20.0, gt=0, le=1e6, description="s")
+    kind: Literal["sampled", "continuous"] = Field(
+        "sampled",
+        description="sampled: the controller runs every dt with the input held; continuous: plant and controller "
+        "are one ordinary differential equation (ODE)",
+    )
+    duration: float = Field(20.0, gt=0, le=1e6, description="duration of the run, s")
     dt: float = Field(1e-3, gt=0, le=10, description="sampling time of the controller, or step of the ODE, s")
     record: float = Field(1e-2, gt=0, le=1e5, description="time between records, s")
     method: Literal["rk4", "euler", "adaptive"] = Field(
-        "rk4", description="integration: rk4; euler (sampled); adaptive, to rtol and atol (continuous)"
+        "rk4",
+        description="integration method: rk4; euler (sampled only); adaptive with rtol and atol (continuous only)",
     )
-    substeps: int = Field(1, ge=1, le=100, description="plant steps per dt (sampled)")
-    engine: Literal["lanes", "xla"] = Field(
-        "lanes",
-        description="what compiles it (sampled): lanes, the same bits everywhere; xla, also for what lanes lack",
+    substeps: int = Field(1, ge=1, le=100, description="integration steps of the plant per dt (sampled only)")
+    backend: Literal["simd", "xla"] = Field(
+        "simd",
+        description="compiler of a sampled loop: simd gives the same bits for single runs and batches; xla supports "
+        "all parts and is used where simd does not",
     )
-    rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (adaptive)")
-    atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (adaptive)")
+    rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (adaptive only)")
+    atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (adaptive only)")
 
 
 class Initial(Strict):
-    """State at t = 0; zero where not given."""
+    """State at t = 0; zero by default."""
 
     position: Numbers | None = Field(None, description="one entry per output, m and rad")
     velocity: Numbers | None = Field(None, description="one entry per output, m/s and rad/s")
 
 
 class Window(Strict):
-    """Part of the run that the metrics `steady` are taken over."""
+    """Part of the run over which the steady metrics are computed."""
 
-    start: float | None = Field(default=None, ge=0, description="s; half of the duration unless given")
-    stop: float | None = Field(default=None, gt=0, description="s; the end unless given")
-    every_tick: bool = Field(
-        default=False, description="count every control step, as campaigns do, and not only the recorded ones (sampled)"
+    start: float | None = Field(default=None, ge=0, description="start, s; default: half of the duration")
+    stop: float | None = Field(default=None, gt=0, description="end, s; default: the duration")
+    every_step: bool = Field(
+        default=False,
+        description="whether to use every control step, as campaigns do, instead of the records (sampled only)",
     )
 
     def of_run(self, duration: float) -> "tuple[float, float]":
@@ -86,73 +93,94 @@ class Window(Strict):
         return start, duration if self.stop is None else self.stop
 
 
-class Tries(Strict):
-    """Runs that gains are tried on: every parameter set with every seed."""
+class TrainingRuns(Strict):
+    """Runs for the evaluation of gains: every parameter set with every seed."""
 
     seeds: int = Field(2, ge=1, le=1000, description="number of seeds")
-    sizes: Numbers = Field([0.6, 1.2], description="of the disturbance, in turn with the seeds; 1 as it is")
-    sets: list[str] | None = Field(None, description="true parameter sets of the vehicle; every second unless given")
+    sizes: Numbers = Field(
+        [0.6, 1.2], description="factors on the disturbance, which alternate with the seeds; 1 leaves it unchanged"
+    )
+    sets: list[str] | None = Field(
+        None, description="plant variants: parameter sets of the vehicle; default: every second published set"
+    )
 
 
 class Weights(Strict):
-    """What a run costs, without unit: errors by their scales, inputs as a share of their limit."""
+    """Weights of the dimensionless cost: errors relative to their scales, inputs relative to their limit."""
 
-    tracking: float = Field(1.0, ge=0, description="of the rms of the error")
-    effort: float = Field(0.1, ge=0, description="of the rms of the input")
-    variation: float = Field(0.05, ge=0, description="of the total variation of the input per second")
-    failure: float = Field(100.0, ge=0, description="of the share of the time that a failed run did not last")
+    tracking: float = Field(1.0, ge=0, description="weight of the rms tracking error")
+    effort: float = Field(0.1, ge=0, description="weight of the rms input")
+    variation: float = Field(0.05, ge=0, description="weight of the total variation of the input per second")
+    failure: float = Field(100.0, ge=0, description="weight of the share of the duration that a failed run lacks")
 
 
 class Tune(Strict):
-    """What `undertow tune` does with this scenario; other commands do not look at it."""
+    """Settings of `undertow tune`; other commands ignore them."""
 
     parameters: dict[str, Numbers] = Field(
-        default_factory=dict, description="options of the controller: [low, high]; its main gains unless given"
+        default_factory=dict,
+        description="tunable parameters: option of the controller -> [low, high]; default: its main gains",
     )
     per: Literal["group", "axis", "all"] = Field(
-        "group", description="gains for translation and rotation of a vehicle, for each axis, or one for all"
+        "group", description="separate gains for translation and rotation (group), for each axis, or one value for all"
     )
-    duration: float | None = Field(None, gt=0, le=1e5, description="s, of every run; 20 or less unless given")
-    start: float | None = Field(None, ge=0, description="s, from when on it counts; the second half unless given")
-    position_scale: float = Field(0.05, gt=0, description="error that costs one, m")
-    angle_scale: float = Field(0.05, gt=0, description="error that costs one, rad")
-    iterations: int = Field(100, ge=1, le=100_000, description="at most")
-    train: Tries = Field(default_factory=Tries, description="runs that the gains are found on")
-    held_out: Tries = Field(
-        default_factory=lambda: Tries.model_validate({"seeds": 4}),
-        description="other runs that they are judged by; 4 seeds unless given",
+    duration: float | None = Field(
+        None, gt=0, le=1e5, description="duration of every run, s; default: that of the scenario, at most 20"
     )
-    weights: Weights = Field(default_factory=Weights, description="of the cost")
+    start: float | None = Field(
+        None, ge=0, description="start of the evaluated window, s; default: half of the duration"
+    )
+    position_scale: float = Field(0.05, gt=0, description="position error with a cost of one, m")
+    angle_scale: float = Field(0.05, gt=0, description="angle error with a cost of one, rad")
+    iterations: int = Field(100, ge=1, le=100_000, description="largest number of iterations")
+    train: TrainingRuns = Field(default_factory=TrainingRuns, description="training runs")
+    held_out: TrainingRuns = Field(
+        default_factory=lambda: TrainingRuns.model_validate({"seeds": 4}),
+        description="held-out runs for the final evaluation; default: 4 seeds",
+    )
+    weights: Weights = Field(default_factory=Weights, description="weights of the cost")
 
 
 class Scenario(Strict):
-    """One closed loop, start to finish."""
+    """One closed loop."""
 
     description: str = Field("", description="free text")
     plant: Annotated[Part, _named("hybrid_vehicle")] = Field(
-        Part(kind="hybrid_vehicle"), description="what is controlled"
+        Part(kind="hybrid_vehicle"), description="the system that is controlled"
     )
-    model: dict[str, Any] = Field(default_factory=dict, description="what the controller may know of the plant")
-    controller: Annotated[Part, _named("rcaf")] = Field(Part(kind="rcaf"), description="the law")
-    reference: NamedPart = Field(description="what to follow")
-    disturbance: OneOrMore = Field(Part(kind="none"), description="what the surroundings do; several as a list")
-    sensor: NamedPart = Field(Part(kind="perfect"), description="what stands before the measurement")
-    loop: Loop = Field(default_factory=Loop, description="how it is run")
+    model: dict[str, Any] = Field(
+        default_factory=dict, description="options of the nominal model, which the controller uses; default: the plant"
+    )
+    controller: Annotated[Part, _named("rcaf")] = Field(Part(kind="rcaf"), description="the control law")
+    reference: NamedPart = Field(description="the desired motion")
+    disturbance: OneOrMore = Field(Part(kind="none"), description="the disturbance; several as a list")
+    navigation: NamedPart = Field(
+        Part(kind="perfect"), description="the navigation filter, which computes the measurement of the controller"
+    )
+    loop: Loop = Field(default_factory=Loop, description="settings of the simulation")
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")
     steady: Window = Field(default_factory=Window, description="window of the steady metrics")
-    tune: Tune = Field(default_factory=Tune, description="what `undertow tune` does with it")
-    seed: int = Field(0, ge=0, le=2**32 - 1, description="of everything random")
-    precision: Literal["float64", "float32"] = Field("float64", description="of all arithmetic")
+    metrics: list[NamedPart] = Field(
+        default_factory=list, description="further metrics, each ./file.py:function that returns an AbstractMetric"
+    )
+    success: dict[str, float] | None = Field(
+        None,
+        description="metric -> what it must stay below in the steady window; position_rms 0.05 m and attitude_rms "
+        "0.05 rad unless given",
+    )
+    tune: Tune = Field(default_factory=Tune, description="settings of `undertow tune`")
+    seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all random numbers")
+    precision: Literal["float64", "float32"] = Field("float64", description="precision of all arithmetic")
 
 
 def validate(text: Text) -> Scenario:
-    """The scenario, or the first complaint about it.
+    """Validate the contents of a scenario file.
 
     Raises:
-        BadInput: unknown key, wrong type, value out of range; names key, place and nearest known word.
+        BadInput: unknown key, wrong type, value out of range; the error names key, location and nearest known word.
     """
     if "scenario" in text.data:
-        hint = "`undertow campaign` flies campaigns"
+        hint = "Run a campaign with `undertow campaign`"
         raise BadInput("scenario", "be a key of campaigns only", hint=hint, where=text.where(("scenario",)))
     try:
         return Scenario.model_validate(text.data)
@@ -161,7 +189,7 @@ def validate(text: Text) -> Scenario:
 
 
 def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scenario) -> BadInput:
-    """The first of pydantic's errors in the house grammar; a misspelt key before the key that it leaves missing."""
+    """The first of pydantic's errors as BadInput; a misspelt key comes before the key that it leaves missing."""
     what = model.__name__.lower()
     error: Any = min(errors.errors(), key=lambda each: each["type"] != "extra_forbidden")
     path = tuple(step for step in error["loc"] if step not in (_ONE, _SEVERAL))
@@ -178,7 +206,7 @@ def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scen
 
 
 def _must(error: Any) -> str:
-    """pydantic's 'Input should be ...' in the house grammar."""
+    """pydantic's 'Input should be ...' as the phrase after "must"."""
     message = error["msg"].replace("Input should be a valid ", "be a ").replace("Input should be ", "be ")
     message = message.replace("Value error, ", "").replace("Keys should be strings", "have words for keys")
     message = re.sub(r"\w+ should have at (\w+) (\d+) items?.*", r"have at \1 \2 entries", message)
@@ -197,7 +225,7 @@ def _keys_beside(path: tuple, model: Any) -> list[str]:
 
 
 def _beside_none(annotation: Any) -> Any:
-    """What an optional value is when it is there."""
+    """The type of an optional value without None."""
     members = [one for one in typing.get_args(annotation) if one is not type(None)]
     return members[0] if len(members) == 1 else annotation
 
@@ -239,6 +267,7 @@ def _type_name(annotation: Any) -> str:
         Numbers | None: "list of numbers",
         float | None: "number",
         list[str] | None: "list of names",
+        list[NamedPart]: "list of parts",
         typing.get_args(OneOrMore)[0]: "part or list of parts",
     }
     return words.get(annotation, "mapping")

@@ -1,4 +1,4 @@
-"""Whether a value is what an option's annotation says."""
+"""Check the value of an option against its annotation."""
 
 import functools
 import math

@@ -1,10 +1,11 @@
-"""A vehicle of the user's own from a YAML file alone. See docs/your-own-vehicle.md."""
+"""A vehicle from a YAML file. See docs/your-own-vehicle.md."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from undertow.core.errors import BadInput
+from undertow.core.runtime import double_outside_runs
 from undertow.scenario.reading import Text, from_data, key_path, read
 from undertow.scenario.vehicle_data import VehicleData, parse
 from undertow.scenario.vehicle_keys import INSTEAD
@@ -21,6 +22,7 @@ class VehicleFile(NamedTuple):
     text: Text
     changed: frozenset[str]  # keys that are no longer the file's
 
+    @double_outside_runs
     def vehicle(self) -> Vehicle:
         """The vehicle.
 

@@ -1,4 +1,4 @@
-"""The keys of a vehicle file: what each holds, in which unit and shape."""
+"""Keys of a vehicle file: contents, unit and shape of each."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -26,7 +26,7 @@ MATRICES = {"inertia": (3, "about forward, starboard, down")} | {
 _REQUIRED = ("mass", "r_g", "r_b", *MATRICES, "thrusters")
 KEYS = ("name", "source", "inertia_about", *SCALARS, *VECTORS, *MATRICES, "thrusters", "thruster_matrix")
 
-# Ways of saying the same: where one is given, the others are not.
+# Alternatives: where one is given, the others must not be.
 INSTEAD = {
     "weight": ("gravity",),
     "gravity": ("weight",),
@@ -38,7 +38,7 @@ _LARGEST = 1e15
 
 
 def check_keys(contents: Mapping[str, Any]) -> None:
-    """Raise BadInput unless all keys are known, no two say the same, and none is missing."""
+    """Raise BadInput unless all keys are known, none is redundant, and none is missing."""
     for key in contents:
         if key not in KEYS:
             raise BadInput(key, "be a key of a vehicle file", "unknown", hint=did_you_mean(key, KEYS))
@@ -57,12 +57,12 @@ def check_keys(contents: Mapping[str, Any]) -> None:
 
 
 def text_at(contents: Mapping[str, Any], key: str, default: str) -> str:
-    """Text, or what it is when not given."""
+    """Text, or the default."""
     return str(checked(key, contents.get(key, default), str, default))
 
 
 def _ordinary(key: str, value: Any) -> NDArray:
-    """Numbers whose squares are numbers too."""
+    """Numbers whose squares are finite."""
     array = np.asarray(checked(key, value, None, 0.0), dtype=float)
     if array.size and np.abs(array).max() > _LARGEST:
         raise BadInput(key, f"hold numbers below {_LARGEST:g}", value)

@@ -1,7 +1,7 @@
-"""YAML 1.2 as plain data: mappings with words for keys, lists, text, numbers. No tags, and a size that is bounded.
+"""YAML 1.2 as plain data: mappings with text keys, lists, text, numbers. No tags, and a bounded size.
 
-The text is composed from the parser's events, so that a file that stands for too much is refused while it is read:
-aliases let a few lines stand for billions of entries.
+The text is composed from the parser's events, so that a file that is too large is rejected while it is read: with
+aliases, a few lines can stand for billions of entries.
 """
 
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ _MERGE = f"{_PREFIX}merge"
 
 
 class Malformed(Exception):
-    """Text that is no YAML, or none that is taken; the sentence of the complaint and its line, from 1."""
+    """Text that is not valid YAML, or not supported; with the parts of the error and its line, from 1."""
 
     def __init__(self, must: str, got: str, line: int | None, hint: str = ""):
         self.must, self.got, self.line, self.hint = must, got, line, hint
@@ -39,7 +39,7 @@ class Malformed(Exception):
 
 
 class _Node(NamedTuple):
-    """A value with the lines of its keys or entries, how many entries it stands for, and how deep it is."""
+    """A value with the lines of its keys or entries, its number of entries, and its depth."""
 
     value: Any  # a scalar, or nodes by key, or a list of nodes
     lines: dict[str | int, int]
@@ -159,8 +159,8 @@ class _Composer:
                 merged = {**_mergeable(node, line), **merged}
                 continue
             if key in own:
-                said = f'found duplicate key "{key}" with value "{node.value}" (original value: "{own[key].value}")'
-                raise _invalid(said, line)
+                found = f'found duplicate key "{key}" with value "{node.value}" (original value: "{own[key].value}")'
+                raise _invalid(found, line)
             own[key], lines[key] = node, line
         return {**own, **{key: node for key, node in merged.items() if key not in own}}, lines
 
@@ -194,7 +194,7 @@ class _Composer:
 
 
 def _mergeable(node: _Node, line: int) -> dict[str, _Node]:
-    """What `<<` brings in: the keys of a mapping, or of several, of which the first one counts."""
+    """The keys that `<<` merges from a mapping, or from several, of which the first has precedence."""
     several = node.value if isinstance(node.value, list) else [node]
     if not all(isinstance(one.value, dict) for one in several):
         raise _invalid("`<<` takes a mapping, or a list of them", line)

@@ -1,4 +1,4 @@
-"""Sensors: what stands between the truth and the measurement. One file each."""
+"""Sensors of a vehicle, one file each. `navigation/observer.py` estimates the state from their readings."""
 
 from undertow.core.catalogue import publish
 

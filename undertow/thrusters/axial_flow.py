@@ -1,4 +1,4 @@
-"""A thruster that sets the water around it in motion: thrust overshoots, then falls as the flow builds up."""
+"""A thruster with axial flow: thrust overshoots, then falls as the flow builds up."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param, sources_field
-from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.memoryless import AbstractMotorlessThruster
 from undertow.thrusters.thruster import PerThruster
 
 
@@ -28,7 +28,7 @@ class AxialFlowThruster(AbstractMotorlessThruster):
         n_dot = -k_n n - k_q Q + k_V (V -+ dead zone)
         v_dot = -k_v v - k_vv (v - v_a)|v| + k_t T ,  v_a_dot = -k_a v_a - k_aa v_a|v_a| + k_ta T
 
-    The ambient flow is that which the thruster makes itself, as on a bench; the speed of the vehicle is not in it.
+    The ambient flow is caused by the thruster itself, as on a test bench; the speed of the vehicle is neglected.
 
     Raises:
         BadInput: a value that is not positive (losses, linear terms, dead zones, current: negative).
@@ -42,7 +42,7 @@ class AxialFlowThruster(AbstractMotorlessThruster):
     torque_load: Float[Array, ""] = param("rad/(N m s^2)", "deceleration per torque", symbol="k_q")
     forward_drive: Float[Array, ""] = param("rad/(s^2 V)", "acceleration per volt beyond the dead zone", symbol="k_V+")
     reverse_drive: Float[Array, ""] = param("rad/(s^2 V)", "the same in reverse", symbol="k_V-")
-    forward_dead_zone: Float[Array, ""] = param("V", "voltage lost before anything turns")
+    forward_dead_zone: Float[Array, ""] = param("V", "voltage below which the propeller stands still")
     reverse_dead_zone: Float[Array, ""] = param("V", "the same in reverse")
     flow_decay: Float[Array, ""] = param("1/s", "linear loss of flow", symbol="k_v")
     flow_drag: Float[Array, ""] = param("1/m", "quadratic loss of flow", symbol="k_vv")
@@ -51,9 +51,9 @@ class AxialFlowThruster(AbstractMotorlessThruster):
     ambient_drag: Float[Array, ""] = param("1/m", "quadratic loss of ambient flow", symbol="k_aa")
     ambient_drive: Float[Array, ""] = param("1/kg", "acceleration of the ambient flow per thrust", symbol="k_ta")
     current_per_torque: Float[Array, ""] = param("A/(N m)", "current per propeller torque")
-    linear_gain: Float[Array, ""] = param("N/V", "gain the controller's model assumes", symbol="alpha")
+    linear_gain: Float[Array, ""] = param("N/V", "gain in the nominal model", symbol="alpha")
     supply: Float[Array, ""] = param("V", "largest drive voltage")
-    dead_zone: Float[Array, ""] = param("V", "command that the drive takes for none", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "largest command that the drive ignores", default=0.0)
     sources: tuple = sources_field()
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
@@ -90,7 +90,7 @@ class AxialFlowThruster(AbstractMotorlessThruster):
         return self.current_per_torque * self.torque(state)
 
     def speed_term(self, report):
-        hint = "A speed sensor does not see the axial flow, which takes a third of the thrust at full speed"
+        hint = "A speed sensor does not measure the axial flow, which reduces the thrust by a third at full speed"
         raise BadInput("speed_sensor", "be false with thruster axial_flow", "true", hint=hint)
 
     def advice(self):
@@ -100,15 +100,15 @@ class AxialFlowThruster(AbstractMotorlessThruster):
 
 
 def axial_flow(supply: float = 5.0, current_per_torque: float = 0.0) -> AxialFlowThruster:
-    """A small ROV thruster of unnamed make, propeller of 0.115 m: the one identified set with axial flow.
+    """A small ROV thruster of unknown make, propeller of 0.115 m: the only identified parameter set with axial flow.
 
-    Against its own bench at +-3 V: speed within 0.7 %, thrust +-11.7 N where 11.7 N and -13.0 N were measured. At
-    +-2 V the thrust is 13 and 35 % high, at +-1 V, next to the dead zone, half of what it should be. A step to 3 V
+    Against its own test bench at +-3 V: speed within 0.7 %, thrust +-11.7 N where 11.7 N and -13.0 N were measured. At
+    +-2 V the thrust is 13 and 35 % high; at +-1 V, next to the dead zone, it is half of the measured one. A step to 3 V
     overshoots in thrust by 37 %. Volts are those of the drive's command, full scale about 5 V.
 
     Args:
         supply: largest command, V.
-        current_per_torque: A/(N m), which makes current and energy mean something; 0, as published, for none.
+        current_per_torque: A/(N m), needed for current and energy; 0 where it is unknown, as published.
     """
     return AxialFlowThruster(
         thrust_coefficient=1.46693e-3,
@@ -133,7 +133,7 @@ def axial_flow(supply: float = 5.0, current_per_torque: float = 0.0) -> AxialFlo
         sources={
             "*": "NGS ROV-Thruster-Model, thruster_config_2.m",
             "linear_gain": "measured thrust over voltage at 3 V: 11.69 N / 3 V",
-            "supply": "full scale of the drive, about",
+            "supply": "approximate full scale of the drive",
             "current_per_torque": "not published",
         },
     )

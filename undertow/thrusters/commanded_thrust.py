@@ -1,4 +1,4 @@
-"""A thruster that takes its command in newtons: thrust within limits of its own each way, behind a first-order lag."""
+"""A thruster commanded in newtons: limits of thrust in each direction and a first-order lag."""
 
 import math
 
@@ -7,16 +7,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.drive import DirectDrive, LaggedDrive
+from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.first_order import LaggedThrust
-from undertow.thrusters.motorless import AbstractMotorlessThruster
+from undertow.thrusters.memoryless import AbstractMotorlessThruster
 from undertow.thrusters.thruster import PerThruster
 
 
 class CommandedThrust(AbstractMotorlessThruster):
-    """tau T_dot = T_c - T with T_c the command within its limits, and |T_dot| limited; nothing is known of a motor.
+    """tau T_dot = T_c - T with T_c the limited command, and |T_dot| limited; there is no motor model.
 
     Raises:
         BadInput: a limit or the time constant is not positive, or the power negative.
@@ -26,7 +26,7 @@ class CommandedThrust(AbstractMotorlessThruster):
     thrust_reverse_max: Float[Array, ""] = param("N", "largest thrust in reverse, as a positive number", symbol="T-")
     time_constant: Float[Array, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
     thrust_rate_max: Float[Array, ""] = param("N/s", "fastest change of thrust", default=jnp.inf)
-    power_per_thrust: Float[Array, ""] = param("W/N", "electrical power per thrust asked for", default=0.0)
+    power_per_thrust: Float[Array, ""] = param("W/N", "electrical power per commanded thrust", default=0.0)
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
     input_unit = "N"
 
@@ -39,24 +39,24 @@ class CommandedThrust(AbstractMotorlessThruster):
 
     @property
     def supply(self):  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Largest command either way, N."""
+        """Largest command in either direction, N."""
         return jnp.maximum(self.thrust_forward_max, self.thrust_reverse_max)
 
     @property
     def dead_zone(self):  # pyright: ignore[reportIncompatibleVariableOverride]
-        """None, N."""
+        """No dead zone: 0 N."""
         return jnp.zeros(())
 
     @property
     def linear_gain(self):  # pyright: ignore[reportIncompatibleVariableOverride]
-        """N per N."""
+        """1 N of thrust per 1 N of command."""
         return jnp.ones(())
 
     def limits(self):
         return -self.thrust_reverse_max, self.thrust_forward_max
 
     def terminal(self, voltage) -> PerThruster:
-        """The command, N, as it is."""
+        """The command itself, N."""
         return voltage
 
     def initial_state(self, count) -> LaggedThrust:
@@ -70,18 +70,18 @@ class CommandedThrust(AbstractMotorlessThruster):
         return state.thrust
 
     def current(self, state, voltage) -> PerThruster:
-        """Zero: what is commanded in newtons has no voltage, so only its `electrical_power` means something."""
+        """Zero: without a voltage only `electrical_power` is defined."""
         return jnp.zeros_like(state.thrust)
 
     def electrical_power(self, state, voltage) -> PerThruster:
         return self.power_per_thrust * jnp.abs(voltage)
 
     def speed_term(self, report):
-        hint = "It takes newtons, whatever turns inside. Preset `robust` knows its lag"
+        hint = "It is commanded in newtons and has no propeller speed. Preset `robust` models its lag"
         raise BadInput("speed_sensor", "be false with thruster commanded_thrust", "true", hint=hint)
 
-    def drive(self, count: int, measured: bool) -> LaggedDrive:
-        return LaggedDrive(DirectDrive(self.linear_gain, *self.limits()), self.time_constant, count)
+    def actuator_model(self, count: int, measured: bool) -> LaggedActuator:
+        return LaggedActuator(DirectActuator(self.linear_gain, *self.limits()), self.time_constant, count)
 
     def advice(self):
         if float(jnp.max(self.power_per_thrust)) > 0:
@@ -96,16 +96,16 @@ def commanded_thrust(
     thrust_rate_max: float = math.inf,
     power_per_thrust: float = 7.6,
 ) -> CommandedThrust:
-    """Thrust commanded in newtons, with limits of its own each way and a first-order lag: as autopilots command it.
+    """Thrust commanded in newtons, as by autopilots, with limits in each direction and a first-order lag.
 
     Default limits and power are those of the T200 at 16 V in the manufacturer's table: 51.4 N and -39.9 N, 389 W
-    forward. The time constant is a guess, as that of `first_order`.
+    forward. The time constant is an assumption, as that of `first_order`.
 
     Args:
         thrust_forward_max: largest thrust forward, N.
         thrust_reverse_max: largest thrust in reverse, N; a positive number.
         time_constant: from a step of the command to 63 % of its thrust, s.
         thrust_rate_max: fastest change of thrust, N/s; infinite by default.
-        power_per_thrust: electrical power per newton asked for, either way, W/N; 0 for not known.
+        power_per_thrust: electrical power per commanded newton in either direction, W/N; 0 where it is unknown.
     """
     return CommandedThrust(thrust_forward_max, thrust_reverse_max, time_constant, thrust_rate_max, power_per_thrust)

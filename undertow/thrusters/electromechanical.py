@@ -1,4 +1,4 @@
-"""Rung `electromechanical`: the whole of Eqs. (8)-(11)."""
+"""Fidelity level `electromechanical`: the full motor model, Eqs. (8)-(11)."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.motor_drive import MotorDrive
+from undertow.thrusters.motor_speed_control import SpeedControlledMotor
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
 
 
@@ -24,7 +24,7 @@ class ElectromechanicalThruster(AbstractThruster):
 
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
@@ -58,8 +58,8 @@ class ElectromechanicalThruster(AbstractThruster):
     def speed_term(self, report: PropellerReport) -> PerThruster:
         return self.motor.speed_term(report.speed, report.acceleration)
 
-    def drive(self, count: int, measured: bool) -> MotorDrive:
-        return MotorDrive(self, count, measured)
+    def actuator_model(self, count: int, measured: bool) -> SpeedControlledMotor:
+        return SpeedControlledMotor(self, count, measured)
 
     def advice(self):
         return self.motor.advice()

@@ -1,4 +1,4 @@
-"""A thruster of which only gain and time constant are known: thrust follows the voltage with a first-order lag."""
+"""A thruster given by gain and time constant: thrust follows the voltage with a first-order lag."""
 
 import math
 from typing import NamedTuple
@@ -8,12 +8,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.drive import LaggedDrive
+from undertow.core.actuator_model import LaggedActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.thrusters.memoryless import MemorylessThruster
-from undertow.thrusters.motorless import AbstractMotorlessThruster
-from undertow.thrusters.steady_drive import SteadyDrive
+from undertow.thrusters.memoryless import AbstractMotorlessThruster, MemorylessThruster
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import PerThruster
 
 _OF_STEADY_STATE = (
@@ -35,7 +34,7 @@ class LaggedThrust(NamedTuple):
 
 
 class FirstOrderThruster(AbstractMotorlessThruster):
-    """tau T_dot + T = c |V|^(p-1) V, less by a share in reverse; no motor behind it.
+    """tau T_dot + T = c |V|^(p-1) V, multiplied by `reverse_share` in reverse; without a motor model.
 
     Raises:
         BadInput: a coefficient is not positive.
@@ -44,11 +43,11 @@ class FirstOrderThruster(AbstractMotorlessThruster):
     thrust_per_volt: Float[Array, ""] = param("N/V^p", "steady thrust coefficient", symbol="c")
     power: Float[Array, ""] = param("", "power of the voltage", symbol="p")
     time_constant: Float[Array, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
-    reverse_share: Float[Array, ""] = param("", "thrust in reverse, as a share of that forward")
+    reverse_share: Float[Array, ""] = param("", "thrust in reverse as a share of forward thrust")
     current_per_thrust: Float[Array, ""] = param("A/N", "current per steady thrust", symbol="c_I")
     linear_gain: Float[Array, ""] = param("N/V", "gain that preset `paper` assumes", symbol="alpha")
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
@@ -61,7 +60,7 @@ class FirstOrderThruster(AbstractMotorlessThruster):
         return MemorylessThruster(**{name: getattr(self, name) for name in _OF_STEADY_STATE})
 
     def steady_thrust(self, voltage: PerThruster) -> PerThruster:
-        """Thrust, N, that a voltage in V leads to."""
+        """Steady thrust, N, of a voltage in V."""
         return self.settled().thrust((), voltage)
 
     def initial_state(self, count) -> LaggedThrust:
@@ -74,15 +73,15 @@ class FirstOrderThruster(AbstractMotorlessThruster):
         return state.thrust
 
     def current(self, state, voltage) -> PerThruster:
-        """That of the steady state: it leads the thrust, so that no power comes back from a thruster being reversed."""
+        """Current of the steady state, A. It leads the thrust, so that a thruster being reversed returns no power."""
         return self.current_per_thrust * self.steady_thrust(voltage)
 
     def speed_term(self, report):
-        hint = "This thruster has no propeller speed. Describe its motor (DCMotor); preset `robust` knows its lag"
+        hint = "This thruster has no propeller speed. Describe its motor (DCMotor); preset `robust` models its lag"
         raise BadInput("speed_sensor", "be false with thruster first_order", "true", hint=hint)
 
-    def drive(self, count: int, measured: bool) -> LaggedDrive:
-        return LaggedDrive(SteadyDrive(self.settled()), self.time_constant, count)
+    def actuator_model(self, count: int, measured: bool) -> LaggedActuator:
+        return LaggedActuator(QuasiStaticActuator(self.settled()), self.time_constant, count)
 
     def advice(self):
         return ()
@@ -99,23 +98,23 @@ def first_order(
     dead_zone: float = 0.0,
     dead_zone_kind: str = "pass",
 ) -> FirstOrderThruster:
-    """Thrust that follows T = c V (or c V|V|) with a first-order lag, for those who know no more of a thruster.
+    """Thrust that follows T = c V (or c V|V|) with a first-order lag, where no more is known of a thruster.
 
     For limits in newtons, which may differ forward and in reverse, take `commanded_thrust`.
 
-    Default gain and current are those of the paper's motor at 10 V; the time constant is a guess, as it is for most
-    thrusters: published ones of small vehicles go from 0.05 s (RexROV, LAUV) to 0.2 s.
+    Default gain and current are those of the paper's motor at 10 V; the time constant is an assumption, as for most
+    thrusters: published ones of small vehicles range from 0.05 s (RexROV, LAUV) to 0.2 s.
 
     Args:
         thrust_per_volt: c, N/V, or N/V^2 with power 2.
         time_constant: from a step of voltage to 63 % of its thrust, s.
         power: of the voltage in the steady thrust; 1 linear, 2 quadratic.
-        reverse_share: thrust in reverse as a share of that forward, at the same voltage.
+        reverse_share: thrust in reverse as a share of forward thrust at the same voltage.
         current_per_thrust: c_I, A/N, in steady state.
         linear_gain: alpha that preset `paper` assumes, N/V; None for thrust_per_volt, when power is 1.
         supply: voltage limit, V.
-        dead_zone: voltage below which nothing turns, V.
-        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        dead_zone: voltage below which the thrust is zero, V.
+        dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
 
     Raises:
         BadInput: a value that is not positive, or no linear_gain for a thrust that is not linear.

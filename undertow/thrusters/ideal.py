@@ -1,4 +1,4 @@
-"""Rung `ideal`: thrust proportional to voltage."""
+"""Fidelity level `ideal`: thrust proportional to voltage."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.steady_drive import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
@@ -15,7 +15,7 @@ class IdealThruster(AbstractThruster):
 
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 
@@ -32,7 +32,7 @@ class IdealThruster(AbstractThruster):
         return self.motor.steady_current(self.motor.speed_at(self.thrust(state, voltage)))
 
     def powers(self, state, voltage) -> Powers:
-        """As of the motor at its steady current; the volts R I + k_e Om that V lacks come out of nothing too."""
+        """Powers of the motor at its steady current; the part of R I + k_e Om above V is created energy, too."""
         motor, volts = self.motor, self.terminal(voltage)
         speed = motor.speed_at(self.thrust(state, voltage))
         current = motor.steady_current(speed)
@@ -56,8 +56,8 @@ class IdealThruster(AbstractThruster):
         """V, V, that gives a thrust in N."""
         return self.commanded(self.motor.ideal_voltage(thrust))
 
-    def drive(self, count: int, measured: bool) -> SteadyDrive:
-        return SteadyDrive(self)
+    def actuator_model(self, count: int, measured: bool) -> QuasiStaticActuator:
+        return QuasiStaticActuator(self)
 
     def advice(self):
         return self.motor.advice()

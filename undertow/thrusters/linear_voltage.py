@@ -18,8 +18,8 @@ def linear_voltage(
         thrust_per_volt: c_0, N/V.
         current_per_thrust: c_I, A/N.
         supply: voltage limit, V.
-        dead_zone: voltage below which nothing turns, V.
-        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        dead_zone: voltage below which the thrust is zero, V.
+        dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
     """
     known = (thrust_per_volt, 1.0, current_per_thrust, thrust_per_volt)
     return MemorylessThruster(*known, supply, dead_zone, dead_zone_kind)

@@ -1,4 +1,4 @@
-"""The static thruster models that the paper's Fig. 2 argues against: T = c_0 V, T = c_V V|V|, I = c_I T."""
+"""The static thruster models that the paper's Fig. 2 criticises: T = c_0 V, T = c_V V|V|, I = c_I T."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -7,15 +7,33 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param
-from undertow.thrusters.motorless import AbstractMotorlessThruster
-from undertow.thrusters.steady_drive import SteadyDrive
-from undertow.thrusters.thruster import PerThruster
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
+from undertow.thrusters.thruster import AbstractThruster, PerThruster
+
+
+class AbstractMotorlessThruster(AbstractThruster):
+    """A thruster without a motor model: no energy balance, no speed to report, and a given nominal gain."""
+
+    linear_gain: eqx.AbstractVar[Float[Array, ""]]  # N/V
+
+    def powers(self, state, voltage) -> None:
+        return None
+
+    def stored(self, state) -> PerThruster:
+        return jnp.zeros(())
+
+    def report(self, state) -> None:
+        return None
+
+    def voltage_gain(self):
+        return self.linear_gain
+
 
 _LEAST = 1e-30  # stands for 0, where a power has no slope
 
 
 class MemorylessThruster(AbstractMotorlessThruster):
-    """Thrust c |V|^(p-1) V, less by a share in reverse, with no motor behind it; current proportional to thrust.
+    """Thrust c |V|^(p-1) V, multiplied by `reverse_share` in reverse; current proportional to thrust.
 
     Raises:
         BadInput: a coefficient is not positive.
@@ -24,11 +42,11 @@ class MemorylessThruster(AbstractMotorlessThruster):
     thrust_per_volt: Float[Array, ""] = param("N/V^p", "thrust coefficient", symbol="c_0, c_V")
     power: Float[Array, ""] = param("", "power of the voltage", symbol="p")
     current_per_thrust: Float[Array, ""] = param("A/N", "current coefficient", symbol="c_I")
-    linear_gain: Float[Array, ""] = param("N/V", "gain the controller's model assumes", symbol="alpha")
+    linear_gain: Float[Array, ""] = param("N/V", "gain in the nominal model", symbol="alpha")
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
-    reverse_share: Float[Array, ""] = param("", "thrust in reverse, as a share of that forward", default=1.0)
+    reverse_share: Float[Array, ""] = param("", "thrust in reverse as a share of forward thrust", default=1.0)
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
@@ -56,8 +74,8 @@ class MemorylessThruster(AbstractMotorlessThruster):
         """V, V, that gives a thrust in N."""
         return self.commanded(_signed_power(thrust / self._coefficient(thrust), 1 / self.power))
 
-    def drive(self, count: int, measured: bool) -> SteadyDrive:
-        return SteadyDrive(self)
+    def actuator_model(self, count: int, measured: bool) -> QuasiStaticActuator:
+        return QuasiStaticActuator(self)
 
     def advice(self):
         return ()
@@ -67,6 +85,6 @@ class MemorylessThruster(AbstractMotorlessThruster):
 
 
 def _signed_power(x: PerThruster, power: PerThruster) -> PerThruster:
-    """|x|^(p-1) x, whose slope at 0 is that of its neighbours: 1 where p is 1."""
+    """|x|^(p-1) x with a finite slope at 0: 1 where p is 1."""
     size = jnp.abs(x)
     return x * jnp.where(size > 0, size, _LEAST) ** (power - 1)

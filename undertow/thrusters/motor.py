@@ -15,9 +15,8 @@ Scalar = Float[Array, ""]
 class DCMotor(eqx.Module):
     """Motor and propeller constants, one value for all thrusters or one per thruster.
 
-    A propeller gives less thrust in reverse than forward, and may take another torque for it: coefficients of their
-    own, equal to the forward ones where None. The gains of the control law (`torque_per_thrust`, `voltage_gain`) are
-    those of forward motion.
+    Thrust and torque in reverse have coefficients of their own, equal to the forward ones where None. The gains of
+    the control law (`torque_per_thrust`, `voltage_gain`) are those of forward motion.
 
     Raises:
         BadInput: a constant is not positive (inductance, friction: negative).
@@ -86,15 +85,15 @@ class DCMotor(eqx.Module):
         return signed * speed * speed
 
     def ideal_thrust(self, voltage: PerThruster) -> PerThruster:
-        """Thrust, N, if the whole voltage overcame propeller torque: alpha V, with the alpha of each direction."""
+        """Thrust, N, if all of the voltage overcame propeller torque: alpha V, with the alpha of each direction."""
         return self._gain(voltage) * voltage
 
     def ideal_voltage(self, thrust: PerThruster) -> PerThruster:
-        """Voltage, V, for a thrust in N: `ideal_thrust` solved."""
+        """Voltage, V, for a thrust in N: the inverse of `ideal_thrust`."""
         return thrust / self._gain(thrust)
 
     def speed_at(self, thrust: PerThruster) -> PerThruster:
-        """Propeller speed, rad/s, that gives a thrust in N: Eq. (11) solved."""
+        """Propeller speed, rad/s, that gives a thrust in N: the inverse of Eq. (11)."""
         coefficient = jnp.where(thrust < 0, self.reverse_thrust_coefficient, self.thrust_coefficient)
         size = jnp.abs(thrust) / coefficient
         return jnp.sign(thrust) * jnp.sqrt(jnp.where(size > 0, size, 1.0))  # the root has no gradient at 0
@@ -116,13 +115,13 @@ class DCMotor(eqx.Module):
     def speed_term(self, speed: PerThruster, acceleration: PerThruster) -> PerThruster:
         """phi = -alpha (k_1 speed_dot + k_2 speed), N. Eq. (15).
 
-        In reverse, where the gain is another than the alpha that stands before V, the difference is made up here.
+        In reverse the gain differs from the alpha that multiplies V; the difference is included here.
         """
         phi = -self.voltage_gain * (self.k1 * acceleration + self.k2 * speed)
         return phi + (1 - self.voltage_gain / self._gain(speed)) * self.thrust(speed)
 
     def powers(self, voltage: PerThruster, current: PerThruster, speed: PerThruster) -> Powers:
-        """Where the power goes that a voltage drives through the winding. Eqs. (8), (9) times Om, I."""
+        """Power balance of the motor: Eqs. (8), (9) times Om, I."""
         return Powers(
             source=voltage * current,
             copper=self.resistance * current**2,
@@ -136,7 +135,7 @@ class DCMotor(eqx.Module):
         return self.rotor_inertia * speed**2 / 2
 
     def advice(self) -> tuple[str, ...]:
-        """What is odd about these constants."""
+        """Advice on implausible constants."""
         ratio = np.asarray(self.torque_constant / self.back_emf_constant)
         if np.all(np.abs(ratio - 1) <= 0.05):
             return ()

@@ -2,27 +2,27 @@
 
 import math
 
-from undertow.thrusters.ladder import on_rung
+from undertow.thrusters.fidelity import with_fidelity
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import AbstractThruster
 
 
 def paper_table3(
-    rung: str = "electromechanical",
+    fidelity: str = "electromechanical",
     supply: float = math.inf,
     dead_zone: float = 0.0,
     dead_zone_kind: str = "pass",
     inductance: float = 0.01,
 ) -> AbstractThruster:
-    """Thruster of Table 3, as printed, on a rung of the fidelity ladder.
+    """Thruster of Table 3, as printed, at a fidelity level.
 
-    An impossible motor: k_t / k_e is 117, so the shaft gives several times the power the supply puts in.
+    The motor is physically impossible: k_t / k_e is 117, so the shaft gives several times the power of the supply.
 
     Args:
-        rung: ideal, static, shaft or electromechanical.
+        fidelity: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; infinite by default.
-        dead_zone: voltage below which nothing turns, V.
-        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        dead_zone: voltage below which the thrust is zero, V.
+        dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
         inductance: of the winding, H; Table 3 prints 0.01. It decides whether Table 1 is stable.
     """
     motor = DCMotor(
@@ -36,4 +36,4 @@ def paper_table3(
         torque_coefficient=0.00232,
         sources={"*": "the paper, Table 3", "friction": "the paper, Table 3 (unit printed as N s)"},
     )
-    return on_rung(motor, rung, supply, dead_zone, dead_zone_kind)
+    return with_fidelity(motor, fidelity, supply, dead_zone, dead_zone_kind)

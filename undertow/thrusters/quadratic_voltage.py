@@ -20,8 +20,8 @@ def quadratic_voltage(
         current_per_thrust: c_I, A/N.
         linear_gain: alpha that the controller's model assumes, N/V.
         supply: voltage limit, V.
-        dead_zone: voltage below which nothing turns, V.
-        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        dead_zone: voltage below which the thrust is zero, V.
+        dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
     """
     known = (thrust_per_volt_squared, 2.0, current_per_thrust, linear_gain)
     return MemorylessThruster(*known, supply, dead_zone, dead_zone_kind)

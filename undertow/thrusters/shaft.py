@@ -1,4 +1,4 @@
-"""Rung `shaft`: the rotor has inertia, the winding no inductance."""
+"""Fidelity level `shaft`: the rotor has inertia, the winding no inductance."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.motor_drive import MotorDrive
+from undertow.thrusters.motor_speed_control import SpeedControlledMotor
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
 
 
@@ -24,7 +24,7 @@ class ShaftThruster(AbstractThruster):
 
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
@@ -49,7 +49,7 @@ class ShaftThruster(AbstractThruster):
         return self.motor.rotor_energy(state.speed)
 
     def report(self, state) -> PropellerReport:
-        """Speed alone: its rate follows from the voltage that the answer to this is used to find."""
+        """Speed only: its rate depends on the voltage that the controller computes from this report."""
         return PropellerReport(state.speed, None)
 
     def voltage_gain(self):
@@ -58,14 +58,14 @@ class ShaftThruster(AbstractThruster):
     def speed_term(self, report):
         raise BadInput(
             "speed_sensor",
-            "be false on rung `shaft`",
+            "be false on fidelity `shaft`",
             "true",
             hint="There Om_dot depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1. "
-            "Use preset: robust, which needs the speed only, or rung: electromechanical, where states give Om_dot",
+            "Use preset: robust, which needs the speed only, or fidelity: electromechanical, where states give Om_dot",
         )
 
-    def drive(self, count: int, measured: bool) -> MotorDrive:
-        return MotorDrive(self, count, measured)
+    def actuator_model(self, count: int, measured: bool) -> SpeedControlledMotor:
+        return SpeedControlledMotor(self, count, measured)
 
     def advice(self):
         return self.motor.advice()

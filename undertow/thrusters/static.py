@@ -1,4 +1,4 @@
-"""Rung `static`: the motor is in its steady state at every instant."""
+"""Fidelity level `static`: the quasi-static motor, in its steady state at every instant."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.steady_drive import SteadyDrive
+from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
 
 
@@ -16,7 +16,7 @@ class StaticThruster(AbstractThruster):
 
     motor: DCMotor
     supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which nothing turns", default=0.0)
+    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 
@@ -49,7 +49,7 @@ class StaticThruster(AbstractThruster):
     def speed_term(self, report):
         raise BadInput(
             "speed_sensor",
-            "be false on rung `static`",
+            "be false on fidelity `static`",
             "true",
             hint="There phi depends on the voltage being computed: Eq. (23) is an algebraic loop of gain 1",
         )
@@ -58,8 +58,8 @@ class StaticThruster(AbstractThruster):
         """V, V, that gives a thrust in N."""
         return self.commanded(self.motor.steady_voltage(self.motor.speed_at(thrust)))
 
-    def drive(self, count: int, measured: bool) -> SteadyDrive:
-        return SteadyDrive(self)
+    def actuator_model(self, count: int, measured: bool) -> QuasiStaticActuator:
+        return QuasiStaticActuator(self)
 
     def advice(self):
         return self.motor.advice()

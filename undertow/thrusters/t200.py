@@ -1,7 +1,7 @@
-"""Blue Robotics T200: one brushed-DC equivalent for the manufacturer's whole table, 10-20 V."""
+"""Blue Robotics T200: one brushed DC motor fitted to all of the manufacturer's table, 10-20 V."""
 
 from undertow.core import checks
-from undertow.thrusters.ladder import on_rung
+from undertow.thrusters.fidelity import with_fidelity
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import DEAD_ZONES, AbstractThruster
 
@@ -15,24 +15,24 @@ _FITS = {
 
 
 def t200(
-    rung: str = "shaft", supply: float = 16.0, dead_zone: float = 1.2, dead_zone_kind: str = "pass"
+    fidelity: str = "shaft", supply: float = 16.0, dead_zone: float = 1.2, dead_zone_kind: str = "pass"
 ) -> AbstractThruster:
-    """Blue Robotics T200 on a rung of the fidelity ladder: within 2.5 N, 0.8 A and 15 rad/s rms of its table.
+    """Blue Robotics T200 at a fidelity level: within 2.5 N, 0.8 A and 15 rad/s rms of its table.
 
-    A motor with k_t = k_e. The bench: duty = (PWM - 1500) / 400, V = duty times supply. How the loss divides into
-    copper and shaft cannot be read from such a table; this set gives the propeller a credible figure of merit of 0.65
-    at full thrust, and R and k_e within 2 and 9 % of the motor's data sheet.
-    Each kind of dead zone has constants of its own. With `subtract` the table is met less well (2.32 N and 0.65 A rms
-    where `pass` has 2.20 N and 0.63 A) by a motor that cannot be: a figure of merit of 1.5. Up to 4 V its thrust is
-    nearer, 0.42 N where `pass` has 0.57 N. Take it to see what a law makes of a dead zone that takes volts away.
+    A motor with k_t = k_e. Test bench: duty = (PWM - 1500) / 400, V = duty times supply. The table does not determine
+    how the loss divides into copper and shaft; this set gives the propeller a plausible figure of merit of 0.65 at
+    full thrust, and R and k_e within 2 and 9 % of the motor's data sheet.
+    Each kind of dead zone has constants of its own. `subtract` fits the table less well (2.32 N and 0.65 A rms, `pass`
+    2.20 N and 0.63 A) with an impossible figure of merit of 1.5. Up to 4 V its thrust fits better, 0.42 N rms (`pass`
+    0.57 N). Use it to test a law with a dead zone that reduces the voltage.
     Not modelled: limits of current (25 A continuous; 32 A were measured at 20 V) and power (350 W), heat.
-    With an inductance of 0.154 mH the winding settles in 0.4 ms: on `electromechanical` take steps of 0.2 ms.
+    With an inductance of 0.154 mH the winding settles in 0.4 ms: at `electromechanical` use steps of 0.2 ms.
 
     Args:
-        rung: ideal, static, shaft or electromechanical.
+        fidelity: ideal, static, shaft or electromechanical.
         supply: voltage limit, V; the table ends at 20 V.
-        dead_zone: voltage below which nothing turns, V; the table's bands are 1.0 to 1.4 V.
-        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        dead_zone: voltage below which the thrust is zero, V; the table's bands are 1.0 to 1.4 V.
+        dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
     """
     checks.choice("dead_zone_kind", dead_zone_kind, DEAD_ZONES)
     back_emf, resistance, torque, thrust, reverse_thrust, inertia = _FITS[dead_zone_kind]
@@ -51,7 +51,7 @@ def t200(
             "inductance": "data sheet of the motor: 0.077 mH per phase, twice",
             "friction": "not identifiable from the table; counted as propeller torque",
             "rotor_inertia": "not published; chosen for a time constant of 0.1 s about half of the full speed at 16 V",
-            "reverse_torque_coefficient": "as forward: the table shows no difference that matters",
+            "reverse_torque_coefficient": "as forward: the table shows no significant difference",
         },
     )
-    return on_rung(motor, rung, supply, dead_zone, dead_zone_kind)
+    return with_fidelity(motor, fidelity, supply, dead_zone, dead_zone_kind)

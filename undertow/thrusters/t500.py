@@ -1,7 +1,7 @@
-"""Blue Robotics T500: one brushed-DC equivalent for the manufacturer's plot data at 16 V and 24 V."""
+"""Blue Robotics T500: one brushed DC motor fitted to the manufacturer's plot data at 16 V and 24 V."""
 
 from undertow.core import checks
-from undertow.thrusters.ladder import on_rung
+from undertow.thrusters.fidelity import with_fidelity
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.thruster import DEAD_ZONES, AbstractThruster
 
@@ -15,22 +15,22 @@ _FITS = {
 
 
 def t500(
-    rung: str = "shaft", supply: float = 24.0, dead_zone: float = 1.2, dead_zone_kind: str = "pass"
+    fidelity: str = "shaft", supply: float = 24.0, dead_zone: float = 1.2, dead_zone_kind: str = "pass"
 ) -> AbstractThruster:
-    """Blue Robotics T500 on a rung of the fidelity ladder: within 2.5 N, 1 A and 6 rad/s rms of its data.
+    """Blue Robotics T500 at a fidelity level: within 2.5 N, 1 A and 6 rad/s rms of its data.
 
-    A motor with k_t = k_e. One source only, and it labels its curves badly: two different arrays are both named 12 V,
-    the 20 V curve has a jump. Only 16 V and 24 V are used here; each alone would be fitted by another R and k_e
-    (0.34 ohm and 0.032 V s/rad at 16 V, 0.37 ohm and 0.026 V s/rad at 24 V): how the loss divides is not known well.
-    Each kind of dead zone has constants of its own; `subtract` meets the data less well: 2.76 N, 0.99 A and 8.2 rad/s
-    rms where `pass` has 2.06 N, 0.87 A and 5.1 rad/s.
+    A motor with k_t = k_e. The only source has doubtful labels: two different arrays are both named 12 V, and the 20 V
+    curve has a jump. Only 16 V and 24 V are used here; each alone would be fitted by another R and k_e (0.34 ohm and
+    0.032 V s/rad at 16 V, 0.37 ohm and 0.026 V s/rad at 24 V), so the division of the loss is uncertain.
+    Each kind of dead zone has constants of its own; `subtract` fits the data less well: 2.76 N, 0.99 A and 8.2 rad/s
+    rms (`pass`: 2.06 N, 0.87 A and 5.1 rad/s).
     Not modelled: limits of current and power.
 
     Args:
-        rung: ideal, static, shaft or electromechanical.
+        fidelity: ideal, static, shaft or electromechanical.
         supply: voltage limit, V.
-        dead_zone: voltage below which nothing turns, V.
-        dead_zone_kind: what is left of a voltage outside it: pass, the whole, or subtract, what is beyond it.
+        dead_zone: voltage below which the thrust is zero, V.
+        dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
     """
     checks.choice("dead_zone_kind", dead_zone_kind, DEAD_ZONES)
     back_emf, resistance, torque, thrust, reverse_thrust, reverse_torque, inertia = _FITS[dead_zone_kind]
@@ -52,4 +52,4 @@ def t500(
             "rotor_inertia": "not published; chosen for a time constant of 0.1 s about half of the full speed at 24 V",
         },
     )
-    return on_rung(motor, rung, supply, dead_zone, dead_zone_kind)
+    return with_fidelity(motor, fidelity, supply, dead_zone, dead_zone_kind)

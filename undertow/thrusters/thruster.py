@@ -1,4 +1,4 @@
-"""What a thruster is to the rest of undertow: volts in, thrust out; N of them at once, Eq. (16)."""
+"""The contract of a thruster: volts in, thrust out; N of them at once, Eq. (16)."""
 
 import abc
 from typing import Any, NamedTuple
@@ -8,39 +8,39 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.drive import AbstractDrive, DirectDrive
+from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
 
 PerThruster = Float[Array, " N"]
 
-# What is left of a voltage outside the dead zone: the whole of it, or what is beyond the zone.
+# Effect of a voltage outside the dead zone: all of it (`pass`), or its part beyond the zone (`subtract`).
 DEAD_ZONES = ("pass", "subtract")
 
 
 class PropellerReport(NamedTuple):
-    """What a propeller-speed sensor tells: speed (rad/s) and its rate (rad/s^2; None where states do not give it)."""
+    """Report of a propeller-speed sensor: speed (rad/s) and its rate (rad/s^2; None where states do not give it)."""
 
     speed: PerThruster
     acceleration: PerThruster | None
 
 
 class Powers(NamedTuple):
-    """Where each thruster's power comes from and goes, W: source + conversion = the others + d(stored)/dt."""
+    """Power balance of each thruster, W: source + conversion = the others + d(stored)/dt."""
 
     source: PerThruster  # V I, what the drive takes
     copper: PerThruster  # R I^2
     friction: PerThruster  # k_f Om^2
     water: PerThruster  # Q Om, given to the water
-    conversion: PerThruster  # (k_t - k_e) I Om, out of nothing unless k_t = k_e
+    conversion: PerThruster  # (k_t - k_e) I Om: created power unless k_t = k_e
 
 
 class AbstractThruster(eqx.Module):
     """A set of N thrusters of one kind; every array has one entry per thruster."""
 
     supply: eqx.AbstractVar[Float[Array, ""]]  # V; the drive can give -supply ... supply
-    dead_zone: eqx.AbstractVar[Float[Array, ""]]  # V; smaller voltages turn nothing
+    dead_zone: eqx.AbstractVar[Float[Array, ""]]  # V; smaller voltages have no effect
     dead_zone_kind = "pass"  # one of DEAD_ZONES; a field where a thruster offers both
-    input_unit = "V"  # of what it is commanded with; where this is not V, read every voltage below in that unit
-    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, rungs `ideal` and `static`.
+    input_unit = "V"  # unit of the command; where this is not V, every voltage below has that unit
+    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, `ideal` and `static`.
     has_prescribed_acceleration: eqx.AbstractVar[bool]
 
     def __check_init__(self):
@@ -65,7 +65,7 @@ class AbstractThruster(eqx.Module):
 
     @abc.abstractmethod
     def powers(self, state: Any, voltage: PerThruster) -> Powers | None:
-        """Where the power goes; None where no motor stands behind the thrust."""
+        """Power balance; None without a motor model."""
 
     @abc.abstractmethod
     def stored(self, state: Any) -> PerThruster:
@@ -73,53 +73,53 @@ class AbstractThruster(eqx.Module):
 
     @abc.abstractmethod
     def report(self, state: Any) -> PropellerReport | None:
-        """What a speed sensor would tell; None where speed is not a state."""
+        """Report of a speed sensor; None where speed is not a state."""
 
     @abc.abstractmethod
     def voltage_gain(self) -> Float[Array, ""]:
-        """alpha of Eq. (7), N/V: what the controller's model takes for granted."""
+        """alpha of Eq. (7), N/V, in the nominal model."""
 
     @abc.abstractmethod
     def speed_term(self, report: Any) -> PerThruster | Float[Array, ""]:
         """phi of Eq. (15), N, from a speed sensor."""
 
-    def drive(self, count: int, measured: bool) -> AbstractDrive:
-        """What a controller may know of `count` of them, to make them obey; T = alpha V where nothing better is known.
+    def actuator_model(self, count: int, measured: bool) -> AbstractActuatorModel:
+        """Nominal model of `count` thrusters for the controller; T = alpha V where no better one is known.
 
         Args:
             count: N.
             measured: whether propeller speeds are reported.
         """
-        return DirectDrive(self.voltage_gain(), *self.limits(), at_once=False)
+        return DirectActuator(self.voltage_gain(), *self.limits(), at_once=False)
 
     @abc.abstractmethod
     def advice(self) -> tuple[str, ...]:
-        """What is odd about this thruster."""
+        """Advice on implausible parameters."""
 
     def limits(self) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
-        """Smallest and largest command that the drive can carry out, V."""
+        """Smallest and largest command of the drive, V."""
         return -self.supply, self.supply
 
     def electrical_power(self, state: Any, voltage: PerThruster) -> PerThruster:
-        """Electrical power, W: no voltage, no power, though a spinning motor may carry a current."""
+        """Electrical power V I, W: zero without voltage, although a spinning motor may carry a current."""
         return self.terminal(voltage) * self.current(state, voltage)
 
     def terminal(self, voltage: PerThruster) -> PerThruster:
-        """Voltage, V, that turns the motor: zero inside the dead zone; what is not a number stays so.
+        """Voltage at the motor, V: zero inside the dead zone; NaN stays NaN.
 
-        Outside, it is the whole voltage (`pass`), or |V| less the dead zone with the sign of V (`subtract`); the drive
-        loses no power with what it subtracts.
+        Outside, it is V (`pass`), or |V| less the dead zone with the sign of V (`subtract`); the drive loses no power
+        with the part that it subtracts.
         """
         size = jnp.abs(voltage)
-        inside = (size <= self.dead_zone) & (self.dead_zone > 0)  # without a zone, 0 V has the slope of its neighbours
+        inside = (size <= self.dead_zone) & (self.dead_zone > 0)  # without a zone, the slope at 0 V is that around it
         if self.dead_zone_kind == "subtract":
             return jnp.where(inside, 0.0, voltage - jnp.sign(voltage) * self.dead_zone)
         return jnp.where(inside, 0.0, voltage)
 
     def commanded(self, terminal: PerThruster) -> PerThruster:
-        """Command, V, for a voltage that is to turn the motor: `terminal` solved.
+        """Command, V, for a voltage at the motor: the inverse of `terminal`.
 
-        A voltage that `pass` cannot give, since it is inside the dead zone, is returned as it is, and turns nothing.
+        A voltage inside the dead zone, which `pass` cannot give, is returned unchanged and has no effect.
         """
         if self.dead_zone_kind == "subtract":
             return terminal + jnp.sign(terminal) * self.dead_zone

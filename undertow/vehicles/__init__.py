@@ -1,4 +1,4 @@
-"""Vehicles: the body in the water and the published numbers. One file per vehicle."""
+"""Vehicles: equation of motion of the body, and published parameters. One file per vehicle."""
 
 from undertow.core.catalogue import publish
 from undertow.vehicles.body import Body as Body

@@ -1,4 +1,4 @@
-"""A body that is not what the controller was told: coefficients off by factors, or a load carried along."""
+"""A body that differs from the nominal model: scaled coefficients, or attached payloads."""
 
 import functools
 
@@ -6,15 +6,15 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import Factors, Payload
-from undertow.numerics.elimination import inverse_symmetric
+from undertow.core.contracts import ModelScaling, Payload
+from undertow.numerics.linear_algebra import inverse_symmetric
 from undertow.vehicles.body import Body, rigid_body_mass
 
 
-def altered(body: Body, factors: Factors | None, payloads: tuple[Payload, ...]) -> Body:
-    """The body with its coefficients scaled, and then with payloads attached; None and () leave it as it is."""
-    if factors is not None:
-        body = _scaled(body, factors)
+def altered(body: Body, scaling: ModelScaling | None, payloads: tuple[Payload, ...]) -> Body:
+    """The body with its coefficients scaled, and then with payloads attached; None and () leave it unchanged."""
+    if scaling is not None:
+        body = _scaled(body, scaling)
     return functools.reduce(_carrying, payloads, body)
 
 
@@ -23,7 +23,7 @@ def point_inertia(mass: Float[Array, ""], point: Float[Array, "3"]) -> Float[Arr
     return mass * ((point @ point) * jnp.eye(3) - jnp.outer(point, point))
 
 
-def _scaled(body: Body, factors: Factors) -> Body:
+def _scaled(body: Body, scaling: ModelScaling) -> Body:
     return eqx.tree_at(
         lambda b: (
             b.mass_matrix,
@@ -36,13 +36,13 @@ def _scaled(body: Body, factors: Factors) -> Body:
         ),
         body,
         (
-            factors.mass * body.mass_matrix,
-            body.inverse_mass_matrix / factors.mass,
-            factors.damping * body.linear_damping,
-            factors.damping * body.quadratic_damping,
-            factors.restoring * body.weight,
-            factors.restoring * body.buoyancy,
-            factors.restoring * body.gravity,  # mass = weight / gravity stays
+            scaling.mass * body.mass_matrix,
+            body.inverse_mass_matrix / scaling.mass,
+            scaling.damping * body.linear_damping,
+            scaling.damping * body.quadratic_damping,
+            scaling.restoring * body.weight,
+            scaling.restoring * body.buoyancy,
+            scaling.restoring * body.gravity,  # mass = weight / gravity stays
         ),
     )
 

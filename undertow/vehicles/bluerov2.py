@@ -114,7 +114,7 @@ LAYOUTS = {
 
 
 def bluerov2(parameters: str = "hkpolyu", layout: str = "hkpolyu") -> Vehicle:
-    """BlueROV2 with six thrusters: five directions can be pushed independently, pitch follows surge and heave.
+    """BlueROV2 with six thrusters: five degrees of freedom are independent, pitch follows surge and heave.
 
     Args:
         parameters: hull. hkpolyu: added mass and linear damping are those of another vehicle (Desistek SAGA), with

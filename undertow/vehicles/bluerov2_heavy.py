@@ -113,23 +113,23 @@ LAYOUTS = {
 
 
 def bluerov2_heavy(parameters: str = "vonbenzon2022", layout: str = "vonbenzon2022") -> Vehicle:
-    """BlueROV2 Heavy as one of its published parameter sets has it.
+    """BlueROV2 Heavy with one of its published parameter sets.
 
     The sets are different vehicles and fits, not repeated measurements: surge drag at 0.5 m/s is 6.6 (wu2018), 10.4
     (px4), 14.6 (gazebo_box_drag), 27.2 (ng2024) or 42.1 N (vonbenzon2022). Together they are a band of uncertainty;
-    mixing numbers of two sets makes a third vehicle that nobody has seen.
+    numbers of two sets should not be mixed.
 
     Left out: the set identified by edxmorgan/diff_uv (mass and added mass lumped, nothing about rotation), that of
     IOES DAVE (no added mass or linear damping, rest not given), and layouts printed with wrong signs or lever arms.
 
     Args:
         parameters: hull. vonbenzon2022: validated in a tank; no linear damping in sway, roll and yaw. wu2018: the most
-            copied, drag 5 to 10 times lower. ng2024: identified in a tank, heave as when diving (rising: added mass
-            22.45 kg, damping 50.62 and 76.69); its inertia looks too large for the size. gazebo_box_drag: no added
-            mass, drag of the bounding box. px4: the Gazebo model of PX4, von Benzon's numbers with added mass x 0.2
-            and quadratic damping x 0.1.
+            copied, drag 5 to 10 times lower. ng2024: identified in a tank, heave when diving (when rising: added mass
+            22.45 kg, damping 50.62 and 76.69); its inertia is large for its size. gazebo_box_drag: no added mass, drag
+            of the bounding box. px4: the Gazebo model of PX4, von Benzon's numbers with added mass x 0.2 and quadratic
+            damping x 0.1.
         layout: thrusters, 1-4 horizontal at 45 degrees, 5-8 vertical. vonbenzon2022: 5-8 push up. wu2018: the same
-            places, 6 and 7 push down. ardusub_gazebo: order and signs of ArduSub, positions relative to the
+            positions, 6 and 7 push down. ardusub_gazebo: order and signs of ArduSub, positions relative to the
             base_link of the Gazebo model, 11 mm below its centre of gravity.
     """
     hull = choose("parameters", parameters, PARAMETERS)

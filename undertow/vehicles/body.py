@@ -1,12 +1,15 @@
 """Rigid body in water: M, C(nu) nu, D(nu) nu and g of Eq. (2), in the form of Fossen (2021), ch. 3, 6 and 8."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.core.contracts import Water
 from undertow.core.param import param
-from undertow.numerics.linear import matvec
+from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross, skew
 
 Vector3 = Float[Array, "3"]
@@ -15,7 +18,7 @@ Matrix6 = Float[Array, "6 6"]
 
 
 class Body(eqx.Module):
-    """Coefficients of the equation of motion about the body origin, ready for use.
+    """Coefficients of the equation of motion about the body origin.
 
     Body axes forward, starboard, down. Added mass is part of `mass_matrix`; damping matrices are positive.
     """
@@ -31,7 +34,7 @@ class Body(eqx.Module):
     gravity: Float[Array, ""] = param("m/s^2", "gravity, weight per dry mass", symbol="g", default=9.81)
 
     def coriolis(self, nu: Vector6) -> Vector6:
-        """C(nu) nu, N and N m; does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, multiplied out."""
+        """C(nu) nu, N and N m, which does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, expanded."""
         momentum = matvec(self.mass_matrix, nu)
         linear, angular = momentum[:3], momentum[3:]
         return jnp.concatenate([cross(nu[3:], linear), cross(nu[:3], linear) + cross(nu[3:], angular)])
@@ -44,7 +47,7 @@ class Body(eqx.Module):
         """g, N and N m, on the left side of Eq. (2).
 
         Args:
-            down: direction of gravity seen from the body: third row of R in water that does not accelerate.
+            down: direction of gravity in body axes: third row of R in water that does not accelerate.
         """
         force = (self.weight - self.buoyancy) * down
         moment = cross(self.weight * self.r_g - self.buoyancy * self.r_b, down)
@@ -63,7 +66,7 @@ class Body(eqx.Module):
         return 0.5 * (nu * matvec(self.mass_matrix, nu)).sum()
 
     def potential_energy(self, position: Vector3, down: Vector3) -> Float[Array, ""]:
-        """Of weight and buoyancy, J; zero with the body upright at the world origin and r_g = r_b = 0."""
+        """Energy of weight and buoyancy, J; zero with the body upright at the world origin and r_g = r_b = 0."""
         lever = self.weight * self.r_g - self.buoyancy * self.r_b
         return -(self.weight - self.buoyancy) * position[2] - (lever * down).sum()
 
@@ -82,7 +85,7 @@ def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> 
 
 
 def shift_matrix(r: Vector3) -> Matrix6:
-    """H(r): the same motion seen from a point r away is H nu; M_b = H^T M H. Fossen (2021), Eq. (C.5)."""
+    """H(r): the velocity at a point at r is H nu; M_b = H^T M H. Fossen (2021), Eq. (C.5)."""
     return jnp.block([[jnp.eye(3), skew(r).T], [jnp.zeros((3, 3)), jnp.eye(3)]])
 
 
@@ -92,3 +95,37 @@ def coriolis_matrix(mass_matrix: Matrix6, nu: Vector6) -> Matrix6:
     momentum = matvec(symmetric, nu)
     linear, angular = skew(momentum[:3]), skew(momentum[3:])
     return -jnp.block([[jnp.zeros((3, 3)), linear], [linear, angular]])
+
+
+class SeenFromWater(NamedTuple):
+    """Arguments of the equation of motion relative to the water, body axes."""
+
+    nu: Vector6  # velocity through the water, m/s, rad/s
+    down: Vector3  # apparent gravity, in units of gravity
+    rate: Vector6 | Float[Array, ""]  # nu_dot less that of the velocity through the water, m/s^2
+
+
+def seen_from_water(
+    water: Water | None, rotation: Float[Array, "3 3"], nu: Vector6, gravity: Float[Array, ""]
+) -> SeenFromWater:
+    """Motion of the body relative to the water around it, Fossen (2021), ch. 10.3.
+
+    Where the water is uniform over the body, it is at rest in axes that move with it. An acceleration of the water
+    acts in these axes as a change of gravity on the mass of the body and on the displaced water.
+
+    Args:
+        water: motion of the water, world axes; None for water at rest.
+        rotation: body -> world.
+        nu: body velocity over ground, m/s and rad/s.
+        gravity: m/s^2.
+    """
+    if water is None:
+        return SeenFromWater(nu, rotation[2], jnp.zeros(()))
+    flow = matvec(rotation.T, water.velocity)
+    acceleration = matvec(rotation.T, water.acceleration)
+    rest = jnp.zeros(3)
+    return SeenFromWater(
+        nu=nu - jnp.concatenate([flow, rest]),
+        down=rotation[2] - acceleration / gravity,
+        rate=jnp.concatenate([acceleration - cross(nu[3:], flow), rest]),
+    )

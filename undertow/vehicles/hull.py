@@ -1,7 +1,7 @@
 """Drag and lift of slender hulls and fins, from Fossen (2021), ch. 6.4 and 9, and Beard and McLain (2012).
 
-Checked against the golden values of PythonVehicleSimulator in tests/peers. Its cross-flow integral counts half
-a strip too much at bow and stern (21 strips of L/20); ours is the trapezoidal rule.
+Checked against the golden values of PythonVehicleSimulator in tests/peers. Its cross-flow integral has half
+a strip too much at bow and stern (21 strips of L/20); this one is the trapezoidal rule.
 """
 
 import jax.numpy as jnp

@@ -40,9 +40,9 @@ _LAYOUT = Layout(f"{_UUV}/actuators.xacro", [[-0.53994, 0, 0]], [[1, 0, 0]])
 
 
 def lauv() -> Vehicle:
-    """LAUV driven by its propeller alone: surge is controlled, the rest is not.
+    """LAUV with its propeller only: surge is controlled, the other degrees of freedom are not.
 
-    Left out: the four fins (each 0.0064 m^2 at x = -0.4 m, lift coefficient 3, drag coefficient 1.98) and the
+    Not modelled: the four fins (each 0.0064 m^2 at x = -0.4 m, lift coefficient 3, drag coefficient 1.98) and the
     propeller's reaction torque. The damping matrices are full, as printed; UUV Simulator itself uses only the
     diagonal of the quadratic one. Positive thrust pushes forward (the source mounts the propeller backwards).
     """

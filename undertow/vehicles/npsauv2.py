@@ -38,12 +38,12 @@ _DRAG, _DRAG_SIDEWAYS, _DRAG_VERTICAL = 3.85e-3, 0.5, 0.6  # surge, and two-dime
 
 
 def npsauv2(parameters: str = "fossen_mss", speed: float = 1.63) -> Vehicle:
-    """NPS AUV II driven by its propeller alone: surge is controlled, the rest is not.
+    """NPS AUV II with its propeller only: surge is controlled, the other degrees of freedom are not.
 
     Derived from the published derivatives: linear damping in sway, heave, roll, pitch and yaw is that of Y_v u v,
     Z_w u w, K_p u p, M_q u q and N_r u r at the given speed, less the part of the last two that the Coriolis forces
-    of the added mass already are; quadratic damping is the propeller-off drag in surge, and the cross-flow integral
-    over the hull in closed form for pure sway, heave, pitch and yaw. Left out: fins and their drag, the propeller's
+    of the added mass contain; quadratic damping is the propeller-off drag in surge, and the cross-flow integral
+    over the hull in closed form for pure sway, heave, pitch and yaw. Not modelled: fins and their drag, the propeller's
     effect on hull and fins, and all other derivatives (Y_p, Y_r, Z_q, K_v, K_r, M_w, N_v, N_p, and products of two of
     v, w, p, q, r), of which the Coriolis forces keep the ideal-fluid part.
 

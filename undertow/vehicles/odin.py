@@ -13,7 +13,7 @@ _TANGENTS = np.sqrt(0.5) * np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1,
 
 
 def odin() -> Vehicle:
-    """ODIN with the parameters of Antonelli (2006); our reading of the paper's unnamed vehicle.
+    """ODIN with the parameters of Antonelli (2006); assumed to be the paper's unnamed vehicle.
 
     Thrusters 1-4 are horizontal, 5-8 vertical (positive thrust pushes up), both on the four corners counted from
     fore port. In the book's thruster matrix the sign of (Y, thruster 2) reads -; only + gives four corners.

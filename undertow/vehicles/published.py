@@ -1,4 +1,4 @@
-"""From numbers as printed to a `Vehicle`: variants by name, diagonals as matrices, inertia about the body origin."""
+"""A `Vehicle` from published numbers: variants by name, diagonals as matrices, inertia about the body origin."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
@@ -13,7 +13,7 @@ Variant = TypeVar("Variant")
 
 
 class Hull(NamedTuple):
-    """One published parameter set, as printed but for axes and signs: forward, starboard, down; matrices positive.
+    """One published parameter set, as printed except for axes and signs: forward, starboard, down; matrices positive.
 
     Matrices may be given by their diagonals. Damping is D nu + D_q (|nu| nu).
     """

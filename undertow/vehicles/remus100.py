@@ -91,9 +91,9 @@ PARAMETERS = {
 
 
 def remus100(parameters: str = "prestero2001") -> Vehicle:
-    """REMUS 100 driven by its propeller alone: surge is controlled, the rest is not.
+    """REMUS 100 with its propeller only: surge is controlled, the other degrees of freedom are not.
 
-    Left out: rudder, stern planes and propeller torque; lift of the hull; terms in u v, u w, u q and u r other than
+    Not modelled: rudder, stern planes and propeller torque; lift of the hull; terms in u v, u w, u q and u r other than
     the Coriolis forces of M (prestero2001: Y_uv, Y_ur, Z_uw, Z_uq, M_uw, M_uq, N_uv, N_ur and the fins' u^2; both
     Fossen models: the wing-like lift, and that they zero the Munk moment and let linear damping fade with speed).
 
@@ -101,9 +101,9 @@ def remus100(parameters: str = "prestero2001") -> Vehicle:
         parameters: prestero2001: the measured vehicle of 1.33 m; weight 299 N (others 300, 305), buoyancy 308 N
             (others 310). Y_v|v| is 1310 in half of the copies; 131 here, since the hull is one of revolution,
             Z_w|w| is 131 and strip theory gives 144. M_q|q| and N_r|r| of 188 and 94 are 20 and 10 times the 9.4
-            that other copies have and strip theory gives: tuned to trials, it seems. fossen_mss: spheroid of
+            of other copies and of strip theory, probably tuned to trials. fossen_mss: spheroid of
             31.9 kg, g = 9.81 m/s^2 instead of the local one. fossen_python: spheroid of 31.03 kg. In both, cross
-            flow is in heave and pitch what it is in sway and yaw, and holds for motion along one axis at a time.
+            flow in heave and pitch equals that in sway and yaw, and is valid for motion along one axis at a time.
     """
     hull = choose("parameters", parameters, PARAMETERS)
     stern = -0.5 * (1.33 if parameters == "prestero2001" else 1.6)

@@ -68,11 +68,11 @@ _LAYOUT = Layout(
 def rexrov(parameters: str = "berg2012") -> Vehicle:
     """RexROV: thrusters 1-4 mostly vertical (positive thrust pushes up), 5-8 horizontal at 45 degrees.
 
-    Poses are those of the URDF, turned from forward, port, up. The added mass is taken as it is, since UUV Simulator
+    Poses are those of the URDF, turned from forward, port, up. The added mass is unchanged, because UUV Simulator
     applies it in forward, starboard, down.
 
     Args:
-        parameters: berg2012: added mass full, made symmetric. uuvsim_nominal: what the model-based controllers of
-            UUV Simulator assume, rounded and diagonal; the body is the same. Good as a nominal model.
+        parameters: berg2012: added mass full, made symmetric. uuvsim_nominal: that of the model-based controllers
+            of UUV Simulator, rounded and diagonal; the body is the same. Suitable as a nominal model.
     """
     return assemble("rexrov", choose("parameters", parameters, PARAMETERS), _LAYOUT)

@@ -1,4 +1,4 @@
-"""A vehicle as data: published numbers with their sources, and what follows from them."""
+"""A vehicle as data: published numbers with their sources, and derived matrices."""
 
 import equinox as eqx
 import jax
@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import param, sources_field
+from undertow.core.runtime import double_outside_runs
 from undertow.vehicles.body import Body, rigid_body_mass
 
 
@@ -33,10 +34,11 @@ class Vehicle(eqx.Module):
     quadratic_damping: Float[Array, "6 6"] = param(
         "N s^2/m^2, N s^2, N m s^2", "quadratic damping, positive", symbol="D_q"
     )
-    thruster_positions: Float[Array, "N 3"] = param("m", "where each thruster acts", symbol="r_j")
+    thruster_positions: Float[Array, "N 3"] = param("m", "position of each thruster", symbol="r_j")
     thruster_directions: Float[Array, "N 3"] = param("", "unit vector of positive thrust", symbol="e_j")
     sources: tuple = sources_field()
 
+    @double_outside_runs
     def __check_init__(self):
         for name in ("r_g", "r_b"):
             checks.length(name, getattr(self, name), 3, "forward, starboard, down")
@@ -69,14 +71,17 @@ class Vehicle(eqx.Module):
         """Number N of thrusters."""
         return self.thruster_positions.shape[0]
 
+    @double_outside_runs
     def mass_matrix(self) -> Float[Array, "6 6"]:
         """M = M_RB + M_A."""
         return rigid_body_mass(self.mass, self.r_g, self.inertia) + self.added_mass
 
+    @double_outside_runs
     def thruster_matrix(self) -> Float[Array, "6 N"]:
         """B of Eq. (6) from the thruster poses: column j is (e_j, r_j x e_j)."""
         return _columns(self.thruster_positions, self.thruster_directions)
 
+    @double_outside_runs
     def body(self) -> Body:
         """Coefficients of the equation of motion."""
         mass_matrix = self.mass_matrix()
@@ -92,11 +97,12 @@ class Vehicle(eqx.Module):
             gravity=self.weight / self.mass,
         )
 
+    @double_outside_runs
     def with_thrusters(self, numbers) -> "Vehicle":
-        """Same hull with only some of its thrusters, numbered from 1.
+        """The same hull with some of its thrusters only, numbered from 1.
 
         Raises:
-            BadInput: a number that is not one of the vehicle's thrusters, one given twice, or none at all.
+            BadInput: a number that is not one of the vehicle's thrusters, a repeated one, or none.
         """
         for number in numbers:
             if number not in range(1, self.thrusters + 1):

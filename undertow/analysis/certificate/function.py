@@ -1,4 +1,4 @@
-"""The Lyapunov function of the law that ran, from what was recorded: Eq. (46), and section X4 of the theory.
+"""The Lyapunov function of a controller from recorded signals: Eq. (46), and section X4 of the theory.
 
 theta* = d(t) 1: the basis sums to one, so these weights are exact at every instant (U6 of the theory). While d moves
 they move, and the function may rise.
@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from undertow.controllers.law import RCAF
+from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.law import RobustRCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
 
 PerRecord = np.ndarray  # (time,)
 
@@ -21,7 +21,7 @@ class Lyapunov(NamedTuple):
 
     meaning: str
     value: PerRecord
-    estimation: PerRecord  # what eps and theta contribute; the rest is the tracking error's
+    estimation: PerRecord | None = None  # part of the modelling error and the weights; the rest is that of tracking
 
 
 def of_paper(law: RCAF, run: xr.Dataset) -> Lyapunov:
@@ -40,7 +40,7 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
     """
     matrix = gramian(law.estimator, dt, run.sizes["axis"])
     d_til = run["estimate"].values - run["uncertainty"].values
-    eps, rho = run["modelling_error"].values, float(law.estimator.fuzzy.gathering())
+    eps, rho = run["modelling_error"].values, float(law.estimator.fuzzy.basis_norm_squared())
     per_axis = matrix[:, 0, 0] * eps**2 + 2 * matrix[:, 0, 1] * eps * d_til + matrix[:, 1, 1] * rho * _departure(run)
     share = np.broadcast_to(law.tracking_share, eps.shape[1:])
     if not (share > 0).all():
@@ -51,16 +51,16 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
 
 
 def transition(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
-    """Matrix of (eps, d_hat - d) from one tick to the next, per axis, for constant d and basis: poles at exp(p T)."""
+    """Matrix of (eps, d_hat - d) from one step to the next, per axis, for constant d and basis: poles at exp(p T)."""
     of_rates, of_estimate = (np.broadcast_to(gain, axes) for gain in estimator.gains(np.asarray(dt)))
     one = np.ones(axes)
     return np.stack([np.stack([1 - of_rates, dt * one], -1), np.stack([-of_estimate, one], -1)], -2)
 
 
 def gramian(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
-    """W per axis with l_1 sum of eps^2 over this and all later ticks = x^T W x, x = (eps, d_hat - d), l_1 = 1 - A_11.
+    """W per axis with l_1 sum of eps^2 over this and all later steps = x^T W x, x = (eps, d_hat - d), l_1 = 1 - A_11.
 
-    So x^T W x falls by exactly l_1 eps^2 per tick, at any sampling time. For short ones W comes to
+    So x^T W x falls by exactly l_1 eps^2 per step, at any sampling time. For short ones W comes to
     diag(1, 1 / (gamma gamma_eps |xi|^2)) / 2.
     """
     step = transition(estimator, dt, axes)
@@ -74,3 +74,49 @@ def gramian(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
 def _departure(run: xr.Dataset) -> np.ndarray:
     """|theta - d 1|^2, (time, axis)."""
     return ((run["weights"].values - run["uncertainty"].values[..., None]) ** 2).sum(-1)
+
+
+# max over s of s (1 - tanh s).
+_TANH = 0.27846454
+
+# An impulse response is added up until it has fallen to this share, over this many steps at most.
+_FORGOTTEN, _STEPS = 1e-12, 20_000
+
+
+def lyapunov_residual(law: RCAF, axes: int) -> float:
+    """What tanh adds to Vf_dot at most, all axes together: U9, I22. Zero with sign. m^2/s^3 and rad^2/s^3."""
+    own = _layer(law.switching, law.robust_gain, law.layer)
+    compensation = law.identification
+    other = _layer(compensation.switching, compensation.compensation_gain, compensation.layer)
+    return float(np.broadcast_to(own + np.asarray(law.composite) * other, axes).sum())
+
+
+def _layer(switching: str, amplitude, layer):
+    return _TANH * np.asarray(amplitude) * np.asarray(layer) if switching == "tanh" else np.zeros(())
+
+
+def fastest_uncertainty(run: xr.Dataset) -> np.ndarray:
+    """Largest |d_dot| of each axis from record to record, m/s^3 and rad/s^3."""
+    steps = np.abs(np.diff(run["uncertainty"].values, axis=0)) / np.diff(run["time"].values)[:, None]
+    return steps.max(axis=0, initial=0.0)
+
+
+def estimation_bound(estimator: Estimator, dt: float, rate: np.ndarray) -> np.ndarray:
+    """Largest |d_hat - d| per axis once the start is forgotten, where |d_dot| <= rate: an L1 norm.
+
+    It holds for the exact poles, free of noise, with weights off their bound, as long as the basis does not change.
+
+    Args:
+        estimator: of the law.
+        dt: sampling time, s.
+        rate: largest |d_dot| of each axis, m/s^3 and rad/s^3.
+    """
+    step = transition(estimator, dt, len(rate))
+    slowest = np.abs(np.linalg.eigvals(step)).max()
+    steps = _STEPS if slowest >= 1 else min(_STEPS, int(np.ceil(np.log(_FORGOTTEN) / np.log(slowest))) + 2)
+    rows, row = np.zeros(step.shape[:1] + (2,)), np.tile([[0.0, 1.0]], (len(rate), 1))
+    for _ in range(steps):
+        rows += np.abs(row)
+        row = np.einsum("ni,nij->nj", row, step)
+    # In one step d moves by rate dt; its mean over the step is off by half of that, and eps by dt times as much.
+    return rate * dt * (rows[:, 1] + dt / 2 * rows[:, 0])

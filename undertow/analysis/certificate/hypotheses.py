@@ -1,4 +1,4 @@
-"""What the proof of the theorem asks for, held against a recorded run: Eqs. (33), (38), (41), (43), U6 and U7."""
+"""Hypotheses of the stability proof, checked along a recorded run: Eqs. (33), (38), (41), (43), U6 and U7."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.certificate.set_point import minimax_weight
-from undertow.controllers.law import RCAF
-from undertow.controllers.robust.law import RobustRCAF
-from undertow.core.contracts import AbstractModel, Measurement
+from undertow.controllers.composite_law import RCAF
+from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.core.contracts import Model
 
 # Smaller departures are rounding: shares, or m/s^2 and rad/s^2.
 ROUNDING = 1e-9
@@ -21,21 +21,21 @@ _SAME_BASIS = 0.01
 
 
 class Hypothesis(NamedTuple):
-    """One thing that the proof takes for granted; per record whether it held, None where no record tells."""
+    """One hypothesis of the proof; per record whether it held, None where the record does not show it."""
 
     name: str
     sentence: str
     held: np.ndarray | None  # (time,)
-    unknown: str = ""  # why no record tells
+    unknown: str = ""  # why the record does not show it
 
 
 def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterator[Hypothesis]:
-    """What both laws need; `bound` is theta_max of each axis, (n,)."""
+    """Hypotheses of both controllers; `bound` is theta_max of each axis, (n,)."""
     d = run["uncertainty"].values
     true = lambda name: (run[f"measured_{name}"].values == run[name].values).all(-1)
     yield Hypothesis("limits", "no input is at its limit", (run["saturated"].values == 0).all(-1))
     full = run["attained_share"].values >= 1 - ROUNDING
-    yield Hypothesis("demand", "the command gives the whole wanted acceleration (sigma = 0)", full)
+    yield Hypothesis("demand", "the command gives the whole required acceleration (sigma = 0)", full)
     unknown = "G depends on what actuators report"
     yield Hypothesis("rank", "G has full rank: every axis can be accelerated", _full_rank(law.model, run), unknown)
     yield Hypothesis("measurement", "the measurement is the truth", true("position") & true("velocity"))
@@ -51,6 +51,9 @@ def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     sentence = "w_bar >= |omega + sigma|, Eq. (43), with sigma = 0 (else it is not recorded)"
     yield Hypothesis("robust_gain", sentence, whole & (omega <= np.asarray(law.robust_gain)).all(-1))
     amplitude = np.asarray(law.identification.compensation_gain)
+    if law.modification is not None or law.identification_input != "applied":
+        sentence = "the weights follow Eq. (44), Eq. (32) is driven by the applied input"
+        yield Hypothesis("adaptation", sentence, np.zeros(run.sizes["time"], bool))
     yield Hypothesis("compensation_gain", "omega_bar >= |omega|, Eq. (33)", (omega <= amplitude).all(-1))
 
 
@@ -58,7 +61,7 @@ def of_robust(law: RobustRCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """What the discrete function asks of the basis, and what bounds the estimation error where d moves."""
     fuzzy, eps = law.estimator.fuzzy, run["modelling_error"].values
     rho = (np.asarray(fuzzy.basis(eps.reshape(-1, 1))) ** 2).sum(-1).reshape(eps.shape)
-    still = (np.abs(rho / float(fuzzy.gathering()) - 1) <= _SAME_BASIS).all(-1)
+    still = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
     yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", still)
     yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records")
 
@@ -69,7 +72,7 @@ def _constant(d: np.ndarray) -> np.ndarray:
     return np.concatenate([still[:1], still]) if len(still) else np.ones(len(d), bool)
 
 
-def _full_rank(model: AbstractModel, run: xr.Dataset) -> np.ndarray | None:
+def _full_rank(model: Model, run: xr.Dataset) -> np.ndarray | None:
     """Whether G had as many independent columns as there are axes, where the controller believed to be."""
     try:
         gains = _gains(model, run["measured_position"].values, run["measured_velocity"].values)
@@ -82,5 +85,5 @@ def _full_rank(model: AbstractModel, run: xr.Dataset) -> np.ndarray | None:
 
 
 @eqx.filter_jit
-def _gains(model: AbstractModel, position, velocity):
-    return jax.vmap(lambda x, v: model.gain(Measurement(x, v)))(position, velocity)
+def _gains(model: Model, position, velocity):
+    return jax.vmap(lambda x, v: model.dynamics.gain(model.coordinates.measurement(x, v)))(position, velocity)

@@ -1,4 +1,4 @@
-"""The Lyapunov function of the paper per axis, on the way to a set-point: Eqs. (46)-(60).
+"""The Lyapunov function of the paper per axis, towards a set-point: Eqs. (46)-(60).
 
 Eqs. (38), (41) and (45) define the best weights theta* and what they leave over; the basis sums to one, so both
 are known in closed form.
@@ -7,7 +7,7 @@ are known in closed form.
 import numpy as np
 import xarray as xr
 
-from undertow.controllers.law import RCAF
+from undertow.controllers.composite_law import RCAF
 
 
 def lyapunov_function(law: RCAF, run: xr.Dataset, best_weight: np.ndarray) -> np.ndarray:

@@ -1,1 +1,1 @@
-"""Ready-made settings of the law: the paper's, and the sound one."""
+"""Presets of the law: the paper's gains, and the robust variant."""

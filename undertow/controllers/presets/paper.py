@@ -1,21 +1,22 @@
-"""Preset `paper`: Table 1, its fuzzy sets, and what may be chosen differently."""
+"""Preset `paper`: Table 1, its fuzzy sets, and options."""
 
 import math
 
-from undertow.controllers.law import FUZZY_INPUTS, RCAF
+from undertow.controllers.composite_law import FUZZY_INPUTS, RCAF
+from undertow.controllers.robust_modification import modification_of
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
-from undertow.fuzzy.tsk import gaussian_sets
-from undertow.identification.series_parallel import SeriesParallel
+from undertow.estimation.fuzzy_system import gaussian_sets
+from undertow.estimation.series_parallel import SeriesParallel
 
-# Outermost sets of each fuzzy input. The paper leaves centres and widths blank: eps in m/s and rad/s as fixed by
-# the benchmark; for the state input, wide enough for the paper's step of 4 m and its velocities.
+# Outermost sets of each fuzzy input. The paper does not give centres and widths: for eps, m/s and rad/s, as in the
+# benchmark; for the state input, wide enough for the paper's step of 4 m and its velocities.
 _REACH = {"error": (1.0,), "state": (4.0, 2.0)}
 
 
 def paper(
-    model: AbstractModel,
+    model: Model,
     *,
     feedback=(1.0, 2.0),
     weight=((10.0, 0.0), (0.0, 10.0)),
@@ -27,6 +28,10 @@ def paper(
     compensation_gain=0.1,
     compensation_layer=0.5,
     weights_bound=math.inf,
+    leakage=0.0,
+    e_modification=0.0,
+    dead_zone=0.0,
+    identification_input: str = "applied",
     switching: str = "tanh",
     fuzzy_input: str = "error",
     sets: int = 5,
@@ -38,7 +43,7 @@ def paper(
     """The paper's law; every default is Table 1.
 
     Args:
-        model: what the controller may know, from `plant.model()`.
+        model: nominal model, from `plant.model()`.
         feedback: K = (k1, k2), 1/s^2 and 1/s; one pair or one per axis.
         weight: Q of Eq. (21).
         adaptation: gamma.
@@ -48,14 +53,19 @@ def paper(
         pole: alpha_F of the identification model, 1/s.
         compensation_gain: omega_bar, m/s^2 and rad/s^2.
         compensation_layer: boundary layer of the compensation.
-        weights_bound: theta_max, m/s^2 and rad/s^2; weights are projected into +-theta_max, and with them the
-            estimate. The paper has none.
+        weights_bound: theta_max, m/s^2 and rad/s^2; weights, and with them the estimate, are projected into
+            +-theta_max. The paper has none.
+        leakage: kappa of the sigma-modification: weights decay at gamma kappa, 1/s. The paper has none.
+        e_modification: factor of |eps| beside `leakage`, s/m and s/rad. The paper has none.
+        dead_zone: largest |eps| that is treated as noise and stops adaptation, m/s and rad/s. The paper has none.
+        identification_input: input of the identification model: applied (that of the actuators) or commanded (before
+            limits).
         switching: tanh (Remark 5) or sign (as in Eqs. (33), (43)).
         fuzzy_input: error (the modelling error) or state (position and velocity).
         sets: fuzzy sets per input; any number from 1.
         reach: outermost centres, one per fuzzy input; None: 1 for the error, 4 and 2 for the state.
-        width: of the sets as a share of `reach`; None: their spacing.
-        method: how the law is discretised in the sampled loop, euler or rk4.
+        width: width of the sets as a share of `reach`; None: their spacing.
+        method: discretisation of the law in the sampled loop, euler or rk4.
         substeps: steps of `method` per sampling time.
 
     Raises:
@@ -82,6 +92,8 @@ def paper(
         robust_gain=robust_gain,
         layer=layer,
         weights_bound=weights_bound,
+        modification=modification_of(leakage, e_modification, dead_zone),
+        identification_input=identification_input,
         switching=switching,
         fuzzy_input=fuzzy_input,
         method=method,

@@ -1,25 +1,24 @@
-"""Preset `robust`: the sound version, its gains from a few numbers that mean something."""
+"""Preset `robust`: the robust variant, with gains from a few physical numbers."""
 
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
 from undertow.controllers.bandwidths import Axis, Bandwidths, alike, axes_of, robust_bandwidths
-from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.law import RobustRCAF
-from undertow.controllers.robust.reference_filter import ReferenceFilter
-from undertow.controllers.robust.sets import widened
+from undertow.controllers.reference_filter import ReferenceFilter
+from undertow.controllers.robust.estimator import Estimator, widened
+from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core import checks
-from undertow.core.contracts import AbstractModel
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
-from undertow.fuzzy.tsk import gaussian_sets
+from undertow.estimation.fuzzy_system import gaussian_sets
 
-# Beside a bandwidth that is given: the range of tracking bandwidths as shares of it, and the rate of the actuators.
+# With a given bandwidth: range of tracking bandwidths, and bandwidth of the actuator loop, as shares of it.
 _TRACKING_SHARES, _ACTUATORS_FASTER = (0.25, 0.5), 3.0
 
 
 def robust(
-    model: AbstractModel,
+    model: Model,
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
@@ -45,21 +44,21 @@ def robust(
     reach=None,
     width: float | None = None,
 ) -> RobustRCAF:
-    """The sound law: body axes and quaternions where there are any, projected weights, limits respected.
+    """The robust law: body axes and quaternions for a vehicle, projected weights, limits respected.
 
     Args:
-        model: what the controller may know, from `plant.model()`.
-        sampling_time: of the loop, s; a scenario gives it.
-        velocity_noise: standard deviation of the measured velocities at each tick, m/s and rad/s; one number or one
-            per axis; a scenario's sensor gives it.
-        load_rate: how fast loads wander, m/s^2 and rad/s^2 per sqrt(s); counts where there is noise only.
-        delay: of measurement and input together that nothing makes up for, s.
+        model: nominal model, from `plant.model()`.
+        sampling_time: that of the loop, s; a scenario sets it.
+        velocity_noise: standard deviation of the measured velocities at each step, m/s and rad/s; one number or one
+            per axis; a scenario sets it from its navigation.
+        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
+        delay: uncompensated delay of measurement and input together, s.
         bandwidth: natural frequency of the estimator, rad/s; None: the one of least predicted cost among those that
-            keep the margins of `controllers/bandwidths.py` to lag and delay that the law does not know of.
-        damping: its damping ratio.
+            keep the margins of `controllers/bandwidths.py` against unknown lag and delay.
+        damping: damping ratio of the estimator.
         tracking_share: mu, share of the filtered tracking error in the adaptation; 0 for a pure observer.
-        tracking: natural frequency of the tracking error, critically damped, rad/s; None: chosen with the bandwidth,
-            and beside one that is given half of it at most, a quarter at least.
+        tracking: natural frequency of the tracking error, critically damped, rad/s; None: chosen with the bandwidth;
+            with a given bandwidth between a quarter and half of it.
         feedback: K = (k1, k2) instead of `tracking`, 1/s^2 and 1/s; one pair or one per axis.
         weight: Q of Eq. (21).
         pole: alpha_F, with `adaptation` and `composite` instead of `bandwidth`, `damping` and `tracking_share`, 1/s.
@@ -68,25 +67,25 @@ def robust(
         robust_gain: w_bar, m/s^2 and rad/s^2.
         layer: boundary layer of the robust term.
         weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that can be estimated.
-        leakage: rate at which weights of an axis that noise drove apart come together again, 1/s; 0 for none.
-        reference_frequency: of the filter that a jump of the reference goes through, rad/s; None: half of
-            `tracking`, 2 at most; 0 for no filter.
-        actuator_rate: how fast motors are made to follow, 1/s; None: chosen with the bandwidth, and beside one that
-            is given three times as fast, if sampling allows.
-        direction: what departing from the wanted direction costs, where limits bind, beside losing size.
+        leakage: decay rate of differences between the weights of an axis, which noise causes, 1/s; 0 for none.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most; 0 for
+            no filter.
+        actuator_rate: bandwidth of the motor loop, 1/s; None: chosen with the bandwidth; with a given bandwidth three
+            times that, if sampling allows.
+        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
         sets: fuzzy sets; any number from 1.
-        reach: outermost centres, m/s and rad/s; None: so far that weights anywhere in their box add at most a tenth
+        reach: outermost centres, m/s and rad/s; None: so large that weights within their box add at most a tenth
             to the damping of the estimator.
-        width: of the sets as a share of `reach`; None: their spacing.
+        width: width of the sets as a share of `reach`; None: their spacing.
 
     Raises:
-        BadInput: a value is out of its range, or both ways of giving the same thing.
+        BadInput: a value is out of its range, or two options set the same quantity.
     """
     fuzzy = gaussian_sets(sets, tuple(np.ravel(1.0 if reach is None else reach)), width)
     letters = {"pole": pole, "adaptation": adaptation, "composite": composite}
     if any(value is not None for value in letters.values()):
-        bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.gathering()), bandwidth)
-    model = model.own_axes()
+        bandwidth, damping, tracking_share = _from_letters(letters, float(fuzzy.basis_norm_squared()), bandwidth)
+    model = model.in_body_axes()
     if feedback is not None and tracking is not None:
         raise BadInput("tracking", "be left out when there is `feedback`", tracking)
     if any(rate is None for rate in (bandwidth, tracking, actuator_rate)):
@@ -117,7 +116,7 @@ def robust(
 
 
 def _bandwidths(axes: list[Axis], bandwidth, tracking, actuator_rate):
-    """What is not given of bandwidth and tracking (one entry per axis) and of the actuators' rate, rad/s and 1/s."""
+    """Bandwidth and tracking (one entry per axis) and actuator rate, each chosen if not given, rad/s and 1/s."""
     rates, *of_axes = zip(*(robust_bandwidths(axis) for axis in axes), strict=True)
     chosen = Bandwidths(max(rates), *(alike(values) for values in of_axes))
     if bandwidth is None:
@@ -126,12 +125,12 @@ def _bandwidths(axes: list[Axis], bandwidth, tracking, actuator_rate):
         given = jnp.asarray(bandwidth, dtype=float)
         slowest, fastest = _TRACKING_SHARES
         beside = jnp.clip(chosen.tracking, slowest * given, fastest * given)
-        rate = jnp.minimum(axes[0].quickest, _ACTUATORS_FASTER * jnp.max(given))
+        rate = jnp.minimum(axes[0].max_bandwidth, _ACTUATORS_FASTER * jnp.max(given))
     return bandwidth, beside if tracking is None else tracking, rate if actuator_rate is None else actuator_rate
 
 
-def _from_letters(letters: dict, gathering: float, bandwidth):
-    """(bandwidth, damping, tracking share) of Table 1's letters: section 3.12 of the theory."""
+def _from_letters(letters: dict, basis_norm_squared: float, bandwidth):
+    """(bandwidth, damping, tracking share) from the gains of Table 1: section 3.12 of the theory."""
     for name, value in letters.items():
         if value is None:
             raise BadInput(name, "be given with the other two of pole, adaptation and composite")
@@ -139,6 +138,6 @@ def _from_letters(letters: dict, gathering: float, bandwidth):
         raise BadInput("bandwidth", "be left out when there are pole, adaptation and composite", bandwidth)
     pole, adaptation, composite = (np.asarray(value, dtype=float) for value in letters.values())
     if not (composite > 0).all():
-        raise BadInput("composite", "be positive", composite, hint="The sound law has no case gamma_eps = 0 (RAFC)")
-    natural = np.sqrt(adaptation * composite * gathering)
+        raise BadInput("composite", "be positive", composite, hint="The robust law has no case gamma_eps = 0 (RAFC)")
+    natural = np.sqrt(adaptation * composite * basis_norm_squared)
     return natural, pole / (2 * natural), 1 / composite

@@ -1,1 +1,1 @@
-"""The sound version of the paper's law: the same structure, exact in discrete time, within its limits."""
+"""The robust variant of the paper's law: the same structure, exact in discrete time, with actuator limits."""

@@ -3,27 +3,28 @@
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.param import param
-from undertow.fuzzy.tsk import FuzzySystem
+from undertow.estimation.fuzzy_system import FuzzySystem
 
 PerAxis = Float[Array, " n"]
 
-_EVEN = 1e-12  # squared size of what makes a basis differ from one that is alike for all rules
+_EVEN = 1e-12  # squared size below which a basis counts as equal for all rules
 
 
 class EstimatorState(NamedTuple):
-    """What is believed of the motion, and what is learnt."""
+    """Estimated rates, and adapted weights."""
 
     rates: PerAxis  # m/s, rad/s
     weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2
 
 
 class Estimate(NamedTuple):
-    """d_hat and what it comes from."""
+    """d_hat, and the error and basis it comes from."""
 
     error: PerAxis  # eps, m/s, rad/s
     basis: Float[Array, "n rules"]  # xi
@@ -34,13 +35,13 @@ class Estimator(eqx.Module):
     """Eqs. (31), (32), (42), (44) with poles at exp(p T), p^2 + 2 zeta w_o p + w_o^2 = 0. Section X7 of the theory.
 
     Per axis, with alpha = 2 zeta w_o and gamma gamma_eps |xi|^2 = w_o^2 this is the paper's pair of equations, sampled
-    exactly as long as the basis does not change; the weights are stepped by what moves d_hat by a given amount,
-    whatever |xi|^2 is, and kept in their box.
+    exactly as long as the basis does not change. The step of the weights changes d_hat by a given amount for any
+    |xi|^2, and the weights are kept in their box.
 
-    What of them is orthogonal to the basis and to (1, ..., 1) leaks away. By Eq. (44) it could only grow, with the
-    square of the modelling error (section 3.8 of the theory). The estimate does not show it, and the weights that a
-    constant load asks for are all alike: so the leakage costs no accuracy, and adds -leakage |that part|^2 / gamma to
-    the rate of the Lyapunov function.
+    The part of the weights that is orthogonal to the basis and to (1, ..., 1) decays by leakage. By Eq. (44) it could
+    only grow, with the square of the modelling error (section 3.8 of the theory). It does not affect the estimate, and
+    a constant load needs equal weights, so the leakage costs no accuracy; it adds -leakage |that part|^2 / gamma to the
+    rate of the Lyapunov function.
 
     Raises:
         BadInput: bandwidth, damping or bound not positive, leakage negative.
@@ -48,10 +49,10 @@ class Estimator(eqx.Module):
 
     fuzzy: FuzzySystem
     bandwidth: Float[Array, "..."] = param("rad/s", "natural frequency of the estimator", symbol="w_o")
-    damping: Float[Array, "..."] = param("", "its damping ratio", symbol="zeta", default=1.0)
+    damping: Float[Array, "..."] = param("", "damping ratio of the estimator", symbol="zeta", default=1.0)
     bound: Float[Array, "..."] = param("m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=50.0)
     leakage: Float[Array, "..."] = param(
-        "1/s", "rate at which weights that came apart come together", symbol="kappa", default=0.01
+        "1/s", "decay rate of differences between weights", symbol="kappa", default=0.01
     )
 
     def __check_init__(self):
@@ -61,10 +62,10 @@ class Estimator(eqx.Module):
         checks.not_negative("leakage", self.leakage, "1/s")
 
     def init(self, rates: PerAxis) -> EstimatorState:
-        """Nothing learnt."""
+        """State with zero weights."""
         return EstimatorState(rates, jnp.zeros((rates.shape[0], self.fuzzy.rules)))
 
-    def look(self, state: EstimatorState, rates: PerAxis) -> Estimate:
+    def estimate(self, state: EstimatorState, rates: PerAxis) -> Estimate:
         """Modelling error and estimate at measured rates."""
         error = state.rates - rates
         basis = self.fuzzy.basis(error[:, None])
@@ -81,8 +82,8 @@ class Estimator(eqx.Module):
 
         Args:
             state: now.
-            seen: `look` of now.
-            known: F + G u of what was applied, m/s^2 and rad/s^2.
+            seen: `estimate` of now.
+            known: F + G u of the applied input, m/s^2 and rad/s^2.
             tracking: mu s, the share of the filtered tracking error, m/s and rad/s; zero for a pure observer.
             dt: sampling time, s.
         """
@@ -109,3 +110,26 @@ def _cosine_of_root(x: Float[Array, "..."]) -> Float[Array, "..."]:
     small = jnp.abs(x) < 1e-6
     root = jnp.sqrt(jnp.where(small, 1.0, jnp.abs(x)))
     return jnp.where(small, 1 - x / 2 + x**2 / 24, jnp.where(x > 0, jnp.cos(root), jnp.cosh(root)))
+
+
+# Share of the estimator's own damping that weights within their box may add to it.
+_ADDED = 0.1
+_LEAST = 1.0  # m/s, rad/s
+
+
+def widened(fuzzy: FuzzySystem, bandwidth, damping, bound) -> FuzzySystem:
+    """Sets with centres and widths scaled by the smallest sufficient factor, at least one.
+
+    Drift adds c <= theta_max sum |xi'(0)| to 2 zeta w_o, and xi' falls with the width. The sets are then so wide that
+    the basis is nearly constant, and the estimator is one integrator per axis, as the paper's law is in effect.
+
+    Args:
+        fuzzy: system with sets from -1 to 1.
+        bandwidth: w_o, rad/s.
+        damping: zeta.
+        bound: theta_max, m/s^2 and rad/s^2; without a finite one the sets are unchanged.
+    """
+    slope = jnp.abs(jax.jacfwd(lambda x: fuzzy.basis(x[None, None])[0])(jnp.zeros(()))).sum()
+    reach = jnp.asarray(bound, dtype=float) * slope / (_ADDED * 2 * jnp.asarray(damping) * jnp.asarray(bandwidth))
+    factor = jnp.maximum(_LEAST, jnp.max(jnp.where(jnp.isfinite(reach), reach, _LEAST)))
+    return FuzzySystem(factor * fuzzy.centres, factor * fuzzy.widths, evenly_spaced=fuzzy.evenly_spaced)

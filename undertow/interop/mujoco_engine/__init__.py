@@ -1,4 +1,4 @@
-"""Independent physics: an undertow vehicle as a body in MuJoCo's C engine, flown by an undertow controller.
+"""Independent physics: an undertow vehicle as a body in MuJoCo's C engine, under an undertow controller.
 
 What is MuJoCo's own: the rigid body (mass matrix, Coriolis and centripetal forces), weight, buoyancy, thruster
 geometry, kinematics, integration. What it has not, added mass and damping, is computed here in plain NumPy and applied
@@ -10,8 +10,8 @@ import importlib.util
 if importlib.util.find_spec("mujoco") is None:
     raise ModuleNotFoundError("MuJoCo is not installed: pip install 'undertow[mujoco]'", name="mujoco")
 
-from undertow.interop.mujoco_engine.flight import Flight as Flight
-from undertow.interop.mujoco_engine.flight import fly as fly
 from undertow.interop.mujoco_engine.hydrodynamics import Water as Water
 from undertow.interop.mujoco_engine.mjcf import mjcf as mjcf
+from undertow.interop.mujoco_engine.mujoco_run import MujocoRun as MujocoRun
+from undertow.interop.mujoco_engine.mujoco_run import run_in_mujoco as run_in_mujoco
 from undertow.interop.mujoco_engine.submerged import Submerged as Submerged

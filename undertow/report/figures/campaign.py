@@ -1,4 +1,4 @@
-"""How the metrics of a campaign are distributed, and what they depend on."""
+"""Figures of a campaign: empirical distribution functions of the metrics, and rank correlations."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,8 +9,16 @@ from matplotlib.ticker import NullFormatter
 
 from undertow.report.figures import style
 
-# The metrics that are drawn, where they are there.
-_SHOWN = ("tracking_rms", "tracking_max", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
+# The metrics to plot, where they are defined.
+_SHOWN = (
+    "position_rms",
+    "attitude_rms",
+    "tracking_rms",
+    "estimation_rms",
+    "input_rms",
+    "input_variation",
+    "saturated_fraction",
+)
 _LOOKS = (
     style.SOLID,
     style.DASHED,
@@ -23,17 +31,17 @@ _LOOKS = (
 )
 _COLUMNS = 3
 _WIDE = 100.0  # ratio of largest and smallest from which on an axis is logarithmic
-_DARK = 0.6  # correlations beyond this stand on dark ground
+_DARK = 0.6  # correlations above this have a dark background
 
 
 def distributions_figure(
-    values: Mapping[str, Mapping[str, np.ndarray]], flown: Mapping[str, int], units: Mapping[str, str]
+    values: Mapping[str, Mapping[str, np.ndarray]], counts: Mapping[str, int], units: Mapping[str, str]
 ) -> Figure:
-    """Share of trials below each value of a metric: the empirical distribution function; a failure is below none.
+    """Empirical cumulative distribution functions of the metrics; failed trials count as infinite values.
 
     Args:
-        values: metric -> name of the combination -> finite values, in any order; the first eight are drawn.
-        flown: name of the combination -> its trials, with those that failed.
+        values: metric -> name of the combination -> finite values, in any order; the first eight are plotted.
+        counts: name of the combination -> number of its trials, including failed ones.
         units: metric -> unit.
     """
     shown = [name for name in _SHOWN if name in values]
@@ -43,7 +51,7 @@ def distributions_figure(
     beside = max(1, int(9.4 / (0.8 + 0.065 * max(map(len, looks)))))  # entries of the key in a line
     key = 0.2 * -(-len(looks) // beside) if len(looks) > 1 else 0.0
     figure = style.blank(9.6, 0.35 + key + 2.25 * rows)
-    style.head(figure, "Share of the trials below", {})
+    style.head(figure, "Empirical CDF of the metrics", {})
     if key:
         style.key(figure, looks, 0.3, beside)
     for i, metric in enumerate(shown):
@@ -51,7 +59,7 @@ def distributions_figure(
         panel = style.place(figure, 0.6 + 3.1 * column, 0.65 + key + 2.25 * row, 2.35, 1.45)
         for name, look in looks.items():
             ordered = np.sort(values[metric].get(name, np.zeros(0)))
-            share = np.arange(1, len(ordered) + 1) / max(1, flown[name])
+            share = np.arange(1, len(ordered) + 1) / max(1, counts[name])
             panel.step(ordered, share, where="post", color=look.colour, linestyle=look.dashes, linewidth=look.width)
         everything = np.concatenate(list(values[metric].values()))
         if everything.min() > 0 and everything.max() > _WIDE * everything.min():
@@ -65,7 +73,7 @@ def distributions_figure(
 
 
 def sensitivity_figure(found: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Rank correlation of each metric with each parameter, as a field of numbers.
+    """Rank correlation of each metric with each parameter, as a matrix.
 
     Args:
         found: parameter -> metric -> correlation.
@@ -73,7 +81,7 @@ def sensitivity_figure(found: Mapping[str, Mapping[str, Any]]) -> Figure:
     metrics = list(dict.fromkeys(metric for each in found.values() for metric in each))
     lines = 1 + max(key.count(".") for key in found)
     figure = style.blank(9.6, 0.85 + 0.15 * lines + 0.3 * len(metrics))
-    style.head(figure, "Rank correlation with what varies", {})
+    style.head(figure, "Rank correlation with the varied parameters", {})
     panel = style.place(figure, 2.2, 0.6, 7.0, 0.3 * len(metrics))
     field = np.array([[each.get(metric, np.nan) for each in found.values()] for metric in metrics])
     panel.imshow(field, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")

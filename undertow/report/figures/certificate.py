@@ -1,6 +1,7 @@
-"""Certificate of a run: its Lyapunov function, how fast it moves, the weights, and when limits or projection acted."""
+"""Figure of the certificate of a run: Lyapunov function, its rate, the weights, and when limits or projection acted."""
 
 import json
+from collections.abc import Iterable
 
 import numpy as np
 import xarray as xr
@@ -26,36 +27,42 @@ _DECADES = 4
 
 
 def certificate(run: xr.Dataset, title: str) -> Figure:
-    """V and its parts, dV/dt, the largest weight with its bound. Spans are shaded where something was at a limit."""
+    """V and its parts, dV/dt, and the largest weight with its bound, where the controller has weights.
+
+    Spans with active limits are shaded.
+    """
     lived = run.isel(time=run["time"].values <= run.attrs.get("ended", np.inf))
-    time, seen = lived["time"].values, lambda name: lived[name].values
-    figure = style.blank(_WIDTH, _TOP + 3 * _TALL + 2 * _GAP + _FOOT)
-    _head(figure, title)
+    time, values_of = lived["time"].values, lambda name: lived[name].values
+    rows = 3 if "weights_peak" in run else 2
+    figure = style.blank(_WIDTH, _TOP + rows * _TALL + (rows - 1) * _GAP + _FOOT)
+    acting = {"input at a limit": values_of("saturated").max(-1) > 0}
+    if "weights_at_bound" in run:
+        acting["weight at its bound (projection)"] = values_of("weights_at_bound") > 0
+    _head(figure, title, acting)
     panels = [
-        style.place(figure, _LEFT, _TOP + row * (_TALL + _GAP), _WIDTH - _LEFT - _RIGHT, _TALL) for row in range(3)
+        style.place(figure, _LEFT, _TOP + row * (_TALL + _GAP), _WIDTH - _LEFT - _RIGHT, _TALL) for row in range(rows)
     ]
-    value, rate = seen("lyapunov"), seen("lyapunov_rate")
-    parts = [
-        ("V", value, style.SOLID),
-        ("tracking part", seen("lyapunov_tracking"), style.DASHED),
-        ("estimation part", seen("lyapunov_estimation"), style.TRUTH),
-    ]
-    if np.array_equal(value, seen("lyapunov_estimation")):  # then tracking stands beside V, and is no part of it
-        parts = [("V of the estimator", value, style.SOLID), ("tracking, beside it", *parts[1][1:])]
-    _draw(panels[0], time, parts)
+    value, rate = values_of("lyapunov"), values_of("lyapunov_rate")
+    parts = [("V", value, style.SOLID)]
+    if "lyapunov_tracking" in run and "lyapunov_estimation" in run:
+        parts.append(("tracking part", values_of("lyapunov_tracking"), style.DASHED))
+        parts.append(("estimation part", values_of("lyapunov_estimation"), style.TRUTH))
+        if np.array_equal(value, values_of("lyapunov_estimation")):  # then the tracking part is not part of V
+            parts = [("V of the estimator", value, style.SOLID), ("tracking, not in V", *parts[1][1:])]
+    _plot(panels[0], time, parts)
     fit_log(panels[0], [(name, time, values) for name, values, _ in parts], 0.0)
     style.label(panels[0], "", "V, m$^2$/s$^2$", "Lyapunov function")
-    _draw(panels[1], time, [("dV/dt", rate, style.SOLID)], key=False)
+    _plot(panels[1], time, [("dV/dt", rate, style.SOLID)], key=False)
     _fit_rate(panels[1], rate)
-    style.label(panels[1], "", "dV/dt, m$^2$/s$^3$", "its rate: above zero it rises")
-    weights = [("largest |$\\theta$|", seen("weights_peak"), style.SOLID)]
-    bound = _bound(run)
-    if np.isfinite(bound):
-        weights.append(("bound", np.full(len(time), bound), style.TRUTH))
-    _draw(panels[2], time, weights)
-    fit_linear(panels[2], [(name, time, values) for name, values, _ in weights], 0.0)
-    style.label(panels[2], "time, s", "|$\\theta$|, m/s$^2$", "weights")
-    acting = dict(zip(_SPANS, (seen("saturated").max(-1) > 0, seen("weights_at_bound") > 0), strict=True))
+    style.label(panels[1], "" if rows > 2 else "time, s", "dV/dt, m$^2$/s$^3$", "rate of the Lyapunov function")
+    if rows > 2:
+        weights = [("largest |$\\theta$|", values_of("weights_peak"), style.SOLID)]
+        bound = _bound(run)
+        if np.isfinite(bound):
+            weights.append(("bound", np.full(len(time), bound), style.TRUTH))
+        _plot(panels[2], time, weights)
+        fit_linear(panels[2], [(name, time, values) for name, values, _ in weights], 0.0)
+        style.label(panels[2], "time, s", "|$\\theta$|, m/s$^2$", "weights")
     for panel in panels:
         for name, now in acting.items():
             _shade(panel, time, now, name)
@@ -64,11 +71,9 @@ def certificate(run: xr.Dataset, title: str) -> Figure:
     return figure
 
 
-def _head(figure: Figure, title: str) -> None:
+def _head(figure: Figure, title: str, acting: Iterable[str]) -> None:
     style.head(figure, title, {})
-    patches = [
-        Patch(facecolor=colour, alpha=alpha, linewidth=0, label=name) for name, (colour, alpha, _) in _SPANS.items()
-    ]
+    patches = [Patch(facecolor=_SPANS[name][0], alpha=_SPANS[name][1], linewidth=0, label=name) for name in acting]
     figure.legend(
         handles=patches,
         loc="upper right",
@@ -79,7 +84,7 @@ def _head(figure: Figure, title: str) -> None:
     )
 
 
-def _draw(panel: Axes, time: np.ndarray, curves, key: bool = True) -> None:
+def _plot(panel: Axes, time: np.ndarray, curves, key: bool = True) -> None:
     for name, values, look in curves:
         shown = np.where(np.isfinite(values), values, np.nan)
         panel.plot(
@@ -98,7 +103,7 @@ def _draw(panel: Axes, time: np.ndarray, curves, key: bool = True) -> None:
 
 
 def _fit_rate(panel: Axes, rate: np.ndarray) -> None:
-    """Both signs over decades, linear about zero."""
+    """Symmetric logarithmic scale, linear about zero."""
     panel.axhline(0.0, color=style.INK, linewidth=0.8)
     sizes = np.abs(rate[np.isfinite(rate)])
     if not sizes.any():
@@ -110,7 +115,7 @@ def _fit_rate(panel: Axes, rate: np.ndarray) -> None:
 
 
 def _shade(panel: Axes, time: np.ndarray, now: np.ndarray, name: str) -> None:
-    """Spans over all records at which something acted, each as long as until the next record."""
+    """Shade the records at which a limit acted, each until the next record."""
     if not now.any():
         return
     colour, alpha, height = _SPANS[name]
@@ -130,5 +135,5 @@ def _shade(panel: Axes, time: np.ndarray, now: np.ndarray, name: str) -> None:
 
 def _bound(run: xr.Dataset) -> float:
     """Largest theta_max of any axis; infinite where there is none."""
-    bounds = json.loads(run.attrs["certificate"])["weights_bound"]
+    bounds = json.loads(run.attrs["certificate"]).get("weights_bound", [None])
     return max(np.inf if bound is None else bound for bound in bounds)

@@ -1,4 +1,4 @@
-"""The long horizon: how weights grow on every level, and how long each composite gain lasts on the whole motor."""
+"""Figure of long runs: growth of the weights on every level, and time of divergence for each composite gain."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from undertow.report.figures import style
 from undertow.report.formats import round_time
 
-# Law -> what it is called in the key, and how it looks; bounded weights are drawn thin in the same colour.
+# Controller -> its name in the key, and its look.
 _LOOKS = {
     "rcafc": ("RCAFC, Table 1", style.SOLID),
     "rafc": ("RAFC, Table 1", style.DASHED),
@@ -19,7 +19,7 @@ _LOOKS = {
 }
 _BOUNDED = style.Look("#8c8c8c", "-", 0.8, 1)
 
-_TOP = 1e4  # m/s^2, of the axis; weights that pass it are about to end their run
+_TOP = 1e4  # m/s^2, top of the axis; runs with larger weights are about to diverge
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -29,7 +29,7 @@ def horizons_figure(rows: Rows, duration: float) -> Figure:
 
     Args:
         rows: `level`, `law`, `composite`, `bounded`, `lasted`, `ended` (s) and `growth` of each run.
-        duration: of those that lasted, s.
+        duration: duration of completed runs, s.
     """
     levels = list(dict.fromkeys(row["level"] for row in rows))
     figure = style.blank(9.6, 4.4)
@@ -45,8 +45,8 @@ def horizons_figure(rows: Rows, duration: float) -> Figure:
     style.label(
         panel,
         r"$\gamma_\epsilon$ (0: RAFC)",
-        "lasts, s",
-        f"{levels[-1]}: how long, by composite gain; five sets, gamma 100",
+        "time of divergence, s",
+        rf"{levels[-1]}: time of divergence by composite gain; five sets, $\gamma$ = 100",
     )
     return figure
 
@@ -69,7 +69,7 @@ def _growth(panel: Axes, rows: Rows) -> None:
 
 
 def _survival(panel: Axes, rows: Rows, duration: float) -> None:
-    """Dots where a run diverged, arrows where it lasted."""
+    """Bars up to the time of divergence, or up to the duration."""
     panel.set_yscale("log")
     swept = sorted({row["composite"] for row in rows if _of_the_sweep(row)})
     for row in filter(_of_the_sweep, rows):
@@ -77,7 +77,7 @@ def _survival(panel: Axes, rows: Rows, duration: float) -> None:
         colour = _BOUNDED.colour if row["bounded"] else style.SOLID.colour
         at = duration if row["lasted"] else row["ended"]
         panel.plot([place, place], [0.3, at], color=colour, linewidth=6, solid_capstyle="butt", zorder=2)
-        words = "lasts" if row["lasted"] else f"{round_time(row['ended'])} s"
+        words = "completed" if row["lasted"] else f"{round_time(row['ended'])} s"
         panel.text(place, at * 1.15, words, fontsize=style.TINY, ha="center", va="bottom")
     panel.set_xticks(range(len(swept)), [f"{value:g}" for value in swept])
     panel.set_xlim(-0.6, len(swept) - 0.4)

@@ -1,4 +1,4 @@
-"""Ranges of the y axis: made for what the reader should see, and saying so where something lies outside."""
+"""Ranges of the y axes; values outside are noted above the panel."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ Named = Sequence[tuple[str, np.ndarray, np.ndarray]]  # name, time, values
 
 
 def fit_linear(panel: Axes, series: Named, start: float) -> None:
-    """Fit to the values after `start`, s; what leaves the panel before is written above it."""
+    """Fit to the values after `start`, s; earlier values outside the panel are noted above it."""
     late = _finite([values[time >= start] for _, time, values in series])
     if not late.size:
         return
@@ -30,7 +30,7 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
 
 
 def fit_log(panel: Axes, series: Named, start: float) -> None:
-    """Logarithmic; the bottom leaves out the dips at zero crossings."""
+    """Logarithmic scale; its bottom leaves out the dips at zero crossings."""
     del start
     sizes = _finite([values for _, _, values in series])
     sizes = sizes[sizes > 0]
@@ -42,7 +42,7 @@ def fit_log(panel: Axes, series: Named, start: float) -> None:
 
 
 def fit_symmetric(panel: Axes, series: Named, start: float) -> None:
-    """Linear about zero, logarithmic outside: for runs that left every scale."""
+    """Linear about zero, logarithmic outside, for runs that diverged."""
     del start
     early = max(early_size(time, values) for _, time, values in series)
     panel.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(max(early, 1e-12))))
@@ -53,7 +53,7 @@ def fit_symmetric(panel: Axes, series: Named, start: float) -> None:
 
 
 def early_size(time: np.ndarray, values: np.ndarray) -> float:
-    """Median size in the first third of a record: what was normal before a run failed."""
+    """Median size in the first third of a record, before a run failed."""
     sizes = np.abs(_finite([values[time <= time[0] + (time[-1] - time[0]) / 3].ravel()])) if len(time) else np.zeros(0)
     return float(np.median(sizes)) if sizes.size else 0.0
 

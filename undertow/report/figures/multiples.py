@@ -1,4 +1,4 @@
-"""Small multiples: one panel per axis or thruster, with a second panel that shows what the first cannot."""
+"""Small multiples: one panel per axis or thruster, with a second panel for details."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ class Curve(NamedTuple):
 
 
 class Block(NamedTuple):
-    """What is drawn once per column."""
+    """One panel per column."""
 
     curves: Sequence[Curve]
     quantities: Sequence[str]  # y label per column, with unit
@@ -33,8 +33,8 @@ class Block(NamedTuple):
     width: float = 1.0  # share, where blocks stand beside each other
     scale: str = "linear"  # or log, symlog
     window: tuple[float, float] | None = None  # s; the whole record by default
-    limits_from: float = 0.0  # s; the y axis is made for what comes after
-    titled: bool = False  # carries the name of the column
+    limits_from: float = 0.0  # s; the y axis fits the values after this time
+    titled: bool = False  # whether the panel shows the name of the column
 
 
 def small_multiples(
@@ -57,7 +57,7 @@ def small_multiples(
             panel = style.place(figure, left + _LEFT, top + _above(block), width - _LEFT - _GAP, block.height)
             timed = lowest and (beside or number == len(blocks) - 1)
             style.label(panel, "time, s" if timed else "", block.quantities[index], name if block.titled else "")
-            _draw(panel, block, index)
+            _plot(panel, block, index)
             panel.tick_params(labelbottom=beside or number == len(blocks) - 1 or block.window != blocks[-1].window)
             left, top = (left + width, top) if beside else (left, top + heights[number])
     return figure
@@ -68,7 +68,7 @@ def _above(block: Block) -> float:
     return 0.24 if block.titled else 0.2
 
 
-def _draw(panel: Axes, block: Block, column: int) -> None:
+def _plot(panel: Axes, block: Block, column: int) -> None:
     shown = [_cut(curve, block.window) for curve in block.curves]
     for curve in shown:
         values = np.where(np.isfinite(curve.values[:, column]), curve.values[:, column], np.nan)

@@ -1,4 +1,4 @@
-"""Figures of `undertow analyze`: poles, errors against frequency, and what the actuators can give."""
+"""Figures of `undertow analyze`: poles, frequency responses and actuator authority."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,25 +7,25 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from undertow.prediction.predict import Prediction
 from undertow.report.figures import style
-from undertow.studies.prediction.predict import Prediction
 
 _MARKS = ("o", "s", "^")
 _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#7a5c00")
 _DASHES = ("-", (0, (4, 1.6)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (2, 1)), (0, (8, 2)))
 
 
-def prediction_drawings(prediction: Prediction) -> dict[str, Callable[[], Figure]]:
-    """What makes each figure, by name: poles, frequency, actuators (where inputs have limits)."""
+def prediction_plots(prediction: Prediction) -> dict[str, Callable[[], Figure]]:
+    """Functions that make the figures, by name: poles, frequency, actuators (where inputs have limits)."""
     figures = {"poles": lambda: _poles(prediction), "frequency": lambda: _frequency(prediction)}
-    if np.isfinite(prediction.reach.high).any():
+    if np.isfinite(prediction.authority.high).any():
         figures["actuators"] = lambda: _actuators(prediction)
     return figures
 
 
 def _poles(prediction: Prediction) -> Figure:
     figure = style.blank(9.6, 4.2)
-    style.head(figure, "Poles of the whole loop over its operating range", {})
+    style.head(figure, "Controllable closed-loop poles over the operating range", {})
     panel = style.place(figure, 0.75, 0.55, 8.6, 3.1)
     for point, mark, colour in zip(prediction.points, _MARKS, _COLOURS, strict=False):
         poles: Any = point.poles
@@ -36,7 +36,7 @@ def _poles(prediction: Prediction) -> Figure:
             color=colour,
             markerfacecolor="none",
             markersize=5.5,
-            label=f"load larger than {point.share:.0%} of all",
+            label=f"{point.share:.0%} quantile of the load",
         )
     panel.set_xscale("symlog", linthresh=1.0, linscale=0.5)
     panel.set_yscale("symlog", linthresh=1.0, linscale=0.5)
@@ -60,10 +60,10 @@ def _poles(prediction: Prediction) -> Figure:
 
 def _frequency(prediction: Prediction) -> Figure:
     figure = style.blank(9.6, 3.7)
-    style.head(figure, "Answer to a disturbance, by its frequency", {})
+    style.head(figure, "Frequency response to a disturbance", {})
     error = _log(figure, 0.75)
     missed = _log(figure, 5.55)
-    names = prediction.ground.built.closed_loop.plant.outputs
+    names = prediction.operating_point.built.closed_loop.plant.outputs
     for i, name in enumerate(names):
         look = {"color": _COLOURS[i % 6], "linestyle": _DASHES[i % 6], "linewidth": 1.2, "label": name}
         error.plot(prediction.frequency, np.maximum(prediction.error[:, i], 1e-12), **look)
@@ -72,22 +72,28 @@ def _frequency(prediction: Prediction) -> Figure:
     error.legend(fontsize=style.SMALL, frameon=False, ncols=2, loc="lower center")
     style.label(error, "frequency of d, rad/s", "|e| / |d|, s$^2$", "tracking error")
     style.label(
-        missed, "frequency of d, rad/s", r"$|\hat{d} - d| \,/\, |d|$", "estimation error; above 1 worse than none"
+        missed,
+        "frequency of d, rad/s",
+        r"$|\hat{d} - d| \,/\, |d|$",
+        "estimation error; above 1 the estimate adds error",
     )
     return figure
 
 
 def _actuators(prediction: Prediction) -> Figure:
-    reach = prediction.reach
+    authority = prediction.authority
     figure = style.blank(9.6, 2.9)
-    style.head(figure, "Largest force asked of each actuator, and what it can hold", {})
+    style.head(figure, "Largest force demanded from each actuator, and its limits", {})
     panel = style.place(figure, 0.75, 0.55, 8.6, 1.85)
-    number = np.arange(1, len(reach.demand) + 1)
-    panel.bar(number, reach.demand, width=0.5, color=style.SOLID.colour, label="asked for, at most")
-    for side, dashes, what in ((reach.high, "-", "forward limit"), (-reach.low, (0, (4, 1.6)), "reverse limit")):
+    number = np.arange(1, len(authority.demand) + 1)
+    panel.bar(number, authority.demand, width=0.5, color=style.SOLID.colour, label="largest demand")
+    for side, dashes, what in (
+        (authority.high, "-", "forward limit"),
+        (-authority.low, (0, (4, 1.6)), "reverse limit"),
+    ):
         panel.hlines(side, number - 0.38, number + 0.38, color=style.INK, linestyle=dashes, linewidth=1.4, label=what)
     panel.set_xticks(number)
-    panel.set_ylim(0, 1.25 * max(reach.demand.max(), np.max(reach.high[np.isfinite(reach.high)])))
+    panel.set_ylim(0, 1.25 * max(authority.demand.max(), np.max(authority.high[np.isfinite(authority.high)])))
     panel.legend(fontsize=style.SMALL, frameon=False, ncols=3, loc="upper center")
     style.label(panel, "actuator", "force")
     return figure

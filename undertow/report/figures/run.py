@@ -1,4 +1,4 @@
-"""Figures of any single run: any number of outputs and inputs, whether it lasted or not."""
+"""Figures of a single run, with any number of outputs and inputs, completed or not."""
 
 from collections.abc import Callable
 
@@ -6,41 +6,43 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from undertow.report.figures import signals, style
+from undertow.report.figures import recorded, style
 from undertow.report.figures.certificate import certificate
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
-from undertow.report.figures.uncertainty import settled
+from undertow.report.figures.paper import settled
 
-# A run that failed is drawn on a symmetric logarithmic scale where its peak is this many times its early size.
+# A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
 _RUNAWAY = 1e2
 
 
 def run_figures(run: xr.Dataset) -> dict[str, Figure]:
-    """Tracking, error, estimate and effort of one run, by these names.
+    """Figures `tracking`, `error`, `estimate` and `effort` of one run.
 
-    With a law that has one, `certificate` too; with a sensor that errs, `measurement`.
+    A controller with a certificate adds `certificate`, a measurement with errors adds `measurement`.
     """
-    return {name: draw() for name, draw in run_drawings(run).items()}
+    return {name: make() for name, make in run_plots(run).items()}
 
 
-def run_drawings(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
-    """What makes each of the figures of a run."""
-    outputs, columns = signals.axis_names(run), _columns(run.sizes["axis"])
-    inputs = [f"input {number}" for number in run["input"].values]
-    wanted = signals.curve(run, "wanted $x_d$", "target", style.TRUTH)
-    actual = signals.curve(run, "actual $x$", "position", style.SOLID)
-    error = signals.magnitude(signals.curve(run, "|$x_d - x$|", "error", style.SOLID))
-    true = signals.curve(run, "true $d$", "uncertainty", style.TRUTH)
-    estimate = signals.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID)
-    asked = signals.curve(run, "asked for", "command", style.DASHED)
-    applied = signals.curve(run, "applied", "voltage", style.SOLID)
-    places, errors = signals.places(run), signals.per_axis(run, "|error|")
-    rates = signals.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
-    levels = [f"input, {run['voltage'].attrs['units']}"] * run.sizes["input"]
+def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
+    """Functions that make the figures of a run, by name."""
+    outputs, columns = recorded.axis_names(run), _columns(run.sizes["axis"])
+    inputs = [f"input {number}" for number in run["actuator"].values]
+    desired = recorded.curve(run, "desired $x_d$", "reference", style.TRUTH)
+    actual = recorded.curve(run, "actual $x$", "position", style.SOLID)
+    error = recorded.magnitude(recorded.curve(run, "|$x_d - x$|", "error", style.SOLID))
+    true = recorded.curve(run, "true $d$", "uncertainty", style.TRUTH)
+    curves = [true]
+    if "estimate" in run:
+        curves.append(recorded.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID))
+    commanded = recorded.curve(run, "commanded", "commanded_input", style.DASHED)
+    applied = recorded.curve(run, "applied", "input", style.SOLID)
+    places, errors = recorded.places(run), recorded.per_axis(run, "|error|")
+    rates = recorded.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
+    levels = [f"input, {run['input'].attrs['units']}"] * run.sizes["actuator"]
     figures: dict[str, Callable[[], Figure]] = {
         "tracking": lambda: small_multiples(
-            _titled(run, "Tracking"), outputs, [_block(run, [wanted, actual], places, 0.0)], columns
+            _titled(run, "Tracking"), outputs, [_block(run, [desired, actual], places, 0.0)], columns
         ),
         "error": lambda: small_multiples(
             _titled(run, "Tracking error"), outputs, [Block([error], errors, 1.4, scale="log", titled=True)], columns
@@ -48,14 +50,14 @@ def run_drawings(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
         "estimate": lambda: small_multiples(
             _titled(run, "Lumped uncertainty and its estimate"),
             outputs,
-            [_block(run, [true, estimate], rates, settled(run))],
+            [_block(run, curves, rates, settled(run))],
             columns,
         ),
         "effort": lambda: small_multiples(
             _titled(run, "Inputs"),
             inputs,
-            [_block(run, [asked, applied], levels, settled(run))],
-            _columns(run.sizes["input"]),
+            [_block(run, [commanded, applied], levels, settled(run))],
+            _columns(run.sizes["actuator"]),
         ),
     }
     if "lyapunov" in run:
@@ -67,19 +69,19 @@ def run_drawings(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
 
 
 def _apart(run: xr.Dataset) -> list[Block]:
-    """What the controller was told less the truth: position and, below it, velocity."""
+    """Measurement error of position and, below it, velocity."""
     blocks = []
     for signal, symbol, rate in (("position", "x", ""), ("velocity", r"\dot{x}", "/s")):
-        apart = signals.difference(run, "told less true", f"measured_{signal}", signal, style.SOLID)
+        apart = recorded.difference(run, "measured less true", f"measured_{signal}", signal, style.SOLID)
         turns = np.array(["rad" in unit and not rate for unit in run["axis"].attrs["unit_of_each"].split(", ")])
         wrapped = np.where(turns, (apart.values + np.pi) % (2 * np.pi) - np.pi, apart.values)
-        quantities = signals.per_axis(run, f"error of ${symbol}$", rate)
+        quantities = recorded.per_axis(run, f"error of ${symbol}$", rate)
         blocks.append(_block(run, [apart._replace(values=wrapped)], quantities, 0.0)._replace(titled=not rate))
     return blocks
 
 
 def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float) -> Block:
-    failed = run.attrs.get("status", "ok") != "ok"
+    failed = run.attrs.get("status", "completed") != "completed"
     peaks = [np.nanmax(np.abs(curve.values), initial=0.0) for curve in curves]
     early = [early_size(curve.time, curve.values) for curve in curves]
     runaway = failed and max(peaks) > _RUNAWAY * max(early)
@@ -88,12 +90,12 @@ def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: f
 
 
 def _titled(run: xr.Dataset, what: str) -> str:
-    status = run.attrs.get("status", "ok")
-    return what if status == "ok" else f"{what} ({status.replace('_', ' ')} at {run.attrs['ended']:.3g} s)"
+    status = run.attrs.get("status", "completed")
+    return what if status == "completed" else f"{what} ({status.replace('_', ' ')} at {run.attrs['ended']:.3g} s)"
 
 
 def _columns(count: int) -> int:
-    """Three beside each other, two where that fills the rows better."""
+    """Three columns, or two where that fills the rows better."""
     if count % 3 == 0:
         return 3
     return min(count, 2)

@@ -1,6 +1,6 @@
-"""How every figure looks. Line style carries the meaning, so a grey print says the same as a screen.
+"""The look of all figures. Line styles carry the meaning, so that a grey print shows the same as a screen.
 
-Only matplotlib's objects are used, never pyplot, and no setting of matplotlib is changed: two threads may draw at once.
+Only matplotlib's objects are used, never pyplot, and no setting of matplotlib is changed: two threads may plot at once.
 """
 
 from typing import NamedTuple
@@ -25,7 +25,7 @@ class Look(NamedTuple):
     order: int
 
 
-TRUTH = Look("#000000", (0, (1, 1.8)), 1.1, 4)  # dotted: wanted or true
+TRUTH = Look("#000000", (0, (1, 1.8)), 1.1, 4)  # dotted: desired or true
 SOLID = Look("#0072b2", "-", 1.1, 3)  # RCAFC, or what the run did
 DASHED = Look("#e07b00", (0, (4, 1.6)), 1.1, 2)  # RAFC, or the second of two
 CONTROLLERS = {"rcafc": ("RCAFC", SOLID), "rafc": ("RAFC", DASHED)}
@@ -37,7 +37,7 @@ def blank(width: float, height: float) -> Figure:
 
 
 def place(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
-    """A panel at a place given in inches from the upper left corner."""
+    """A panel, with its position in inches from the upper left corner."""
     page_width, page_height = figure.get_size_inches()
     panel = figure.add_axes(
         (left / page_width, 1 - (top + height) / page_height, width / page_width, height / page_height)
@@ -57,7 +57,7 @@ def label(panel: Axes, x: str = "", y: str = "", title: str = "", size: float = 
     """Axis labels, with units, and a title at the upper left of a panel, at fixed distances from it."""
     panel.set_xlabel(x, fontsize=SMALL, color=INK)
     panel.set_ylabel(y, fontsize=SMALL, color=INK)
-    # Without coordinates of their own the labels would be moved clear of the tick labels: most of the drawing time.
+    # Without coordinates of their own the labels would be moved clear of the tick labels: most of the plotting time.
     panel.xaxis.set_label_coords(0.5, 0, transform=_shifted(panel, 0, -0.2))
     panel.yaxis.set_label_coords(0, 0.5, transform=_shifted(panel, -0.42, 0))
     panel.set_title(title, fontsize=size, color=INK, loc="left", fontweight="bold", y=1, pad=3)
@@ -77,7 +77,7 @@ def head(figure: Figure, title: str, keys: dict[str, Look]) -> None:
 
 
 def key(figure: Figure, keys: dict[str, Look], top: float, columns: int) -> None:
-    """Key of line styles at the left, so far below the upper edge (inches): for names too long to stand in the head."""
+    """Key of line styles at the left, `top` inches below the upper edge, for names too long for the head."""
     _, height = figure.get_size_inches()
     _legend(figure, keys, columns, loc="upper left", bbox_to_anchor=(0.005, 1.0 - top / height))
 
@@ -98,6 +98,6 @@ def _legend(figure: Figure, keys: dict[str, Look], columns: int, **place) -> Non
 
 
 def power(unit: str) -> str:
-    """A unit as it is typeset: m/s^2 with a raised 2."""
+    """A unit as matplotlib typesets it: m/s^2 with a raised 2."""
     base, _, exponent = unit.partition("^")
     return f"{base}$^{exponent}$" if exponent else unit

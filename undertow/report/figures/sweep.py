@@ -1,4 +1,4 @@
-"""How much of a sinusoidal uncertainty the estimate misses, against its frequency."""
+"""Figure: relative error of the estimate of a sinusoidal uncertainty, against its frequency."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,15 +15,15 @@ def sweep_figure(sweep: Mapping[str, Mapping[str, Sequence[float]] | Any]) -> Fi
 
     Args:
         sweep: by controller (`rcafc`, `rafc`), the lists `frequency` (rad/s) and `measured` (|d_err| / |d|), and
-            `theory_frequency` (rad/s) and `theory` where a prediction is at hand.
+            `theory_frequency` (rad/s) and `theory` where there is a prediction.
     """
     figure = style.blank(9.6, 3.7)
-    drawn = {key: look for key, look in style.CONTROLLERS.items() if key in sweep}
+    shown = {key: look for key, look in style.CONTROLLERS.items() if key in sweep}
     style.head(figure, "Estimation error against frequency", {})
     panel = style.place(figure, 0.62, 0.55, 8.75, 2.7)
     panel.set_xscale("log")
     panel.set_yscale("log")
-    for key, (name, look) in drawn.items():
+    for key, (name, look) in shown.items():
         points = sweep[key]
         if points.get("theory"):
             panel.plot(
@@ -47,7 +47,7 @@ def sweep_figure(sweep: Mapping[str, Mapping[str, Sequence[float]] | Any]) -> Fi
         )
     panel.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
     panel.annotate(
-        "above this line the estimate is worse than none",
+        "above this line the estimate increases the error",
         (0.01, 1.0),
         xycoords=("axes fraction", "data"),
         xytext=(0, 2),

@@ -1,4 +1,4 @@
-"""How the cost fell while gains were tuned."""
+"""Figure: cost against the number of evaluations of a tuning."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,7 +9,7 @@ from undertow.report.figures import style
 
 
 def tuning_figure(found: Mapping[str, Any]) -> Figure:
-    """Best cost on the training against the number of gains tried, and what was reached on held-out runs.
+    """Best training cost against the number of evaluations, and the costs of the given and tuned gains on both sets.
 
     Args:
         found: contents of tuning.json.
@@ -26,5 +26,5 @@ def tuning_figure(found: Mapping[str, Any]) -> Figure:
         for place, one in ((0, "given"), (end, "tuned")):
             panel.plot(place, found["gains"][one][name], "o", color=look.colour, markersize=4, clip_on=False, zorder=5)
     panel.set_xlim(0, end)
-    style.label(panel, "gains tried", "cost")
+    style.label(panel, "evaluations", "cost")
     return figure

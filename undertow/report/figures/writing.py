@@ -1,4 +1,4 @@
-"""Figures as files: SVG and PNG, the same bytes for the same figure."""
+"""Writes figures as SVG and PNG files, with the same bytes for the same figure."""
 
 import io
 import re
@@ -12,12 +12,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from undertow.core.foreign import python_says
+from undertow.core.user_code import python_says
 
 DOTS_PER_INCH = 150
 
-# Names inside an SVG are salted at random unless a setting of matplotlib says otherwise; it is held while writing. Only
-# settings that are read while writing may stand here: another thread may be making a figure, and would read them too.
+# By default matplotlib salts names inside an SVG at random. Only settings that are read while writing may be set here:
+# another thread may be making a figure at the same time.
 _SETTINGS = {"svg.hashsalt": "undertow", "svg.fonttype": "path"}
 _WRITING = threading.Lock()
 
@@ -25,22 +25,22 @@ _PATH = re.compile(r'( d=")([^"]+)(")')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
 
 
-Drawings = Mapping[str, Callable[[], Figure]]  # what makes each figure, by name
+Plots = Mapping[str, Callable[[], Figure]]  # functions that make the figures, by name
 
 
 class Saved(NamedTuple):
-    """Figures that were written, and a sentence for each that could not be."""
+    """The figures written, and a sentence for each failed one."""
 
     vectors: dict[str, Path]  # .svg, by name
     failures: list[str]
 
 
 def svg(figure: Figure) -> str:
-    """The figure as SVG, without date, text drawn as outlines (looks alike everywhere)."""
+    """The figure as SVG, without date, with text as outlines (equal on every machine)."""
     text = io.StringIO()
     with _WRITING, matplotlib.rc_context(_SETTINGS):
         FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": "undertow"})
-    # A hundredth of a point is finer than any printer: the rest of the digits is most of the file.
+    # A hundredth of a point is finer than any printer; further digits would be most of the file.
     return _PATH.sub(lambda m: m[1] + _DIGITS.sub(r"\1", m[2]) + m[3], text.getvalue())
 
 
@@ -69,22 +69,22 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     return vector, raster
 
 
-def save_all(drawings: Callable[[], Drawings], folder: Path) -> Saved:
-    """Draw and write figures. One that cannot be drawn costs no other, and none the results that it would show.
+def save_all(plots: Callable[[], Plots], folder: Path) -> Saved:
+    """Make and write figures. A failed figure affects neither the others nor the results.
 
     Args:
-        drawings: gives what makes each figure, by name.
-        folder: made if need be.
+        plots: gives the functions that make the figures, by name.
+        folder: created if missing.
     """
     saved = Saved({}, [])
     try:
-        makers = drawings()
-    except Exception as error:  # whatever matplotlib and xarray say of numbers that nobody thought of
-        saved.failures.append(f"no figure could be drawn ({python_says(error)}); the results are whole")
+        makers = plots()
+    except Exception as error:  # matplotlib and xarray raise many kinds of errors for unusual numbers
+        saved.failures.append(f"the figures could not be made ({python_says(error)}); the results are complete")
         return saved
     for name, make in makers.items():
         try:
             saved.vectors[name], _ = save(make(), folder, name)
         except Exception as error:
-            saved.failures.append(f"figure `{name}` could not be drawn ({python_says(error)}); the results are whole")
+            saved.failures.append(f"figure `{name}` could not be made ({python_says(error)}); the results are complete")
     return saved

@@ -1,0 +1,69 @@
+"""Machine code for this processor."""
+
+import ctypes
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from llvmlite import binding
+
+from simdjit.cache import cached
+from simdjit.graph import Unsupported
+
+# Arguments of a program: numbers, carry, series; steps, steps between records.
+_SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
+
+
+class Code:
+    """A compiled program; may be run by several threads at once.
+
+    Args:
+        assembly: LLVM's, with a function `run`.
+        cache: folder of compiled code; None for the default.
+    """
+
+    def __init__(self, assembly: str, cache: Path | None = None):
+        self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
+        self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly, cache)))
+        self._engine.finalize_object()
+        self._run: Callable[..., None] = _SIGNATURE(self._engine.get_function_address("run"))
+
+    def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, steps: int, every: int) -> None:
+        """Run it for every group of lanes; memories as `layout.Layout` makes them."""
+        for group in range(len(numbers)):
+            self._run(*(memory[group].ctypes.data for memory in (numbers, carry, series)), steps, every)
+
+
+def simd_width(bits: int) -> int:
+    """Numbers of so many bits in one vector register of this processor."""
+    features = binding.get_host_cpu_features()
+    register = 512 if features.get("avx512f") else 256 if features.get("avx2") else 128
+    return register // bits
+
+
+def _target() -> Any:
+    """This processor; a new object each time, as every engine disposes of its own."""
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    name, features = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    return binding.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=2, jit=True)
+
+
+def parsed(assembly: str) -> binding.ModuleRef:
+    """LLVM's module of an assembly, verified.
+
+    Raises:
+        Unsupported: LLVM refuses it.
+    """
+    try:
+        module = binding.parse_assembly(assembly)
+        module.verify()
+    except RuntimeError as error:
+        raise Unsupported(f"LLVM refuses the program ({' '.join(str(error).split())[:200]})") from error
+    return module
+
+
+def _object(assembly: str, cache: Path | None) -> bytes:
+    key = (assembly, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten(), binding.llvm_version_info)
+    return cached(key, ".o", lambda: _target().emit_object(parsed(assembly)), cache)

@@ -1,0 +1,106 @@
+"""A loop over steps, written for one run and compiled for any number of them at once."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from simdjit import nvidia
+from simdjit.codegen import STEP, Sections, assembly, operations
+from simdjit.cpu import Code, simd_width
+from simdjit.cuda import Driver
+from simdjit.graph import I64, Unsupported, flat
+from simdjit.layout import Layout
+from simdjit.lowering import evaluate
+from simdjit.prologue import Prologue, inputs
+from simdjit.tracing import Traced
+
+# Operations; machine code of a longer program would take minutes to make.
+_MOST = 200_000
+
+
+class Loop:
+    """A time-stepping loop, compiled for vector registers or for a GPU.
+
+    Args:
+        prepare: numbers -> everything that does not change from step to step, random draws included.
+        start: prepared -> carry.
+        step: prepared, carry, number of the step -> carry.
+        record: prepared, carry, number of the step -> what is recorded of an instant.
+        numbers: of one run; a tree of arrays.
+        constant: which leaves of `numbers` are the same in every run; they make the program short. None for none.
+        lanes: runs at once; as many as fit a register unless given. No result depends on it.
+        driver: of the GPU that runs it, as `gpu` finds it; None for this processor. No result depends on it.
+        cache: folder of compiled code; None for SIMDJIT_CACHE or the default.
+
+    Raises:
+        Unsupported: a function needs something that the compiler has no rule for.
+        OSError: the GPU's driver fails.
+    """
+
+    def __init__(
+        self,
+        prepare: Callable,
+        start: Callable,
+        step: Callable,
+        record: Callable,
+        numbers: Any,
+        constant: Sequence[bool] | None = None,
+        lanes: int = 0,
+        driver: Driver | None = None,
+        cache: Path | None = None,
+    ):
+        prepared = Traced(prepare, numbers)
+        constant = [False] * len(jax.tree.leaves(numbers)) if constant is None else constant
+        self._prologue = Prologue(prepared, numbers, constant)
+        graph, known = self._prologue.graph, self._prologue.nodes
+        of_arrays = lambda function: lambda arrays, *rest: function(eqx.combine(arrays, prepared.still), *rest)
+        begun = Traced(of_arrays(start), prepared.shapes)
+        first = evaluate(graph, begun.closed, known, _MOST)
+
+        number = jax.ShapeDtypeStruct((), jnp.asarray(0).dtype)
+        k = graph.input(STEP, I64)
+        k = k if number.dtype == I64 else graph.apply("convert", k, dtype=str(number.dtype))
+        given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
+        carried = lambda function: lambda known, carry, k: function(known, eqx.combine(carry, begun.still), k)
+        self._step, self._record = (
+            Traced(of_arrays(carried(function)), prepared.shapes, begun.shapes, number) for function in (step, record)
+        )
+        if self._step.types != begun.types:
+            raise Unsupported("a carry that changes its type")
+        stepped, recorded = (evaluate(graph, traced.closed, given, _MOST) for traced in (self._step, self._record))
+
+        sections = Sections(*map(flat, (first, stepped, recorded)))
+        self.operations = operations(graph, sections)
+        if driver is None:
+            lanes = lanes or simd_width(8 * np.dtype(number.dtype).itemsize)
+            self._code = Code(assembly(graph, sections, lanes), cache)
+        else:
+            lanes = nvidia.LANES
+            self._code = nvidia.Kernel(assembly(graph, sections, lanes, nvidia.THREADS), driver, cache)
+        several = (self._prologue.inputs, begun.leaves, self._record.leaves)
+        self._numbers_layout, self._carry_layout, self._record_layout = (Layout(leaves, lanes) for leaves in several)
+
+    def run(self, numbers: Any, steps: int, every: int = 0) -> tuple[Any, Any]:
+        """Run the loop for a batch.
+
+        Args:
+            numbers: as in the example, with a leading axis over runs.
+            steps: how many.
+            every: steps between records, the first before the first step; 0 for none.
+
+        Returns:
+            The carry after the last step, and what was recorded, with an axis over records; both with a leading axis
+            over runs.
+        """
+        runs = len(jax.tree.leaves(numbers)[0])
+        given = self._numbers_layout.packed(self._prologue.packed(numbers), runs)
+        carry = self._carry_layout.memory(len(given))
+        series = self._record_layout.memory(len(given), steps // every + 1 if every else 0)
+        self._code.run(given, carry, series, steps, every)
+        final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
+        return self._step.whole(final), self._record.whole(self._record_layout.unpacked(series, runs))

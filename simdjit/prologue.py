@@ -1,0 +1,109 @@
+"""The prologue of a loop: the numbers of each run, and what is computed from them before the first step."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from simdjit.graph import Graph, Nodes, Unsupported, filled
+from simdjit.lowering import evaluate, nodes_of
+from simdjit.tracing import Traced
+
+# Operations; what needs more of them (a spectrum of waves) is left to XLA.
+_MOST = 15_000
+
+
+# The width of a program decides about the last bits of a result, what is in the other places does not: every program
+# has this width, however few runs there are, so that no result depends on how they are cut into tasks.
+_WIDTH = 64
+
+
+def _by_vmap(function: Callable[[Any], Any], numbers: Any) -> Callable[[Any], Any]:
+    """The function with a leading axis over runs, by `jax.vmap`: for what has no rule.
+
+    Args:
+        function: of a tree of arrays.
+        numbers: an example of that.
+    """
+    width = _WIDTH
+    stacked = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((width, *np.shape(leaf)), leaf.dtype), numbers)
+    program = jax.jit(jax.vmap(function)).lower(stacked).compile()
+
+    def run(numbers: Any) -> Any:
+        runs, pieces = len(jax.tree.leaves(numbers)[0]), []
+        for first in range(0, runs, width):
+            which = np.minimum(np.arange(first, first + width), runs - 1)
+            results = program(jax.tree.map(lambda leaf, which=which: leaf[which], numbers))
+            pieces.append(jax.tree.map(np.asarray, results))
+        return jax.tree.map(lambda *parts: np.concatenate(parts)[:runs], *pieces)
+
+    return run
+
+
+class Prologue:
+    """What does not depend on the step: computed in the program where there are rules, and by XLA before where not.
+
+    Args:
+        prepare: the function, of `numbers`.
+        numbers: of one run; a tree of arrays.
+        constant: which of its leaves are the same in every run.
+
+    Attributes:
+        graph: with what is computed in the program.
+        nodes: of its results.
+        inputs: shapes and types of what every lane brings along, in the order of its slots.
+
+    Raises:
+        Unsupported: neither the program nor XLA can do it for many runs at once.
+    """
+
+    def __init__(self, prepare: Traced, numbers: Any, constant: Sequence[bool]):
+        given = zip(jax.tree.leaves(numbers), prepare.closed.in_avals, strict=True)
+        leaves = [np.asarray(leaf, dtype=kind.dtype) for leaf, kind in given]  # as JAX takes them, doubles or not
+        self._varying = [i for i, same in enumerate(constant) if not same]
+        self._before: Callable[[Any], list[np.ndarray]] | None = None
+        self.inputs = [leaves[i] for i in self._varying]
+        try:
+            self.graph, given = self._given(leaves)
+            self.nodes = evaluate(self.graph, prepare.closed, given, _MOST)
+        except Unsupported as lacking:
+            passed_on = prepare.passed_on()
+            made = [place is None for place in passed_on]
+            self.inputs += [leaf for leaf, new in zip(prepare.leaves, made, strict=True) if new]
+            try:
+                self._before = _by_vmap(prepare.only(made), numbers)
+            except Exception as error:  # whatever JAX raises for what it cannot do for several at once
+                raise Unsupported(f"{lacking}; nor can JAX compute it for several runs ({error})") from error
+            self.graph, given = self._given(leaves)
+            further = iter(given[len(leaves) :])
+            self.nodes = [next(further) if place is None else given[place] for place in passed_on]
+
+    def packed(self, numbers: Any) -> list[np.ndarray]:
+        """Arrays of `inputs`, with a leading axis over runs, from those of `numbers`."""
+        leaves = jax.tree.leaves(numbers)
+        before = self._before(numbers) if self._before else []
+        return [*(leaves[i] for i in self._varying), *before]
+
+    def _given(self, leaves: list[Any]) -> tuple[Graph, list[Nodes]]:
+        """A new graph, and nodes of all numbers and then of what is made before."""
+        graph = Graph()
+        made = inputs(graph, "number", self.inputs)
+        nodes = [np.zeros(0, dtype=np.int64)] * len(leaves)
+        for i, leaf in enumerate(leaves):
+            if i not in self._varying:
+                nodes[i] = nodes_of(graph, leaf)
+        for i, several in zip(self._varying, made, strict=False):
+            nodes[i] = several
+        return graph, nodes + made[len(self._varying) :]
+
+
+def inputs(graph: Graph, kind: str, leaves: list[Any]) -> list[Nodes]:
+    """Nodes of arrays that lie in memory, slot after slot."""
+    several, slot = [], 0
+    for leaf in leaves:
+        size = int(np.prod(leaf.shape))
+        nodes = [graph.input((kind, slot + i), str(leaf.dtype)) for i in range(size)]
+        several.append(filled(leaf.shape, nodes))
+        slot += size
+    return several

@@ -1,0 +1,40 @@
+"""Programs for a GPU: what its threads do when this processor does it for them."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from batch_compiler.emulated_gpu import EmulatedGpu
+
+from simdjit import Driver, Loop, Unsupported, nvidia
+
+
+@pytest.fixture
+def gpu(monkeypatch):
+    monkeypatch.setattr(nvidia, "ptx", lambda assembly, *rest: assembly)
+    return EmulatedGpu()
+
+
+def test_tables_and_functions_give_the_bits_of_vectors(gpu):
+    """What lies in memory, and what is only called where a thread needs it."""
+
+    def look(numbers, carry, k):
+        x, place = numbers
+        far = jnp.sin(x[place] * 1e9) + jnp.cos(jnp.asarray(np.arange(90.0) ** 9)[place])
+        return far, (x * x)[place], jnp.sort(x[:5]), jnp.power(x[:2], 3.5)
+
+    x, place = np.random.default_rng(3).normal(size=(70, 90)), np.arange(70)
+    nothing = lambda numbers, *rest: np.zeros(())
+    parts = (lambda numbers: numbers, nothing, lambda numbers, carry, k: carry, look)
+    programs = (Loop(*parts, (x[0], place[0]), [False] * 2, driver=d) for d in (Driver(gpu), None))
+    found, wanted = (program.run((x, place), 1, 1)[1] for program in programs)
+    jax.tree.map(np.testing.assert_array_equal, found, wanted)
+
+
+def test_remainders_stay_on_the_processor(gpu):
+    with pytest.raises(Unsupported):
+        nvidia.Kernel("  %x = frem <1 x double> %a, %b", Driver(gpu))
+
+
+def test_no_gpu_here():
+    assert jax.default_backend() != "gpu" and nvidia.gpu() is None

@@ -1,0 +1,164 @@
+"""Importing undertow changes nothing in the process; precision belongs to a run, and the caller's settings stay."""
+
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import jax
+import numpy as np
+import pytest
+
+import undertow as ut
+from undertow.campaign.task import run_trials, site
+from undertow.core.errors import BadInput
+from undertow.scenario.execute import execute
+from undertow.scenario.reading import dump
+
+# What other packages do to a process when they are imported is theirs; they are imported before.
+PROCESS = """
+import json, logging, os, signal, sys, threading, warnings
+import jax, matplotlib, numpy, xarray, netCDF4, diffrax, pydantic
+
+def state():
+    return {
+        "jax": {key: str(value) for key, value in jax.config.values.items()},
+        "environment": dict(os.environ),
+        "warnings": [str(entry) for entry in warnings.filters],
+        "signals": [str(signal.getsignal(one)) for one in signal.valid_signals()],
+        "logging": [logging.root.level, str(logging.root.handlers), logging.root.manager.disable],
+        "matplotlib": {key: str(matplotlib.rcParams[key]) for key in matplotlib.rcParams if key != "backend"},
+        "numpy": [numpy.geterr(), str(numpy.get_printoptions())],
+        "threads": [thread.name for thread in threading.enumerate()],
+        "others": [sys.getrecursionlimit(), sys.getswitchinterval(), str(sys.excepthook), os.getcwd(), os.umask(0o22)],
+    }
+
+before, changed = state(), []
+def look(what):
+    now = state()
+    changed.extend(f"{what}: {kind}" for kind in before if now[kind] != before[kind])
+    before.update(now)
+"""
+EVERYTHING = """
+import undertow
+look("import undertow")
+for name in dir(undertow):
+    getattr(undertow, name)
+    look(name)
+import importlib, pkgutil
+import dask, distributed, rich, ruamel.yaml, scipy.linalg, scipy.optimize, scipy.signal, scipy.sparse, scipy.stats, typer, zarr
+before.update(state())
+for package in ("undertow", "simdjit"):
+    for module in pkgutil.walk_packages(importlib.import_module(package).__path__, package + "."):
+        if module.name != "undertow.bench.first" and "mujoco_engine" not in module.name:  # a program; an extra
+            __import__(module.name)
+            look(module.name)
+print(json.dumps(changed))
+"""
+SCENARIO = {
+    "plant": {"kind": "double_integrator", "limit": 20.0},
+    "controller": {"kind": "pid", "frequency": 2.0},
+    "reference": {"kind": "setpoint", "position": [1.0]},
+    "disturbance": {"kind": "sinusoid", "amplitude": 0.7},
+    "navigation": {"kind": "white_noise", "velocity": 0.01},
+    "loop": {"duration": 0.5, "dt": 0.01, "record": 0.02},
+}
+PRECISIONS = ("float64", "float32")
+
+
+def test_importing_changes_nothing():
+    """Neither the package, nor any public name, nor any module by itself."""
+    done = subprocess.run([sys.executable, "-c", PROCESS + EVERYTHING], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def by_parts(precision):
+    """Parts made by the caller, outside of any run."""
+    plant = ut.plants.double_integrator(limit=20.0)
+    law = ut.controllers.pid(plant.model(), frequency=2.0, sampling_time=0.01)
+    run = ut.simulate(
+        plant,
+        law,
+        ut.references.setpoint([1.0]),
+        disturbance=ut.disturbances.sinusoid(amplitude=0.7),
+        navigation=ut.navigation.white_noise(velocity=0.01),
+        duration=0.5,
+        dt=0.01,
+        record=0.02,
+        seed=3,
+        precision=precision,
+    )
+    return [run.dataset["position"].values, run.metrics["whole"]["input_variation"]]
+
+
+def by_scenario(precision):
+    found = execute(SCENARIO | {"precision": precision, "seed": 3})
+    return [found.dataset["position"].values, found.whole["input_variation"]]
+
+
+def by_xla(precision):
+    found = execute(SCENARIO | {"precision": precision, "seed": 3, "loop": SCENARIO["loop"] | {"backend": "xla"}})
+    return [found.dataset["position"].values, found.whole["input_variation"]]
+
+
+def by_campaign(precision):
+    vary = {"disturbance.amplitude": {"uniform": [0.5, 2.0]}}
+    campaign = {"scenario": SCENARIO | {"precision": precision}, "trials": 2, "seed": 7, "vary": vary}
+    columns = run_trials(dump(campaign), "", range(2))
+    return [columns["input_variation"], columns["position_rms"]]
+
+
+WAYS = {"parts": by_parts, "scenario": by_scenario, "xla": by_xla, "campaign": by_campaign}
+
+
+def same(found, wanted):
+    for one, other in zip(found, wanted, strict=True):
+        assert np.asarray(one).dtype == np.asarray(other).dtype
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """Each way and precision by itself, by a caller who computes in double precision."""
+    found = {}
+    for way, run in WAYS.items():
+        for precision in PRECISIONS:
+            site.cache_clear()
+            found[way, precision] = run(precision)
+    return found
+
+
+@pytest.mark.parametrize("double", [True, False])
+def test_precisions_interleaved_in_threads(alone, double):
+    """Two callers in two threads go through all ways against one another; both have their setting before and after."""
+    site.cache_clear()
+
+    def caller(order):
+        with jax.enable_x64(double):
+            for way, run in WAYS.items():
+                for precision in order:
+                    same(run(precision), alone[way, precision])
+                    assert jax.config.jax_enable_x64 is double
+                    assert jax.numpy.ones(()).dtype == ("float64" if double else "float32")
+
+    before = jax.config.jax_enable_x64
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(caller, [PRECISIONS, PRECISIONS[::-1]]))
+    assert jax.config.jax_enable_x64 is before
+
+
+def test_the_two_precisions_differ(alone):
+    for way in WAYS:
+        assert not np.array_equal(alone[way, "float64"][0], alone[way, "float32"][0]), way
+    assert alone["parts", "float32"][0].dtype == np.float32
+
+
+def test_parts_and_scenario_agree(alone):
+    """The same loop given in two ways: bit for bit, in either precision."""
+    for precision in PRECISIONS:
+        same(alone["parts", precision][:1], alone["scenario", precision][:1])
+
+
+def test_a_precision_that_is_none():
+    with pytest.raises(BadInput, match="`precision` must be one of float64, float32"):
+        by_parts("float16")

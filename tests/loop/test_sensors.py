@@ -1,0 +1,245 @@
+"""When sensors speak and how wrong they are; what the observer makes of it. Closed forms throughout."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.core.contracts import Measurement
+from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
+from undertow.navigation.observer import observer
+from undertow.numerics.rotations import wrap_angle
+from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.sensors.sampling import Sampling
+from undertow.thrusters.thruster import PropellerReport
+
+QUIET_IMU = {"angle_noise": 0.0, "rate_noise": 0.0, "force_noise": 0.0}
+
+
+def readings_of(sampling, step, duration, truth=lambda t: jnp.stack([t]), key=0):
+    """Instants, readings and freshness of a sensor that is asked every `step` seconds."""
+    steps = round(duration / step)
+    times = jnp.arange(steps, dtype=float) * step
+
+    def advance(state, t):
+        chance = jax.random.normal(jax.random.fold_in(jax.random.PRNGKey(key), sampling.number(t)), (2,))
+        arrival, state = sampling.deliver(state, t, truth(t), chance)
+        return state, arrival
+
+    _, arrivals = jax.lax.scan(advance, sampling.init(jnp.zeros(1), jnp.ones(1)), times)
+    return np.asarray(times), np.asarray(arrivals.reading[:, 0]), np.asarray(arrivals.fresh)
+
+
+def test_readings_come_at_the_period_and_are_as_old_as_the_delay():
+    """The truth is the time itself, so a reading tells when it was taken."""
+    times, readings, fresh = readings_of(Sampling(0.05, delay=0.12), 0.01, 2.0)
+    np.testing.assert_allclose(times[fresh], np.arange(38) * 0.05 + 0.12, atol=1e-12)
+    np.testing.assert_allclose(readings[fresh], np.arange(38) * 0.05, atol=1e-12)
+
+
+def test_a_period_between_ticks_waits_for_the_next_tick():
+    times, readings, fresh = readings_of(Sampling(0.015), 0.01, 0.1)
+    np.testing.assert_allclose(times[fresh], [0.0, 0.02, 0.03, 0.05, 0.06, 0.08, 0.09], atol=1e-12)
+    np.testing.assert_array_equal(readings[fresh], times[fresh])
+
+
+def test_faster_than_the_loop_the_newest_is_heard():
+    times, readings, fresh = readings_of(Sampling(0.01, delay=0.03), 0.05, 1.0)
+    assert fresh[1:].all() and not fresh[0]
+    # Sample (t - delay) falls between two steps and is answered with the truth at the step after it.
+    np.testing.assert_allclose(readings[fresh], times[fresh], atol=1e-12)
+
+
+def test_resolution_rounds_to_the_nearest_step():
+    _, readings, _ = readings_of(Sampling(0.01, resolution=0.25), 0.01, 1.0)
+    np.testing.assert_array_equal(readings, np.round(np.arange(100) * 0.01 / 0.25) * 0.25)
+
+
+def test_bias_is_one_number_per_run():
+    _, readings, _ = readings_of(Sampling(0.01, bias=0.3), 0.01, 0.5, lambda t: jnp.zeros(1))
+    np.testing.assert_allclose(readings, 0.3, rtol=1e-15)
+
+
+def test_noise_belongs_to_the_sample_not_to_the_loop():
+    sampling, still = Sampling(0.02, noise=0.5), lambda t: jnp.zeros(1)
+    _, slow, when_slow = readings_of(sampling, 0.02, 4.0, still)
+    _, fast, when_fast = readings_of(sampling, 0.005, 4.0, still)
+    np.testing.assert_array_equal(slow[when_slow], fast[when_fast])
+
+
+def test_noise_and_dropout_have_the_stated_statistics():
+    _, readings, fresh = readings_of(Sampling(0.01, noise=0.5, dropout=0.3), 0.01, 200.0, lambda t: jnp.zeros(1))
+    kept, n = readings[fresh], len(fresh)
+    assert abs(fresh.mean() - 0.7) < 4 * np.sqrt(0.21 / n)
+    assert abs(kept.mean()) < 4 * 0.5 / np.sqrt(len(kept))
+    assert abs(kept.std() / 0.5 - 1) < 4 / np.sqrt(2 * len(kept))
+    assert abs((kept[1:] * kept[:-1]).mean()) < 4 * 0.25 / np.sqrt(len(kept))
+
+
+@pytest.mark.parametrize(
+    "wrong, name",
+    [
+        ({"period": 0.0}, "period"),
+        ({"dropout": 1.0}, "dropout"),
+        ({"noise": -1.0}, "noise"),
+        ({"delay": float("nan")}, "delay"),
+        ({"blend": 0.0}, "blend"),
+        ({"blend": 1.5}, "blend"),
+    ],
+)
+def test_impossible_instruments(wrong, name):
+    with pytest.raises(BadInput, match=name):
+        dvl(**wrong)
+
+
+# The observer. A body swings in all six outputs, smoothly; its truth is a closed form.
+
+AMPLITUDE = jnp.array([1.0, 0.7, 0.4, 0.3, 0.2, 0.5])
+FREQUENCY = jnp.array([0.3, 0.5, 0.4, 0.7, 0.6, 0.2])
+
+
+def swinging(t):
+    return measurement_of_outputs(AMPLITUDE * jnp.sin(FREQUENCY * t), AMPLITUDE * FREQUENCY * jnp.cos(FREQUENCY * t))
+
+
+def still(t):
+    return measurement_of_outputs(jnp.array([1.0, 2.0, 3.0, 0.1, -0.2, 2.5]), jnp.zeros(6))
+
+
+@eqx.filter_jit
+def observe(sensor, motion, steps, step, key):
+    """Estimated and true measurements at every step."""
+    path = sensor.realize(key)
+
+    def advance(state, k):
+        truth = motion(k * step)
+        told, state = sensor.measure(path, state, k * step, truth)
+        return state, (told, truth)
+
+    return jax.lax.scan(advance, sensor.init(path, motion(0.0)), jnp.arange(steps, dtype=float))[1]
+
+
+def errors(sensors, motion, step, duration, key=0):
+    """Errors of position and velocity at every step, [t, 12]."""
+    told, truth = observe(observer(sensors), motion, round(duration / step), step, jax.random.PRNGKey(key))
+    apart = told.position - truth.position
+    apart = apart.at[:, 3:].set(wrap_angle(apart[:, 3:]))
+    return np.concatenate([apart, told.velocity - truth.velocity], axis=1)
+
+
+def test_a_still_vehicle_with_perfect_instruments_is_known_exactly():
+    quiet = [imu(**QUIET_IMU), dvl(noise=0, resolution=0), depth(noise=0, resolution=0), compass(noise=0)]
+    assert np.abs(errors([*quiet, position_fix(noise=0)], still, 0.01, 20.0)).max() < 1e-12
+
+
+def test_the_observer_converges_at_second_order_when_corrected_at_every_tick():
+    """One prediction is off by the square of the step, and each correction takes away the same share of what is left."""
+    found = []
+    for step in (0.02, 0.01, 0.005):
+        period = {"period": step}
+        exact = {"noise": 0.0, "delay": 0.0} | period
+        parts = [imu(**QUIET_IMU, **period), dvl(resolution=0, **exact), depth(resolution=0, **exact), compass(**exact)]
+        found.append(np.abs(errors([*parts, position_fix(**exact)], swinging, step, 20.0)).max())
+    ratios = np.array(found[:-1]) / np.array(found[1:])
+    assert ((ratios > 3.9) & (ratios < 4.1)).all(), (found, ratios)
+    assert found[-1] < 1e-4
+
+
+def test_dead_reckoning_converges_at_first_order():
+    """Inertial navigation alone, without noise: 20 s of it are off by millimetres at 1 kHz, and half of it at 2 kHz."""
+    far = [np.abs(errors([imu(period=step, **QUIET_IMU)], swinging, step, 20.0)[:, :3]).max() for step in (1e-3, 5e-4)]
+    assert far[0] < 0.02
+    assert 1.9 < far[0] / far[1] < 2.1
+
+
+def test_noise_of_the_dvl_is_smoothed_as_an_exponential_filter_does():
+    """Variance alpha / (2 - alpha) of that of the reading."""
+    alpha, sigma = 0.3, 0.02
+    parts = [imu(**QUIET_IMU), dvl(period=0.01, noise=sigma, resolution=0, delay=0, blend=alpha), compass(noise=0)]
+    velocity = errors(parts, still, 0.01, 400.0)[1000:, 6:9]
+    expected = sigma * np.sqrt(alpha / (2 - alpha))
+    # Effective number of independent samples: a third of 39 000 per (2 - alpha) / alpha.
+    assert abs(np.sqrt((velocity**2).mean()) / expected - 1) < 4 / np.sqrt(2 * 3 * 39_000 * alpha / (2 - alpha))
+
+
+def test_noise_of_fixes_is_smoothed_as_an_alpha_beta_filter_does():
+    """Steady variances of position and velocity of the alpha-beta filter. Bar-Shalom et al. (2001), section 6.5."""
+    alpha, sigma, period = 0.2, 0.05, 0.1
+    beta = alpha**2 / (2 - alpha)
+    parts = [imu(**QUIET_IMU), compass(noise=0), position_fix(period, sigma, delay=0.0, blend=alpha)]
+    found = errors(parts, still, period, 4000.0)[400:]
+    denominator = alpha * (4 - 2 * alpha - beta)
+    position = (2 * alpha**2 + beta * (2 - 3 * alpha)) / denominator
+    velocity = 2 * beta**2 / denominator / period**2
+    np.testing.assert_allclose((found[:, :2] ** 2).mean(), position * sigma**2, rtol=0.05)
+    np.testing.assert_allclose((found[:, 6:8] ** 2).mean(), velocity * sigma**2, rtol=0.05)
+
+
+def test_delays_do_not_matter_at_constant_velocity():
+    def steady(t):
+        rates = jnp.array([0.5, -0.3, 0.1, 0.0, 0.0, 0.2])
+        return measurement_of_outputs(rates * t, rates.at[:3].set(rates[:3]))
+
+    late = {"delay": 0.4, "noise": 0.0}
+    parts = [imu(**QUIET_IMU), depth(resolution=0, **late), compass(**late), position_fix(**late)]
+    found = np.abs(errors(parts, steady, 0.01, 30.0))
+    assert found[:, [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]].max() < 1e-9
+    # The quaternion turns by 2 atan(w T / 2) a step instead of w T; 0.05 of it is corrected every fifth step.
+    left = 5 * (0.2 * 0.01) ** 3 / 12 / 0.05
+    np.testing.assert_allclose(found[-1000:, 5].max(), left, rtol=0.05)
+
+
+def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
+    """An offset of b in acceleration grows to b T / alpha between corrections of share alpha every T."""
+    offset, period, alpha = 0.01, 0.2, 0.4
+    key = 5
+    parts = [
+        imu(**QUIET_IMU, force_bias=offset),
+        dvl(period=period, noise=0, resolution=0, delay=0, blend=alpha),
+        compass(noise=0),
+    ]
+    sensor = observer(parts)
+    level = lambda t: measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
+    realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).states[0].offset[5:]
+    velocity = errors(parts, level, 0.01, 40.0, key)[2000:, 6:9]
+    before_correction = np.abs(velocity).max(0)
+    expected = np.abs(np.asarray(realization)) * period / alpha * (1 - alpha)
+    # The largest value that is reported is the one a step before the correction.
+    expected += np.abs(np.asarray(realization)) * (period - 0.01)
+    np.testing.assert_allclose(before_correction, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("rate", [jnp.zeros(2), None], ids=["with its rate", "alone"])
+def test_propeller_speed_and_its_rate(rate):
+    """A propeller that speeds up steadily: speed as read, rate from two readings where thrusters report one."""
+
+    def motion(t):
+        return measurement_of_outputs(jnp.zeros(6), jnp.zeros(6), PropellerReport(jnp.array([3.0, -2.0]) * t, rate))
+
+    parts = [imu(**QUIET_IMU), propeller_speed(noise=0)]
+    told, truth = observe(observer(parts), motion, 100, 0.01, jax.random.PRNGKey(0))
+    np.testing.assert_allclose(told.actuator.speed, truth.actuator.speed, atol=1e-12)
+    if rate is None:
+        assert told.actuator.acceleration is None
+    else:
+        np.testing.assert_allclose(told.actuator.acceleration[2:], np.array([[3.0, -2.0]] * 98), rtol=1e-9)
+
+
+def test_the_same_key_gives_the_same_bits():
+    run = lambda key: errors([imu(), dvl(dropout=0.2), depth(), compass(), position_fix()], swinging, 0.01, 3.0, key)
+    once, again, other = run(7), run(7), run(8)
+    np.testing.assert_array_equal(once, again)
+    assert (np.abs(once - other).max(0) > 0).all()
+
+
+def test_an_imu_is_needed():
+    with pytest.raises(BadInput, match="IMU among them"):
+        observer([dvl(), depth()])
+
+
+def test_only_vehicles_navigate():
+    with pytest.raises(BadInput, match="a plant of 1 output"):
+        sensor = observer([imu()])
+        sensor.init(sensor.realize(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)))

@@ -1,0 +1,106 @@
+"""A run that reached its end is `completed`; whether control succeeded is judged by a stated criterion."""
+
+import numpy as np
+import pytest
+
+from undertow.analysis.metrics import Metrics, for_people, output_groups, results
+from undertow.analysis.success import judged
+from undertow.campaign.task import NOT_JUDGED, run_trials
+from undertow.controllers.pid import pid
+from undertow.core.metric import Metric
+from undertow.core.status import Status
+from undertow.disturbances.sinusoid import sinusoid
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.perfect import perfect
+from undertow.plants.double_integrator import DoubleIntegrator
+from undertow.references.setpoint import setpoint
+from undertow.scenario.execute import execute
+from undertow.scenario.reading import dump
+
+KNOWN = {"position_rms": Metric("m", ""), "attitude_rms": Metric("rad", "")}
+
+
+def test_metres_and_radians_are_never_one_number():
+    """Outputs in m and rad of one plant: each group is the rms of its own axes, and there is none of all."""
+    units = ("m", "rad", "m", "rad")
+    plant = DoubleIntegrator(np.inf, outputs=("x", "a", "y", "b"), output_units=units)
+    law, load = pid(plant.model(), frequency=2.0), sinusoid(np.array([1.0, 2.0, 3.0, 4.0]), 1.0)
+    loop = ClosedLoop(plant, law, setpoint(np.zeros(4)), load, perfect())
+    metrics = Metrics(1.0, 3.99, units)
+    run = sampled.simulate(loop, duration=4.0, dt=0.02, record_every=1, accumulators=(metrics,))
+    found = results((metrics,), run.accumulated)
+    late = (np.asarray(run.time) >= 1.0 - 1e-9) & (np.asarray(run.time) < 3.99)
+    error = np.asarray(run.signals["error"])[late]
+    rms = lambda axes: np.sqrt((error[:, axes] ** 2).mean())
+    assert found["position_rms"] == pytest.approx(rms([0, 2]), rel=1e-12)
+    assert found["attitude_rms"] == pytest.approx(rms([1, 3]), rel=1e-12)
+    assert found["position_max"] == np.abs(error[:, [0, 2]]).max()
+    assert found["attitude_max"] == np.abs(error[:, [1, 3]]).max()
+    np.testing.assert_allclose(found["error_rms_axes"], np.sqrt((error**2).mean(0)), rtol=1e-12)
+    assert "tracking_rms" not in found
+
+
+@pytest.mark.parametrize(
+    ("units", "groups"),
+    [
+        (("m", "m"), {"position": ("m", [0, 1])}),
+        (("rad",), {"attitude": ("rad", [0])}),
+        (("K", "K"), {"tracking": ("K", [0, 1])}),
+        (("m", "K"), {"position": ("m", [0])}),  # K is told per axis only
+        (("K", "Pa"), {}),
+    ],
+)
+def test_outputs_are_grouped_by_unit(units, groups):
+    assert output_groups(units) == groups
+
+
+def test_tables_show_degrees():
+    assert for_people(np.pi / 2, "rad") == (90.0, "deg") and for_people(2.0, "m") == (2.0, "m")
+
+
+def test_the_judgement_and_its_words():
+    criterion = {"position_rms": 0.05, "attitude_rms": 0.1}
+    good = judged(criterion, {"position_rms": 0.01, "attitude_rms": 0.02})
+    assert good.within and good.sentence(KNOWN) == "tracking: within position_rms 0.05 m, attitude_rms 5.73 deg"
+    bad = judged(criterion, {"position_rms": 0.2, "attitude_rms": 0.02})
+    assert not bad.within and bad.sentence(KNOWN) == "tracking: not within position_rms 0.05 m (is 0.2 m)"
+    undefined = judged(criterion, {"position_rms": 0.01})
+    assert undefined.exceeded == {"attitude_rms": None} and "not defined" in undefined.sentence(KNOWN)
+    failed = judged(criterion, None)
+    assert not failed.within and "did not reach its end" in failed.sentence(KNOWN)
+    assert judged({}, {"position_rms": 9.0}) is None
+
+
+SCENARIO = {
+    "plant": {"kind": "double_integrator", "axes": 1},
+    "controller": {"kind": "pid", "frequency": 2.0},
+    "reference": {"kind": "setpoint", "position": [0.0]},
+    "disturbance": {"kind": "sinusoid", "amplitude": 1.0},
+    "loop": {"duration": 4.0, "dt": 0.02, "record": 0.1},
+}
+
+
+def test_completed_is_not_success():
+    """The same loop with a limit above and below its error; the default where nothing is said."""
+    found = execute(SCENARIO)
+    error = found.steady["position_rms"]
+    assert found.status is Status.OK and found.dataset.attrs["status"] == "completed"
+    assert found.success.criterion == {"position_rms": 0.05} and found.success.within == (error < 0.05)
+    for most, within in ((1.01 * error, True), (0.99 * error, False)):
+        assert execute(SCENARIO | {"success": {"position_rms": most}}).success.within is within
+    assert execute(SCENARIO | {"success": {}}).success is None
+
+
+def test_success_of_trials():
+    """Of the two amplitudes one is within; a trial that fails is not, and without a criterion none is judged."""
+    error = execute(SCENARIO | {"steady": {"every_step": True}}).steady["position_rms"]
+    asked = {
+        "scenario": SCENARIO | {"success": {"position_rms": 1.5 * error}},
+        "trials": 1,
+        "cross": {"disturbance.amplitude": [1.0, 2.0, 1e300]},
+    }
+    found = run_trials(dump(asked), "", [0, 1, 2])
+    assert found["success"].tolist() == [1, 0, 0] and found["status"][2] != 0
+    free = asked | {"scenario": SCENARIO | {"success": {}}, "cross": {}}
+    assert run_trials(dump(free), "", [0])["success"].tolist() == [NOT_JUDGED]

@@ -1,0 +1,141 @@
+"""The last chapter: what is run, what is concluded from made-up numbers, and how it stands on the page."""
+
+import re
+
+import numpy as np
+import pytest
+
+from undertow.report.figures.ablations import ablations_figure
+from undertow.report.figures.robust_fidelity import robust_fidelity_figure
+from undertow.report.reproduction.report import write_report
+from undertow.reproduction.robust_variant import fidelity
+from undertow.reproduction.robust_variant.conclusions import conclusions
+from undertow.scenario.reading import from_data
+from undertow.scenario.schema import validate
+
+
+def spread(median):
+    return {
+        "median": median,
+        "low": median / 2,
+        "high": median * 2,
+        "median_low": median * 0.9,
+        "median_high": median * 1.1,
+    }
+
+
+def ablation(identity, medians, failures=0):
+    variants = [
+        {
+            "name": name,
+            "settings": "as given",
+            "seeds": 30,
+            "failures": failures,
+            "metrics": {"tracking_rms": spread(m), "weights_peak": spread(m)},
+        }
+        for name, m in medians.items()
+    ]
+    told = {"question": "What?", "prediction": "This.", "agrees": "partly", "answer": "So.", "left_out": "all else"}
+    return {"id": identity, **told, "variants": variants}
+
+
+def row(place, law, tracking=None, ended=None):
+    metrics = dict.fromkeys(("estimation_rms", "input_rms", "input_variation", "saturated_fraction"), 0.5)
+    return {
+        "place": place,
+        "words": f"at {place}",
+        "law": law,
+        "name": law,
+        "scenario": f"scenarios/robust_variant_{place}_{law}.yaml",
+        "status": "completed" if ended is None else "diverged",
+        "diverged_at": ended,
+        "steady": None if tracking is None else metrics | {"tracking_rms": tracking},
+        "largest_after": 1.25,
+    }
+
+
+ROWS = [
+    row("electromechanical", "rcafc", ended=1.5),
+    row("electromechanical", "robust", 3e-4),
+    row("overload", "rcafc", 0.4),
+    row("overload", "robust", 2e-5),
+]
+LINEAR = {"RCAFC": 1.0, "linear observer": 1.02, "robust": 1.0, "robust, 1 set": 1.0}
+LINEAR |= {"robust's linear observer": 1.0, "robust's INDI": 1.0}
+LIMITED = {"RCAFC, 1.5 m/s^2": 1e-5, "RCAFC, command fed, 1.5 m/s^2": 17.0, "RAFC, 1.5 m/s^2": 22.0}
+ABLATIONS = [
+    ablation("A3", LINEAR),
+    ablation("A10", LIMITED),
+    ablation("A18", {"nothing": np.inf, "projection 6": 0.1, "one set": 0.2}, failures=30),
+]
+
+
+def test_conclusions_say_what_the_numbers_say():
+    found = conclusions(ROWS, ABLATIONS)
+    assert len(found["wins"]) == 1 and "in the model it is 17 m, that of RAFC 22 m (A10)" in found["wins"][0]
+    assert (
+        found["same"][0] == "Accuracy. A linear observer of the same bandwidth has 1.020 times the error of RCAFC (A3)."
+    )
+    assert len(found["same"]) == 2 and "of INDI 1.0000" in found["same"][1]
+    (motor, drift), (again,) = found["loses"], found["neither"]
+    assert "30 of 30 runs end within 20 s" in drift and "keep 0.1 m" in drift
+    assert "ends after 1.5 s" in motor and "0.0003" in motor
+    assert "up to 1.2 m or rad, after 7.5 s back at 2e-05; that of Table 1 is up to 1.2, then 0.4." in again
+
+
+def test_a_win_that_is_none_is_not_told():
+    even = [ablation("A10", dict.fromkeys(LIMITED, 1e-5))]
+    assert conclusions([], even) == {"wins": [], "same": [], "loses": [], "neither": []}
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_every_run_of_the_fidelity_comparison_is_a_scenario(quick):
+    found = fidelity.scenarios(quick)
+    assert all(validate(from_data(one)).loop.kind == "sampled" for one in found.values())
+    assert ("robust_variant_sea_robust" in found) is not quick
+
+
+def test_robust_meets_the_same_as_table_1():
+    for place in fidelity.places(False).values():
+        ours, theirs = (dict(place.runs[law][1]) for law in ("robust", next(iter(place.runs))))
+        for key in ("plant", "disturbance", "reference", "loop"):
+            assert ours[key] == theirs[key]
+
+
+def test_dots_stand_at_the_medians():
+    panel = ablations_figure(ABLATIONS).axes[0]
+    dots = [line.get_xdata()[0] for line in panel.lines if line.get_marker() == "o"]
+    assert dots == list(LINEAR.values())
+    lost = ablations_figure(ABLATIONS[2:]).axes[0]
+    assert next(line.get_marker() for line in lost.lines) == "X"
+
+
+def test_a_run_that_ended_early_is_a_cross():
+    panel = robust_fidelity_figure(ROWS, {}).axes[0]
+    assert sorted(line.get_marker() for line in panel.lines) == ["X", "^", "^", "o"]
+
+
+def test_the_chapter_on_the_page(tmp_path):
+    chapter = {
+        "quick": True,
+        "seeds": 8,
+        "left_out": ["A2"],
+        "fidelity": ROWS,
+        "ablations": ABLATIONS,
+        "conclusions": conclusions(ROWS, ABLATIONS),
+    }
+    page = write_report({"robust_variant": chapter}, {"ablations": ablations_figure(ABLATIONS)}, tmp_path).read_text(
+        "utf-8"
+    )
+    words = re.sub(r"<[^>]+>", "", page)
+    for said in (
+        "The robust variant",
+        "Disadvantages of the paper",
+        "are random, with 8 seeds",
+        "leaves out A2",
+        "30 of 30",
+    ):
+        assert said in words
+    assert "diverged at 1.5 s" in words and "most ended early" in words
+    assert words.count("scenarios/robust_variant_") == len(ROWS)
+    assert "figure-ablations" in page

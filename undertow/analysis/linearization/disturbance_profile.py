@@ -1,0 +1,85 @@
+"""Loads and measurement errors along the reference, before a run."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import PRNGKeyArray
+
+from undertow.analysis.linearization.equilibrium import Equilibrium
+from undertow.loop.closed_loop import ClosedLoop
+
+
+class DisturbanceProfile(NamedTuple):
+    """Along the reference, one row per step.
+
+    Attributes:
+        time: s.
+        load: what the model does not know of the acceleration, as an acceleration of the outputs where the loop
+            rests, m/s^2 and rad/s^2: disturbances, and what moving along the reference takes beyond the model.
+        noise: measured minus true position and velocity, m, rad, m/s, rad/s.
+    """
+
+    time: np.ndarray
+    load: np.ndarray
+    noise: np.ndarray
+
+    def operating_loads(self, shares: tuple[float, ...]) -> np.ndarray:
+        """The loads that are larger than given shares of all, one row each; sizes in units of each axis' rms."""
+        scale = np.sqrt((self.load**2).mean(axis=0))
+        size = np.linalg.norm(self.load / np.where(scale > 0, scale, 1.0), axis=1)
+        order = np.argsort(size, kind="stable")
+        return self.load[order[[round(share * (len(order) - 1)) for share in shares]]]
+
+
+def disturbance_profile(
+    loop: ClosedLoop, at: Equilibrium, key: PRNGKeyArray, steps: int, dt: float
+) -> DisturbanceProfile:
+    """What acts along the reference, with the same chances as in a run with this key.
+
+    Args:
+        loop: the five roles.
+        at: the loop at rest; unknown quantities are relative to it.
+        key: of everything random in the run.
+        steps: how many, from t = 0.
+        dt: s.
+    """
+    x, _ = at.parts.states(at.at)
+    unknown, noise = _along(loop, key, x, jnp.asarray(at.at["u"]), jnp.asarray(dt, dtype=float), steps)
+    return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise))
+
+
+@eqx.filter_jit
+def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
+    realization, plant, zero = loop.realize(key), loop.plant, jnp.zeros(())
+    dynamics, coordinates, actuators = loop.controller.model
+    held = actuators.quasi_static()
+    forces = held.force(held.init(), u)
+
+    def unknown(t, x, load):
+        y = plant.output(t, x)
+        moved = coordinates.acceleration(y, plant.acceleration(t, x, u, load))
+        return moved - dynamics.drift(y) - dynamics.gain(y) @ forces
+
+    y_rest = plant.output(zero, x_rest)
+    at_rest = unknown(zero, x_rest, plant.no_load())
+    still = jnp.zeros_like(y_rest.position)
+    scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)  # outputs -> axes of the law, at rest
+
+    def look(measuring, k):
+        t = k * dt
+        r = loop.reference.at(t)
+        x = plant.initial_state(r.position, r.velocity)
+        truth = plant.output(t, x)
+        y, measuring = loop.navigation.measure(realization.navigation_realization, measuring, t, truth)
+        wrong = jnp.concatenate([coordinates.difference(y.position, truth.position), y.velocity - truth.velocity])
+        wrong = jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
+        return measuring, (jnp.linalg.solve(scale, unknown(t, x, realization.load(t, x)) - at_rest), wrong)
+
+    start = loop.reference.at(zero)
+    measuring = loop.navigation.init(
+        realization.navigation_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
+    )
+    return jax.lax.scan(look, measuring, jnp.arange(steps, dtype=float))[1]

@@ -1,0 +1,138 @@
+"""Exact Jacobians of plant, controller and recorded signals of a closed loop at one instant.
+
+Limits, dead zones, pulses of speed controllers and the sensor are left out: what is linearised is the loop inside its
+limits, measured without error. The controller receives the input `u` that it believes to be applied, and the plant
+gets the same.
+"""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, PyTree
+
+from undertow.core.continuous import AbstractContinuousController
+from undertow.core.contracts import Target, known_acceleration
+from undertow.core.measurement import with_outputs
+from undertow.loop.closed_loop import ClosedLoop
+
+# Arguments of `Parts.values`, in this order; and which signals it gives, as far as the law has them.
+INPUTS = ("plant", "law", "u", "load", "noise")
+SIGNALS = ("error", "uncertainty", "estimate", "modelling_error", "robust_term")
+
+
+class Local(NamedTuple):
+    """Values and derivatives of everything at one instant, by name."""
+
+    values: dict[str, np.ndarray]
+    slopes: dict[str, dict[str, np.ndarray]]  # of what -> with respect to what
+
+
+class Parts(NamedTuple):
+    """A closed loop whose states are vectors.
+
+    Attributes:
+        loop: the five roles.
+        target: constant reference.
+        plant_state, law_state: vectors back into the states of plant and law.
+        sizes: length of each of `INPUTS`.
+    """
+
+    loop: ClosedLoop
+    target: Target
+    plant_state: Any
+    law_state: Any
+    sizes: tuple[int, ...]
+
+    def differentiate(self, at: dict[str, Any], dt: float) -> Local:
+        """Values and slopes where the states, the input, the load and the noise are as given, arrays by name.
+
+        Args:
+            at: vectors for `INPUTS`: states of plant and law; u; load, an acceleration of the outputs (m/s^2,
+                rad/s^2); noise on position and velocity (m, rad, m/s, rad/s). What is missing is zero.
+            dt: sampling time of the law, s.
+        """
+        point = [
+            np.asarray(at.get(name, np.zeros(size)), dtype=float) for name, size in zip(INPUTS, self.sizes, strict=True)
+        ]
+        values, slopes = _evaluated(self, tuple(map(jnp.asarray, point)), jnp.asarray(dt, dtype=float))
+        ends = np.cumsum([0, *self.sizes])
+        columns = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(INPUTS)}
+        return Local(
+            {name: np.asarray(value) for name, value in values.items()},
+            {
+                name: {by: np.asarray(slope)[:, column] for by, column in columns.items()}
+                for name, slope in slopes.items()
+            },
+        )
+
+    def states(self, at: dict[str, Any]) -> tuple[PyTree, PyTree]:
+        """States of plant and law of a point."""
+        return self.plant_state(jnp.asarray(at["plant"])), self.law_state(jnp.asarray(at["law"]))
+
+
+def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.ndarray]]:
+    """A closed loop about a constant reference, and its states at rest there as vectors (`plant` and `law`).
+
+    Args:
+        loop: the five roles.
+        position: reference, m and rad.
+    """
+    loop = without(loop, ("dead_zone",))  # inside a dead zone nothing has a slope
+    position = jnp.asarray(position, dtype=float)
+    still = jnp.zeros_like(position)
+    target = Target(position, still, still)
+    x = loop.plant.initial_state(position, still)
+    z = loop.controller.init(loop.plant.output(jnp.zeros(()), x), target)
+    flat_x, plant_state = ravel_pytree(x)
+    flat_z, law_state = ravel_pytree(z)
+    axes, inputs = position.shape[0], loop.plant.inputs()
+    sizes = (flat_x.size, flat_z.size, inputs, axes, 2 * axes)
+    return Parts(loop, target, plant_state, law_state, sizes), {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
+
+
+def without(loop: ClosedLoop, parameters: tuple[str, ...]) -> ClosedLoop:
+    """Same loop with every parameter of these names at zero: dead zones and resolutions have no slope."""
+    named = lambda realization: getattr(realization[-1], "name", "") in parameters
+    return jax.tree_util.tree_map_with_path(
+        lambda realization, leaf: jnp.zeros_like(leaf) if named(realization) else leaf, loop
+    )
+
+
+@eqx.filter_jit
+def _evaluated(parts: Parts, point: tuple[Array, ...], dt: Array):
+    whole, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
+
+    def both(vector):
+        values = _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt=dt)
+        return values, values
+
+    slopes, values = jax.jacfwd(both, has_aux=True)(whole)
+    return values, slopes
+
+
+def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array]:
+    """What follows from states, input, load and noise."""
+    (plant, law), zero = (parts.loop.plant, parts.loop.controller), jnp.zeros(())
+    x, z, r = parts.plant_state(flat_x), parts.law_state(flat_z), parts.target
+    unloaded = plant.no_load()
+    pushed = unloaded._replace(acceleration=unloaded.acceleration + load)
+    truth, axes = plant.output(zero, x), load.shape[0]
+    y = with_outputs(truth, truth.position + noise[:axes], truth.velocity + noise[axes:])
+    command, of_law = law.command(z, y, r)
+    values = {
+        "plant": ravel_pytree(plant.dynamics(zero, x, u, pushed))[0],
+        "law": ravel_pytree(law.advance(z, y, r, u, dt))[0],
+        "u": command,
+        "position": truth.position,
+        "error": law.model.coordinates.difference(r.position, truth.position),
+        "uncertainty": law.model.coordinates.acceleration(truth, plant.acceleration(zero, x, u, pushed))
+        - known_acceleration(law, z, truth, u),
+    }
+    values |= {name: of_law[name] for name in SIGNALS if name in of_law}
+    if isinstance(law, AbstractContinuousController):
+        values["flow"] = ravel_pytree(law.flow(z, y, r, u))[0]
+    return values

@@ -1,0 +1,122 @@
+"""Robustness margins of the linearised loop: sampling, delay, lag and gain; its poles and its response to noise."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+
+from undertow.analysis.linearization.closed_loop import LinearLoop, close_continuous, close_sampled
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.analysis.linearization.minimal_realization import multipliers, visible
+from undertow.analysis.small_signal import first_crossing
+from undertow.core.errors import BadInput
+from undertow.loop.closed_loop import ClosedLoop
+
+# Inputs and signals of the controllable poles: no controller can stabilise degrees of freedom that no input moves.
+_REACHED_BY, _SHOWN_BY = ("input", "noise"), ("error", "u")
+
+_POINTS, _HALVINGS = 25, 12  # of a search: to a ten-thousandth of the value
+_FADING = 1 - 1e-9  # so that what rounding leaves of modes that nothing excites fades away
+_STABLE = 1 + 1e-9  # a spectral radius of one, and rounding
+
+
+def closed(at: Equilibrium, dt: float, kind: str = "sampled", **between: float) -> LinearLoop:
+    """The closed loop of a scenario's kind; see `close_sampled` for what may stand `between` law and plant.
+
+    Raises:
+        BadInput: its slopes are not finite where it rests.
+    """
+    found = close_sampled(at, dt, **between) if kind == "sampled" else close_continuous(at, dt)
+    if not all(np.isfinite(part).all() for part in (found.matrix, *found.entries.values(), *found.signals.values())):
+        hint = "`loop.dt` is too long for this plant, or some number too large"
+        raise BadInput("SCENARIO", "be a loop that can be linearised", "one whose slopes are not finite", hint=hint)
+    return found
+
+
+def poles(loop: LinearLoop) -> np.ndarray:
+    """Controllable closed-loop poles in 1/s (logarithms over dt), the slowest first."""
+    values = multipliers(loop, _REACHED_BY, _SHOWN_BY).astype(complex)
+    rates = np.log(np.where(values == 0, 1e-300, values)) / loop.dt
+    return rates[np.argsort(-rates.real, kind="stable")]
+
+
+def spectral_radius(loop: LinearLoop) -> float:
+    """Spectral radius of the controllable closed-loop poles over one control step; stable below 1."""
+    return float(np.abs(multipliers(loop, _REACHED_BY, _SHOWN_BY)).max(initial=0.0))
+
+
+def largest_delay(at: Equilibrium, dt: float, most: float) -> float:
+    """Delay, s, from the law to the actuators at which the sampled loop becomes unstable; infinite beyond `most`."""
+    return _largest(lambda delay: close_sampled(at, dt, delay=delay), dt / 50, most)
+
+
+def largest_lag(at: Equilibrium, dt: float, most: float) -> float:
+    """Further first-order lag of the actuators, s, at which it becomes unstable; infinite beyond `most`."""
+    return _largest(lambda lag: close_sampled(at, dt, lag=lag), dt / 50, most)
+
+
+def gain_range(at: Equilibrium, dt: float, most: float = 100.0) -> tuple[float, float]:
+    """Factors on what the input does, below and above which the sampled loop is unstable: 0 and infinite where none
+    from 1 / most to most is; 1 and 1 where it is unstable as it is."""
+    above = _largest(lambda gain: close_sampled(at, dt, gain=gain), 1.0, most)
+    below = _largest(lambda inverse: close_sampled(at, dt, gain=1 / inverse), 1.0, most)
+    return 1 / max(below, 1.0), max(above, 1.0)
+
+
+def largest_sampling_time(at: Equilibrium, dt: float, most: float) -> float:
+    """Sampling time, s, at which the loop with these gains becomes unstable; infinite beyond `most`.
+
+    Where a loop rests does not depend on its sampling time. The search starts well below dt, the present one.
+    """
+    resampled = lambda step: at._replace(local=at.parts.differentiate(at.at, step))
+    return _largest(lambda step: close_sampled(resampled(step), step), dt / 20, most)
+
+
+def noise_gain(loop: LinearLoop, signal: str, deviations: np.ndarray) -> np.ndarray:
+    """Standard deviations of a signal under white noise on the measurement, new at every step.
+
+    From the discrete Lyapunov equation P = A P A^T + B R B^T. Infinite where the loop is unstable.
+
+    Args:
+        loop: closed and sampled.
+        signal: name.
+        deviations: standard deviations of the noise on positions, then on velocities.
+    """
+    small = visible(loop, ("noise",), (signal,))
+    entry = small.entries["noise"] * deviations
+    direct = loop.direct[signal].get("noise", 0.0) * deviations
+    if np.abs(multipliers(loop, ("noise",), (signal,))).max(initial=0.0) >= 1:
+        return np.full(len(loop.signals[signal]), np.inf)
+    covariance = solve_discrete_lyapunov(_FADING * small.matrix, entry @ entry.T)
+    shown = small.signals[signal]
+    return np.sqrt(np.einsum("ij,jk,ik->i", shown, covariance, shown) + (np.atleast_2d(direct) ** 2).sum(axis=1))
+
+
+def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray:
+    """Complex answer of a signal to the load at angular frequencies (rad/s): shape (frequencies, axes, axes)."""
+    small = visible(loop, ("load",), (signal,))
+    turning = np.exp(1j * np.asarray(frequency, dtype=float) * loop.dt)[:, None, None]
+    inner = np.linalg.solve(turning * np.eye(len(small.matrix)) - small.matrix, small.entries["load"] + 0j)
+    return small.signals[signal] @ inner + loop.direct[signal].get("load", 0.0)
+
+
+def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = "sampled") -> list[float]:
+    """Spectral radius of the closed loop at rest under each of some constant loads; below 1 each is stable.
+
+    Loads that no input holds are left out; where none is held, the radius is infinite.
+
+    Args:
+        loop: the five roles.
+        dt: sampling time, s.
+        position: of the reference, m and rad.
+        loads: accelerations of the outputs, m/s^2 and rad/s^2, one per row.
+        kind: sampled or continuous.
+    """
+    found = [at for load in np.atleast_2d(loads) if (at := equilibrium(loop, dt, position, load)).found]
+    return [spectral_radius(closed(at, dt, kind)) for at in found] or [float("inf")]
+
+
+def _largest(closed_at: Callable[[float], LinearLoop], least: float, most: float) -> float:
+    beyond = lambda value: spectral_radius(closed_at(value)) > _STABLE
+    return first_crossing(beyond, np.geomspace(least, most, _POINTS), _HALVINGS)

@@ -1,0 +1,99 @@
+"""Metrics of a run, predicted by driving the linearised loop with the loads along the reference."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.linearization.closed_loop import LinearLoop
+from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile
+from undertow.analysis.linearization.equilibrium import Equilibrium
+from undertow.analysis.linearization.minimal_realization import visible
+from undertow.analysis.metrics import output_groups
+
+_ENTRIES = ("load", "noise")
+_START = "start"  # a column: where the states are at first
+
+
+class Comparison(NamedTuple):
+    """One metric, predicted and found."""
+
+    name: str
+    predicted: float
+    measured: float
+
+    @property
+    def departure(self) -> float:
+        """Of the measured from the predicted, as a share of the predicted."""
+        return abs(self.measured - self.predicted) / self.predicted if self.predicted else float("inf")
+
+
+def signals_within(
+    at: Equilibrium, loop: LinearLoop, around: DisturbanceProfile, window: tuple[float, float], every: int = 1
+) -> dict[str, np.ndarray]:
+    """Predicted signals at the records of a window, arrays (records, entries) by name.
+
+    Args:
+        at: the loop at rest under the mean load of the window.
+        loop: the same, closed, with a start; see `from_start`.
+        around: what acts.
+        window: start and stop, s.
+        every: steps per record; metrics are those of the records, as in a run.
+    """
+    small = visible(loop, (*_ENTRIES, _START), tuple(loop.signals))
+    entry = np.hstack([small.entries[name] for name in _ENTRIES])
+    driven = np.hstack([around.load - at.at["load"], around.noise])
+    states = np.asarray(_driven(*map(jnp.asarray, (small.entries[_START][:, 0], small.matrix, entry, driven))))
+    hair = loop.dt / 2
+    recorded = np.arange(len(around.time)) % every == 0
+    inside = recorded & (around.time >= window[0] - hair) & (around.time <= window[1] + hair)
+    signals = {}
+    for name in loop.signals:
+        direct = np.hstack([_direct(loop, name, way) for way in _ENTRIES])
+        departure = states @ small.signals[name].T + driven @ direct.T
+        signals[name] = (at.local.values[name] + departure)[inside]
+    return signals
+
+
+def metrics_of(signals: dict[str, np.ndarray], units: Sequence[str]) -> dict[str, float]:
+    """Metrics of predicted signals, by the names of results files; `units` are those of the outputs."""
+    rms = lambda values: float(np.sqrt((values**2).mean()))
+    found = {}
+    for group, (_, axes) in output_groups(units).items():
+        found |= {f"{group}_rms": rms(signals["error"][:, axes]), f"{group}_max": _peak(signals["error"][:, axes])}
+    if "estimate" in signals:
+        found["estimation_rms"] = rms(signals["estimate"] - signals["uncertainty"])
+    named = {"uncertainty": "uncertainty_rms", "modelling_error": "model_rms", "robust_term": "robust_rms"}
+    found |= {metric: rms(signals[name]) for name, metric in named.items() if name in signals}
+    return found | {"input_rms": rms(signals["u"]), "input_peak": _peak(signals["u"])}
+
+
+def _peak(values: np.ndarray) -> float:
+    return float(np.abs(values).max())
+
+
+def from_start(loop: LinearLoop, at: Equilibrium, plant: np.ndarray, law: np.ndarray) -> LinearLoop:
+    """The loop with states of plant and law at the first instant, as vectors of `Parts`."""
+    away = np.concatenate([(plant - at.at["plant"])[at.acting], law - at.at["law"]])
+    return loop._replace(entries=loop.entries | {_START: away[:, None]})
+
+
+def compare_metrics(predicted: dict[str, float], measured: dict) -> list[Comparison]:
+    """Predicted metrics beside the measured ones of the same names."""
+    return [Comparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
+
+
+def _direct(loop: LinearLoop, signal: str, entry: str) -> np.ndarray:
+    return loop.direct[signal].get(entry, np.zeros((len(loop.signals[signal]), loop.entries[entry].shape[1])))
+
+
+@jax.jit
+def _driven(start, matrix, entry, driven):
+    """States at each step."""
+
+    def step(state, w):
+        return matrix @ state + entry @ w, state
+
+    return jax.lax.scan(step, start, driven)[1]

@@ -1,0 +1,68 @@
+"""Whether control succeeded: the verdict of a stated criterion, beside whether the run reached its end."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from undertow.analysis.metrics import for_people
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.metric import Metric
+
+# Of tracking, in the steady window, where a scenario has no criterion of its own: 5 cm, and 0.05 rad (2.9 degrees).
+DEFAULT = {"position_rms": 0.05, "attitude_rms": 0.05}  # m, rad
+
+
+class Success(NamedTuple):
+    """What was judged, and how.
+
+    Attributes:
+        criterion: metric -> what its value in the steady window must stay below, in the unit of the metric.
+        exceeded: those of them that do not, or that are not defined.
+        within: whether all do.
+    """
+
+    criterion: dict[str, float]
+    exceeded: dict[str, float | None]
+    within: bool
+
+    def sentence(self, known: Mapping[str, Metric]) -> str:
+        """The verdict as a sentence."""
+        said = lambda name, value: "{:.4g} {}".format(*for_people(value, known[name].unit)).rstrip()
+        each = lambda name: f"{name} {said(name, self.criterion[name])}"
+        if self.within:
+            return f"tracking: within {', '.join(map(each, self.criterion))}"
+        if not self.exceeded:
+            return f"tracking: not within {', '.join(map(each, self.criterion))}, as the run did not reach its end"
+        off = [
+            f"{each(name)} ({'not defined' if value is None else f'is {said(name, value)}'})"
+            for name, value in self.exceeded.items()
+        ]
+        return f"tracking: not within {', '.join(off)}"
+
+
+def criterion_of(given: Mapping[str, float] | None, known: Mapping[str, Metric]) -> dict[str, float]:
+    """What a run is judged by: what the scenario says, or the default for what its plant has; {} for nothing.
+
+    Raises:
+        BadInput: a metric that this plant does not have.
+    """
+    if given is None:
+        return {name: most for name, most in DEFAULT.items() if name in known}
+    for name in given:
+        if name not in known:
+            must = "be a metric of this plant"
+            raise BadInput(name, must, "unknown", hint=did_you_mean(name, known))
+    return dict(given)
+
+
+def judged(criterion: Mapping[str, float], steady: Mapping[str, Any] | None) -> Success | None:
+    """Verdict on a run from the metrics of its steady window; None where it ended early, or without a criterion."""
+    if not criterion:
+        return None
+    exceeded = (
+        {} if steady is None else {n: steady.get(n) for n, most in criterion.items() if not _below(steady, n, most)}
+    )
+    return Success(dict(criterion), exceeded, steady is not None and not exceeded)
+
+
+def _below(steady: Mapping[str, Any], name: str, most: float) -> bool:
+    return name in steady and steady[name] < most

@@ -1,0 +1,58 @@
+"""Theory of the robust variant: poles of its estimator and tracking, drift, and the certificate of section X4."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from undertow.analysis import drift
+from undertow.analysis.certificate import hypotheses
+from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty, of_robust
+from undertow.analysis.theory.contract import RunCertificate, Theory, Window, register
+from undertow.controllers.robust.robust_law import RobustRCAF
+
+
+@register(RobustRCAF)
+def theory(law: RobustRCAF) -> Theory:
+    """Closed forms of the law on axes whose actuators follow the command at once."""
+    estimator = lambda axis: (
+        float(_at(law, law.estimator.bandwidth, axis)),
+        float(_at(law, law.estimator.damping, axis)),
+    )
+    return Theory(
+        poles=lambda axis: _poles(law, axis, *estimator(axis)),
+        estimator=estimator,
+        ramp_error=lambda axis: 2 * estimator(axis)[1] / estimator(axis)[0],
+        drift_bound=lambda axis, dt: (drift.gain_bound(law, axis), drift.largest_gain(law, dt, axis)),
+        limits={"robust_term": ("robust term", law.robust_gain), "estimate": ("estimate", law.weights_bound)},
+        certificate=lambda run, lived, window, dt: _certificate(law, run, lived, window, dt),
+    )
+
+
+def _at(law: RobustRCAF, value: Any, axis: int, *shape: int) -> np.ndarray:
+    return np.broadcast_to(np.asarray(value, dtype=float), (len(law.model.coordinates.angles), *shape))[axis]
+
+
+def _poles(law: RobustRCAF, axis: int, frequency: float, damping: float) -> list[tuple[str, complex]]:
+    k, p = _at(law, law.feedback, axis, 2), _at(law, law.lyapunov(), axis, 2, 2)
+    slope = _at(law, law.robust_gain, axis) / _at(law, law.layer, axis)
+    tracking = np.roots([1.0, k[1] + slope * p[1, 1], k[0] + slope * p[0, 1]])
+    observer = np.roots([1.0, 2 * damping * frequency, frequency**2])
+    return [("estimator", complex(pole)) for pole in observer] + [("tracking", complex(pole)) for pole in tracking]
+
+
+def _certificate(law: RobustRCAF, run: xr.Dataset, lived: xr.Dataset, window: Window, dt: float) -> RunCertificate:
+    """With the estimation error allowed by the largest |d_dot| from record to record, and how often it was kept."""
+    bound = np.broadcast_to(law.estimator.bound, run.sizes["axis"])
+    rate = fastest_uncertainty(lived)
+    allowed = estimation_bound(law.estimator, dt, rate)
+    error = np.abs(lived["estimate"].values - lived["uncertainty"].values)
+    kept = (error <= allowed + hypotheses.ROUNDING).all(-1)
+    numbers = {
+        "uncertainty_rate": rate.tolist(),
+        "estimation_bound": allowed.tolist(),
+        "estimation_within": window.shares(kept, lived["time"].values),
+        "weights_bound": bound.tolist(),
+    }
+    asked = [*hypotheses.of_any(law, bound, lived), *hypotheses.of_robust(law, lived)]
+    return RunCertificate(of_robust(law, run, dt), asked, numbers)

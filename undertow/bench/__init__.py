@@ -1,0 +1,1 @@
+"""Speed of undertow, compared with plain NumPy."""

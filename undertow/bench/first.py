@@ -1,0 +1,18 @@
+"""A new process up to its first result: python -m undertow.bench.first"""
+
+from undertow.process import prepare
+
+prepare()
+
+from undertow.bench.workload import W1
+from undertow.scenario.execute import execute
+
+
+def main() -> None:
+    """Run W1 and print its rms error of position."""
+    steady = execute(W1).steady
+    print(steady and steady["position_rms"])
+
+
+if __name__ == "__main__":
+    main()

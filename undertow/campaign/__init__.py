@@ -1,0 +1,1 @@
+"""Monte Carlo studies and parameter sweeps: sampling, batches of runs, the results store and its evaluation."""

@@ -1,0 +1,147 @@
+"""Runs trials in batches: trials that differ only in numbers share one compiled program."""
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from undertow.analysis.metrics import results_of_batch
+from undertow.campaign.campaign_schema import Series
+from undertow.campaign.runs import leaves, planned, run_of, shared_numbers
+from undertow.core import runtime
+from undertow.core.status import Status
+from undertow.loop import simd_batch, vmap_batch
+from undertow.loop.simd_batch import Plan, Run
+from undertow.scenario.build import Built
+from undertow.scenario.part_cache import structure
+from undertow.scenario.schema import Scenario
+
+# Backend of a trial. XLA is slower, and a single run repeats such a trial only up to rounding.
+SIMD, XLA = 0, 1
+
+
+class BatchResult(NamedTuple):
+    """Results of trials, one entry per trial."""
+
+    metrics: dict[str, np.ndarray]  # over the steady window; NaN for failed runs and undefined metrics
+    status: np.ndarray
+    ended: np.ndarray  # s
+    backend: np.ndarray  # SIMD or XLA
+    series: dict[str, np.ndarray]  # (trials, records, ...)
+
+
+class _Kind(NamedTuple):
+    """Properties that trials of one program share."""
+
+    structure: Any
+    plan: Plan
+    usual: bool  # numbers that were the same in all probes are the same here
+    backend: str
+    precision: str
+
+
+class _Group(NamedTuple):
+    """Trials of one kind in a task."""
+
+    first: Run
+    members: list[int]  # their indices in the task
+    numbers: list[list[np.ndarray]]  # the numbers that differ between trials
+
+
+class ProgramCache:
+    """Compiled programs, shared by any number of threads.
+
+    Args:
+        probes: some trials; numbers that are equal in all probes of one structure become constants of its program. The
+            program of a trial then depends on the campaign only, not on the task.
+    """
+
+    def __init__(self, probes: Callable[[], Sequence[Built]]):
+        self._probes = probes
+        self._shared: dict[Any, list[np.ndarray | None]] | None = None
+        self._programs: dict[_Kind, Any] = {}
+        self._lock = threading.Lock()
+
+    def run(self, built: Iterable[Built], asked: Series | None = None) -> BatchResult:
+        """Run trials in batches of one kind.
+
+        Args:
+            built: the trials, sampled loops; only the numbers that differ are kept in memory.
+            asked: series to record.
+        """
+        groups: dict[_Kind, _Group] = {}
+        for i, one in enumerate(built):
+            run = run_of(one)
+            numbers = leaves(run)
+            kind = self._kind(run, numbers, planned(one, asked), one.scenario)
+            group = groups.setdefault(kind, _Group(run, [], []))
+            group.members.append(i)
+            pairs = zip(numbers, self._common(kind, len(numbers)), strict=True)
+            # Copies: views would keep JAX's arrays, and those ten times the memory.
+            group.numbers.append([np.array(leaf) for leaf, shared in pairs if shared is None])
+        if not groups:  # no trials: the arrays of one trial, cut to length zero
+            return jax.tree.map(lambda kept: kept[:0], self.run(self._probes()[:1], asked))
+        pieces = []
+        for kind, group in groups.items():
+            with runtime.in_precision(kind.precision):
+                pieces.append(self._together(kind, group))
+        names = dict.fromkeys(name for piece in pieces for name in piece.metrics)
+        pieces = [piece._replace(metrics={name: _defined(piece, name) for name in names}) for piece in pieces]
+        back = np.argsort([i for group in groups.values() for i in group.members])
+        return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
+
+    def _together(self, kind: _Kind, group: _Group) -> BatchResult:
+        common = self._common(kind, len(leaves(group.first)))
+        with self._lock:
+            if kind not in self._programs:
+                self._programs[kind] = _program(group.first, kind, [shared is not None for shared in common])
+        count, own = len(group.members), map(np.stack, zip(*group.numbers, strict=True))
+        repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
+        numbers = [next(own) if shared is None else repeated(shared) for shared in common]
+        tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
+        result = self._programs[kind].run(jax.tree.unflatten(tree, numbers))
+        lasted = result.status == int(Status.OK)
+        found = results_of_batch(group.first.accumulators, result.accumulated)
+        metrics = {name: np.where(lasted, value, np.nan) for name, value in found.items()}
+        backend = np.full(
+            count, SIMD if isinstance(self._programs[kind], simd_batch.BatchRunner) else XLA, dtype=np.int8
+        )
+        return BatchResult(metrics, result.status.astype(np.int8), result.ended, backend, result.series)
+
+    def _common(self, kind: _Kind, count: int) -> list[np.ndarray | None]:
+        """Constants of the program of a kind, in the order of the leaves of its runs; None for the other leaves."""
+        found = self._commons().get(kind.structure) if kind.usual else None
+        return [None] * count if found is None else found
+
+    def _kind(self, run: Run, numbers: list[Any], plan: Plan, scenario: Scenario) -> _Kind:
+        form = structure(run)
+        common = self._commons().get(form)
+        usual = common is not None and all(
+            shared is None or leaf is shared or np.array_equal(leaf, shared)
+            for leaf, shared in zip(numbers, common, strict=True)
+        )
+        return _Kind(form, plan, usual, scenario.loop.backend, scenario.precision)
+
+    def _commons(self) -> dict[Any, list[np.ndarray | None]]:
+        """Numbers that all probes of a structure share, by structure; None for numbers that differ."""
+        with self._lock:
+            if self._shared is None:
+                self._shared = shared_numbers(self._probes())
+            return self._shared
+
+
+def _defined(piece: BatchResult, name: str) -> np.ndarray:
+    """A metric of some trials; NaN where their law or plant has none of that name."""
+    return piece.metrics.get(name, np.full(len(piece.status), np.nan))
+
+
+def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
+    if kind.backend == "simd":
+        for driver in dict.fromkeys((simd_batch.gpu(), None)):
+            with contextlib.suppress(simd_batch.Unsupported):
+                return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver)
+    return vmap_batch.BatchRunner(run, kind.plan)

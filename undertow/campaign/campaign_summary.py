@@ -1,0 +1,133 @@
+"""Summary of a campaign: distributions, sensitivities, requirements, failures and the worst trials."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.stats import binom, spearmanr
+
+from undertow.campaign.batch_runner import XLA
+from undertow.campaign.columns import ENDINGS, JUDGEMENTS
+from undertow.campaign.invalid_trials import reasons
+from undertow.campaign.requirements import verdict
+from undertow.campaign.store_results import Results
+from undertow.campaign.trials import Trials
+
+QUANTILES = (0.05, 0.5, 0.95)
+
+
+def quantiles(values: np.ndarray) -> dict[str, float]:
+    """5 %, 50 % and 95 % quantiles of numbers, without undefined ones; some may be infinite."""
+    known = values[~np.isnan(values)]
+    method: Any = "linear" if np.isfinite(known).all() else "higher"
+    found = np.quantile(known, QUANTILES, method=method) if known.size else np.full(len(QUANTILES), np.nan)
+    return dict(zip(map(str, QUANTILES), found.tolist(), strict=True))
+
+
+def median_interval(values: np.ndarray, confidence: float = 0.95) -> tuple[float, float]:
+    """Interval that holds the median of the population, whatever its distribution; some values may be infinite.
+
+    The number of values below the median is binomial (count, 1/2), so the r-th smallest and r-th largest enclose it;
+    with few values the smallest and largest are taken. David and Nagaraja (2003), section 7.1.
+    """
+    ordered = np.sort(values)
+    rank = max(int(binom.ppf((1 - confidence) / 2, ordered.size, 0.5)), 1)
+    return float(ordered[rank - 1]), float(ordered[-rank])
+
+
+def defined_quantiles(rows: xr.Dataset, metrics: Iterable[str], which: np.ndarray) -> dict[str, dict[str, float]]:
+    """Quantiles of metrics over some of the rows; what is defined for none of them is not there."""
+    chosen = {name: rows[name].values[which] for name in metrics}
+    return {name: quantiles(values) for name, values in chosen.items() if not np.isnan(values).all()}
+
+
+def correlations(results: Results) -> dict[str, dict[str, float]]:
+    """Rank correlation (Spearman) of every metric with every sampled number, mean over the combinations."""
+    found: dict[str, dict[str, float]] = {}
+    groups = [results.lasted & (results.combinations == number) for number in np.unique(results.combinations)]
+    for key in results.campaign.vary:
+        column = results.rows[f"vary:{key}"]
+        if "choices" in column.attrs:
+            continue
+        for name in results.metrics:
+            values = results.rows[name].values
+            finite = [group & np.isfinite(values) for group in groups]
+            pairs = [(column.values[group], values[group]) for group in finite]
+            known = [
+                float(spearmanr(*pair)[0]) for pair in pairs if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
+            ]
+            if known:
+                found.setdefault(key, {})[name] = sum(known) / len(known)
+    return found
+
+
+def by_choice(results: Results) -> dict[str, dict[str, Any]]:
+    """Trials, failures and metrics for every entry of a choice, over all combinations."""
+    found: dict[str, dict[str, Any]] = {}
+    for key in results.campaign.vary:
+        column = results.rows[f"vary:{key}"]
+        for i, word in enumerate(column.attrs.get("choices", ())):
+            chosen = column.values == i
+            lasted, failed = chosen & results.lasted, chosen & results.ran & ~results.lasted
+            metrics = defined_quantiles(results.rows, results.metrics, lasted)
+            counts = {"trials": int(chosen.sum()), "failed": int(failed.sum())}
+            found.setdefault(key, {})[word] = counts | {"metrics": metrics}
+    return found
+
+
+_WORST = 5
+
+
+def summary(results: Results, several: Trials) -> dict[str, Any]:
+    """The contents of summary.json.
+
+    Args:
+        results: results of the campaign.
+        several: its trials, to find out why some were invalid.
+    """
+    invalid = results.rows["trial"].values[~results.ran]
+    return {
+        "trials": results.total,
+        "done": results.rows.sizes["trial"],
+        "status": endings(results.rows),
+        "by_xla": int((results.rows["backend"].values == XLA).sum()),
+        "invalid": [one._asdict() for one in reasons(several, invalid)],
+        "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
+        "sensitivity": correlations(results),
+        "choices": by_choice(results),
+        "worst": [int(trial) for trial in _worst(results)],
+    }
+
+
+def endings(rows: xr.Dataset) -> dict[str, int]:
+    """Number of trials by status; empty before the first is done."""
+    codes = rows["status"].values if "status" in rows else np.zeros(0)
+    return {word: int((codes == code).sum()) for code, word in ENDINGS.items() if (codes == code).any()}
+
+
+def _combination(results: Results, number: int) -> dict[str, Any]:
+    """Distributions and requirements of one combination of `cross`."""
+    own = results.combinations == number
+    rows, lasted, ran = results.rows.isel(trial=own), results.lasted[own], results.ran[own]
+    return {
+        "values": dict(zip(results.campaign.axes, results.named(number), strict=True)),
+        "trials": int(lasted.size),
+        "status": endings(rows),
+        "failed": int((ran & ~lasted).sum()),
+        "invalid": int((~ran).sum()),
+        "metrics": defined_quantiles(rows, results.metrics, lasted),
+        "success": {word: int((rows["success"].values == code).sum()) for code, word in JUDGEMENTS.items()},
+        "requirements": [
+            verdict(rows.isel(trial=ran), name, required) for name, required in results.campaign.requirements.items()
+        ],
+    }
+
+
+def _worst(results: Results) -> np.ndarray:
+    """Failed trials, the earliest first; then those with the largest error. Invalid trials are left out."""
+    rows, lasted = results.rows.isel(trial=results.ran), results.lasted[results.ran]
+    errors = rows[results.tracking[0]].values if results.tracking else np.inf
+    error = np.where(lasted, errors, np.inf)
+    order = np.lexsort((rows["ended"].values, -error))
+    return rows["trial"].values[order[:_WORST]]

@@ -1,0 +1,204 @@
+"""Executors of the tasks of a campaign: threads of this process, or the workers of a Dask cluster."""
+
+import contextlib
+import itertools
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from typing import Any
+
+import numpy as np
+
+from undertow.core.errors import BadInput, nearest
+
+Columns = dict[str, np.ndarray]
+Work = tuple[Any, ...]  # arguments of the function
+
+# Tasks per worker that run or wait: enough to keep it busy, few enough to fit in memory.
+_AHEAD = 2
+
+# Switch interval of threads, s; with Python's default of 5 ms, writing a task takes half a second, not a tenth.
+_TURN = 2e-4
+
+
+def in_threads(function: Callable[..., Columns], work: Sequence[Work], threads: int) -> Iterator[tuple[int, Columns]]:
+    """Number and result of each piece of work as it is completed, by threads of this process."""
+    with _taking_turns(), ThreadPoolExecutor(threads) as pool:
+        waiting = enumerate(work)
+        going = {pool.submit(function, *one): i for i, one in itertools.islice(waiting, _AHEAD * threads)}
+        try:
+            while going:
+                done, _ = wait(going, return_when=FIRST_COMPLETED)
+                for future in done:
+                    number = going.pop(future)
+                    for i, one in itertools.islice(waiting, 1):
+                        going[pool.submit(function, *one)] = i
+                    yield number, future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+@contextlib.contextmanager
+def _taking_turns() -> Iterator[None]:
+    """Switch between threads often: writing a task needs hundreds of short turns."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(_TURN)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(usual)
+
+
+def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any) -> Iterator[tuple[int, Columns]]:
+    """Number and result of each piece of work as it is completed, by the workers of a `dask.distributed` client.
+
+    The work of a killed worker is given to another one.
+
+    Raises:
+        OSError: the connection to the cluster is lost.
+    """
+    from distributed import as_completed
+    from distributed.client import FutureCancelledError
+    from distributed.comm.core import CommClosedError
+
+    waiting = enumerate(work)
+    ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+    start = lambda one: client.submit(function, *one, pure=False, retries=3)
+    numbers = {start(one): i for i, one in itertools.islice(waiting, ahead)}
+    done = as_completed(list(numbers), raise_errors=False)
+    try:
+        for future in done:
+            number, result = numbers.pop(future), future.result()
+            future.release()
+            for i, one in itertools.islice(waiting, 1):
+                further = start(one)
+                numbers[further] = i
+                done.add(further)
+            yield number, result
+    except (FutureCancelledError, CommClosedError, TimeoutError) as error:
+        raise OSError(f"the connection to the Dask cluster is lost ({error})") from error
+    if numbers:
+        raise OSError("the connection to the Dask cluster is lost")
+
+
+CLUSTERS = ("local", "slurm", "ssh")
+
+# Workers may die often. Dask's own monitoring at 50 Hz would take 3 % of a core in every process.
+_DASK = {
+    "distributed.scheduler.allowed-failures": 100,
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.system-monitor.interval": "2s",
+}
+
+# Dask's dashboards have no authentication: those started here listen on this machine only.
+_PAGE = "127.0.0.1:0"
+
+_INSTALL = "pip install 'undertow[campaign]'"
+
+
+def check_cluster(kind: str) -> None:
+    """Check that the argument is a kind of cluster or an address.
+
+    Raises:
+        BadInput: it is neither.
+    """
+    if "://" not in kind and kind not in CLUSTERS:
+        must = f"be one of {', '.join(CLUSTERS)}, or an address such as tcp://10.0.0.1:8786"
+        raise BadInput("--cluster", must, kind, hint=nearest(kind.lower(), CLUSTERS))
+
+
+@contextlib.contextmanager
+def cluster(kind: str, workers: int) -> Iterator[Any]:
+    """A client of a cluster started for this campaign, or of the scheduler at an address.
+
+    Args:
+        kind: local, slurm, ssh (hosts in the environment variable UNDERTOW_HOSTS, separated by commas), or an address
+            such as tcp://10.0.0.1:8786.
+        workers: number of workers to start; on each host, for ssh.
+
+    Raises:
+        BadInput: Dask is not installed, or no such cluster can be reached.
+    """
+    check_cluster(kind)
+    try:
+        from dask import config
+        from distributed import Client
+    except ImportError:
+        raise BadInput("--cluster", "have Dask installed", "not", hint=_INSTALL) from None
+    with config.set(_DASK), contextlib.ExitStack() as stack:
+        try:
+            where = kind if "://" in kind else stack.enter_context(_started(kind, workers))
+        except ModuleNotFoundError as error:
+            raise BadInput("--cluster", f"have {error.name} installed", "not", hint=_INSTALL) from None
+        try:
+            client = stack.enter_context(Client(where, timeout=10))
+        except OSError as error:
+            raise BadInput("--cluster", "be a scheduler that answers", f"{kind}: {error}") from None
+        client.wait_for_workers(1)
+        yield client
+
+
+def _started(kind: str, workers: int) -> Any:
+    if kind == "local":
+        from distributed import LocalCluster
+
+        from undertow.campaign import local_worker
+
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            preload=[local_worker.__name__],
+            host="127.0.0.1",
+            dashboard_address=_PAGE,
+            silence_logs=logging.CRITICAL,  # errors are raised here
+        )
+    if kind == "ssh":
+        return _over_ssh(os.environ.get("UNDERTOW_HOSTS", ""), workers)
+    return _in_slurm(workers)
+
+
+def _over_ssh(names: str, workers: int) -> Any:
+    from asyncssh import Error
+    from distributed import SSHCluster
+
+    hosts = [name.strip() for name in names.split(",") if name.strip()]
+    if not hosts:
+        raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
+    logging.getLogger("distributed.deploy").setLevel(logging.ERROR)  # an error is reported once, below
+    try:
+        return SSHCluster(
+            [hosts[0], *hosts],
+            scheduler_options={"dashboard_address": _PAGE},
+            worker_options={"nthreads": 1, "n_workers": workers, "dashboard_address": _PAGE},
+        )
+    except (OSError, Error, RuntimeError) as error:
+        reason = error.__cause__ or error
+        hint = "`ssh HOST` must work without a prompt"
+        raise BadInput("UNDERTOW_HOSTS", "be hosts that accept the login", f"{names}: {reason}", hint=hint) from None
+
+
+def _in_slurm(workers: int) -> Any:
+    from dask import config
+    from dask_jobqueue.slurm import SLURMCluster
+
+    try:  # otherwise Dask would submit jobs that cannot be queued again and again
+        subprocess.run(["sinfo", "--noheader"], check=True, capture_output=True, text=True)
+    except OSError as error:
+        raise BadInput("--cluster", "find SLURM on this machine", str(error)) from None
+    except subprocess.CalledProcessError as error:
+        said = error.stderr.strip().splitlines() or ["sinfo fails"]
+        raise BadInput("--cluster", "find a SLURM that answers", said[-1]) from None
+    setting = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
+    found = SLURMCluster(
+        cores=setting("cores", 1),
+        memory=setting("memory", "2 GB"),
+        scheduler_options={"dashboard_address": _PAGE, **(setting("scheduler-options", {}))},
+        worker_extra_args=["--dashboard-address", _PAGE, *setting("worker-extra-args", [])],
+    )
+    found.scale(jobs=workers)
+    return found

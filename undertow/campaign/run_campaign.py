@@ -1,0 +1,73 @@
+"""Run the missing tasks of a campaign with an executor and write their results to the store."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.campaign import task as tasks
+from undertow.campaign.columns import METRICS, coordinates, labels
+from undertow.campaign.executors import Columns, Work
+from undertow.campaign.fingerprint import identity
+from undertow.campaign.layout import layout
+from undertow.campaign.prepare import Prepared
+from undertow.campaign.store import Store
+
+STORE = "trials.zarr"
+
+Executor = Callable[[Callable[..., Columns], Sequence[Work]], Iterator[tuple[int, Columns]]]
+
+
+class Tally(NamedTuple):
+    """Progress of a campaign. `failed` and `invalid` do not count trials done before it was resumed."""
+
+    trials: int
+    done: int
+    failed: int
+    invalid: int
+
+    def after(self, status: np.ndarray) -> "Tally":
+        """Progress after one more task."""
+        invalid = int(np.count_nonzero(status == tasks.INVALID))
+        failed = int(np.count_nonzero(status)) - invalid
+        return Tally(self.trials, self.done + len(status), self.failed + failed, self.invalid + invalid)
+
+
+Watch = Callable[[Tally], None]
+
+
+def run_campaign(prepared: Prepared, out: Path, executor: Executor, watch: Watch) -> None:
+    """Run the missing tasks of a campaign.
+
+    Args:
+        prepared: the campaign.
+        out: folder of the store.
+        executor: runs the tasks.
+        watch: called after each task.
+
+    Raises:
+        BadInput: the folder holds another campaign.
+        OSError: the disk is full, or the cluster is lost; finished tasks are kept.
+    """
+    several, text, folder = prepared.trials, prepared.text, prepared.folder
+    store = Store(
+        out / STORE,
+        layout(several.campaign),
+        identity(text, prepared.named),
+        labels(several, prepared.first, prepared.metrics),
+        coordinates(several, prepared.first),
+        {METRICS: json.dumps({name: list(metric) for name, metric in prepared.metrics.items()})},
+    )
+    try:
+        missing = store.missing()
+        tally = Tally(several.number, several.number - sum(map(store.layout.count, missing)), 0, 0)
+        watch(tally)
+        work = [(text, str(folder), store.layout, number) for number in missing]
+        for i, columns in executor(tasks.run_block, work):
+            store.write(missing[i], columns)
+            tally = tally.after(columns["status"])
+            watch(tally)
+    finally:
+        store.close()

@@ -1,0 +1,87 @@
+"""Samples of a campaign: points of the unit cube, their seeds, and the parameter values they stand for."""
+
+import functools
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from undertow.campaign.campaign_schema import Campaign, Distribution
+from undertow.core.errors import BadInput
+
+# Streams of random numbers from one seed.
+_POINTS, _SEEDS = 0, 1
+
+# Samples per block, and number of cached blocks. Sobol's sequence needs a power of two.
+_BLOCK, _KEPT = 4096, 8
+_MOST_LATIN = 10_000_000
+
+# The quantiles of a normal distribution are infinite at 0 and 1.
+_EDGE = 2.0**-53
+
+
+class Samples:
+    """Points of the unit cube and seeds, equal on every machine and with every executor.
+
+    Blocks are computed on demand, so that a billion samples take no memory. Only a Latin hypercube is computed as a
+    whole.
+
+    Args:
+        campaign: number of samples, design and seed.
+
+    Raises:
+        BadInput: too many samples for a Latin hypercube.
+    """
+
+    def __init__(self, campaign: Campaign):
+        if campaign.design == "latin" and campaign.trials > _MOST_LATIN:
+            hint = "`random` and `sobol` have no such limit"
+            raise BadInput("trials", f"be at most {_MOST_LATIN} with `design: latin`", campaign.trials, hint=hint)
+        self._campaign = campaign
+        self._block = campaign.trials if campaign.design == "latin" else _BLOCK
+        self._points = functools.lru_cache(_KEPT)(self._make_points)
+        self._seeds = functools.lru_cache(_KEPT)(self._make_seeds)
+
+    def point(self, sample: int) -> Float[np.ndarray, " k"]:
+        """Point of a sample, shape (k,), in [0, 1), in the order of `vary`."""
+        block, row = divmod(sample, self._block)
+        return self._points(block)[row]
+
+    def seed(self, sample: int) -> int:
+        """Seed of all random numbers of a sample."""
+        block, row = divmod(sample, _BLOCK)
+        return int(self._seeds(block)[row])
+
+    def _make_points(self, block: int) -> Float[np.ndarray, "rows k"]:
+        seed, dimensions = self._campaign.seed, len(self._campaign.vary)
+        if not dimensions:
+            return np.zeros((self._block, 0))
+        if self._campaign.design == "random":
+            return np.random.default_rng([seed, _POINTS, block]).random((self._block, dimensions))
+        chance = np.random.default_rng([seed, _POINTS])
+        if self._campaign.design == "latin":
+            return qmc.LatinHypercube(dimensions, rng=chance).random(self._block)
+        sequence = qmc.Sobol(dimensions, rng=chance)
+        if block:  # SciPy cannot go forward by nothing
+            sequence.fast_forward(block * self._block)
+        return sequence.random(self._block)
+
+    def _make_seeds(self, block: int) -> np.ndarray:
+        return np.random.default_rng([self._campaign.seed, _SEEDS, block]).integers(0, 2**32, _BLOCK, dtype=np.uint32)
+
+
+def value(spread: Distribution, share: float) -> Any:
+    """Parameter value for a coordinate in [0, 1): the quantile of the distribution."""
+    if spread.uniform is not None:
+        low, high = spread.uniform
+        return low + share * (high - low)
+    if spread.log_uniform is not None:
+        low, high = spread.log_uniform
+        return low * (high / low) ** share
+    if spread.normal is not None:
+        mean, deviation = spread.normal
+        return float(mean + deviation * ndtri(np.clip(share, _EDGE, 1 - _EDGE)))
+    choices = spread.choice or []
+    return choices[min(int(share * len(choices)), len(choices) - 1)]

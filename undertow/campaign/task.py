@@ -1,0 +1,165 @@
+"""A task of a campaign: build and run some trials. It is given as text and numbers, so that any process can run it."""
+
+import contextlib
+import functools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from undertow.analysis.metrics import gathered_meanings
+from undertow.campaign.batch_runner import ProgramCache
+from undertow.campaign.campaign_schema import read_text
+from undertow.campaign.layout import Layout
+from undertow.campaign.trials import Trials, trials
+from undertow.core import runtime
+from undertow.core.errors import BadInput
+from undertow.core.metric import Metric
+from undertow.scenario.build import Built, build
+from undertow.scenario.part_cache import PartCache
+from undertow.scenario.reading import Text
+
+# Status of a trial whose scenario cannot be built, in addition to those of `undertow.core.status`.
+INVALID = -1
+
+# Success of a trial that was invalid, or has no criterion.
+NOT_JUDGED = -1
+
+
+class Site(NamedTuple):
+    """Objects that a process keeps between the tasks of one campaign."""
+
+    trials: Trials
+    part_cache: PartCache
+    programs: ProgramCache
+    probes: Callable[[], dict[int, Built]]  # the valid ones among the first trials of every combination
+    alternatives: Callable[[], list[Built]]  # the first trial with each entry of every choice, where valid
+
+    def metrics(self) -> dict[str, Metric]:
+        """Metrics that any of the trials may have. Each has a column, which is NaN where a trial has no such metric."""
+        found: dict[str, Metric] = {}
+        for built in (*self.probes().values(), *self.alternatives()):
+            found = gathered_meanings(built.closed_loop, built.metrics) | found
+        return found
+
+
+@functools.lru_cache(maxsize=2)
+def site(text: str, folder: str) -> Site:
+    """The campaign in this process.
+
+    Args:
+        text: of the campaign file.
+        folder: where relative paths in it start.
+    """
+    several, part_cache = trials(*read_text(text, Path(folder))), PartCache()
+    rows = several.probes()
+    probes = functools.cache(lambda: {rows[place]: built for place, built in _built(several, part_cache, rows)})
+    others = functools.cache(lambda: list(_alternatives(several, part_cache)))
+    return Site(several, part_cache, ProgramCache(lambda: list(probes().values())), probes, others)
+
+
+def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
+    """Columns of the trials of a task."""
+    return run_trials(text, folder, layout.trials(task).tolist())
+
+
+def run_trials(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndarray]:
+    """Run trials and return their columns: sampled values, status and metrics.
+
+    Args:
+        text: text of the campaign file.
+        folder: folder of relative paths in it.
+        rows: numbers of the trials.
+    """
+    with runtime.on_processor():
+        return _ran(site(text, folder), rows)
+
+
+def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
+    columns = {f"vary:{key}": column for key, column in _columns(here.trials, rows)}
+    columns["trial"] = np.array(rows, dtype=np.uint32)
+    columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
+    where: list[int] = []
+    criteria: list[dict[str, float]] = []
+
+    def trials_of_task() -> Iterator[Built]:
+        for place, built in _built(here.trials, here.part_cache, rows):
+            where.append(place)
+            judged = built.window()[0] < built.scenario.loop.duration
+            criteria.append(built.resolved["success"] if judged else {})
+            yield built
+
+    result = here.programs.run(trials_of_task(), here.trials.campaign.series)
+    scatter = functools.partial(_scatter, len(rows), where)
+    columns["status"] = scatter(result.status, INVALID)
+    columns["ended"] = scatter(result.ended, np.nan)
+    columns["backend"] = scatter(result.backend, INVALID)
+    columns["success"] = scatter(_success(criteria, result.metrics), NOT_JUDGED)
+    undefined = np.full(len(where), np.nan)
+    found = {name: result.metrics.get(name, undefined) for name in here.metrics()}
+    found |= {f"series:{name}": values for name, values in result.series.items()}
+    if "precision" in here.trials.campaign.keys:  # one array holds both
+        found = {name: values.astype(np.float64) for name, values in found.items()}
+    return columns | {name: scatter(values, np.nan) for name, values in found.items()}
+
+
+def _alternatives(several: Trials, part_cache: PartCache) -> Iterator[Built]:
+    """They may name other files, and have metrics of their own."""
+    for data in several.alternatives():
+        with contextlib.suppress(BadInput):
+            yield build_data(several, part_cache, data)
+
+
+def _success(criteria: Sequence[Mapping[str, float]], metrics: Mapping[str, np.ndarray]) -> np.ndarray:
+    """1 where all that a trial is judged by stays below its limit, 0 where not, `NOT_JUDGED` without a criterion."""
+    found = np.full(len(criteria), NOT_JUDGED, dtype=np.int8)
+    for i, criterion in enumerate(criteria):
+        if criterion:  # what is not defined, as in a run that failed, is NaN and below nothing
+            found[i] = all(name in metrics and metrics[name][i] < most for name, most in criterion.items())
+    return found
+
+
+def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
+    """One trial, ready to run.
+
+    Raises:
+        BadInput: its scenario cannot be built.
+    """
+    try:
+        return build_data(several, part_cache, several.data(row))
+    except BadInput as error:
+        place = several.place(error.name) or error.where
+        raise error.at(where=f"{place}, trial {row}" if place else f"trial {row}") from error.__cause__
+
+
+def build_data(several: Trials, part_cache: PartCache, data: dict[str, Any]) -> Built:
+    """Build a scenario with the location of the campaign's scenario.
+
+    Raises:
+        BadInput: the scenario cannot be built.
+    """
+    scenario = several.scenario
+    return build(Text(data, scenario.name, scenario.folder, scenario.lines), part_cache)
+
+
+def _built(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
+    """Index and trial of each valid row, one at a time: a large task does not keep them all in memory."""
+    for place, row in enumerate(rows):
+        with contextlib.suppress(BadInput):
+            yield place, build_trial(several, part_cache, row)
+
+
+def _columns(several: Trials, rows: Sequence[int]) -> Iterable[tuple[str, np.ndarray]]:
+    """Sampled values; the index of the choice where they are not numbers."""
+    values = [several.values(row) for row in rows]
+    for key, entries in several.columns():
+        pick: Any = float if entries is None else list(entries.values()).index
+        yield key, np.array([pick(one[key]) for one in values], dtype=float)
+
+
+def _scatter(count: int, where: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
+    """An array with values at their rows and `empty` elsewhere."""
+    whole = np.full((count, *values.shape[1:]), empty, dtype=values.dtype)
+    whole[where] = values
+    return whole

@@ -1,0 +1,164 @@
+"""Trials of a campaign by number: each is a scenario that `undertow simulate` could run."""
+
+import copy
+import itertools
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from undertow.campaign.campaign_schema import VARIANT, Campaign
+from undertow.campaign.labels import is_number, words
+from undertow.campaign.sampling import Samples, value
+from undertow.core.errors import BadInput, nearest
+from undertow.scenario.reading import Text, key_path, read
+
+# Trials of each combination that are built first, to find errors and the numbers that differ.
+_PROBES = 4
+
+
+class Trials(NamedTuple):
+    """All trials by number: every combination of `cross` with the first sample, then with the next one, and so on.
+
+    Attributes:
+        campaign: the campaign.
+        text: text of the campaign file.
+        scenario: the scenario that it varies, and the folder of relative paths in it.
+        samples: points of the unit cube, for `vary`, and seeds.
+        combinations: values of `cross`, one tuple per combination.
+    """
+
+    campaign: Campaign
+    text: Text
+    scenario: Text
+    samples: Samples
+    combinations: tuple[tuple[Any, ...], ...]
+
+    @property
+    def number(self) -> int:
+        """Number of trials."""
+        return self.campaign.number
+
+    def values(self, trial: int) -> dict[str, Any]:
+        """Values that this trial sets in the scenario, by key path."""
+        sample, combination = divmod(trial, len(self.combinations))
+        swept = dict(zip(self.campaign.axes, self.combinations[combination], strict=True))
+        swept |= swept.pop(VARIANT, {}) if self.campaign.variants else {}
+        sampled = zip(self.campaign.vary.items(), self.samples.point(sample), strict=True)
+        return swept | {key: value(spread, float(share)) for (key, spread), share in sampled}
+
+    def seed(self, trial: int) -> int:
+        """Seed of all random numbers of this trial."""
+        return self.samples.seed(trial // len(self.combinations))
+
+    def first(self, combination: int) -> list[int]:
+        """The trials of a combination that are built before the first run."""
+        return [sample * len(self.combinations) + combination for sample in range(min(_PROBES, self.campaign.trials))]
+
+    def probes(self) -> list[int]:
+        """The first trials of all combinations."""
+        return [trial for combination in range(len(self.combinations)) for trial in self.first(combination)]
+
+    def data(self, trial: int) -> dict[str, Any]:
+        """The scenario of this trial."""
+        data = copy.deepcopy(self.scenario.data)
+        for key, put in self.values(trial).items():
+            _put(data, key, copy.deepcopy(put))
+        return data | {"seed": self.seed(trial)}
+
+    def alternatives(self) -> Iterator[dict[str, Any]]:
+        """The scenario of the first trial with each entry of every choice that is not numeric."""
+        for key, entries in self.columns():
+            for entry in (entries or {}).values():
+                data = self.data(0)
+                _put(data, key, copy.deepcopy(entry))
+                yield data
+
+    def place(self, name: str) -> str:
+        """Line of the campaign file that sets a key of the scenario; empty where the scenario sets it."""
+        for section, keys in (("vary", self.campaign.vary), ("cross", self.campaign.cross)):
+            for key in keys:
+                if name == key or name.startswith((f"{key}.", f"{key}[")):
+                    return self.text.where((section, key))
+        for variant, keys in self.campaign.variants.items():
+            for key in keys:
+                if name == key or name.startswith((f"{key}.", f"{key}[")):
+                    return self.text.where(("variants", variant, key))
+        return ""
+
+    def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
+        """See `varied_keys`."""
+        return varied_keys(self.campaign)
+
+
+def varied_keys(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None]]:
+    """Key paths of `vary`, with the values by name where they are not numbers."""
+    for key, spread in campaign.vary.items():
+        named = spread.choice is not None and not all(map(is_number, spread.choice))
+        yield key, {words(entry): entry for entry in spread.choice or []} if named else None
+
+
+def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
+    """The trials of a campaign.
+
+    Args:
+        campaign: the campaign.
+        text: text of its file.
+        allow_code: whether the code that an earlier run.nc names may run, if the scenario is one.
+
+    Raises:
+        BadInput: the scenario cannot be read, or there are too many trials.
+    """
+    if campaign.number >= 2**31:
+        raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", campaign.number)
+    combinations = tuple(itertools.product(*(entries.values() for entries in campaign.axes.values())))
+    return Trials(campaign, text, _scenario(campaign, text, allow_code), Samples(campaign), combinations)
+
+
+def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
+    given = campaign.scenario
+    if isinstance(given, str):
+        try:
+            found = read(text.folder / given, "scenario", allow_code)
+        except BadInput as error:
+            raise error.at(where=error.where or text.where(("scenario",))) from error.__cause__
+        if "scenario" in found.data:
+            where = text.where(("scenario",))
+            raise BadInput("scenario", "be the file of a scenario", f"{given}, a campaign", where=where)
+        return found
+    lines = {path[1:]: line for path, line in text.lines.items() if path[0] == "scenario"}
+    return Text(given, text.name, text.folder, lines)
+
+
+def _put(data: dict[str, Any], key: str, put: Any) -> None:
+    """Set the value at a key path; a part given by its name alone becomes a mapping."""
+    path = key_path(key)
+    node: Any = data
+    for step, following in itertools.pairwise(path):
+        inner = _entry(node, step, key)
+        if isinstance(inner, str):
+            inner = {"kind": inner}
+        elif inner is None and isinstance(following, int):
+            raise _no_list(node, step, key)
+        elif inner is None:
+            inner = {}
+        node[step] = inner
+        node = inner
+    _entry(node, path[-1], key)
+    node[path[-1]] = put
+
+
+def _no_list(node: Any, step: str | int, key: str) -> BadInput:
+    """The error for a key path that names an entry of a list the scenario does not have."""
+    hint = nearest(str(step), node) or f"Give `{step}` in the scenario, with all its entries"
+    return BadInput(key, "name an entry of a list of the scenario", f"of `{step}`, which it does not have", hint=hint)
+
+
+def _entry(node: Any, step: str | int, key: str) -> Any:
+    if isinstance(node, list):
+        if isinstance(step, int) and 0 <= step < len(node):
+            return node[step]
+        raise BadInput(key, f"name one of the {len(node)} entries, 0 to {len(node) - 1}", f"[{step}]")
+    if not isinstance(node, dict):
+        raise BadInput(key, "lead to a key of the scenario", f"past {node!r}")
+    if isinstance(step, int):
+        raise BadInput(key, "name an entry of a list only where there is a list", f"[{step}] of {', '.join(node)}")
+    return node.get(step)

@@ -1,0 +1,159 @@
+"""Checks of the contract of a part: it is used once as in the loop, and its results are compared."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.checks.answers import agree, alike, is_a, shaped, two_values
+from undertow.checks.controller_check import check_controller
+from undertow.checks.finding import Finding, error
+from undertow.checks.plant_check import check_plant
+from undertow.checks.thruster_check import check_thruster
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractDisturbance,
+    AbstractNavigation,
+    AbstractPlant,
+    AbstractReference,
+    Load,
+    Measurement,
+    Pose,
+)
+from undertow.core.measurement import measurement_of_outputs
+from undertow.core.user_code import fault_of
+from undertow.sensors.estimate import estimate_of, motion_of
+from undertow.sensors.sensor import AbstractSensor
+from undertow.thrusters.thruster import AbstractThruster, PropellerReport
+
+_TIMES = (0.37, 1.93, 7.1)  # s; no round numbers, at which references may have corners
+
+
+class DisturbanceProfile(NamedTuple):
+    """Plant around a part."""
+
+    truth: Measurement
+    pose: Pose | None
+
+
+_BODY = DisturbanceProfile(
+    truth=measurement_of_outputs(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
+    pose=Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
+)
+
+
+def of_plant(plant: AbstractPlant) -> DisturbanceProfile:
+    """Profile of a plant in its initial state."""
+    x = plant.initial_state()
+    return DisturbanceProfile(plant.output(jnp.zeros(()), x), plant.pose(x))
+
+
+def check_contract(part: Any, around: DisturbanceProfile = _BODY) -> tuple[Finding, ...]:
+    """Violations of the contract of a part; none for kinds that are data only.
+
+    Args:
+        part: part to check.
+        around: plant around it; by default a body in water.
+    """
+    for kind, use in _USES.items():
+        if isinstance(part, kind):
+            try:
+                return tuple(use(part, around))
+            except Exception as complaint:
+                return (_failed(part, complaint),)
+    return ()
+
+
+def _failed(part: Any, complaint: Exception) -> Finding:
+    """Finding for an exception in a part or in its use."""
+    says, hint = fault_of(complaint)
+    if says.startswith("cannot"):
+        return Finding("error", "contract", "", says[:1].upper() + says[1:], hint)
+    return error("contract", type(part).__name__, "be usable as its contract says", f"not: {says}", hint)
+
+
+def _disturbance(disturbance: AbstractDisturbance, around: DisturbanceProfile) -> Iterator[Finding]:
+    n, pose = len(around.truth.position), around.pose
+    still = Load(jnp.zeros(n), jnp.zeros(n))
+    busy = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
+    realization, again = (disturbance.realize(jax.random.PRNGKey(0)) for _ in range(2))
+    yield from alike("realize", again, realization, "give the same realization for the same key")
+    if not all(map(np.array_equal, jax.tree.leaves(realization), jax.tree.leaves(again))):
+        yield error("contract", "realize", "give the same realization for the same key", "another one")
+    at = jax.jit(lambda t, still: disturbance.at(realization, t, pose, still))
+    form = jax.eval_shape(at, jnp.zeros(()), still)
+    wrong = list(is_a("at", form, Load))
+    wrong = wrong or [*shaped("at", form.acceleration, (n,)), *shaped("at", form.wrench, (n,))]
+    if wrong:
+        yield from wrong
+        return
+    for t in map(jnp.asarray, _TIMES):
+        load, more = at(t, still), at(t, busy)
+        yield from (finding for value in load[:2] for finding in shaped("at", value, (n,)))
+        for name in ("acceleration", "wrench"):
+            gained = getattr(more, name) - getattr(load, name)
+            yield from agree("at", gained, getattr(busy, name), f"what was there already: add to `load.{name}`")
+    jumps = disturbance.jumps(10.0)
+    if not isinstance(jumps, tuple) or not all(0 < jump < 10 for jump in jumps):
+        yield error("contract", "jumps", "be a tuple of times between 0 and the duration", f"{jumps} for 10 s")
+
+
+def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> Iterator[Finding]:
+    realization = jax.eval_shape(navigation.realize, jax.random.PRNGKey(0))
+    state = jax.eval_shape(navigation.init, realization, around.truth)
+    answer = jax.eval_shape(navigation.measure, realization, state, jnp.zeros(()), around.truth)
+    if unpaired := list(two_values("measure", answer, "the measurement and the state after it")):
+        yield from unpaired
+        return
+    y, after = answer
+    yield from alike("measure", after, state, "return the state in the form that `init` gives it", types=True)
+    wrong, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
+    yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
+
+
+def _sensor(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
+    """Check of a sensor on a body at rest, so that a delay has no effect."""
+    report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
+    truth = measurement_of_outputs(around.truth.position, jnp.zeros(6), report)
+    motion, right = motion_of(truth, jnp.zeros(3), jnp.asarray(0.01)), estimate_of(truth)
+    reading = sensor.reading(motion)
+    if jnp.ndim(reading) != 1:
+        yield error("contract", "reading", "give an array of one axis", f"of shape {jnp.shape(reading)}")
+        return
+    corrected = sensor.correct(right, reading)
+    wrong = list(alike("correct", corrected, right, "give an estimate in the form it was"))
+    if wrong:
+        yield from wrong
+        return
+    off = jnp.array([0.1, -0.2, 0.3])
+    for name in ("position", "velocity"):
+        true = getattr(right, name)
+        yield from agree("correct", getattr(corrected, name), true, f"the {name}, where the reading tells nothing new")
+        after = sensor.correct(right._replace(**{name: true + off}), reading)
+        errors = [float(jnp.linalg.norm(vector)) for vector in (off, getattr(after, name) - true)]
+        late = name == "velocity" and (after.position != right.position).any()  # a position of some time ago
+        if not late and errors[1] > (1 + 1e-9) * errors[0]:
+            got = f"from {errors[0]:.3g} to {errors[1]:.3g} off"
+            yield error("contract", "correct", f"move the {name} towards the reading", got)
+
+
+def _reference(reference: AbstractReference, around: DisturbanceProfile) -> Iterator[Finding]:
+    for t in map(jnp.asarray, _TIMES):
+        target, rate = jax.jvp(lambda t: tuple(reference.at(t)), (t,), (jnp.ones(()),))
+        for value in target:
+            yield from shaped("at", value, target[0].shape)
+        yield from agree("at", target[1], rate[0], f"the rate of the position at {t:g} s")
+        yield from agree("at", target[2], rate[1], f"the rate of the velocity at {t:g} s")
+
+
+_USES: dict[type, Callable[[Any, DisturbanceProfile], Iterator[Finding]]] = {
+    AbstractPlant: lambda plant, around: check_plant(plant),
+    AbstractController: lambda controller, around: check_controller(controller),
+    AbstractDisturbance: _disturbance,
+    AbstractReference: _reference,
+    AbstractNavigation: _navigation,
+    AbstractSensor: _sensor,
+    AbstractThruster: lambda thruster, around: check_thruster(thruster),
+}

@@ -1,0 +1,42 @@
+"""Signals that a part declares for recording."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from undertow.core.errors import BadInput
+
+
+class Signal(NamedTuple):
+    """One recorded signal.
+
+    Attributes:
+        dimensions: names of its dimensions; `axis` runs over the outputs, `actuator` over the inputs, others are the
+            part's own; () for a number.
+        unit: in which `[axis]` stands for the unit of each output and `[input]` for that of the inputs; `1` for none.
+        meaning: in words.
+    """
+
+    dimensions: tuple[str, ...]
+    unit: str
+    meaning: str
+
+    def unit_for(self, output_units: Iterable[str], input_unit: str) -> str:
+        """Unit of this signal of a plant; the units of all axes where they differ."""
+        units = dict.fromkeys(self.unit.replace("[axis]", unit) for unit in output_units)
+        return ", ".join(units).replace("[input]", input_unit)
+
+
+def check_declared(part: Any, values: Mapping[str, Any]) -> None:
+    """Check that a part gives the signals that it declares; names only, so it costs nothing in compiled code.
+
+    Raises:
+        BadInput: a signal is undeclared, or a declared one is missing.
+    """
+    declared, who = part.signals(), type(part).__name__
+    for name in values:
+        if name not in declared:
+            hint = f"Declare it: `signals` of {who} returns {{{name!r}: Signal(dimensions, unit, meaning), ...}}"
+            raise BadInput(name, f"be declared by `signals` of {who}", "not", hint=hint)
+    for name in declared:
+        if name not in values:
+            raise BadInput(name, f"be given by {who}, whose `signals` declares it", "not")

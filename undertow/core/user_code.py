@@ -1,0 +1,105 @@
+"""Errors of parts that users wrote, as a sentence with the method and the line of their file."""
+
+import inspect
+import re
+import traceback
+from dataclasses import FrozenInstanceError
+from pathlib import Path
+from types import FrameType
+from typing import Any, NamedTuple
+
+from jax import errors
+
+MODULE_PREFIX = "undertow_part_"  # of the modules that users' files become
+
+_ABSTRACT = re.compile(r"Can't instantiate abstract class (\w+).* abstract (method|attribute)s? (.+)")
+_ASSIGNED = re.compile(r"cannot assign to field '(\w+)'")
+_LONGEST = 110  # characters of Python's message
+
+# JAX's error, its cause and the remedy; the first that applies.
+_REFUSED: tuple[tuple[type[Exception], str, str], ...] = (
+    (
+        errors.TracerBoolConversionError,
+        "Python's `if`, `while`, `and`, `or`, `not`, `min` or `max` needs the value of a traced array",
+        "Use `jnp.where(condition, a, b)`, `jnp.minimum` or `jnp.maximum`",
+    ),
+    (errors.TracerArrayConversionError, "NumPy needs the value of a traced array", "Use `jax.numpy`"),
+    (errors.TracerIntegerConversionError, "a traced array is used as an index or a length", "Use `jnp.take`"),
+    (
+        errors.ConcretizationTypeError,
+        "`float`, `int`, `math` or a shape needs the value of a traced array",
+        "Keep the array, and use `jax.numpy`",
+    ),
+)
+
+
+class Fault(NamedTuple):
+    """What failed and why, with its location in the user's file; and the remedy, "" where none is known."""
+
+    says: str
+    hint: str
+
+
+def fault_of(error: BaseException) -> Fault:
+    """The cause of an exception in a part: `cannot run `Mine.command`: NumPy needs ... (mine.py, line 7)`."""
+    if isinstance(error, SyntaxError):
+        return Fault(f"{type(error).__name__}: {error.msg}, line {error.lineno}", "")
+    text = " ".join(str(error).split())
+    frames = [(f, line) for f, line in traceback.walk_tb(error.__traceback__) if _is_own(f.f_globals.get("__name__"))]
+    if abstract := _ABSTRACT.match(text):
+        return _abstract(abstract, frames)
+    why, hint = _reason(error, text)
+    if not frames:
+        return Fault(why, hint)
+    (frame, line), method = frames[-1], frames[-1][0].f_code.co_qualname.partition(".<locals>")[0]
+    doing = "" if method == "<module>" else f"cannot run `{method}`: "
+    return Fault(f"{doing}{why} ({Path(frame.f_code.co_filename).name}, line {line})", hint)
+
+
+def python_says(error: BaseException) -> str:
+    """Cause and remedy in one line."""
+    says, hint = fault_of(error)
+    return f"{says}. {hint}" if hint else says
+
+
+def place_of(part: Any, method: str = "") -> str:
+    """`mine.py, line 7`, where a class of the user's own begins, or a method of it; "" for other people's classes.
+
+    Args:
+        part: an object, or the class.
+        method: its name; "" for the class itself.
+    """
+    kind = part if isinstance(part, type) else type(part)
+    thing: Any = inspect.unwrap(getattr(kind, method, None) or str) if method else kind
+    if not _is_own(getattr(thing, "__module__", None)):
+        return ""
+    return f"{Path(inspect.getsourcefile(thing) or '').name}, line {inspect.getsourcelines(thing)[1]}"
+
+
+def _is_own(module: str | None) -> bool:
+    return (module or "").startswith(MODULE_PREFIX)
+
+
+def _reason(error: BaseException, text: str) -> tuple[str, str]:
+    """Cause and remedy."""
+    for kind, why, hint in _REFUSED:
+        if isinstance(error, kind):
+            return why, hint
+    if isinstance(error, FrozenInstanceError) and (assigned := _ASSIGNED.match(text)):
+        why = f"it assigns `self.{assigned[1]}`, but a part holds parameters only"
+        return why, "Keep what changes in the state: it goes in as an argument and comes out as a result"
+    shown = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+    return f"{type(error).__name__}: {shown}", ""
+
+
+def _abstract(found: re.Match[str], frames: list[tuple[FrameType, int]]) -> Fault:
+    """A class that lacks methods or attributes of its contract."""
+    name, what, lacking = found.groups()
+    names = re.findall(r"\w+", lacking)
+    listed = " and ".join(f"`{one}`" for one in names)
+    many, verb = ("s", "are") if len(names) > 1 else ("", "is")
+    missing = "implemented" if what == "method" else "declared"
+    kind = next((f.f_globals[name] for f, _ in reversed(frames) if isinstance(f.f_globals.get(name), type)), None)
+    place = place_of(kind) if kind is not None else ""
+    at = f" ({place})" if place else ""
+    return Fault(f"cannot instantiate `{name}`: {what}{many} {listed} {verb} not {missing}{at}", "")

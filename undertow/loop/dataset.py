@@ -1,0 +1,51 @@
+"""A run as a labelled dataset: names, units and meanings of what was recorded."""
+
+import numpy as np
+import xarray as xr
+
+from undertow.core.contracts import AbstractPlant
+from undertow.core.signals import Signal
+from undertow.core.status import Status
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.outcome import Outcome
+
+
+def to_dataset(outcome: Outcome, loop: ClosedLoop) -> xr.Dataset:
+    """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1)."""
+    variables = {
+        name: series(dimensions(signal), np.asarray(outcome.signals[name]), *meaning(signal, loop.plant))
+        for name, signal in loop.signals().items()
+    }
+    status = Status(int(outcome.status))
+    return xr.Dataset(
+        variables,
+        coords=coordinates(np.asarray(outcome.time), loop.plant),
+        attrs={"status": status.word, "status_sentence": outcome.sentence(), "ended": float(outcome.ended)},
+    )
+
+
+def coordinates(time: np.ndarray, plant: AbstractPlant) -> dict[str, xr.Variable]:
+    """Coordinates of the dimensions `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1)."""
+    axis = series(("axis",), np.array(plant.outputs), "output")
+    axis.attrs["unit_of_each"] = ", ".join(plant.output_units)
+    return {
+        "time": series(("time",), time, "time", "s"),
+        "axis": axis,
+        "actuator": series(("actuator",), np.arange(1, plant.inputs() + 1), "input"),
+    }
+
+
+def dimensions(signal: Signal) -> tuple[str, ...]:
+    """Names of the dimensions of a series."""
+    return ("time", *signal.dimensions)
+
+
+def meaning(signal: Signal, plant: AbstractPlant) -> tuple[str, str]:
+    """Meaning of a signal and its unit; the units of all axes where they differ."""
+    return signal.meaning, signal.unit_for(plant.output_units, plant.input_unit)
+
+
+def series(dims: tuple[str, ...], values: np.ndarray, meaning: str, unit: str | None = None) -> xr.Variable:
+    """One variable of a dataset; as a plain array, for which xarray does not import dask."""
+    units = {} if unit is None else {"units": unit}
+    return xr.Variable(dims, values, {"long_name": meaning, **units}, fastpath=True)

@@ -1,0 +1,200 @@
+"""The sampled loop as SIMD batches: many runs of one kind at once, by the batch compiler.
+
+Results equal those of `sampled.simulate` to rounding; their bits depend neither on the machine nor on the other runs.
+
+This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
+`unavailable` says why.
+"""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, PRNGKeyArray
+
+from undertow.core.contracts import Outputs
+from undertow.core.status import Status
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.outcome import Outcome
+from undertow.loop.recording import instant
+from undertow.numerics.integrators import METHODS
+from undertow.process import cache_folder
+
+if TYPE_CHECKING:
+    from simdjit import Driver, Unsupported
+else:
+    try:
+        from simdjit import Unsupported
+    except ImportError as error:
+        _REASON = (
+            f"the batch compiler cannot be imported ({error}). `pip install .` in the folder of undertow installs it"
+        )
+
+        class Unsupported(Exception):
+            """The batch compiler cannot make a program; the message says why."""
+
+    else:
+        _REASON = ""
+
+
+def unavailable() -> str:
+    """Why no run can be a SIMD batch on this machine; empty where runs can."""
+    return "" if TYPE_CHECKING else _REASON
+
+
+def gpu() -> "Driver | None":
+    """The GPU that runs SIMD batches; None where there is none."""
+    if unavailable():
+        return None
+    import simdjit
+
+    return simdjit.gpu()
+
+
+def simd_width(bits: int) -> int:
+    """How many numbers of `bits` bits fit a vector register of this processor; 1 without the batch compiler."""
+    if unavailable():
+        return 1
+    import simdjit
+
+    return simdjit.simd_width(bits)
+
+
+class Run(NamedTuple):
+    """What may differ between runs of one kind: the arrays of these trees; the rest is the same for all."""
+
+    loop: ClosedLoop
+    accumulators: tuple[sampled.AbstractAccumulator, ...]
+    start: tuple[Outputs, Outputs]
+    key: PRNGKeyArray
+
+
+class Plan(NamedTuple):
+    """Time grid, recording and integration of a run.
+
+    Attributes:
+        steps: how many.
+        dt: sampling time, s.
+        every: steps per record; 0 for none.
+        signals: names of those that are recorded.
+        method, substeps: integration of the plant within one control step.
+    """
+
+    steps: int
+    dt: float
+    every: int
+    signals: tuple[str, ...]
+    method: str
+    substeps: int
+
+    def times(self) -> Float[np.ndarray, " records"]:
+        """Times of the records, s."""
+        return np.arange(0, self.steps + 1, self.every) * self.dt
+
+
+class Ended(NamedTuple):
+    """Runs at their end, one entry each: as in `Outcome`."""
+
+    accumulated: Any
+    final: Any
+    status: np.ndarray
+    ended: np.ndarray
+    input: np.ndarray
+    time: np.ndarray
+    series: dict[str, Any]
+
+
+class BatchRunner:
+    """Runs of one kind, compiled once.
+
+    Args:
+        run: one of them.
+        plan: how they are run.
+        constant: which arrays of `run` are equal in all runs, in the order of its leaves; they shorten the program.
+        width: runs at once; as many as fit a register unless given.
+        driver: that of the GPU; None for this processor.
+
+    Raises:
+        Unsupported: a part uses an operation that the batch compiler lacks, or there is no batch compiler.
+        OSError: the driver of the GPU fails.
+    """
+
+    def __init__(self, run: Run, plan: Plan, constant: list[bool], width: int = 0, driver: "Driver | None" = None):
+        if unavailable():
+            raise Unsupported(unavailable())
+        from simdjit import Loop
+
+        numbers, rest = eqx.partition(run, eqx.is_array)
+        self._plan = plan
+        integrate, dt = METHODS[plan.method], plan.dt
+
+        def realize(numbers):
+            loop, accumulators, at, key = eqx.combine(numbers, rest)
+            return loop.realize(key), accumulators, at
+
+        def start(known):
+            realization, accumulators, at = known
+            return sampled.begin(realization, at, accumulators)
+
+        def control_step(known, carry, k):
+            realization, accumulators, _ = known
+            return sampled.control_step(realization, accumulators, jnp.asarray(dt), integrate, plan.substeps, carry, k)
+
+        def record(known, carry, k):
+            t = instant(k, jnp.asarray(dt))
+            signals = known[0].record(t, *carry[0])
+            return t, {name: signals[name] for name in plan.signals}
+
+        cache = cache_folder() / "native"
+        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache)
+
+    @property
+    def operations(self) -> int:
+        """Arithmetic operations of one step of one run: law, integration of the plant, accumulators."""
+        return self._program.operations
+
+    def run(self, numbers: Any, steps: int | None = None) -> Ended:
+        """Run a batch.
+
+        Args:
+            numbers: arrays of the runs, as in `run`, with a leading axis over runs.
+            steps: how many; as planned unless given.
+        """
+        steps, every = self._plan.steps if steps is None else steps, self._plan.every
+        carry, (time, series) = self._program.run(numbers, steps, every)
+        states, accumulated, (status, ended, wrong) = carry
+        ended = np.where(status == int(Status.OK), steps * self._plan.dt, ended)
+        return Ended(accumulated, states[:2], status, ended, wrong, time, series)
+
+
+def simulate(
+    loop: ClosedLoop,
+    *,
+    duration: float,
+    dt: float = 1e-3,
+    key: PRNGKeyArray | None = None,
+    position: Any = None,
+    velocity: Any = None,
+    record_every: int = 10,
+    accumulators: tuple[sampled.AbstractAccumulator, ...] = (),
+    method: str = "rk4",
+    substeps: int = 1,
+) -> Outcome:
+    """One run; arguments, result and errors of `sampled.simulate`.
+
+    Raises:
+        Unsupported: a part uses an operation that the batch compiler lacks, or there is no batch compiler.
+    """
+    steps, loop = sampled.steps_of(duration, dt, record_every), loop.starting_at(position)
+    start = loop.outputs_at_start(position, velocity)
+    run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
+    arrays = eqx.filter(run, eqx.is_array)
+    constant = [True] * len(jax.tree.leaves(arrays))
+    plan = Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps)
+    batch = BatchRunner(run, plan, constant, width=1)
+    ended = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
+    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, ended)
+    return Outcome(one.time, one.series, one.accumulated, one.final, one.status, one.ended, one.input)

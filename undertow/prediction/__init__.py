@@ -1,0 +1,1 @@
+"""Prediction of a scenario from its linearised closed loop."""

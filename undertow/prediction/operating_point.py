@@ -1,0 +1,98 @@
+"""Operating point of a scenario under its mean load, and the metrics predicted from there."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jax.flatten_util import ravel_pytree
+
+from undertow.analysis.linearization import margins
+from undertow.analysis.linearization.closed_loop import LinearLoop
+from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile, disturbance_profile
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.analysis.linearization.response import from_start, metrics_of, signals_within
+from undertow.analysis.theory import theory_of
+from undertow.core.contracts import AbstractController
+from undertow.numerics.random_keys import key_of_seed
+from undertow.scenario.build import Built
+
+_HELD = "at fixed weights"
+_MAX_STEPS = 200_000  # largest number of predicted steps
+
+
+class OperatingPoint(NamedTuple):
+    """Equilibrium of a scenario's loop under its mean load, with the disturbances along the reference."""
+
+    built: Built
+    around: DisturbanceProfile
+    mean: Equilibrium
+    linear: LinearLoop
+    radius: float  # spectral radius of `linear`
+
+
+def operating_point(built: Built) -> OperatingPoint:
+    """Equilibrium of a scenario's loop under the mean load of its steady window, with its linearisation.
+
+    Raises:
+        BadInput: the Jacobians are not finite there.
+    """
+    loop, settings = built.closed_loop, built.scenario.loop
+    start, stop = built.window()
+    position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)
+    unloaded = equilibrium(loop, settings.dt, position, np.zeros(len(position)))
+    steps = min(round(settings.duration / settings.dt) + 1, _MAX_STEPS)
+    around = disturbance_profile(loop, unloaded, key_of_seed(built.scenario.seed), steps, settings.dt)
+    inside = (around.time >= start) & (around.time <= stop)
+    load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
+    mean = equilibrium(loop, settings.dt, position, load)
+    linear = margins.closed(mean, settings.dt, settings.kind)
+    return OperatingPoint(built, around, mean, linear, margins.spectral_radius(linear))
+
+
+def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
+    """Metrics of the steady window from the linearised loop; or None, and the reason."""
+    if not known.mean.found:
+        rate = f"{known.mean.moving:.2g} per second"
+        return None, f"the loop has no equilibrium under the mean load: a state still changes by {rate}"
+    if known.radius >= 1:
+        pole = margins.poles(known.linear)[0]
+        moving = (
+            "; adapting weights may change that, which only a run shows"
+            if theory_of(known.built.closed_loop.controller).adapts
+            else ""
+        )
+        return (
+            None,
+            f"the loop linearised {_HELD} is unstable: rightmost pole {pole.real:+.3g} {_turning(pole)}1/s{moving}",
+        )
+    start, stop = known.built.window()
+    settings = known.built.scenario.loop
+    every = max(1, round(settings.record / settings.dt))
+    begun = from_start(known.linear, known.mean, *_start(known))
+    signals = signals_within(known.mean, begun, known.around, (start, stop), every)
+    forbidden = _forbidden(known.built.closed_loop.controller, signals)
+    units = known.built.closed_loop.plant.output_units
+    return (None, forbidden) if forbidden else (metrics_of(signals, units), "")
+
+
+def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
+    """A sentence where predicted signals exceed a bound of the controller; otherwise empty."""
+    for name, (meaning, bound) in theory_of(law).limits.items():
+        share = np.abs(signals[name]) / np.maximum(np.asarray(bound, dtype=float), 1e-300)
+        if share.max() > 1 and np.abs(signals[name]).max() > 0:
+            row, axis = np.unravel_index(share.argmax(), share.shape)
+            limit = np.broadcast_to(np.asarray(bound, dtype=float), share.shape[1:])[axis]
+            required = f"the linear model requires a {meaning} of {abs(signals[name][row, axis]):.3g}"
+            return f"{required}, which the controller limits to {limit:.3g}: the loop leaves its linear range"
+    return ""
+
+
+def _start(known: OperatingPoint) -> list[np.ndarray]:
+    """States of plant and controller at t = 0 as vectors."""
+    loop, initial = known.built.closed_loop, known.built.scenario.initial
+    outputs = loop.outputs_at_start(initial.position, initial.velocity)
+    realization = loop.realize(key_of_seed(known.built.scenario.seed))
+    return [np.asarray(ravel_pytree(state)[0]) for state in realization.start(*outputs)]
+
+
+def _turning(pole: complex) -> str:
+    return f"+- {abs(pole.imag):.3g}j " if pole.imag else ""

@@ -1,0 +1,45 @@
+"""Signals of a dataset as curves, with names and units."""
+
+import numpy as np
+import xarray as xr
+
+from undertow.report.figures.multiples import Curve
+from undertow.report.figures.style import Look, power
+
+
+def axis_names(run: xr.Dataset) -> list[str]:
+    """Names of the outputs: north, east, ..."""
+    return [str(name) for name in run["axis"].values]
+
+
+def places(run: xr.Dataset) -> list[str]:
+    """Label of the position on each axis: a position or an angle."""
+    return [label.replace("position, rad", "angle, rad") for label in per_axis(run, "position")]
+
+
+def per_axis(run: xr.Dataset, quantity: str, rate: str = "") -> list[str]:
+    """Label of a quantity on each axis with its unit, divided by `rate`: "", "/s" or "/s^2"."""
+    units = run["axis"].attrs["unit_of_each"].split(", ")
+    return [f"{quantity}, {power(unit + rate)}" for unit in units]
+
+
+def per_input(run: xr.Dataset, quantity: str, signal: str = "input") -> list[str]:
+    """Label of a quantity on each input with its unit."""
+    return [f"{quantity}, {run[signal].attrs['units']}"] * run.sizes["actuator"]
+
+
+def curve(run: xr.Dataset, name: str, signal: str, look: Look) -> Curve:
+    """A signal of a dataset, up to the end of the run."""
+    lived = run["time"].values <= run.attrs.get("ended", np.inf)
+    return Curve(name, run["time"].values[lived], run[signal].values[lived], look)
+
+
+def difference(run: xr.Dataset, name: str, signal: str, other: str, look: Look) -> Curve:
+    """One signal less another."""
+    first, second = curve(run, name, signal, look), curve(run, name, other, look)
+    return first._replace(values=first.values - second.values)
+
+
+def magnitude(curve: Curve) -> Curve:
+    """Its absolute value."""
+    return curve._replace(values=np.abs(curve.values))

@@ -1,0 +1,107 @@
+"""Long runs of the paper's controllers behind several motor models: a part of the section on fidelity levels."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from undertow.report.formats import number, prose, round_time
+from undertow.report.page import Html, join, table, tag
+
+FIGURES = ("horizons", "lags", "drifting")
+
+CAPTIONS = {
+    "horizons": prose(
+        "The upper panels show the largest weight against time; a cross marks a run that ended early. Thin grey lines "
+        "are the same controllers with weights bounded by 20. The lower panel shows the time of divergence of RCAFC on "
+        "the full motor model for each composite gain: free weights (blue) drift until the loop diverges; with bounded "
+        "weights (grey) it lasts."
+    ),
+    "lags": prose(
+        "The upper panels show thrust that follows the voltage with a first-order lag, the lower panels the motor of "
+        "Table 3 with other inductances. Five sets tolerate every lag from 1 to 300 ms, with chattering and growing "
+        "weights. One rule at the same loop gain enters a limit cycle at once. A line stops where runs ended early."
+    ),
+    "drifting": prose(
+        "One sinusoid acts per axis. Weights that differ between sets give $\\hat d = z - c \\varepsilon$, and $c$ "
+        "grows with the square of the oscillation: $\\dot c = \\gamma \\gamma_\\varepsilon |\\xi'|^2 \\varepsilon^2$. "
+        "It stops growing where the linearised loop with this $c$ is stable (dotted); the chattering decays, and the "
+        "error is that of Example 1. With weights bounded by 20, $c$ cannot reach this value, and the limit cycle "
+        "persists."
+    ),
+}
+
+
+def horizon_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
+    """The long runs, the map of lags and the mechanism; empty if they were not run.
+
+    Args:
+        results: of results.json; `horizons`, `lags` and `drifting` are used.
+        figures: figures by name.
+    """
+    content = []
+    if results.get("horizons"):
+        content += [*_horizons(results["horizons"]), *_figure(figures, "horizons"), _table(results["horizons"])]
+    if results.get("lags"):
+        content += [tag("h3", "Effect of a lag and of the winding inductance"), *_figure(figures, "lags")]
+        content.append(_lags(results["lags"], results["horizons"]["windows"]))
+    if results.get("drifting"):
+        content += [tag("h3", "Mechanism: drifting weights add damping"), *_figure(figures, "drifting")]
+    return content
+
+
+def _horizons(found: Mapping[str, Any]) -> list[Html]:
+    text = (
+        f"The same fidelity levels for {found['duration']:,.0f} s of suite U2, which repeats U1 every 20 s (U1 itself "
+        "cannot be continued, because its chirp keeps rising), sampled at 1 kHz. Each controller runs with free "
+        "weights and with weights bounded by 20 m/s^2 or rad/s^2. Metrics are computed over three windows, chattering "
+        "from every sample."
+    )
+    return [tag("h3", f"Long runs: {found['duration']:,.0f} s"), tag("p", prose(text))]
+
+
+def _table(found: Mapping[str, Any]) -> Html:
+    windows = found["windows"]
+    rows, last = [], None
+    for row in found["rows"]:
+        level = tag("b", row["level"]) if row["level"] != last else ""
+        last = row["level"]
+        name = join(prose(row["words"]), tag("div", tag("code", row["scenario"]), class_="small"))
+        rows.append((level, name, _ended(row), *_by_window(row, windows)))
+    return _wide(("level", "controller", f"status after {found['duration']:g} s"), windows, rows)
+
+
+def _lags(rows: Sequence[Mapping[str, Any]], windows: Sequence[Sequence[float]]) -> Html:
+    """One row per run of the map, with the prediction for drifted weights beside five sets."""
+    shown = []
+    for row in rows:
+        unit = "ms" if row["kind"] == "lag" else "mH"
+        behind = f"{'lag' if row['kind'] == 'lag' else 'winding'} {1e3 * row['value']:g} {unit}"
+        between = row["damping"]
+        theory = "" if row["law"] != "five" else "never" if between is None else _between(between)
+        shown.append((behind, row["words"], theory, _ended(row), *_by_window(row, windows)))
+    return _wide(("behind", "controller", "stable for c, 1/s", "status"), windows, shown)
+
+
+def _between(gains: Sequence[float]) -> str:
+    low, high = gains
+    return f"above {low:.0f}" if high >= 6000 else f"{low:.0f} to {high:.0f}"
+
+
+def _ended(row: Mapping[str, Any]) -> Html:
+    word = str(row["status"]).replace("_", " ")
+    text = f"lasts {row['ended']:g} s" if row["lasted"] else f"{word} at {round_time(row['ended'])} s"
+    return tag("span", text, class_=f"chip {'holds' if row['lasted'] else 'fails'}")
+
+
+def _by_window(row: Mapping[str, Any], windows: Sequence[Sequence[float]]) -> list[Html]:
+    metrics = ("tracking_rms", "input_variation", "weights_peak")
+    return [number(row[metric][i]) for metric in metrics for i in range(len(windows))]
+
+
+def _wide(head: Sequence[str], windows: Sequence[Sequence[float]], rows: Sequence[Sequence[Any]]) -> Html:
+    names = ("tracking rms", "variation, V/s", "largest weight")
+    titles = [join(name, tag("div", f"{a:g} to {b:g} s", class_="small")) for name in names for a, b in windows]
+    return table((*head, *titles), rows, numeric=range(len(head), len(head) + len(titles)), wide=True)
+
+
+def _figure(figures: Mapping[str, Html], name: str) -> list[Html]:
+    return [figures[name]] if name in figures else []

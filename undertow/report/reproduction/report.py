@@ -1,0 +1,177 @@
+"""The report of `undertow reproduce`: one self-contained page, and the figures as files."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from undertow.report.figures import fidelity_figure, paper_figures, sweep_figure
+from undertow.report.figures.ablations import ablations_figure
+from undertow.report.figures.horizons import horizons_figure
+from undertow.report.figures.lags import drifting_figure, lags_figure
+from undertow.report.figures.robust_fidelity import robust_fidelity_figure
+from undertow.report.figures.writing import save
+from undertow.report.formats import prose
+from undertow.report.page import Html, bullets, document, figure, section, table, tag
+from undertow.report.reproduction import horizon_section, tables
+from undertow.report.reproduction.background import ASSUMED, INTRODUCTION, LEFT_OPEN
+from undertow.report.reproduction.captions import captions
+from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, robust_section
+from undertow.reproduction.reproduce import Reproduction
+
+_TITLE = "Reproduction of the paper and check of its claims"
+
+# Figures with a section of their own; all others are in the first section.
+_ELSEWHERE = ("fidelity", "sweep", *horizon_section.FIGURES, *FIGURES)
+
+
+def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path) -> Path:
+    """Write `report.html`, and every figure as SVG and PNG into `figures/`.
+
+    Args:
+        results: contents of results.json; missing parts are left out of the page.
+        figures: by name: fig02, fig06, ..., fig13, fidelity, sweep; others are shown after the paper's.
+        folder: where to write, created if missing.
+
+    Returns:
+        The page.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = captions(dict(results)) | horizon_section.CAPTIONS | CAPTIONS
+    shown = {}
+    for name, one in figures.items():
+        vector, _ = save(one, folder / "figures", name)
+        shown[name] = figure(vector.read_text(encoding="utf-8"), name, _alternative(one, name), texts.get(name, name))
+    page = folder / "report.html"
+    page.write_text(document(_TITLE, *_content(results, shown)), encoding="utf-8")
+    return page
+
+
+def _content(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
+    claims = list(results.get("claims") or [])
+    parts = {
+        "figures": ("Figures", _figures(results, figures)),
+        "table2": ("Table 2 in numbers", _table2(results)),
+        "fidelity": ("Fidelity levels of the thruster model", _fidelity(results, figures)),
+        "audit": ("Check of the claims", _audit(claims, figures)),
+        "robust_variant": (TITLE, robust_section(results.get("robust_variant") or {}, figures)),
+        "open": ("Open points and misprints of the paper", _left_open()),
+        "provenance": ("Provenance", _provenance(results)),
+    }
+    shown = {name: (title, content) for name, (title, content) in parts.items() if content}
+    links = tag("nav", *(tag("a", title, href=f"#{name}") for name, (title, _) in shown.items()))
+    first = [tag("h1", _TITLE), tag("p", INTRODUCTION, class_="lead"), links]
+    verdicts = tag("div", tag("h3", "Summary of the verdicts"), tables.glance(claims)) if claims else Html("")
+    assumed = tag("div", tag("h3", "Assumptions"), bullets(ASSUMED), class_="assumed")
+    first.append(tag("div", verdicts, assumed, class_="first"))
+    return [*first, *(section(name, title, *content) for name, (title, content) in shown.items())]
+
+
+def _figures(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
+    content = [one for name, one in figures.items() if name not in _ELSEWHERE]
+    if content:
+        note = (
+            "Dotted lines are desired or true values, solid lines RCAFC, dashed lines RAFC. Figures 1 and 3 to 5 of "
+            "the paper are block diagrams."
+        )
+        content = [tag("p", note), *content]
+    if results.get("example1"):
+        text = (
+            "A separate script solves Example 1 independently with a fixed step of 1 ms. The two solutions should "
+            "agree within 2 %; because of the jumps in $d$ the last digit depends on how the run is sampled."
+        )
+        content += [tag("h3", "Comparison with an independent solution"), tag("p", prose(text))]
+        content.append(tables.reference_table(results["example1"]))
+    return content
+
+
+def _table2(results: Mapping[str, Any]) -> list[Html]:
+    if not results.get("table2"):
+        return []
+    text = (
+        "Example 1, 10 s to 20 s, rms over the six axes. The paper's own words are below each number. "
+        "The input of the fuzzy system is the modelling error $\\varepsilon$ or the state $X$."
+    )
+    return [tag("p", prose(text)), tables.table2(results["table2"])]
+
+
+def _fidelity(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
+    if not results.get("fidelity"):
+        return []
+    text = (
+        "Both controllers, with the gains of Table 1, control the same vehicle under the same disturbance on four "
+        "fidelity levels of the thruster model. First, 20 s of U1 as one differential equation, with tracking rms in m "
+        "and rad and estimation rms in m/s^2 and rad/s^2 from 10 s to 20 s. A run that completes 20 s can still "
+        "diverge later."
+    )
+    return [
+        tag("p", prose(text)),
+        *(figures[name] for name in ("fidelity",) if name in figures),
+        tables.fidelity_levels(results["fidelity"]),
+        *horizon_section.horizon_section(results, figures),
+    ]
+
+
+def _audit(claims: list[dict[str, Any]], figures: Mapping[str, Html]) -> list[Html]:
+    if not claims:
+        return []
+    text = (
+        "Each verdict names the run behind it, with the fidelity levels and the simulated time. It does not extend "
+        "beyond these. Run the commands in the folder of this page."
+    )
+    return [tag("p", prose(text)), tables.audit(claims), *(figures[name] for name in ("sweep",) if name in figures)]
+
+
+def _left_open() -> list[Html]:
+    return [
+        table(
+            ("location", "problem", "treatment here"), [[prose(cell) for cell in row] for row in LEFT_OPEN], wide=True
+        )
+    ]
+
+
+def _provenance(results: Mapping[str, Any]) -> list[Html]:
+    found = results.get("provenance")
+    return [tables.provenance(found)] if found else []
+
+
+def _alternative(one: Figure, name: str) -> str:
+    """Title of a figure, as its alternative text."""
+    return one.texts[0].get_text() if one.texts else name
+
+
+def write(found: Reproduction, folder: Path) -> Path:
+    """Write `report.html` and `figures/`; returns the page.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    return write_report(found.results, make_figures(found), folder)
+
+
+def make_figures(found: Reproduction) -> dict[str, Figure]:
+    """Every figure of the report, by name."""
+    numbers = {claim["id"]: claim["numbers"] for claim in found.results["claims"]}
+    levels = found.results["fidelity"]
+    figures = paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
+        "fidelity": fidelity_figure(levels, {fidelity: found.datasets(fidelity) for fidelity in levels}),
+        "sweep": sweep_figure(numbers["C6"]["sweep"]),
+        "horizons": horizons_figure(found.results["horizons"]["rows"], found.results["horizons"]["duration"]),
+        "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),
+        "drifting": drifting_figure(found.results["drifting"]),
+    }
+    robust = found.results.get("robust_variant")
+    return figures | _of_last_chapter(found, robust) if robust else figures
+
+
+def _of_last_chapter(found: Reproduction, robust: dict[str, Any]) -> dict[str, Figure]:
+    rows = robust["fidelity"]
+    datasets = {(row["place"], row["law"]): found.runs[Path(row["scenario"]).stem].dataset for row in rows}
+    return {
+        "robust_fidelity": robust_fidelity_figure(rows, datasets),
+        "ablations": ablations_figure(robust["ablations"]),
+    }

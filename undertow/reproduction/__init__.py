@@ -1,0 +1,1 @@
+"""Reproduction of the paper: its examples, figures, tables and claims."""

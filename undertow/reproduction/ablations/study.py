@@ -1,0 +1,119 @@
+"""Running the ablations by the campaign engine, and their rows in results.json."""
+
+import itertools
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from undertow.campaign import task
+from undertow.campaign.campaign_schema import read_campaign, whole
+from undertow.campaign.campaign_summary import median_interval, quantiles
+from undertow.campaign.labels import words
+from undertow.campaign.trials import trials
+from undertow.core.status import Status
+from undertow.reproduction.ablations.verdicts import Ablation
+from undertow.reproduction.all_outputs import RMS
+from undertow.scenario.part_cache import PartCache
+
+QUICK_SEEDS = 8
+
+_FOLDER = Path(__file__).parent
+
+
+class Spread(NamedTuple):
+    """One metric over the seeds; a run that ended early counts as infinite."""
+
+    median: float
+    low: float  # 5 % of the seeds are below
+    high: float  # 5 % are above
+    median_low: float  # 95 % confidence interval of the median
+    median_high: float
+
+
+class Summary(NamedTuple):
+    """One variant over the seeds."""
+
+    seeds: int
+    failures: int  # runs that ended early
+    metrics: Mapping[str, Spread]
+
+    def median(self, metric: str) -> float:
+        """Median of a metric."""
+        return self.metrics[metric].median
+
+
+def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str, Any]:
+    """One ablation as in results.json.
+
+    Args:
+        ablation: which one.
+        quick: whether to run fewer seeds.
+        folder: folder of `campaigns/`, from which it can be run again; None to write nothing.
+
+    Raises:
+        KeyError: the verdict needs a variant that the campaign does not have.
+    """
+    found: dict[str, tuple[str, Summary]] = {}
+    for name in ablation.campaigns:
+        found |= dict(summaries(_FOLDER / f"{name}.yaml", ablation.metrics, quick, folder))
+    verdict = ablation.judge({name: one for name, (_, one) in found.items()})
+    return {
+        "id": ablation.id,
+        "question": read_campaign(_FOLDER / f"{ablation.campaigns[0]}.yaml")[0].description,
+        "prediction": ablation.prediction,
+        "agrees": verdict.agrees,
+        "answer": verdict.text,
+        "left_out": ablation.left_out,
+        "variants": [
+            {
+                "name": name,
+                "settings": settings,
+                "seeds": one.seeds,
+                "failures": one.failures,
+                "metrics": {metric: spread._asdict() for metric, spread in one.metrics.items()},
+            }
+            for name, (settings, one) in found.items()
+        ],
+    }
+
+
+def summaries(
+    path: Path, metrics: tuple[str, ...], quick: bool, folder: Path | None = None
+) -> Iterator[tuple[str, tuple[str, Summary]]]:
+    """Every combination of a campaign by its name: how it differs from the scenario, and its metrics over the seeds."""
+    campaign, text = read_campaign(path)
+    if quick:
+        campaign = campaign.model_copy(update={"trials": QUICK_SEEDS})
+    several = trials(campaign, text)
+    asked = whole(campaign, several.scenario.data)
+    if folder is not None:
+        (folder / "campaigns").mkdir(parents=True, exist_ok=True)
+        (folder / "campaigns" / path.name).write_text(asked, encoding="utf-8")
+    columns = task.run_trials(asked, str(several.scenario.folder), range(several.number))
+    if (columns["status"] == task.INVALID).any():
+        task.build_trial(several, PartCache(), int(np.argmax(columns["status"] == task.INVALID)))  # raises the error
+    names = list(itertools.product(*campaign.axes.values()))
+    for i, name in enumerate(names):
+        own = {key: values[i :: len(names)] for key, values in columns.items()}
+        lasted = own["status"] == int(Status.OK)
+        own |= {RMS: _over_all_outputs(own)}
+        own["share"] = own["estimation_rms"] / np.where(own["uncertainty_rms"] > 0, own["uncertainty_rms"], np.nan)
+        defined = [metric for metric in metrics if not np.isnan(own[metric][lasted]).all() or not lasted.any()]
+        kept = {metric: spread(np.where(lasted, own[metric], np.inf)) for metric in defined}
+        settings = ", ".join(f"{key}: {words(value)}" for key, value in several.values(i).items())
+        yield ", ".join(name), (settings or "Table 1", Summary(lasted.size, int((~lasted).sum()), kept))
+
+
+def _over_all_outputs(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The paper's figure over six outputs, from groups of equal size: m and, for a vehicle, rad."""
+    groups = [columns[name] for name in ("position_rms", "attitude_rms") if name in columns]
+    defined = [group for group in groups if not np.isnan(group).all()] or groups
+    return np.sqrt(np.mean(np.square(defined), axis=0))
+
+
+def spread(values: np.ndarray) -> Spread:
+    """Quantiles of a metric over the seeds."""
+    low, median, high = quantiles(values).values()
+    return Spread(median, low, high, *median_interval(values))

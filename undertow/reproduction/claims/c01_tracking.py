@@ -1,0 +1,60 @@
+"""C1: tracking converges to a small neighbourhood of zero."""
+
+from undertow.reproduction.claims.finding import Finding, Runs
+from undertow.reproduction.horizons import Long, name_of
+from undertow.reproduction.lag_map import windings
+from undertow.reproduction.setup import FIDELITIES
+
+CLAIM = "The tracking error converges to a small neighbourhood of zero."
+
+_SMALL = 1e-3  # m, rad; rms
+
+
+def scenarios(quick: bool) -> dict:
+    """No runs besides the fidelity comparison, the long runs and the map of lags."""
+    return {}
+
+
+def judge(runs: Runs, long: Long) -> Finding:
+    """At every fidelity level, for 20 s and for the long horizon; and against the inductance of the winding."""
+    lasting = {level: long[name] for level in FIDELITIES if (name := name_of(level, "rcafc")) in long}
+    short = {level: one.windows[0] for level, one in lasting.items()}
+    horizon = max(one.built.scenario.loop.duration for one in lasting.values())
+    said = []
+    for level, run in lasting.items():
+        found, last = run.windows[0], run.windows[-1]
+        if found is None:
+            said.append(f"{level}: ends at {run.ended:.2f} s")
+            continue
+        ending = "lasts" if run.lasted else f"ends at {run.ended:.0f} s"
+        late = f", {last['tracking_rms']:.2g} at its end" if last else ""
+        said.append(
+            f"{level}: {found['tracking_rms']:.2g} m and rad rms at 10 to 20 s with {found['input_variation']:.0f} "
+            f"V/s of chattering, {ending}{late}"
+        )
+    kept = {value: run for value, run in windings(long).items() if run.windows[0] is not None}
+    lost = {value: run for value, run in windings(long).items() if run.windows[0] is None}
+    text = f"RCAFC at Table 1, 1 kHz, U2 for {horizon:g} s. " + "; ".join(said) + ". Inductance of the winding: "
+    text += ", ".join(f"{1e3 * value:g} mH {_ending(run)}" for value, run in windings(long).items())
+    text += " (Table 3: 10 mH). With a lag only, weights that drift apart add damping, unknown to the theorem."
+    numbers = {
+        "tracking_rms_short": {level: found and found["tracking_rms"] for level, found in short.items()},
+        "ended": {level: None if run.lasted else run.ended for level, run in lasting.items()},
+        "windings_ended": {f"{value:g}": None if run.lasted else run.ended for value, run in windings(long).items()},
+    }
+    simulated = f"levels {', '.join(lasting)}, U2 at 1 kHz, {horizon:g} s"
+    good = [level for level, found in short.items() if found and found["tracking_rms"] < _SMALL]
+    if len(good) == len(short) and not lost:
+        return Finding("holds", text, "ideal_rcafc", simulated, numbers)
+    if not good:
+        return Finding("fails", text, "electromechanical_rcafc", simulated, numbers)
+    verdict = f"holds if the winding has at most {1e3 * max(kept, default=0):g} mH and 20 s are enough"
+    early = [f"{level} ends at {run.ended:.0f} s" for level, run in lasting.items() if level in good and not run.lasted]
+    completed = [level for level in good if lasting[level].lasted]
+    verdict += f"; for {horizon:g} s, of {', '.join(lasting)}, at {' and '.join(completed)} only" if completed else ""
+    verdict += f" ({', '.join(early)})" if early else ""
+    return Finding(verdict, text, "electromechanical_rcafc", simulated, numbers)
+
+
+def _ending(run) -> str:
+    return "lasts" if run.lasted else f"ends at {run.ended:.3g} s"

@@ -1,0 +1,87 @@
+"""Comparison of RCAFC and RAFC at equal tuning effort under voltage limits and velocity noise."""
+
+from typing import Any
+
+from undertow.reproduction.horizons import BOUND, Long, sampled
+from undertow.reproduction.running import BatchResult
+from undertow.reproduction.setup import RAFC, RCAFC, equal_gain, scenario
+
+LIMITS = (150.0, 100.0, 60.0)  # V
+NOISE = 0.01  # m/s, rad/s
+
+# Name -> words, gamma_eps, gains.
+_LAWS: dict[str, tuple[str, float, dict[str, Any]]] = {
+    "rcafc": ("RCAFC", RCAFC, {}),
+    "rafc": ("RAFC with gamma raised", RAFC, equal_gain()),
+    "rafc_bounded": ("RAFC with gamma raised and weights within 20", RAFC, equal_gain() | {"weights_bound": BOUND}),
+}
+
+
+def scenarios() -> dict[str, dict[str, Any]]:
+    """Example 1 at 1 kHz with limited voltages, and with noise of 1 cm/s on the velocities."""
+    found, load = {}, {"kind": "u2"}  # U1 for 20 s, as in the long runs, so that they share a program
+    for law, (words, composite, gains) in _LAWS.items():
+        common = {
+            "composite": composite,
+            "controller": {"weights_bound": float("inf")} | gains,
+            "loop": sampled(20.0),
+            "disturbance": load,
+        }
+        for volts in LIMITS:
+            one = scenario(f"{words}, voltages limited to {volts:g} V", **common)
+            one["plant"]["thruster"]["supply"] = volts
+            found[_limited(law, volts)] = one
+        noise = {"kind": "white_noise", "velocity": NOISE}
+        found[_noisy(law)] = scenario(f"{words}, 1 cm/s of velocity noise", navigation=noise, **common)
+    return found
+
+
+def sentences(long: Long, metric: str, unit: str) -> tuple[str, dict[str, Any]]:
+    """The metric under limits and under noise, in words and as numbers (None: ended early)."""
+    limited = {law: [_steady(long[_limited(law, volts)], metric) for volts in LIMITS] for law in _LAWS}
+    tracking = {law: [_shown(long[_limited(law, volts)]) for volts in LIMITS] for law in _LAWS}
+    noisy = {law: _steady(long[_noisy(law)], metric) for law in _LAWS}
+    volts = ", ".join(f"{one:g}" for one in LIMITS)
+    text = (
+        f"This is so with unlimited voltages and exact velocities. With limits of {volts} V (1 kHz) RCAFC tracks "
+        f"to {_listed(tracking['rcafc'])} m and rad, RAFC with gamma raised to {_listed(tracking['rafc'])}, because "
+        f"its weights wind up (with weights within {BOUND:g}: {_listed(tracking['rafc_bounded'])}). With 1 cm/s of "
+        f"velocity noise: RCAFC {noisy['rcafc']:.3g} {unit}, RAFC with gamma raised {noisy['rafc']:.3g}."
+    )
+    return text, {"limits": list(LIMITS), "limited": limited, "noisy": noisy}
+
+
+def lost_by_limits(long: Long) -> bool:
+    """Whether RAFC with gamma raised is worse than RCAFC at every limit."""
+    worse = lambda volts: (
+        (_steady(long[_limited("rafc", volts)], "tracking_rms") or float("inf"))
+        > 10 * (_steady(long[_limited("rcafc", volts)], "tracking_rms") or float("inf"))
+    )
+    return all(map(worse, LIMITS))
+
+
+def worse_by_noise(long: Long, metric: str) -> bool:
+    """Whether the metric of RAFC with gamma raised is larger than that of RCAFC under noise."""
+    return (_steady(long[_noisy("rafc")], metric) or float("inf")) > (_steady(long[_noisy("rcafc")], metric) or 0.0)
+
+
+def _limited(law: str, volts: float) -> str:
+    return f"c02_{law}_{volts:g}V"
+
+
+def _noisy(law: str) -> str:
+    return f"c02_{law}_noise"
+
+
+def _steady(run: BatchResult, metric: str) -> float | None:
+    found = run.windows[0]
+    return None if found is None else found[metric]
+
+
+def _shown(run: BatchResult) -> str:
+    error = _steady(run, "tracking_rms")
+    return f"an early end at {run.ended:.1f} s" if error is None else f"{error:.2g}"
+
+
+def _listed(words: list[str]) -> str:
+    return f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,53 @@
+"""Verdict on a claim, and comparisons that several claims share."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from undertow.reproduction.all_outputs import with_all_outputs
+from undertow.reproduction.setup import equal_gain_ratio
+from undertow.scenario.execute import Executed
+
+Runs = Mapping[str, Executed]
+
+
+class Finding(NamedTuple):
+    """Verdict on one claim."""
+
+    verdict: str
+    evidence: str
+    shown_by: str | None  # name of the scenario of the evidence
+    simulated: str  # fidelity levels, conditions and duration
+    numbers: Mapping[str, Any] = MappingProxyType({})
+
+
+# RAFC with gamma raised until its low-frequency loop gain equals that of RCAFC, for a fair comparison.
+EQUAL_GAIN = "rafc_equal_gain"
+
+
+def pair(runs: Runs, metric: str) -> tuple[float, float, float]:
+    """A steady metric of RCAFC and RAFC at Table 1, and of RAFC at equal loop gain (Example 1)."""
+    names = ("ideal_rcafc", "ideal_rafc", EQUAL_GAIN)
+    return tuple(steady(runs[name])[metric] for name in names)
+
+
+def steady(run: Executed) -> dict[str, Any]:
+    """Steady metrics of a run that reached its end.
+
+    Raises:
+        RuntimeError: it did not.
+    """
+    if run.steady is None:
+        raise RuntimeError(f"a run of the audit ended early: {run.status.word} ({run.built.scenario.description})")
+    return with_all_outputs(run.steady)
+
+
+def at_table_1(runs: Runs, metric: str, what: str, unit: str) -> tuple[str, dict[str, float]]:
+    """A metric of RCAFC and RAFC as a sentence, at the paper's gains and at equal tuning, and as numbers."""
+    rcafc, rafc, fair = pair(runs, metric)
+    text = (
+        f"{what} of RCAFC {rcafc:.3g} {unit}, RAFC {rafc:.3g} {unit} ({rafc / rcafc:.1f} times) at Table 1; "
+        f"RAFC with gamma raised {equal_gain_ratio():.0f} times, to the same loop gain: {fair:.3g} {unit} "
+        f"({fair / rcafc:.2f} times)."
+    )
+    return text, {"rcafc": rcafc, "rafc": rafc, EQUAL_GAIN: fair}

@@ -1,0 +1,280 @@
+"""Build parts from their descriptions; the signature of a part defines its options."""
+
+import functools
+import inspect
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+
+from undertow.core import catalogue, checks, contracts
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.metric import AbstractMetric
+from undertow.core.user_code import fault_of
+from undertow.power import ESC, Battery
+from undertow.scenario.csv_table import read_csv, samples_of
+from undertow.scenario.values import checked
+from undertow.scenario.vehicle_file import is_vehicle_file, make_vehicle
+from undertow.sensors.sensor import AbstractSensor
+from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.vehicle import Vehicle
+
+# Arguments that are parts themselves: their kind, and the default part; a tuple for a list of parts.
+INNER = {
+    "vehicle": ("vehicles", "odin"),
+    "thruster": ("thrusters", "paper_table3"),
+    "battery": ("power", "battery"),
+    "esc": ("power", "esc"),
+    "sensors": ("sensors", ("imu", "dvl", "depth", "compass", "position_fix")),
+}
+
+# Kinds that are data: a scenario may change every declared parameter by name.
+_ADJUSTABLE = ("vehicles", "thrusters")
+
+_CONTRACTS = {
+    "vehicles": Vehicle,
+    "thrusters": AbstractThruster,
+    "power": Battery | ESC,
+    "plants": contracts.AbstractPlant,
+    "controllers": contracts.AbstractController,
+    "disturbances": contracts.AbstractDisturbance,
+    "references": contracts.AbstractReference,
+    "sensors": AbstractSensor,
+    "navigation": contracts.AbstractNavigation,
+    "metrics": AbstractMetric,
+}
+
+_VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+
+
+def make(
+    kind: str,
+    description: str | Mapping[str, Any],
+    folder: Path,
+    given: tuple[Any, ...] = (),
+    context: Mapping[str, Any] | None = None,
+) -> tuple[Any, dict[str, Any]]:
+    """A part, and its description with every default filled in.
+
+    Args:
+        kind: folder of the catalogue.
+        description: name, or mapping of `kind` (the name) and options; a vehicle's name may be that of a YAML file.
+        folder: folder of relative file names.
+        given: leading arguments that do not come from the user.
+        context: defaults of options that follow from the rest of a scenario.
+
+    Raises:
+        BadInput: the description is invalid; key names start at the part.
+    """
+    options: dict[str, Any] = {"kind": description} if isinstance(description, str) else dict(description)
+    name = options.pop("kind", None)
+    if not isinstance(name, str):
+        raise BadInput("kind", f"name one of the {kind}", name)
+    if kind == "vehicles" and is_vehicle_file(name):
+        return make_vehicle(name, options, folder)
+    try:
+        function = catalogue.find(kind, name, folder)
+    except BadInput as error:
+        raise BadInput("kind", error.must, error.got, hint=error.hint) from error.__cause__
+    function, preset = _preset(function, options)
+    own = inspect.signature(function).parameters
+    options = {key: value for key, value in (context or {}).items() if key in own} | options
+    changes, table = {}, {}
+    if kind in _ADJUSTABLE:
+        changes = {key: options.pop(key) for key in list(options) if key not in own}
+    if "samples" in own:
+        table = _samples(options, folder)
+    part, resolved = call(function, options, given, folder)
+    if not isinstance(part, _CONTRACTS[kind]):
+        raise BadInput("kind", f"name a function that returns {_title(_CONTRACTS[kind])}", f"{name}: {part!r}")
+    if table:
+        del resolved["samples"]
+    part = adjust(part, changes, tuple(own)) if changes else part
+    return part, {"kind": _portable(name, folder), **preset, **resolved, **changes, **table}
+
+
+def presets_of(function: Callable[..., Any]) -> Mapping[str, Callable[..., Any]]:
+    """Presets of a part, each with its own options; most parts have none."""
+    return getattr(function, "presets", {})
+
+
+def call(
+    function: Callable[..., Any], options: Mapping[str, Any], given: tuple[Any, ...] = (), folder: Path | None = None
+) -> tuple[Any, dict[str, Any]]:
+    """Result of a function called with checked options, and all options with their defaults.
+
+    Raises:
+        BadInput: unknown, missing or mistyped option, or an error of the function.
+    """
+    declared = _declared_once if inspect.isfunction(function) else _declared
+    signature, hints = declared(function)
+    known = {name: option for name, option in signature[len(given) :] if option.kind not in _VARIABLE}
+    for key in options:
+        if key not in known:
+            raise BadInput(key, "be an option here", "unknown", hint=did_you_mean(key, known) if known else "")
+    arguments, resolved = {}, {}
+    for name, parameter in known.items():
+        if name in INNER:
+            description = options.get(name, inner_default(name, parameter))
+            made = (None, None) if description is parameter.default is None else _inner(name, description, folder)
+            arguments[name], resolved[name] = made
+        elif name in options:
+            arguments[name] = resolved[name] = checked(name, options[name], hints.get(name), parameter.default)
+        elif parameter.default is inspect.Parameter.empty:
+            raise BadInput(name, "be given")
+        else:
+            arguments[name], resolved[name] = parameter.default, _listed(parameter.default)
+    return _made(lambda: function(*given, **arguments)), resolved
+
+
+def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -> Any:
+    """The same part with some declared parameters replaced; parameters of inner parts as nested mappings.
+
+    Args:
+        part: the part.
+        changes: new values by name.
+        options: other valid names, for suggestions.
+
+    Raises:
+        BadInput: unknown parameter, wrong type or shape, or an error of the part.
+    """
+    fields = type(part).__dataclass_fields__
+    values = {name: getattr(part, name) for name in fields}
+    adjustable = [n for n, f in fields.items() if "unit" in f.metadata or isinstance(values[n], eqx.Module)]
+    for key, change in changes.items():
+        if key not in adjustable:
+            raise BadInput(
+                key, "be an option or parameter here", "unknown", hint=did_you_mean(key, [*options, *adjustable])
+            )
+        if isinstance(values[key], eqx.Module):
+            if not isinstance(change, Mapping):
+                raise BadInput(key, "be a mapping of parameters", change)
+            try:
+                values[key] = adjust(values[key], change)
+            except BadInput as error:
+                raise error.at(key) from error.__cause__
+        else:
+            number = np.asarray(checked(key, change, None, 0.0), dtype=float)
+            if number.shape != np.shape(values[key]):
+                raise BadInput(
+                    key, _sized(np.shape(values[key])), f"of shape {number.shape}" if number.shape else change
+                )
+            values[key] = number
+    return _made(lambda: type(part)(**values))
+
+
+def is_part(thing: Any) -> bool:
+    """Whether an object keeps the contract of some kind of part."""
+    return isinstance(thing, tuple(_CONTRACTS.values()))
+
+
+def contract_like(thing: Any) -> tuple[str, list[str]]:
+    """Name of the contract of which something has most methods, and these; "" where it has none of any."""
+    kinds = [kind for contract in _CONTRACTS.values() for kind in typing.get_args(contract) or (contract,)]
+    shared = {
+        kind: [name for name in getattr(kind, "__abstractmethods__", ()) if hasattr(thing, name)] for kind in kinds
+    }
+    nearest = max(kinds, key=lambda kind: len(shared[kind]))
+    return (nearest.__name__ if shared[nearest] else ""), sorted(shared[nearest])
+
+
+def _preset(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Callable[..., Any], dict[str, str]]:
+    """The function of the preset in the options, by default the first; and its name."""
+    presets = presets_of(function)
+    if not presets:
+        return function, {}
+    name = options.pop("preset", next(iter(presets)))
+    checks.choice("preset", name, tuple(presets))
+    return presets[name], {"preset": name}
+
+
+def _title(contract: Any) -> str:
+    names = [kind.__name__ for kind in typing.get_args(contract) or (contract,)]
+    return " or ".join(f"an {name}" if name[0] in "AEIO" else f"a {name}" for name in names)
+
+
+def _sized(shape: tuple[int, ...]) -> str:
+    return {0: "be one number", 1: f"be a list of {sum(shape)} numbers"}.get(len(shape), f"have shape {shape}")
+
+
+def _declared(function: Callable[..., Any]) -> tuple[list[tuple[str, inspect.Parameter]], dict[str, Any]]:
+    """Options of a function, and their annotations."""
+    return list(inspect.signature(function).parameters.items()), typing.get_type_hints(function)
+
+
+_declared_once = functools.cache(_declared)  # for thousands of trials; methods belong to short-lived parts
+
+
+def _made(make: Callable[[], Any]) -> Any:
+    """Result of `make`; any exception is about the options, which are its only input."""
+    try:
+        return make()
+    except BadInput:
+        raise
+    except Exception as error:
+        fault = fault_of(error)
+        raise BadInput("", "", fault.says, hint=fault.hint) from error
+
+
+def inner_default(name: str, parameter: inspect.Parameter) -> Any:
+    """Default part of an argument of INNER; None for no part."""
+    return INNER[name][1] if parameter.default is inspect.Parameter.empty else parameter.default
+
+
+def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[str, Any] | list[dict[str, Any]]]:
+    kind, default = INNER[name]
+    if isinstance(default, tuple):
+        if not isinstance(description, list | tuple):
+            raise BadInput(name, "be a list of parts", description)
+        pairs = [_at(f"{name}[{i}]", kind, {}, entry, folder) for i, entry in enumerate(description)]
+        return [part for part, _ in pairs], [resolved for _, resolved in pairs]
+    return _at(name, kind, {"kind": default}, description, folder)
+
+
+def _at(
+    name: str, kind: str, default: Mapping[str, str], description: Any, folder: Path | None
+) -> tuple[Any, dict[str, Any]]:
+    """The part at a key."""
+    if isinstance(description, Mapping):
+        description = {**default, **description}
+    elif not isinstance(description, str):
+        raise BadInput(name, "be a name, or a mapping with `kind` and options", description)
+    try:
+        return make(kind, description, folder or Path())
+    except BadInput as error:
+        raise error.at(name) from error.__cause__
+
+
+def _samples(options: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Turn `file` (a CSV file) or `csv` (its text, as results keep it) into `samples`; returns what results keep."""
+    given = [key for key in ("file", "csv", "samples") if key in options]
+    if len(given) > 1:
+        must = "be left out when there is another source of samples"
+        raise BadInput(given[1], must, f"given together with `{given[0]}`")
+    for key in ("file", "csv"):
+        if key in options and not isinstance(options[key], str):
+            raise BadInput(key, "be text", repr(options[key]))
+    if "file" in options:
+        name = options.pop("file")
+        options["csv"] = read_csv(folder / name)
+    else:
+        name = "csv"
+    if "csv" not in options:
+        return {}
+    text = options.pop("csv")
+    options["samples"] = samples_of(text, Path(name).name)
+    return {"csv": text}
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(entry) for entry in value] if isinstance(value, tuple) else value
+
+
+def _portable(name: str, folder: Path) -> str:
+    if ".py:" not in name:
+        return name
+    path, attribute = name.rsplit(":", 1)
+    return f"{(folder / path).resolve()}:{attribute}"

@@ -1,0 +1,124 @@
+"""Results of a finished run: status, metrics, and a self-describing dataset."""
+
+import json
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import xarray as xr
+
+from undertow.analysis.certify import certify
+from undertow.analysis.metrics import Gathered, meanings, measure, results
+from undertow.analysis.success import Success, judged
+from undertow.core.metric import AbstractMetric, Metric
+from undertow.core.status import Status
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.dataset import to_dataset
+from undertow.loop.outcome import Outcome
+from undertow.power.ledger import closure
+from undertow.scenario.provenance import checksum, content_hash, versions
+
+
+class Measuring(NamedTuple):
+    """How a run is measured.
+
+    Attributes:
+        window: start and stop of the steady metrics, s.
+        dt: sampling time, s.
+        own: metrics of the scenario's own.
+        criterion: of success.
+        gathered: what has gathered the steady metrics along the run; () where the record is what counts.
+    """
+
+    window: tuple[float, float]
+    dt: float
+    own: tuple[AbstractMetric, ...] = ()
+    criterion: Mapping[str, float] = MappingProxyType({})
+    gathered: Gathered = ()
+
+
+class Labelled(NamedTuple):
+    """One finished run."""
+
+    status: Status
+    steady: dict[str, Any] | None  # metrics over the steady window; None when the run ended early
+    whole: dict[str, Any]
+    success: Success | None
+    dataset: xr.Dataset
+
+
+def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[str, Any]) -> Labelled:
+    """Compute the metrics of a run and make its dataset.
+
+    Args:
+        loop: the closed loop.
+        outcome: its outcome.
+        how: settings of the measurement.
+        attributes: further attributes of the dataset.
+    """
+    status, ended = Status(int(outcome.status)), float(outcome.ended)
+    counted = {} if rules(loop) is None else {"rules": rules(loop)}
+    covered = status is Status.OK and how.window[0] < ended
+    dataset = to_dataset(outcome, loop)
+    over = lambda start, stop: (
+        measure(outcome, loop.plant, start, stop, how.own) | closure(dataset, start, stop) | counted
+    )
+    # A run ended by an invalid command has no input at that instant.
+    last = ended - how.dt / 2 if status is Status.COMMAND_NOT_FINITE else ended
+    steady, whole = over(*how.window) if covered else None, over(0.0, last)
+    if steady is not None and how.gathered:
+        steady |= results(how.gathered, outcome.accumulated)
+    lasted_but_unseen = status is Status.OK and not covered
+    success = None if lasted_but_unseen else judged(how.criterion, steady)
+    certified = certify(dataset, loop.controller, how.window, how.dt)
+    if certified is not None:
+        dataset = dataset.assign(certified.signals)
+        dataset.attrs["certificate"] = to_json(certified.summary)
+    dataset.attrs |= attributes | versions()
+    known = meanings(loop, how.own)
+    dataset.attrs["metrics"] = to_json({"steady": steady, "whole": whole})
+    dataset.attrs["metric_meanings"] = to_json({n: one._asdict() for n, one in known.items() if n in whole})
+    if success is not None:
+        dataset.attrs["success"] = to_json(success._asdict())
+    dataset.attrs["content_hash"] = content_hash(dataset)
+    dataset.attrs["checksum"] = checksum(dataset)
+    return Labelled(status, steady, whole, success, dataset)
+
+
+def rules(loop: ClosedLoop) -> int | None:
+    """Number of fuzzy rules per axis; None for a controller without a fuzzy system."""
+    fuzzy = getattr(loop.controller, "fuzzy", None)
+    return None if fuzzy is None else fuzzy.rules
+
+
+def metrics_text(dataset: xr.Dataset, further: dict[str, Any] | None = None) -> str:
+    """Contents of metrics.json for a run, with further entries."""
+    ending = {"status": dataset.attrs["status"], "ended": dataset.attrs["ended"]}
+    metrics = json.loads(dataset.attrs["metrics"]) | (further or {})
+    success = json.loads(dataset.attrs.get("success", "null"))
+    found = ending | {"success": success} | metrics | {"certificate": certificate_of(dataset)}
+    return to_json(found, indent=2) + "\n"
+
+
+def metrics_of(dataset: xr.Dataset) -> dict[str, Metric]:
+    """Unit and meaning of the metrics of a run, by name, in the order of tables."""
+    return {name: Metric(**one) for name, one in json.loads(dataset.attrs["metric_meanings"]).items()}
+
+
+def certificate_of(dataset: xr.Dataset) -> dict[str, Any] | None:
+    """Certificate of a run from its attributes; None for a controller without one, and in older files."""
+    return json.loads(dataset.attrs["certificate"]) if "certificate" in dataset.attrs else None
+
+
+def to_json(value: Any, indent: int | None = None) -> str:
+    """Standard JSON: numbers that are not finite become null."""
+    return json.dumps(_finite(value), indent=indent, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

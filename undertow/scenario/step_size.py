@@ -1,0 +1,114 @@
+"""Stability of fixed integration steps: for the thrusters before a run, for the whole loop after a failed run."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+
+from undertow.core.status import Status
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.continuous import flow
+from undertow.loop.outcome import Outcome
+from undertow.scenario.schema import Loop
+from undertow.thrusters.thruster import AbstractThruster
+
+# Largest step times decay rate at which a method is stable.
+_LIMITS = {"rk4": 2.785, "euler": 2.0}
+
+# Number of records of a failed run that are examined.
+_LOOKS = 9
+
+
+def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[str, ...]:
+    """A sentence when steps are too long for the linearised thrusters at rest."""
+    if loop.method not in _LIMITS:
+        return ()
+    rate, step = fastest_decay(thruster), loop.dt / loop.substeps
+    longest = _LIMITS[loop.method] / rate if rate else np.inf
+    if step <= longest:
+        return ()
+    return (
+        f"the thrusters have a time constant of {1e3 / rate:.3g} ms, for which integration steps above "
+        f"{1e3 * longest:.3g} ms are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically. "
+        f"Use {_remedy(loop, longest)}, or another fidelity level",
+    )
+
+
+def _remedy(loop: Loop, longest: float) -> str:
+    """A setting with steps of at most `longest` seconds."""
+    if loop.kind == "continuous":
+        return f"a loop.dt of at most {longest:.2g} s"
+    return f"loop.substeps: {int(np.ceil(loop.dt / longest))} or more"
+
+
+def fastest_decay(thruster: AbstractThruster) -> float:
+    """Fastest decay of a thruster at rest, 1/s; 0 for one without a state."""
+    rest, tree = ravel_pytree(thruster.initial_state(1))
+    if not rest.size:
+        return 0.0
+    rates = lambda x: ravel_pytree(thruster.dynamics(tree(x), jnp.zeros(1)))[0]
+    return float(np.abs(np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(rates))(rest)))).max())
+
+
+def step_failure(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> str:
+    """The reason of a failed run if its integration steps were too long; empty if that is not the cause.
+
+    A sampled run integrates the plant, a continuous run the controller with it. The loop is linearised at the start and
+    at further records before the plant moved unusually fast: quadratic drag makes any diverging plant fast.
+    """
+    failed = Status(int(outcome.status)) in (Status.DIVERGED, Status.NOT_FINITE)
+    if not failed or loop.method not in _LIMITS:
+        return ""
+    rate = max(_decays(closed_loop, loop, outcome), default=0.0)
+    step, longest = loop.dt / loop.substeps, _LIMITS[loop.method] / rate if rate else np.inf
+    if loop.kind == "continuous":
+        step = loop.dt
+    if step <= longest:
+        return ""
+    what = "plant and controller have" if loop.kind == "continuous" else "the plant has"
+    return (
+        f"The run diverged numerically, not because the loop is unstable: {what} a time constant of {1e3 / rate:.3g} "
+        f"ms, for which steps of {loop.method} above {1e3 * longest:.3g} ms are unstable, but the step is "
+        f"{1e3 * step:g} ms. Use {_remedy(loop, longest)}."
+    )
+
+
+def _decays(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> list[float]:
+    """Fastest decay rates at some records, 1/s, without those where the fastest mode grows."""
+    plant, samples = closed_loop.plant, outcome.signals
+    ordinary = np.abs(np.asarray(samples["velocity"])).max(axis=1) <= _ordinary(closed_loop, outcome)
+    rows = np.flatnonzero(ordinary & (np.asarray(outcome.time) <= float(outcome.ended)))
+    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, _LOOKS).round().astype(int))] if len(rows) else []
+    first = plant.initial_state(samples["position"][0], samples["velocity"][0])
+    if loop.kind == "continuous":
+        realization = closed_loop.realize(jax.random.PRNGKey(0))
+        flat, tree = ravel_pytree(realization.start(samples["position"][0], samples["velocity"][0]))
+        rates = lambda state: ravel_pytree(flow(jnp.zeros(()), tree(state), realization))[0]
+        return _fastest(rates, [(flat,)])
+    _, tree = ravel_pytree(first)
+    still = plant.no_load()
+    rates = lambda state, u: ravel_pytree(plant.dynamics(jnp.zeros(()), tree(state), u, still))[0]
+    states = [ravel_pytree(plant.initial_state(samples["position"][i], samples["velocity"][i]))[0] for i in chosen]
+    return _fastest(rates, [(state, samples["input"][i]) for state, i in zip(states, chosen, strict=True)])
+
+
+def _ordinary(closed_loop: ClosedLoop, outcome: Outcome) -> float:
+    """Largest usual speed, m/s or rad/s: a few times that of the reference or of the start."""
+    times = np.linspace(0.0, float(outcome.ended), _LOOKS)
+    desired = np.abs([np.asarray(closed_loop.reference.at(jnp.asarray(t)).velocity) for t in times]).max()
+    return max(1.0, 3 * float(desired), 1.5 * float(np.abs(np.asarray(outcome.signals["velocity"][0])).max()))
+
+
+def _fastest(rates: Callable[..., Any], points: list[tuple[Any, ...]]) -> list[float]:
+    """Fastest decay rate at each point, without points where the fastest mode grows."""
+    slopes, found = jax.jit(jax.jacfwd(rates)), []
+    for point in points:
+        matrix = np.asarray(slopes(*map(jnp.asarray, point)))
+        if np.isfinite(matrix).all():
+            poles = np.linalg.eigvals(matrix)
+            fastest = poles[np.abs(poles).argmax()]
+            found += [float(abs(fastest))] if fastest.real < 0 else []
+    return found

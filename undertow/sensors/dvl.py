@@ -1,0 +1,47 @@
+"""Doppler velocity log: velocity over the ground, in body axes."""
+
+import jax.numpy as jnp
+
+from undertow.numerics.linear_algebra import matvec
+from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractVelocitySensor
+
+
+class DVL(AbstractVelocitySensor):
+    """u, v, w over the ground, m/s."""
+
+    def reading(self, motion: Motion):
+        return matvec(motion.rotation.T, motion.velocity)
+
+    def velocity_noise(self):
+        return jnp.full(6, jnp.inf).at[:3].set(self.sampling.noise)
+
+    def correct(self, estimate: Estimate, reading) -> Estimate:
+        """Compare the reading with the velocity at its time, from the acceleration since."""
+        then = estimate.velocity - self.sampling.delay * estimate.acceleration
+        error = matvec(estimate.rotation(), reading) - then
+        return estimate._replace(velocity=estimate.velocity + self.blend * error)
+
+
+def dvl(
+    period: float = 0.125,
+    noise: float = 5e-3,
+    bias: float = 0.0,
+    resolution: float = 1e-3,
+    delay: float = 0.05,
+    dropout: float = 0.0,
+    blend: float = 0.3,
+) -> DVL:
+    """Velocity over the ground from four acoustic beams. Defaults are those of a small device near the bottom.
+
+    Args:
+        period: between pings, s; it grows with the distance to the bottom.
+        noise: standard deviation of each component, m/s.
+        bias: standard deviation of a constant offset, sampled once per run, m/s.
+        resolution: step of the reading, m/s; 0 for none.
+        delay: until a sample is delivered, s.
+        dropout: probability that a ping finds no bottom.
+        blend: share of each new velocity in the estimated one; the rest comes from the accelerometers.
+    """
+    return DVL(Sampling(period, noise, bias, resolution, delay, dropout), blend)

@@ -1,0 +1,57 @@
+"""Inertial measurement unit: roll and pitch, angular rates, specific force."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.numerics.linear_algebra import matvec
+from undertow.sensors.estimate import Estimate, Motion, gravity
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractVelocitySensor
+
+
+class IMU(AbstractVelocitySensor):
+    """Roll, pitch (rad), p, q, r (rad/s), specific force (m/s^2, body axes, the mean since the last step)."""
+
+    def reading(self, motion: Motion):
+        return jnp.concatenate([motion.angles[:2], motion.rates, motion.specific_force])
+
+    def velocity_noise(self):
+        return jnp.full(6, jnp.inf).at[3:].set(self.sampling.noise[2:5])
+
+    def predict(self, estimate: Estimate, reading) -> Estimate:
+        acceleration = matvec(estimate.rotation(), reading[5:]) + gravity()
+        return estimate._replace(rates=reading[2:5], acceleration=acceleration)
+
+    def correct(self, estimate: Estimate, reading) -> Estimate:
+        return estimate.turned(jnp.concatenate([reading[:2], estimate.angles()[2:]]), self.blend)
+
+
+def imu(
+    period: float = 0.01,
+    angle_noise: float = 5e-3,
+    rate_noise: float = 2e-3,
+    force_noise: float = 0.02,
+    angle_bias: float = 0.0,
+    rate_bias: float = 0.0,
+    force_bias: float = 0.0,
+    delay: float = 0.0,
+    dropout: float = 0.0,
+    blend: float = 0.05,
+) -> IMU:
+    """Gyroscopes, accelerometers and the inclination fused from them. Defaults are those of cheap MEMS devices.
+
+    Args:
+        period: between samples, s.
+        angle_noise: standard deviation of roll and pitch, rad.
+        rate_noise: of p, q and r, rad/s.
+        force_noise: of the specific force, m/s^2.
+        angle_bias: standard deviation of a constant offset of roll and pitch, sampled once per run, rad.
+        rate_bias: likewise of p, q and r, rad/s.
+        force_bias: likewise of the specific force, m/s^2; an error of roll of 0.01 rad acts like 0.1 m/s^2.
+        delay: until a sample is delivered, s.
+        dropout: probability that a sample is lost.
+        blend: share of each new inclination in the estimated one; the rest comes from the rates.
+    """
+    noise = np.repeat([angle_noise, rate_noise, force_noise], [2, 3, 3])
+    bias = np.repeat([angle_bias, rate_bias, force_bias], [2, 3, 3])
+    return IMU(Sampling(period, noise, bias, delay=delay, dropout=dropout), blend)

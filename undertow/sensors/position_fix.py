@@ -1,0 +1,40 @@
+"""Position fixes: acoustic positioning (USBL, LBL), or a satellite receiver at the surface."""
+
+from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
+
+_LEVEL = slice(0, 2)
+
+
+class PositionFix(AbstractSensor):
+    """North and east, m."""
+
+    def reading(self, motion: Motion):
+        return motion.position[_LEVEL]
+
+    def correct(self, estimate: Estimate, reading) -> Estimate:
+        return estimate.fixed(_LEVEL, reading, self.sampling, self.blend)
+
+
+def position_fix(
+    period: float = 1.0,
+    noise: float = 0.05,
+    bias: float = 0.0,
+    resolution: float = 0.0,
+    delay: float = 0.2,
+    dropout: float = 0.0,
+    blend: float = 0.2,
+) -> PositionFix:
+    """North and east at a low rate.
+
+    Args:
+        period: between fixes, s.
+        noise: standard deviation of each, m.
+        bias: standard deviation of a constant offset, sampled once per run, m.
+        resolution: step of the reading, m; 0 for none.
+        delay: until a fix is delivered, s.
+        dropout: probability that a fix is lost.
+        blend: alpha of the alpha-beta filter of the estimate.
+    """
+    return PositionFix(Sampling(period, noise, bias, resolution, delay, dropout), blend)

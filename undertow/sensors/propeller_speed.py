@@ -1,0 +1,51 @@
+"""Propeller speeds, reported by sensorless drives or encoders."""
+
+from undertow.core.errors import BadInput
+from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
+
+
+class PropellerSpeed(AbstractSensor):
+    """Speed of every propeller, rad/s; its rate of change is the difference of successive readings.
+
+    Raises:
+        BadInput: the thrusters have no speed that could be measured.
+    """
+
+    def reading(self, motion: Motion):
+        if motion.actuator is None:
+            hint = "Take fidelity: shaft or electromechanical, on which it is reported, or leave propeller_speed out"
+            raise BadInput("propeller_speed", "have propellers that turn", "thrusters without a speed", hint=hint)
+        return motion.actuator.speed
+
+    def correct(self, estimate: Estimate, reading) -> Estimate:
+        before = estimate.actuator.speed
+        speed = before + self.blend * (reading - before)
+        report = estimate.actuator._replace(speed=speed)
+        if report.acceleration is not None:
+            report = report._replace(acceleration=(speed - before) / self.sampling.period)
+        return estimate._replace(actuator=report)
+
+
+def propeller_speed(
+    period: float = 0.01,
+    noise: float = 0.5,
+    bias: float = 0.0,
+    resolution: float = 0.0,
+    delay: float = 0.0,
+    dropout: float = 0.0,
+    blend: float = 1.0,
+) -> PropellerSpeed:
+    """Speeds of all propellers.
+
+    Args:
+        period: between samples, s; not shorter than the sampling time of the loop.
+        noise: standard deviation, rad/s.
+        bias: standard deviation of a constant offset, sampled once per run, rad/s.
+        resolution: step of the reading, rad/s; 0 for none.
+        delay: until a sample is delivered, s.
+        dropout: probability that a sample is lost.
+        blend: share of each new reading in the estimate; 1 for no filter.
+    """
+    return PropellerSpeed(Sampling(period, noise, bias, resolution, delay, dropout), blend)

@@ -1,1 +1,0 @@
-"""Studies: the paper, figure by figure and claim by claim."""

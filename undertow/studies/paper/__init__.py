@@ -1,1 +1,0 @@
-"""The paper: its examples, figures, tables and claims, as runs and numbers."""

@@ -1,1 +1,0 @@
-"""What will happen, before anything is run."""

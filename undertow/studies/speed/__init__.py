@@ -1,1 +1,0 @@
-"""How fast undertow is, beside what anyone would write in NumPy."""

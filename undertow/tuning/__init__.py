@@ -1,0 +1,1 @@
+"""Tuning of controllers: tunable parameters, training runs, cost, search and certificate."""

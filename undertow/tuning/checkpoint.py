@@ -1,0 +1,118 @@
+"""Checkpoint of a tuning: every evaluation is written to disk, so that an interrupted tuning can be resumed.
+
+The methods are deterministic functions of the evaluations, so a tuning is resumed by running them again: the
+evaluations come from the checkpoint as far as it goes. The result is the same as without the interruption, bit for bit.
+"""
+
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from undertow.core.errors import BadInput
+
+_KEYS = ("what", "at", "answer", "elapsed")  # of an evaluation
+
+
+class OutOfTime(Exception):
+    """The budget does not allow another evaluation."""
+
+
+class Checkpoint:
+    """Evaluations in order.
+
+    Args:
+        path: the file, with one evaluation per line; the first line identifies the tuning.
+        about: identifies the tuning; an earlier checkpoint must have the same.
+        budget: s, of all sessions together.
+        resume: whether to continue an earlier checkpoint.
+        started: `time.perf_counter()` of the start, so that preparations count.
+
+    Raises:
+        BadInput: there is nothing to resume, or another tuning; or there is an unfinished tuning without `resume`.
+    """
+
+    def __init__(self, path: Path, about: str, budget: float, resume: bool, started: float | None = None):
+        self._path, self._budget = path, budget
+        self._started = time.perf_counter() if started is None else started
+        self._known = _read(path, about, resume)
+        self._asked, self._spent = 0, self._known[-1]["elapsed"] if self._known else 0.0
+        self._longest: dict[str, float] = {}
+        if not self._known:
+            path.write_text(json.dumps({"about": about}) + "\n", encoding="utf-8")
+
+    @property
+    def elapsed(self) -> float:
+        """Time spent in all sessions, s."""
+        if self._asked < len(self._known):
+            return self._known[self._asked]["elapsed"]
+        return self._spent + time.perf_counter() - self._started
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the budget is used up."""
+        return self.elapsed > self._budget
+
+    def ask(self, what: str, at: np.ndarray, compute: Callable[[], Any], must: bool = False) -> Any:
+        """An evaluation, from the checkpoint or computed and written.
+
+        Args:
+            what: kind of evaluation.
+            at: its arguments.
+            compute: computes it, as JSON can hold it.
+            must: whether to compute it even if the budget is used up.
+
+        Raises:
+            OutOfTime: it would exceed the budget.
+        """
+        place = np.asarray(at, dtype=float).tolist()
+        if self._asked < len(self._known):
+            found = self._known[self._asked]
+            if (found["what"], found["at"]) != (what, place):
+                raise BadInput("--resume", "repeat the same steps as before", f"a run with other steps from {what} on")
+            self._asked += 1
+            return found["answer"]
+        begun = self.elapsed
+        if not must and begun + self._longest.get(what, 0.0) > self._budget:
+            raise OutOfTime
+        answer = compute()
+        self._longest[what] = self.elapsed - begun if what in self._longest else 0.0  # the first one is compiled
+        line = {"what": what, "at": place, "answer": answer, "elapsed": self.elapsed}
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
+            file.flush()
+            os.fsync(file.fileno())  # faster than any evaluation
+        return answer
+
+
+def has_answers(path: Path) -> bool:
+    """Whether a checkpoint holds an evaluation, so that resuming makes sense."""
+    try:
+        return path.read_bytes().count(b"\n") > 1
+    except OSError:
+        return False
+
+
+def _read(path: Path, about: str, resume: bool) -> list[dict[str, Any]]:
+    if not path.exists():
+        if resume:
+            raise BadInput("--resume", "find an unfinished tuning", f"nothing in {path.parent}")
+        return []
+    if not resume:
+        hint = "Add --resume to continue it, or choose another folder"
+        raise BadInput("--out", "be a folder without an unfinished tuning", str(path.parent), hint=hint)
+    try:
+        lines = path.read_bytes().decode().splitlines(keepends=True)
+        entries = [json.loads(line) for line in lines if line.endswith("\n")]  # the last one may be incomplete
+        known = [{key: entry[key] for key in _KEYS} for entry in entries[1:]]
+    except (ValueError, KeyError, TypeError) as error:
+        hint = "Remove it to start again"
+        raise BadInput("--resume", "find a checkpoint that can be read", f"{path}: {error!r}", hint=hint) from None
+    if entries[:1] not in ([], [{"about": about}]):  # a process may have been killed while it wrote the first line
+        raise BadInput("--resume", "continue with the same scenario and method", "given with others")
+    path.write_text("".join(line for line in lines if line.endswith("\n")), encoding="utf-8")
+    return known

@@ -1,0 +1,170 @@
+"""Tune the controller of a scenario: certified gains, and their evaluation on held-out runs."""
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from undertow.core.contracts import AbstractController
+from undertow.core.errors import BadInput
+from undertow.scenario.build import in_its_precision
+from undertow.scenario.provenance import text_hash
+from undertow.scenario.reading import Text, dump
+from undertow.tuning.checkpoint import Checkpoint, OutOfTime
+from undertow.tuning.cost import Shares
+from undertow.tuning.evaluator import AT_ONCE, Evaluation
+from undertow.tuning.objective import Objective, Step, Watch
+from undertow.tuning.problem import Problem, problem
+from undertow.tuning.search import descend, search, spread_points
+from undertow.tuning.stability import Certificate, Certifier, no_certificate
+
+METHODS = ("gradient", "search")
+
+# Share of the budget for the search; the rest is for the final evaluation.
+_FOR_THE_SEARCH = 0.85
+
+_INITIAL_DESIGN = 2 * AT_ONCE  # points that are evaluated before the search, including the given gains
+
+
+class Evaluated(NamedTuple):
+    """One choice of gains on both sets of trials."""
+
+    name: str
+    options: Mapping[str, Any] | None  # None for the gains as given
+    train: Shares  # arrays, one entry per trial
+    held_out: Shares
+    train_cost: float
+    held_out_cost: float
+    certificate: Certificate
+
+
+class Tuned(NamedTuple):
+    """Result of a tuning."""
+
+    problem: Problem
+    method: str
+    evaluated: tuple[Evaluated, ...]  # given, ..., start, tuned
+    steps: list[Step]
+    evaluations: int
+    rejected: int  # points that would have been better, but have no certificate
+    elapsed: float  # s
+    finished: bool  # whether the search converged within the budget
+    searched: int  # points that were evaluated after the initial design
+
+    @property
+    def scenario(self) -> dict[str, Any]:
+        """The scenario with the tuned gains."""
+        return self.problem.scenario(self.evaluated[-1].options or {})
+
+
+@in_its_precision
+def tune(
+    text: Text,
+    checkpoint: Path,
+    *,
+    method: str = "gradient",
+    budget: float = 240.0,
+    resume: bool = False,
+    beside: Mapping[str, Mapping[str, Any]] | None = None,
+    say: Callable[[str], None] = lambda stage: None,
+    watch: Watch = lambda best, evaluations: None,
+) -> Tuned:
+    """Tune the controller of a scenario.
+
+    Args:
+        text: the scenario.
+        checkpoint: file from which an interrupted tuning is resumed.
+        method: `gradient`, gradient descent by forward differentiation, or `search`, differential evolution.
+        budget: s, in total; the initial design is always evaluated, and a batch that has begun is completed.
+        resume: whether to resume from the checkpoint.
+        beside: other choices of options, by name, to evaluate like the given and the tuned ones.
+        say: called with the current stage.
+        watch: called with the best so far after every batch.
+
+    Raises:
+        BadInput: the scenario, or the checkpoint to resume, is invalid.
+    """
+    begun = time.perf_counter()
+    say("building")
+    task = problem(text)
+    about = text_hash(dump({"method": method, "tune": task.built.scenario.tune.model_dump(), **task.built.resolved}))
+    notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
+    make = lambda point: task.law(task.options(point))
+    first = make(task.start)
+    evaluation = Evaluation(task.training_loop, make, first, task.train)
+    if method == "gradient" and not notes.is_over:
+        evaluation.precompile_slope(task.start)
+    certifier = Certifier(task.training_loop, task.train, first)
+    objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
+    say("compiling and evaluating the initial design")
+    seed = task.built.scenario.seed
+    others = spread_points(_INITIAL_DESIGN - 1, len(task.parameters), seed)
+    objective.costs(np.vstack([task.start, others]), must=True)  # otherwise slow compiling would leave no result
+    start = objective.best
+    if start is None:
+        raise no_certificate(certifier(first), _INITIAL_DESIGN)
+    say("tuning")
+    finished = True
+    try:
+        iterations = task.built.scenario.tune.iterations
+        if method == "gradient":
+            descend(objective, np.array(start.point), start.cost, iterations)
+        else:
+            search(objective, np.array(start.point), iterations, seed)
+    except OutOfTime:
+        finished = False
+    say("evaluating on held-out runs")
+    best = objective.best or start
+    chosen: list[tuple[str, Mapping[str, Any] | None]] = [("given", None), *(beside or {}).items()]
+    chosen += [(name, task.rounded(np.array(step.point))) for name, step in (("start", start), ("tuned", best))]
+    evaluated = _evaluate(task, evaluation, certifier, chosen)
+    if not evaluated[-1].certificate.holds:
+        raise BadInput("tune", "find gains whose certificate holds after rounding", evaluated[-1].certificate.worst)
+    return Tuned(
+        problem=task,
+        method=method,
+        evaluated=evaluated,
+        steps=objective.steps,
+        evaluations=objective.evaluations,
+        rejected=objective.rejected,
+        elapsed=notes.elapsed,
+        finished=finished,
+        searched=objective.evaluations - _INITIAL_DESIGN,
+    )
+
+
+@in_its_precision
+def compare_gains(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple[Evaluated, ...]:
+    """Evaluate the gains of a scenario, and other choices of its options by name, on the runs that `tune` would use.
+
+    Scenarios that differ only in their controller use the same runs.
+
+    Raises:
+        BadInput: the scenario is invalid.
+    """
+    task = problem(text)
+    make = lambda point: task.law(task.options(point))
+    first = make(task.start)
+    evaluation = Evaluation(task.training_loop, make, first, task.train)
+    return _evaluate(
+        task, evaluation, Certifier(task.training_loop, task.train, first), [("given", None), *choices.items()]
+    )
+
+
+def _evaluate(
+    task: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, Mapping[str, Any] | None]]
+) -> tuple[Evaluated, ...]:
+    """Evaluate all choices on both sets of trials; the given gains without rounding."""
+    own = task.built.closed_loop.controller
+    laws: list[AbstractController] = [own if options is None else task.law(options) for _, options in chosen]
+    train, held_out = (evaluation.shares(laws, trials) for trials in (task.train, task.held_out))
+    costs = [evaluation.total(parts).mean(axis=1) for parts in (train, held_out)]
+    row = lambda parts, i: Shares(*(np.asarray(part)[i] for part in parts))
+    return tuple(
+        Evaluated(
+            name, options, row(train, i), row(held_out, i), float(costs[0][i]), float(costs[1][i]), certifier(laws[i])
+        )
+        for i, (name, options) in enumerate(chosen)
+    )
