@@ -31,6 +31,6 @@ def test_times_of_divergence():
     """Seconds after which the paper's laws end, in the section of failures, are those of the page of limits."""
     section = plain(README).split("## Where the paper's claims fail")[1].split("## Beyond the paper")[0]
     ends = re.findall(r"(?:after|lasts|with none) (\d+(?:\.\d+)?) s\b", section)
-    assert {"60", "1829", "139", "545", "122"} <= set(ends)
-    for end in ("60", "1829", "139", "545", "122"):
+    assert {"60", "1829", "135", "547", "122"} <= set(ends)
+    for end in ("60", "1829", "135", "547", "122"):
         assert re.search(rf"\b{end}(?:,| s| and)", plain(LIMITS)), end

@@ -57,7 +57,7 @@ def test_a_batch_is_its_runs_one_by_one():
 
 
 def test_w1_lasts_only_with_bounded_weights():
-    """Benchmark, section 7: gamma_eps 20 on the full motor model is lost after 139 s; within a box of 20 it lasts."""
+    """Benchmark, section 7: gamma_eps 20 on the full motor model is lost after 135 to 139 s, by rounding; within a box of 20 it lasts."""
     names = [horizons.name_of("electromechanical", "w1", bounded) for bounded in (False, True)]
     free, bounded = flown({name: horizons.scenarios(True)[name] for name in names}).values()
     assert free.windows[0] is not None, "20 s show nothing"

@@ -66,8 +66,10 @@ ASSUMED = (
         mathml("d(t)"),
         " includes the kinematic term ",
         mathml(r"\dot J \nu"),
-        ", as in Remark 2 of the paper, although it could be computed. On fidelity levels <i>shaft</i> and ",
-        "<i>electromechanical</i> the body moves freely, and ",
+        Html(
+            ", as in Remark 2 of the paper, although it could be computed. On fidelity levels <i>shaft</i> and "
+            "<i>electromechanical</i> the body moves freely, and "
+        ),
         mathml("d(t)"),
         " is added. In both cases the uncertainty is measured from the run.",
     ),

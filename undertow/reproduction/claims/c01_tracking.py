@@ -51,7 +51,7 @@ def judge(runs: Runs, long: Long) -> Finding:
     verdict = f"holds if the winding has at most {1e3 * max(kept, default=0):g} mH and 20 s are enough"
     early = [f"{level} ends at {run.ended:.0f} s" for level, run in lasting.items() if level in good and not run.lasted]
     completed = [level for level in good if lasting[level].lasted]
-    verdict += f"; for {horizon:g} s, of {', '.join(lasting)}, at {' and '.join(completed)} only" if completed else ""
+    verdict += f"; for {horizon:g} s only at fidelity {' and '.join(completed)}" if completed else ""
     verdict += f" ({', '.join(early)})" if early else ""
     return Finding(verdict, text, "electromechanical_rcafc", simulated, numbers)
 
