@@ -18,7 +18,7 @@ FEEDBACK = 10 ** RNG.uniform(-1.5, 1.5, (COUNT, 2))
 FACTORS = RNG.normal(size=(COUNT, 2, 2))
 WEIGHTS = FACTORS @ FACTORS.swapaxes(1, 2) + 0.1 * np.eye(2)
 A = np.stack([np.array([[0, 1], [-k1, -k2]]) for k1, k2 in FEEDBACK])
-P = np.asarray(companion_lyapunov(FEEDBACK, WEIGHTS))
+P = np.asarray(companion_lyapunov(jnp.asarray(FEEDBACK), jnp.asarray(WEIGHTS)))
 
 
 def test_table_1_gives_the_matrix_of_the_theory():

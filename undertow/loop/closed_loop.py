@@ -160,6 +160,7 @@ class Realization(NamedTuple):
             "measured_velocity": y.velocity,
             "reference": r.position,
             "error": controller.model.coordinates.difference(r.position, truth.position),
+            # From the true acceleration; it includes Delta of Eq. (3).
             "uncertainty": controller.model.coordinates.acceleration(truth, acceleration)
             - known_acceleration(controller, z, truth, applied),
             "input": applied,

@@ -15,7 +15,6 @@ RECORDED = {
     "measured_velocity": Signal(("axis",), "[axis]/s", "velocity that the controller receives"),
     "reference": Signal(("axis",), "[axis]", "desired position x_d"),
     "error": Signal(("axis",), "[axis]", "tracking error x_d - x"),
-    # Computed from the true acceleration; includes Delta of Eq. (3).
     "uncertainty": Signal(("axis",), "[axis]/s^2", "lumped uncertainty d = x_ddot - F - G u, measured"),
     "input": Signal(("actuator",), "[input]", "input applied"),
     "commanded_input": Signal(("actuator",), "[input]", "input commanded"),

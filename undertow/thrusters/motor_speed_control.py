@@ -1,6 +1,6 @@
 """Speed control of motors by computed voltage, so that a thruster follows a commanded thrust."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -26,6 +26,7 @@ class MotorState(NamedTuple):
     current: PerThruster  # A
 
 
+@runtime_checkable
 class WithMotor(Protocol):
     """A thruster with a motor model."""
 
