@@ -13,7 +13,7 @@ from undertow.campaign.runs import planned, run_of
 from undertow.loop.simd_batch import BatchRunner, Plan, Run
 from undertow.scenario.build import build
 
-# Table 1 except for gamma_eps and the weight bound: without it the weights drift until the loop diverges after about 135 s.
+# Table 1 except for gamma_eps and the weight bound: without it the weights drift, and the loop diverges at about 135 s.
 W1: dict[str, Any] = {
     "description": "W1",
     "plant": {
