@@ -137,5 +137,7 @@ def test_the_chapter_on_the_page(tmp_path):
     ):
         assert said in words
     assert "diverged at 1.5 s" in words and "most ended early" in words
+    colours = set(re.findall(r'<span class="chip (holds|fails)">(completed|diverged)', page))
+    assert colours == {("holds", "completed"), ("fails", "diverged")}
     assert words.count("scenarios/robust_variant_") == len(ROWS)
     assert "figure-ablations" in page

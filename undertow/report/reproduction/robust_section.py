@@ -108,7 +108,7 @@ def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
         steady = row["steady"] or {}
         place = tag("b", row["words"]) if row["words"] != last else ""
         last = row["words"]
-        ended = tag("span", ending(dict(row)), class_=f"chip {'holds' if row['status'] == 'ok' else 'fails'}")
+        ended = tag("span", ending(dict(row)), class_=f"chip {'holds' if row['status'] == 'completed' else 'fails'}")
         name = join(row["name"], tag("div", tag("code", row["scenario"]), class_="small"))
         shown.append((place, name, ended, *(number(steady.get(metric)) for metric in _FIDELITY)))
     head = (
