@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.analysis import theory
 from undertow.analysis.certificate.function import gramian, lyapunov_residual, transition
+from undertow.controllers.composite_law import RCAF
+from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
 from undertow.controllers.robust.estimator import Estimator
 from undertow.disturbances.sinusoid import sinusoid
@@ -219,3 +222,13 @@ def test_a_run_that_failed_counts_until_its_end():
     assert run.status != 0 and ended < 2.0
     assert hypothesis(run, "limits")["steady"] is None
     json.dumps(run.certificate, allow_nan=False)
+
+
+def test_theory_holds_for_a_class_made_of_a_law_and_for_no_other():
+    class Renamed(RCAF):
+        """The paper's law under another name."""
+
+    law = rcaf(double_integrator(2).model())
+    renamed = Renamed(**vars(law))
+    assert theory.theory_of(renamed).poles(0) == theory.theory_of(law).poles(0) != []
+    assert theory.theory_of(pid(double_integrator(2).model())).certificate is None

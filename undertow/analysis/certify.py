@@ -7,7 +7,7 @@ import xarray as xr
 
 from undertow.analysis.certificate.function import Lyapunov
 from undertow.analysis.certificate.hypotheses import Hypothesis
-from undertow.analysis.theory import Window, theory_of
+from undertow.analysis.theory import SteadyWindow, theory_of
 from undertow.core.contracts import AbstractController
 from undertow.loop.dataset import series
 
@@ -45,7 +45,7 @@ def certify(
     lived = run.isel(time=run["time"].values <= run.attrs["ended"] + _HAIR)
     if parts is None or not lived.sizes["time"]:
         return None
-    steady = Window(*window) if run.attrs["status"] == "completed" else Window(np.inf, np.inf)
+    steady = SteadyWindow(*window) if run.attrs["status"] == "completed" else SteadyWindow(np.inf, np.inf)
     time = lived["time"].values
     with np.errstate(all="ignore"):  # a run that diverged may have had any numbers
         function, hypotheses, numbers = parts(run, lived, steady, dt)
@@ -77,7 +77,7 @@ def _rate(value: np.ndarray, time: np.ndarray) -> np.ndarray:
     return np.concatenate([[np.nan], np.diff(value) / np.diff(time)])
 
 
-def _summed(one: Hypothesis, time: np.ndarray, window: Window) -> dict[str, Any]:
+def _summed(one: Hypothesis, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:
     known = {"name": one.name, "sentence": one.sentence}
     if one.held is None:
         return known | {"whole": None, "steady": None, "first_failure": None, "unknown": one.unknown}
@@ -85,7 +85,7 @@ def _summed(one: Hypothesis, time: np.ndarray, window: Window) -> dict[str, Any]
     return known | window.shares(one.held, time) | {"first_failure": float(broken[0]) if broken.size else None}
 
 
-def _course(value: np.ndarray, time: np.ndarray, window: Window) -> dict[str, Any]:
+def _course(value: np.ndarray, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:
     """Where V began and ended, and the share of steps from record to record at which it rose."""
     rises = np.diff(value) > _RISE * value.max()
     ends = {"start": float(value[0]), "end": float(value[-1]), "largest": float(value.max())}

@@ -6,12 +6,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.law_signals import ESTIMATE, MODELLING_ERROR
-from undertow.controllers.tracking_error import check_gains, demanded_acceleration
+from undertow.controllers.tracking_error import check_gains, demanded_acceleration, modelled_acceleration
 from undertow.core import checks
-from undertow.core.actuator_model import force_of, input_for
+from undertow.core.actuator_model import input_for
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.param import param
-from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
 
@@ -59,9 +58,7 @@ class INDI(AbstractInformedController):
         return input_for(model.actuators, forces), signals
 
     def known_acceleration(self, z, y: Measurement, u_applied) -> PerAxis:
-        """F + G f, with actuators without lag."""
-        dynamics, _, actuators = self.model
-        return dynamics.drift(y) + matvec(dynamics.gain(y), force_of(actuators, u_applied))
+        return modelled_acceleration(self.model, y, u_applied)
 
     def signals(self):
         return ESTIMATE | MODELLING_ERROR

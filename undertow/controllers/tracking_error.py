@@ -5,7 +5,9 @@ from typing import Any, NamedTuple
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractCoordinates, Measurement, Target
+from undertow.core.actuator_model import force_of
+from undertow.core.contracts import AbstractCoordinates, Inputs, Measurement, Model, Target
+from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
 Feedback = Float[Array, "*n 2"]
@@ -35,6 +37,11 @@ def demanded_acceleration(coordinates: AbstractCoordinates, gains: Feedback, y: 
     """x_ddot_d + K^T E, m/s^2 and rad/s^2: the acceleration that state feedback demands."""
     error, rate, acceleration = coordinates.tracking_error(y, r)
     return acceleration + gains[..., 0] * error + gains[..., 1] * rate
+
+
+def modelled_acceleration(model: Model, y: Measurement, u_applied: Inputs) -> PerAxis:
+    """F + G f with the forces f that the applied input gives in steady state, (n,)."""
+    return model.dynamics.drift(y) + matvec(model.dynamics.gain(y), force_of(model.actuators, u_applied))
 
 
 def check_gains(feedback: Feedback, weight: Matrices, per_axis: dict[str, Any], axes: int) -> None:

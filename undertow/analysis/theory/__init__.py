@@ -3,7 +3,7 @@
 from undertow.analysis.theory import composite as composite
 from undertow.analysis.theory import robust as robust
 from undertow.analysis.theory.contract import RunCertificate as RunCertificate
+from undertow.analysis.theory.contract import SteadyWindow as SteadyWindow
 from undertow.analysis.theory.contract import Theory as Theory
-from undertow.analysis.theory.contract import Window as Window
 from undertow.analysis.theory.contract import register as register
 from undertow.analysis.theory.contract import theory_of as theory_of

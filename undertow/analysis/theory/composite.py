@@ -6,7 +6,7 @@ import xarray as xr
 from undertow.analysis import drift, small_signal
 from undertow.analysis.certificate import hypotheses
 from undertow.analysis.certificate.function import lyapunov_residual, of_paper
-from undertow.analysis.theory.contract import RunCertificate, Theory, Window, register
+from undertow.analysis.theory.contract import RunCertificate, SteadyWindow, Theory, register
 from undertow.controllers.composite_law import RCAF
 
 
@@ -43,7 +43,7 @@ def _layers(law: RCAF, dt: float) -> tuple[float, float]:
     return float(least), float(np.min(np.asarray(law.layer)))
 
 
-def _certificate(law: RCAF, run: xr.Dataset, lived: xr.Dataset, window: Window) -> RunCertificate:
+def _certificate(law: RCAF, run: xr.Dataset, lived: xr.Dataset, window: SteadyWindow) -> RunCertificate:
     """U9: on average 1/2 E^T Q E ends below the residual, while all hypotheses hold."""
     bound = np.broadcast_to(law.weights_bound, run.sizes["axis"])
     late = lived["lyapunov_decay"].values[window.inside(lived["time"].values)]

@@ -1,5 +1,6 @@
 """The theory of a controller: what is known of it without running it. Each controller registers what it has."""
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -41,10 +42,10 @@ class Theory(NamedTuple):
     limits: Mapping[str, tuple[str, Any]] = {}
     adapts: bool = False
     thinnest_layer: Callable[[float], tuple[float, float]] | None = None
-    certificate: Callable[[xr.Dataset, xr.Dataset, "Window", float], RunCertificate] | None = None
+    certificate: Callable[[xr.Dataset, xr.Dataset, "SteadyWindow", float], RunCertificate] | None = None
 
 
-class Window(NamedTuple):
+class SteadyWindow(NamedTuple):
     """A span of time; both ends count."""
 
     start: float  # s
@@ -60,20 +61,10 @@ class Window(NamedTuple):
         return {"whole": share(held), "steady": share(held[self.inside(time)])}
 
 
-_REGISTERED: dict[type, Callable[[Any], Theory]] = {}
-
-
-def register(controller: type[AbstractController]) -> Callable[[Callable[[Any], Theory]], Callable[[Any], Theory]]:
-    """Decorator of the function that gives the theory of a class of controllers."""
-
-    def remember(theory: Callable[[Any], Theory]) -> Callable[[Any], Theory]:
-        _REGISTERED[controller] = theory
-        return theory
-
-    return remember
-
-
+@functools.singledispatch
 def theory_of(controller: AbstractController) -> Theory:
-    """What is registered for the class of a controller; an empty theory if nothing is."""
-    known = _REGISTERED.get(type(controller))
-    return Theory() if known is None else known(controller)
+    """What is registered for the class of a controller or the nearest class above it; else an empty theory."""
+    return Theory()
+
+
+register = theory_of.register  # decorator of the function that gives the theory of a class of controllers

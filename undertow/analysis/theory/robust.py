@@ -8,7 +8,7 @@ import xarray as xr
 from undertow.analysis import drift
 from undertow.analysis.certificate import hypotheses
 from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty, of_robust
-from undertow.analysis.theory.contract import RunCertificate, Theory, Window, register
+from undertow.analysis.theory.contract import RunCertificate, SteadyWindow, Theory, register
 from undertow.controllers.robust.robust_law import RobustRCAF
 
 
@@ -41,7 +41,9 @@ def _poles(law: RobustRCAF, axis: int, frequency: float, damping: float) -> list
     return [("estimator", complex(pole)) for pole in observer] + [("tracking", complex(pole)) for pole in tracking]
 
 
-def _certificate(law: RobustRCAF, run: xr.Dataset, lived: xr.Dataset, window: Window, dt: float) -> RunCertificate:
+def _certificate(
+    law: RobustRCAF, run: xr.Dataset, lived: xr.Dataset, window: SteadyWindow, dt: float
+) -> RunCertificate:
     """With the estimation error allowed by the largest |d_dot| from record to record, and how often it was kept."""
     bound = np.broadcast_to(law.estimator.bound, run.sizes["axis"])
     rate = fastest_uncertainty(lived)
