@@ -29,7 +29,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.navigation.perfect import perfect
 from undertow.scenario import execute
-from undertow.scenario.consistency import check_fit, check_times, rounded_times
+from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
 from undertow.scenario.finished_run import Measuring, certificate_of, label, metrics_of
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.schema import Initial, Loop, Window, complaint
@@ -151,16 +151,14 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
         settings = Loop.model_validate({"kind": kind, **plain})
         start = Initial(position=_plain(position), velocity=_plain(velocity))
         window = Window()
-        check_times(nowhere, settings, window)
-        check_fit(nowhere, closed_loop, start)
-        for sentence in rounded_times(settings):
-            warnings.warn(sentence, stacklevel=3)
     except ValidationError as errors:
         wrong = complaint(errors, nowhere)
         raise BadInput("loop" if wrong.name == "kind" else wrong.name, wrong.must, wrong.got) from None
-    except BadInput as error:
-        name = error.name.removeprefix("loop.").removeprefix("initial.")
-        raise BadInput(name, error.must, error.got, hint=error.hint) from error.__cause__
+    check_times(settings)
+    check_start(closed_loop, start)
+    check_fit(closed_loop)
+    for sentence in rounded_times(settings):
+        warnings.warn(sentence, stacklevel=3)
     outcome, left_to_xla = execute.run_loop(closed_loop, settings, start, seed)
     attributes: dict[str, Any] = left_to_xla | {"title": "a closed loop run by undertow", "seed": seed}
     if why := step_failure(closed_loop, settings, outcome):

@@ -53,7 +53,8 @@ def gains(law: RCAF, axis: int = 0) -> Gains:
         damping=float(feedback[1] + slope * p22),
         p12=float(p12),
         p22=float(p22),
-        pole=_number(model.pole, axis) + _number(model.compensation_gain, axis) / _number(model.layer, axis),
+        pole=_number(model.pole, axis)
+        + _number(model.compensation_gain, axis) / _number(model.compensation_layer, axis),
         adaptation=_number(law.adaptation, axis) * float(law.fuzzy.basis_norm_squared()),
         composite=_number(law.composite, axis),
     )

@@ -14,7 +14,7 @@ from undertow.campaign.campaign_schema import read_text
 from undertow.campaign.layout import Layout
 from undertow.campaign.trials import Trials, trials
 from undertow.core import runtime
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, within
 from undertow.core.metric import Metric
 from undertow.scenario.build import Built, build
 from undertow.scenario.part_cache import PartCache
@@ -126,21 +126,17 @@ def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
     Raises:
         BadInput: its scenario cannot be built.
     """
-    try:
+    with within(location=several.location, note=f"trial {row}"):
         return build_data(several, part_cache, several.data(row))
-    except BadInput as error:
-        place = several.place(error.name) or error.where
-        raise error.at(where=f"{place}, trial {row}" if place else f"trial {row}") from error.__cause__
 
 
 def build_data(several: Trials, part_cache: PartCache, data: dict[str, Any]) -> Built:
-    """Build a scenario with the location of the campaign's scenario.
+    """Build a scenario of the campaign.
 
     Raises:
         BadInput: the scenario cannot be built.
     """
-    scenario = several.scenario
-    return build(Text(data, scenario.name, scenario.folder, scenario.lines), part_cache)
+    return build(Text(data, "", several.scenario.folder, {}), part_cache)
 
 
 def _built(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:

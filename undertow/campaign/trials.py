@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from undertow.campaign.campaign_schema import VARIANT, Campaign
 from undertow.campaign.labels import is_number, words
 from undertow.campaign.sampling import Samples, value
-from undertow.core.errors import BadInput, nearest
+from undertow.core.errors import BadInput, nearest, within
 from undertow.scenario.reading import Text, key_path, read
 
 # Trials of each combination that are built first, to find errors and the numbers that differ.
@@ -72,8 +72,8 @@ class Trials(NamedTuple):
                 _put(data, key, copy.deepcopy(entry))
                 yield data
 
-    def place(self, name: str) -> str:
-        """Line of the campaign file that sets a key of the scenario; empty where the scenario sets it."""
+    def location(self, name: str) -> str:
+        """Line that sets a key of the scenario: of the campaign file, or of the scenario's own."""
         for section, keys in (("vary", self.campaign.vary), ("cross", self.campaign.cross)):
             for key in keys:
                 if name == key or name.startswith((f"{key}.", f"{key}[")):
@@ -82,7 +82,7 @@ class Trials(NamedTuple):
             for key in keys:
                 if name == key or name.startswith((f"{key}.", f"{key}[")):
                     return self.text.where(("variants", variant, key))
-        return ""
+        return self.scenario.location(name)
 
     def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
         """See `varied_keys`."""
@@ -116,13 +116,10 @@ def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
 def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
     given = campaign.scenario
     if isinstance(given, str):
-        try:
+        with within(location=text.location):
             found = read(text.folder / given, "scenario", allow_code)
-        except BadInput as error:
-            raise error.at(where=error.where or text.where(("scenario",))) from error.__cause__
-        if "scenario" in found.data:
-            where = text.where(("scenario",))
-            raise BadInput("scenario", "be the file of a scenario", f"{given}, a campaign", where=where)
+            if "scenario" in found.data:
+                raise BadInput("scenario", "be the file of a scenario", f"{given}, a campaign")
         return found
     lines = {path[1:]: line for path, line in text.lines.items() if path[0] == "scenario"}
     return Text(given, text.name, text.folder, lines)

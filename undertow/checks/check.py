@@ -21,7 +21,7 @@ from undertow.core.user_code import place_of
 from undertow.plants.double_integrator import double_integrator
 from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
-from undertow.scenario.reading import Text, key_path, read
+from undertow.scenario.reading import Text, read
 from undertow.scenario.schema import Scenario
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 from undertow.scenario.vehicle_keys import KEYS
@@ -88,7 +88,7 @@ def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Rep
 
 def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
     found = read_vehicle(path, options, "THING")
-    report = _of_vehicle(found.data.facts(), lambda key: found.text.where(key_path(key)))
+    report = _of_vehicle(found.data.facts(), found.text.location)
     if not report.errors:
         found.vehicle()  # raises errors that no rule covers
     return report
@@ -142,7 +142,7 @@ def _of_scenario(text: Text) -> list[Report]:
     said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
     reports = [_report(said, title="scenario")]
     if (facts := vehicle_facts(built)) is not None:
-        reports.append(_of_vehicle(facts, lambda key: text.where(("plant", "vehicle"))))
+        reports.append(_of_vehicle(facts, lambda key: text.location("plant.vehicle")))
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
         reports.append(_of_thruster(thruster, "thruster"))
     if any(report.errors for report in reports):
@@ -160,10 +160,7 @@ def _of_scenario(text: Text) -> list[Report]:
 def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[..., Any]]:
     """Name and instance of a part, and a function that makes another one, for a given model."""
     if ".py:" in thing:
-        try:
-            function = catalogue.find("", thing)
-        except BadInput as error:
-            raise BadInput("THING", error.must, error.got, hint=error.hint) from error.__cause__
+        function = catalogue.find("", thing, what="THING")
         make = lambda *given: factory.call(function, options, given, Path())[0]
         part, name = make(*_leading(function)), thing.rpartition(":")[2]
         if not factory.is_part(part):

@@ -42,7 +42,7 @@ FUZZY_INPUTS = ("error", "state")
 IDENTIFICATION_INPUTS = ("applied", "commanded")
 
 _PER_AXIS = ("adaptation", "composite", "robust_gain", "layer", "weights_bound")
-_PER_AXIS_IDENTIFICATION = ("pole", "compensation_gain", "layer")
+_PER_AXIS_IDENTIFICATION = ("pole", "compensation_gain", "compensation_layer")
 
 
 _PREDICTED = {

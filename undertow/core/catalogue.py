@@ -76,18 +76,24 @@ def _entry_points(group: str) -> tuple[importlib.metadata.EntryPoint, ...]:
     return tuple(importlib.metadata.entry_points(group=group))
 
 
-def find(kind: str, name: str, folder: Path | None = None) -> Part:
+def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -> Part:
     """Part called `name`, or the callable named by `path.py:callable` (relative to `folder`).
+
+    Args:
+        kind: folder of the catalogue.
+        name: of the part, or of a callable in a file.
+        folder: where the file's name starts.
+        what: the argument or key that gives the name, for messages.
 
     Raises:
         BadInput: no such part, file or callable.
     """
     if ".py:" in name:
-        return _from_file(name, folder or Path())
+        return _from_file(name, folder or Path(), what)
     parts = names(kind)
     if name not in parts:
         hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
-        raise BadInput("name", f"be a part in {kind}", name, hint=hint)
+        raise BadInput(what, f"be a part in {kind}", name, hint=hint)
     return parts[name]
 
 
@@ -103,17 +109,17 @@ def _module(path: Path, contents: bytes) -> ModuleType:
     return module
 
 
-def _from_file(name: str, folder: Path) -> Part:
+def _from_file(name: str, folder: Path, what: str) -> Part:
     path_text, attribute = name.rsplit(":", 1)
     path = (folder / path_text).resolve()
     if not path.is_file():
-        raise BadInput("name", "name an existing file", path_text)
+        raise BadInput(what, "name an existing file", path_text)
     try:
         module = _module(path, path.read_bytes())
     except (Exception, SystemExit) as error:
-        raise BadInput("name", "name a file that Python can run", f"{path_text}: {python_says(error)}") from error
+        raise BadInput(what, "name a file that Python can run", f"{path_text}: {python_says(error)}") from error
     part = getattr(module, attribute, None)
     if not callable(part):
         hint = did_you_mean(attribute, [n for n, v in vars(module).items() if callable(v) and n[0] != "_"])
-        raise BadInput("name", f"name a callable of {path.name}", attribute, hint=hint)
+        raise BadInput(what, f"name a callable of {path.name}", attribute, hint=hint)
     return part

@@ -2,27 +2,62 @@
 
     Error: `plant.thruster.resistance` must be positive, but is -1.2 ohm (scenario.yaml, line 14)
 
+Whoever reads a file says where he stands (`within`), so that an error is worded once, where it is found, with the key
+path and the line that the user knows.
+
 Advice is not an error: a part returns it from its method `advice()`, and the run continues.
 """
 
+import contextlib
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextvars import ContextVar
+from typing import NamedTuple
 
 _LONGEST = 200  # characters of a value in a message
+
+
+class _Place(NamedTuple):
+    key: str
+    location: Callable[[str], str]  # file and line of a key path that starts here; "" where unknown
+    note: str
+
+
+_PLACES: ContextVar[tuple[_Place, ...]] = ContextVar("places", default=())
+
+
+@contextlib.contextmanager
+def within(key: str = "", location: Callable[[str], str] = lambda name: "", note: str = "") -> Iterator[None]:
+    """Errors that arise inside are about what stands at a key; may be nested, and used as a decorator.
+
+    Args:
+        key: key path of what is read or made inside; goes before the names that errors give.
+        location: file and line of a key path; the innermost that knows it is asked.
+        note: follows the location.
+    """
+    token = _PLACES.set((*_PLACES.get(), _Place(key, location, note)))
+    try:
+        yield
+    finally:
+        _PLACES.reset(token)
 
 
 class BadInput(ValueError):
     """A value that the user gave cannot be used. One line; the command line turns it into exit code 2.
 
     Args:
-        name: key path or argument, as the user wrote it.
+        name: key path or argument, as the user wrote it, from the key that the code stands within.
         must: what it must be, completing "must ..."; "" where an action failed.
         got: what it is; or which action failed, and why.
         hint: the remedy, a full sentence.
-        where: file and line, when known.
+        where: file and line, when known otherwise than by `within`.
     """
 
     def __init__(self, name: str, must: str, got: object = None, *, hint: str = "", where: str = ""):
+        for place in reversed(_PLACES.get()):
+            where = where or place.location(name)
+            where = ", ".join(filter(None, (where, place.note)))
+            name = ".".join(filter(None, (place.key, name)))
         self.name, self.must, self.got, self.hint, self.where = name, must, got, hint, where
         super().__init__(name, must, got)
 
@@ -35,11 +70,6 @@ class BadInput(ValueError):
             said = f"`{_one_line(self.name)}`: {failed}" if self.name else failed[:1].upper() + failed[1:]
             return f"{said}{where}{hint}"
         return f"`{_one_line(self.name)}` must {self.must}{got}{where}{hint}"
-
-    def at(self, prefix: str = "", where: str = "") -> "BadInput":
-        """The same error with a key prefix and a location in a file."""
-        name = f"{prefix}.{self.name}" if prefix and self.name else prefix or self.name
-        return BadInput(name, self.must, self.got, hint=self.hint, where=where or self.where)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -21,7 +21,7 @@ class SeriesParallel(eqx.Module):
     compensation_gain: Float[Array, "..."] = param(
         "m/s^2, rad/s^2", "amplitude of the compensation", symbol="omega_bar", default=0.1, source="Table 1"
     )
-    layer: Float[Array, "..."] = param(
+    compensation_layer: Float[Array, "..."] = param(
         "m/s, rad/s", "boundary layer of the compensation", symbol="phi", default=0.5, source="Table 1"
     )
     switching: str = eqx.field(static=True, default="tanh")
@@ -29,7 +29,7 @@ class SeriesParallel(eqx.Module):
     def __check_init__(self):
         checks.positive("pole", self.pole, "1/s")
         checks.not_negative("compensation_gain", self.compensation_gain)
-        checks.positive("layer", self.layer)
+        checks.positive("compensation_layer", self.compensation_layer)
         checks.choice("switching", self.switching, SWITCHES)
 
     def error(self, predicted_velocity: PerAxis, velocity: PerAxis) -> PerAxis:
@@ -38,7 +38,7 @@ class SeriesParallel(eqx.Module):
 
     def compensation(self, error: PerAxis) -> PerAxis:
         """v, m/s^2 and rad/s^2. Eq. (33), Remark 5."""
-        return self.compensation_gain * switch(error, self.layer, self.switching)
+        return self.compensation_gain * switch(error, self.compensation_layer, self.switching)
 
     def acceleration(self, error: PerAxis, known: PerAxis, estimate: PerAxis) -> PerAxis:
         """x_hat_ddot, m/s^2 and rad/s^2. Eq. (32).

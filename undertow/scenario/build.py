@@ -12,13 +12,14 @@ from undertow.core import runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.catalogue import KIND_OF
 from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation
+from undertow.core.errors import within
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
-from undertow.scenario.consistency import check_fit, check_times, placed, rounded_times
+from undertow.scenario.consistency import check_fit, check_start, check_times, check_window, rounded_times
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
@@ -93,7 +94,7 @@ def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None)
     """
     text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
-    with runtime.on_processor():
+    with runtime.on_processor(), within(location=text.location):
         with runtime.in_precision("float64"):
             built = _build(text, scenario, part_cache or PartCache())
         with runtime.in_precision(scenario.precision):
@@ -115,7 +116,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
         described = {"part": part.model_dump(), "context": context}
         new = lambda: factory.make(KIND_OF[key], described["part"], text.folder, given, context)
-        return placed(text, where, lambda: part_cache.part(where, described, given, new))
+        with within(where):
+            return part_cache.part(where, described, given, new)
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):
@@ -126,22 +128,28 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
 
     plant = make("plant")
     known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
-    model, resolved["model"] = placed(text, "model", lambda: part_cache.part("model", scenario.model, (plant,), known))
+    with within("model"):
+        model, resolved["model"] = part_cache.part("model", scenario.model, (plant,), known)
     navigation = make("navigation")
     noise = isinstance(navigation, AbstractInformedNavigation) and navigation.velocity_noise(scenario.loop.dt)
     context["velocity_noise"] = np.asarray(noise, dtype=float).tolist()
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
     resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario
-    if scenario.loop.kind == "continuous":
-        placed(text, "loop", lambda: continuous.check(loop))
-    check_times(text, scenario.loop, scenario.steady)
-    shape = (loop, [value and len(value) for _, value in scenario.initial])
-    part_cache.check_once(shape, lambda: check_fit(text, loop, scenario.initial))
+    with within("loop"):
+        if scenario.loop.kind == "continuous":
+            continuous.check(loop)
+        check_times(scenario.loop)
+    with within("steady"):
+        check_window(scenario.steady, scenario.loop.duration)
+    with within("initial"):
+        check_start(loop, scenario.initial)
+    part_cache.check_once(loop, lambda: check_fit(loop))
     several = [one("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
     if several:
         resolved["metrics"] = [description for _, description in several]
     built = Built(loop.starting_at(scenario.initial.position), scenario, resolved, tuple(part for part, _ in several))
-    placed(text, "controller.signals", loop.signals)
-    criterion = placed(text, "success", built.criterion)
-    return built._replace(resolved=resolved | {"success": criterion})
+    with within("controller.signals"):
+        loop.signals()
+    with within("success"):
+        return built._replace(resolved=resolved | {"success": built.criterion()})

@@ -9,10 +9,9 @@ import jax.numpy as jnp
 
 from undertow.core import checks
 from undertow.core.contracts import Load
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, within
 from undertow.core.user_code import python_says
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.scenario.reading import Text, key_path
 from undertow.scenario.schema import Initial, Loop, Window
 
 # A record takes about a kilobyte, a control step some microseconds.
@@ -23,43 +22,37 @@ MOST_STEPS = 2_000_000_000
 _ROUNDING = 1e-9
 
 
-def placed(text: Text, key: str, make: Callable[[], Any]) -> Any:
-    """Result of `make`; its errors get the key path and location in the scenario file."""
-    try:
-        return make()
-    except BadInput as error:
-        complaint = error.at(key)
-        where = complaint.where or text.where(key_path(complaint.name))  # a named file has its own locations
-        raise complaint.at(where=where) from error.__cause__
-
-
-def check_times(text: Text, loop: Loop, window: Window) -> None:
+def check_times(loop: Loop) -> None:
     """Check that duration, records and sampling time are consistent.
 
     Raises:
         BadInput: they are not.
     """
-    start, stop = window.of_run(loop.duration)
-    if not start < stop:
-        must, got = f"be later than steady.start ({start:g} s)", f"{stop:g} s"
-        raise BadInput("steady.stop", must, got, where=text.where(("steady", "stop")))
     allowed = {"sampled": ("rk4", "euler"), "continuous": ("rk4", "adaptive")}[loop.kind]
     if loop.method not in allowed:
-        where = text.where(("loop", "method"))
-        raise BadInput("loop.method", f"be {' or '.join(allowed)} when {loop.kind}", loop.method, where=where)
+        raise BadInput("method", f"be {' or '.join(allowed)} when {loop.kind}", loop.method)
     stepped = loop.method != "adaptive"
     shortest = max(loop.record, loop.dt if stepped else 0.0)
     if loop.duration < shortest:
-        must, got = f"be at least one record ({shortest:g} s)", f"{loop.duration:g} s"
-        raise BadInput("loop.duration", must, got, where=text.where(("loop", "duration")))
+        raise BadInput("duration", f"be at least one record ({shortest:g} s)", f"{loop.duration:g} s")
     for key, most, what in (("record", MOST_RECORDS, "records"), ("dt", MOST_STEPS, "sampling times")):
         step = getattr(loop, key)
         if loop.duration / step > most and (stepped or key == "record"):
             must = f"be at least {loop.duration / most:g} s, so that the run has at most {most} {what}"
-            raise BadInput(f"loop.{key}", must, f"{step:g} s", where=text.where(("loop", key)))
+            raise BadInput(key, must, f"{step:g} s")
     if stepped and not whole_steps(loop.record, loop.dt):
-        must, got = f"be a whole number of steps ({loop.dt:g} s)", f"{loop.record:g} s"
-        raise BadInput("loop.record", must, got, where=text.where(("loop", "record")))
+        raise BadInput("record", f"be a whole number of steps ({loop.dt:g} s)", f"{loop.record:g} s")
+
+
+def check_window(window: Window, duration: float) -> None:
+    """Check that the steady window has a length.
+
+    Raises:
+        BadInput: it has none.
+    """
+    start, stop = window.of_run(duration)
+    if not start < stop:
+        raise BadInput("stop", f"be later than steady.start ({start:g} s)", f"{stop:g} s")
 
 
 def rounded_times(loop: Loop) -> tuple[str, ...]:
@@ -84,51 +77,52 @@ def whole_steps(interval: float, step: float) -> bool:
     return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6 * ratio
 
 
-def check_fit(text: Text, loop: ClosedLoop, start: Initial) -> None:
+def check_start(loop: ClosedLoop, start: Initial) -> None:
+    """Check that the initial motion has an entry per output.
+
+    Raises:
+        BadInput: it has not, or is not finite.
+    """
+    for key, value in start:
+        if value is not None:
+            checks.length(key, value, len(loop.plant.outputs), "one per output of the plant")
+            checks.finite(key, value)
+
+
+def check_fit(loop: ClosedLoop) -> None:
     """Check that the parts agree on the number of outputs and can take a step together.
 
     Raises:
         BadInput: they do not fit together.
     """
-    axes, zero, what = len(loop.plant.outputs), jnp.zeros(()), "one per output of the plant"
-    for key, value in start:
-        if value is not None:
-            placed(text, "initial", lambda key=key, value=value: checks.length(key, value, axes, what))
-            placed(text, "initial", lambda key=key, value=value: checks.finite(key, value))
-    target = _traced(text, "reference", loop.reference.at, zero)
-    if target.position.shape != (axes,):
-        must, got = f"have {axes} entries, one per output of the plant", f"of shape {target.position.shape}"
-        raise BadInput("reference.position", must, got, where=text.where(("reference", "position")))
-    realization = _traced(text, "disturbance", loop.realize, jax.random.PRNGKey(0))
-    x, z = _traced(text, "navigation", lambda realization: realization.start(), realization)
-    load = _traced(text, "disturbance", lambda realization, x: realization.load(zero, x), realization, x)
-    if not isinstance(load, Load):
-        raise BadInput("disturbance", "give a Load", "something else", where=text.where(("disturbance",)))
-    if any(signal.shape != (axes,) for signal in load[:2]):
-        got = f"of shapes {[signal.shape for signal in load[:2]]}"
-        raise BadInput("disturbance", f"have {axes} axes", got, where=text.where(("disturbance",)))
-    rest = jnp.zeros(loop.plant.inputs())
-    moved = lambda realization, x: loop.plant.dynamics(zero, x, rest, realization.load(zero, x))
-    _traced(text, "disturbance", moved, realization, x)
-    _traced(
-        text,
-        "controller",
-        lambda realization, x, z: realization.decide(zero, x, z, realization.initial_measuring(x)),
-        realization,
-        x,
-        z,
-    )
+    axes, zero = len(loop.plant.outputs), jnp.zeros(())
+    with within("reference"):
+        target = _traced(loop.reference.at, zero)
+        if target.position.shape != (axes,):
+            must, got = f"have {axes} entries, one per output of the plant", f"of shape {target.position.shape}"
+            raise BadInput("position", must, got)
+    with within("disturbance"):
+        realization = _traced(loop.realize, jax.random.PRNGKey(0))
+    with within("navigation"):
+        x, z = _traced(lambda realization: realization.start(), realization)
+    with within("disturbance"):
+        load = _traced(lambda realization, x: realization.load(zero, x), realization, x)
+        if not isinstance(load, Load):
+            raise BadInput("", "give a Load", "something else")
+        if any(signal.shape != (axes,) for signal in load[:2]):
+            raise BadInput("", f"have {axes} axes", f"of shapes {[signal.shape for signal in load[:2]]}")
+        rest = jnp.zeros(loop.plant.inputs())
+        _traced(lambda realization, x: loop.plant.dynamics(zero, x, rest, realization.load(zero, x)), realization, x)
+    with within("controller"):
+        decided = lambda realization, x, z: realization.decide(zero, x, z, realization.initial_measuring(x))
+        _traced(decided, realization, x, z)
 
 
-def _traced(text: Text, key: str, function: Callable[..., Any], *arguments: Any) -> Any:
+def _traced(function: Callable[..., Any], *arguments: Any) -> Any:
     """Shapes of a result; any exception means that the part does not fit the others."""
-
-    def trace() -> Any:
-        try:
-            return jax.eval_shape(function, *arguments)
-        except BadInput:
-            raise
-        except Exception as error:
-            raise BadInput("", "fit the other parts", f"not: {python_says(error)}") from error
-
-    return placed(text, key, trace)
+    try:
+        return jax.eval_shape(function, *arguments)
+    except BadInput:
+        raise
+    except Exception as error:
+        raise BadInput("", "fit the other parts", f"not: {python_says(error)}") from error

@@ -50,10 +50,7 @@ def describe(name: str) -> tuple[Description, ...]:
         found = read_vehicle(Path(name), what="NAME")
         return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), (), {}),)
     if ".py:" in name:
-        try:
-            return (_describe("", name, catalogue.find("", name)),)
-        except BadInput as error:
-            raise BadInput("NAME", error.must, error.got, hint=error.hint) from error.__cause__
+        return (_describe("", name, catalogue.find("", name, what="NAME")),)
     given, _, short = name.rpartition("/")
     kinds = [kind for kind in catalogue.KINDS if given in ("", kind)]
     known = {kind: catalogue.names(kind) for kind in kinds}

@@ -11,7 +11,7 @@ import equinox as eqx
 import numpy as np
 
 from undertow.core import catalogue, checks, contracts
-from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.errors import BadInput, did_you_mean, within
 from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import fault_of
 from undertow.power import ESC, Battery
@@ -75,11 +75,7 @@ def make(
         raise BadInput("kind", f"name one of the {kind}", name)
     if kind == "vehicles" and is_vehicle_file(name):
         return make_vehicle(name, options, folder)
-    try:
-        function = catalogue.find(kind, name, folder)
-    except BadInput as error:
-        raise BadInput("kind", error.must, error.got, hint=error.hint) from error.__cause__
-    function, preset = _preset(function, options)
+    function, preset = _preset(catalogue.find(kind, name, folder, "kind"), options)
     own = inspect.signature(function).parameters
     options = {key: value for key, value in (context or {}).items() if key in own} | options
     changes, table = {}, {}
@@ -152,10 +148,8 @@ def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -
         if isinstance(values[key], eqx.Module):
             if not isinstance(change, Mapping):
                 raise BadInput(key, "be a mapping of parameters", change)
-            try:
+            with within(key):
                 values[key] = adjust(values[key], change)
-            except BadInput as error:
-                raise error.at(key) from error.__cause__
         else:
             number = np.asarray(checked(key, change, None, 0.0), dtype=float)
             if number.shape != np.shape(values[key]):
@@ -242,10 +236,8 @@ def _at(
         description = {**default, **description}
     elif not isinstance(description, str):
         raise BadInput(name, "be a name, or a mapping with `kind` and options", description)
-    try:
+    with within(name):
         return make(kind, description, folder or Path())
-    except BadInput as error:
-        raise error.at(name) from error.__cause__
 
 
 def _samples(options: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -32,6 +32,10 @@ class Text(NamedTuple):
             return ""
         return f"{self.name}, line {self.lines[path]}" if path in self.lines else self.name
 
+    def location(self, name: str) -> str:
+        """Location of a key by its path in words, such as `thrusters[2].position`."""
+        return self.where(key_path(name))
+
 
 def from_data(data: Mapping[str, Any]) -> Text:
     """A scenario given as Python data."""

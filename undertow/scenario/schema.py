@@ -181,7 +181,7 @@ def validate(text: Text) -> Scenario:
     """
     if "scenario" in text.data:
         hint = "Run a campaign with `undertow campaign`"
-        raise BadInput("scenario", "be a key of campaigns only", hint=hint, where=text.where(("scenario",)))
+        raise BadInput("scenario", "be a key of campaigns only", hint=hint, where=text.location("scenario"))
     try:
         return Scenario.model_validate(text.data)
     except ValidationError as errors:

@@ -2,16 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, within
 from undertow.core.runtime import double_outside_runs
 from undertow.scenario.reading import Text, from_data, key_path, read
 from undertow.scenario.vehicle_data import VehicleData, parse
 from undertow.scenario.vehicle_keys import INSTEAD
 from undertow.vehicles.vehicle import Vehicle
-
-Made = TypeVar("Made")
 
 
 class VehicleFile(NamedTuple):
@@ -29,7 +27,8 @@ class VehicleFile(NamedTuple):
         Raises:
             BadInput: numbers that cannot be a vehicle's, with their place in the file.
         """
-        return _placed(self.text, self.changed, self.data.vehicle)
+        with within(location=_location(self.text, self.changed)):
+            return self.data.vehicle()
 
 
 def is_vehicle_file(name: str) -> bool:
@@ -58,7 +57,8 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
     contents = {"name": path.stem, **text.data, **changes}
     contents = {key: value for key, value in contents.items() if key not in forgotten}
     changed = frozenset(changes)
-    return VehicleFile(_placed(text, changed, lambda: parse(contents)), contents, text, changed)
+    with within(location=_location(text, changed)):
+        return VehicleFile(parse(contents), contents, text, changed)
 
 
 def make_vehicle(name: str, options: Mapping[str, Any], folder: Path) -> tuple[Vehicle, dict[str, Any]]:
@@ -76,9 +76,6 @@ def make_vehicle(name: str, options: Mapping[str, Any], folder: Path) -> tuple[V
     return found.vehicle(), {"kind": Path(name).name, "contents": found.contents}
 
 
-def _placed(text: Text, changed: frozenset[str], make: Callable[[], Made]) -> Made:
-    try:
-        return make()
-    except BadInput as error:
-        path = key_path(error.name)
-        raise error.at(where="" if path[:1] and path[0] in changed else text.where(path)) from error.__cause__
+def _location(text: Text, changed: frozenset[str]) -> Callable[[str], str]:
+    """Location of a key in the file; none where the key has been changed."""
+    return lambda name: "" if set(key_path(name)[:1]) & changed else text.location(name)

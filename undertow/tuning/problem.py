@@ -9,11 +9,10 @@ import numpy as np
 
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
-from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.errors import BadInput, did_you_mean, within
 from undertow.scenario import factory
 from undertow.scenario.build import Built, build
-from undertow.scenario.consistency import placed
-from undertow.scenario.reading import Text, key_path
+from undertow.scenario.reading import Text
 from undertow.tuning import tunable_parameters as tunable_parameters
 from undertow.tuning.cost import CostSums
 from undertow.tuning.evaluator import TrainingLoop
@@ -62,23 +61,22 @@ def problem(text: Text) -> Problem:
     Raises:
         BadInput: the scenario, or its section `tune`, cannot be used.
     """
-    built = build(text)
+    with within(location=text.location):
+        return _problem(text, build(text))
+
+
+def _problem(text: Text, built: Built) -> Problem:
     loop, scenario, tune = built.closed_loop, built.scenario, built.scenario.tune
     if scenario.loop.kind != "sampled":
-        where = text.where(("loop", "kind"))
-        raise BadInput("loop.kind", "be sampled, for gains to be used on a vehicle", scenario.loop.kind, where=where)
+        raise BadInput("loop.kind", "be sampled, for gains to be used on a vehicle", scenario.loop.kind)
     known, dt, angles = _law_of(built), scenario.loop.dt, loop.controller.model.coordinates.angles
     function, given = _controller(text, built)
-    try:
-        chosen = _parameters(known, function, tune, dt, angles)
-        train, held_out = training_and_held_out(text, built)
-    except BadInput as error:
-        raise error.at(where=text.where(key_path(error.name))) from error.__cause__
+    chosen = _parameters(known, function, tune, dt, angles)
+    train, held_out = training_and_held_out(text, built)
     duration = min(scenario.loop.duration, _LONGEST) if tune.duration is None else tune.duration
     start = duration / 2 if tune.start is None else tune.start
     if not start < duration or round(duration / dt) < 2:
-        must = f"be earlier than the end of a run ({duration:g} s)"
-        raise BadInput("tune.start", must, f"{start:g} s", where=text.where(("tune", "start")))
+        raise BadInput("tune.start", f"be earlier than the end of a run ({duration:g} s)", f"{start:g} s")
     scales = np.where(angles, tune.angle_scale, tune.position_scale)
     sums = CostSums(start, scales, _input_scale(loop.plant, loop.controller))
     places = tuple(None if place is None else np.asarray(place, dtype=float) for _, place in scenario.initial)
@@ -87,7 +85,8 @@ def problem(text: Text) -> Problem:
     law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))
     begin = [parameter.share(_mean(known, loop.controller, given, parameter)) for parameter in chosen]
     found = Problem(built, chosen, law, np.array(begin), training_loop, train, held_out)
-    placed(text, "controller", lambda: found.law(found.options(found.start)))
+    with within("controller"):
+        found.law(found.options(found.start))
     return found
 
 

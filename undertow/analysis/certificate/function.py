@@ -87,7 +87,7 @@ def lyapunov_residual(law: RCAF, axes: int) -> float:
     """What tanh adds to Vf_dot at most, all axes together: U9, I22. Zero with sign. m^2/s^3 and rad^2/s^3."""
     own = _layer(law.switching, law.robust_gain, law.layer)
     compensation = law.identification
-    other = _layer(compensation.switching, compensation.compensation_gain, compensation.layer)
+    other = _layer(compensation.switching, compensation.compensation_gain, compensation.compensation_layer)
     return float(np.broadcast_to(own + np.asarray(law.composite) * other, axes).sum())
 
 

@@ -77,14 +77,10 @@ def paper(
         raise BadInput("substeps", "be 1 or more", substeps)
     reach = _REACH[fuzzy_input] if reach is None else reach
     checks.length("reach", reach, len(_REACH[fuzzy_input]), f"one per input of fuzzy_input = {fuzzy_input}")
-    try:
-        identification = SeriesParallel(pole, compensation_gain, compensation_layer, switching)
-    except BadInput as error:
-        raise BadInput(error.name.replace("layer", "compensation_layer"), error.must, error.got) from None
     return RCAF(
         model=model,
         fuzzy=gaussian_sets(sets, tuple(reach), width),
-        identification=identification,
+        identification=SeriesParallel(pole, compensation_gain, compensation_layer, switching),
         feedback=feedback,
         weight=weight,
         adaptation=adaptation,
