@@ -76,11 +76,7 @@ def _while(equation: Equation, *given: Nodes) -> list[Nodes]:
 
 
 def _repeated(
-    equation: Equation,
-    initial: list[Node],
-    test: Callable[[list[Node]], Node],
-    body: regions.Step,
-    like: Sequence[Any],
+    equation: Equation, initial: list[Node], test: Callable[[list[Node]], Node], body: regions.Step, like: Sequence[Any]
 ) -> list[Nodes]:
     equation.graph.endless += 1
     return _shaped(regions.repeated(equation.graph, initial, test, body), like)

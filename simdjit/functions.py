@@ -250,10 +250,7 @@ def _turned_far(x: Scalar, more: int) -> Scalar:
     return where(abs(x) < inf, value, nan)
 
 
-_FAR = (
-    called("sin_far")(lambda x: _turned_far(x, 0)),
-    called("cos_far")(lambda x: _turned_far(x, 1)),
-)
+_FAR = (called("sin_far")(lambda x: _turned_far(x, 0)), called("cos_far")(lambda x: _turned_far(x, 1)))
 
 
 def atan(x: Scalar) -> Scalar:

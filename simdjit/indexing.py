@@ -121,11 +121,7 @@ def _dynamic_update_slice(equation: Equation, array: Nodes, part: Nodes, *starts
     return replaced(equation.graph, array, list(map(int, starts)), part, True, lambda old, new: new)
 
 
-@rule(
-    "gather",
-    reads="dimension_numbers slice_sizes mode fill_value",
-    idle="unique_indices indices_are_sorted",
-)
+@rule("gather", reads="dimension_numbers slice_sizes mode fill_value", idle="unique_indices indices_are_sorted")
 def _gather(equation: Equation, array: Nodes, indices: Nodes) -> Nodes:
     graph, params = equation.graph, equation.params
     numbers, sizes = params["dimension_numbers"], params["slice_sizes"]
@@ -184,9 +180,7 @@ def _scatter(primitive: str, merging: str | None) -> None:
     """Entries set, or merged with what stands there; one after another where a place occurs twice."""
 
     @rule(
-        primitive,
-        reads="dimension_numbers mode",
-        idle="update_jaxpr update_consts indices_are_sorted unique_indices",
+        primitive, reads="dimension_numbers mode", idle="update_jaxpr update_consts indices_are_sorted unique_indices"
     )
     def scatter(equation: Equation, array: Nodes, indices: Nodes, updates: Nodes) -> Nodes:
         graph = equation.graph

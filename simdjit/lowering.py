@@ -67,11 +67,7 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
 @rule("closed_call", "core_call", reads="call_jaxpr", idle="name")
 @rule("checkpoint", reads="jaxpr", idle="prevent_cse differentiated policy")
 @rule("custom_jvp_call", reads="call_jaxpr", idle="jvp_jaxpr_fun num_consts symbolic_zeros")
-@rule(
-    "custom_vjp_call",
-    reads="call_jaxpr fun_jaxpr",
-    idle="fwd_jaxpr_thunk bwd num_consts out_trees symbolic_zeros",
-)
+@rule("custom_vjp_call", reads="call_jaxpr fun_jaxpr", idle="fwd_jaxpr_thunk bwd num_consts out_trees symbolic_zeros")
 def _call(equation: Equation, *given: Nodes) -> list[Nodes]:
     """Primitives that only call another function."""
     params = equation.params

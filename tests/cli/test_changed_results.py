@@ -4,9 +4,9 @@ import pytest
 from good_scenario import SCENARIO
 
 from undertow.scenario.execute import execute, save
+from undertow.scenario.finished_run import compare
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
-from undertow.scenario.reproducibility import compare
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.run import simulate_scenario
 from undertow.scenario.execute import execute, save
+from undertow.scenario.finished_run import compare
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
-from undertow.scenario.reproducibility import compare
 
 CODE = """
 import pathlib

@@ -95,12 +95,7 @@ def _by_xla(one: Workload) -> dict[str, float]:
         at = dict(zip(("position", "velocity"), run.start, strict=True))
         return jax.block_until_ready(
             sampled.simulate(
-                run.loop,
-                duration=plan.steps * plan.dt,
-                dt=plan.dt,
-                record_every=0,
-                accumulators=run.accumulators,
-                **at,
+                run.loop, duration=plan.steps * plan.dt, dt=plan.dt, record_every=0, accumulators=run.accumulators, **at
             )
         )
 

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.campaign.runs import planned, run_of
+from undertow.campaign.batch_runner import planned, run_of
 from undertow.loop.simd_batch import BatchRunner, Plan, Run
 from undertow.scenario.build import build
 
@@ -42,10 +42,7 @@ W2: dict[str, Any] = {
     "model": {"rate_term": True},
     "controller": {"kind": "rcaf", "preset": "robust"},
     "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 20},
-    "disturbance": [
-        {"kind": "current", "velocity": [0.3, 0.2, 0]},
-        {"kind": "waves", "height": 0.5, "period": 5},
-    ],
+    "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0]}, {"kind": "waves", "height": 0.5, "period": 5}],
     "navigation": {"kind": "observer", "sensors": _SENSORS},
     "loop": {"kind": "sampled", "dt": 0.01, "duration": 120, "record": 0.05},
 }

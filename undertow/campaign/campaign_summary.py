@@ -9,9 +9,9 @@ from scipy.stats import binom, spearmanr
 
 from undertow.campaign.batch_runner import XLA
 from undertow.campaign.columns import ENDINGS, JUDGEMENTS
-from undertow.campaign.invalid_trials import reasons
 from undertow.campaign.requirements import verdict
 from undertow.campaign.store_results import Results
+from undertow.campaign.task import reasons
 from undertow.campaign.trials import Trials
 
 QUANTILES = (0.05, 0.5, 0.95)

@@ -6,11 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from undertow.campaign.batch_runner import SIMD, XLA
+from undertow.campaign.batch_runner import SIMD, XLA, planned
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.labels import is_number, words
 from undertow.campaign.layout import SAMPLES
-from undertow.campaign.runs import planned
 from undertow.campaign.task import INVALID, NOT_JUDGED
 from undertow.campaign.trials import Trials, varied_keys
 from undertow.core.metric import Metric

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 from undertow.campaign import task as tasks
 from undertow.campaign.campaign_schema import Campaign, read_campaign, whole
-from undertow.campaign.invalid_trials import reasons
 from undertow.campaign.requirements import too_few
+from undertow.campaign.task import reasons
 from undertow.campaign.trials import Trials, trials
-from undertow.checks.vehicle_findings import vehicle_warnings
+from undertow.checks.vehicle_lint import vehicle_warnings
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.metric import Metric

@@ -159,3 +159,30 @@ def _scatter(count: int, where: list[int], values: np.ndarray, empty: Any) -> np
     whole = np.full((count, *values.shape[1:]), empty, dtype=values.dtype)
     whole[where] = values
     return whole
+
+
+# Trials that are built again: each takes milliseconds.
+_MOST = 200
+
+
+class InvalidTrials(NamedTuple):
+    """Trials that are invalid for the same reason."""
+
+    why: str  # the error of the first of them
+    trials: int
+
+
+def reasons(several: Trials, rows: Sequence[int]) -> tuple[InvalidTrials, ...]:
+    """The reasons why trials are invalid, the most frequent first.
+
+    Args:
+        several: the trials.
+        rows: numbers of the invalid trials; only the first 200 are built again.
+    """
+    part_cache, found = PartCache(), dict[tuple[str, str], list[str]]()
+    for row in rows[:_MOST]:
+        try:
+            build_trial(several, part_cache, int(row))
+        except BadInput as error:
+            found.setdefault((error.name, error.must), []).append(str(error))
+    return tuple(InvalidTrials(each[0], len(each)) for each in sorted(found.values(), key=len, reverse=True))

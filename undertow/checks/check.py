@@ -11,8 +11,7 @@ from undertow.checks.finding import Finding
 from undertow.checks.part_check import check_contract, of_plant
 from undertow.checks.plant_check import derived_of_plant
 from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
-from undertow.checks.vehicle_findings import vehicle_facts
-from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint
+from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint, vehicle_facts
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean
@@ -23,8 +22,8 @@ from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.reading import Text, read
 from undertow.scenario.schema import Scenario
+from undertow.scenario.vehicle_data import KEYS
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
-from undertow.scenario.vehicle_keys import KEYS
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 

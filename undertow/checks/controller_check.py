@@ -8,8 +8,7 @@ import numpy as np
 
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
-from undertow.checks.answers import alike, form, shaped, two_values
-from undertow.checks.finding import Finding, advice
+from undertow.checks.finding import Finding, advice, alike, form, shaped, two_values
 from undertow.core.contracts import AbstractController, Target
 from undertow.core.signals import check_declared
 from undertow.disturbances.none import none

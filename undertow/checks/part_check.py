@@ -7,9 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.checks.answers import agree, alike, is_a, shaped, two_values
 from undertow.checks.controller_check import check_controller
-from undertow.checks.finding import Finding, error
+from undertow.checks.finding import Finding, agree, alike, error, is_a, shaped, two_values
 from undertow.checks.plant_check import check_plant
 from undertow.checks.thruster_check import check_thruster
 from undertow.core.contracts import (

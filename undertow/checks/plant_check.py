@@ -9,8 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from undertow.checks.answers import agree, alike, is_a, shaped
-from undertow.checks.finding import Finding, error
+from undertow.checks.finding import Finding, agree, alike, error, is_a, shaped
 from undertow.core.contracts import AbstractPlant, Effort, Measurement, Model
 from undertow.core.signals import check_declared
 

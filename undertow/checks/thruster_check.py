@@ -8,8 +8,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from scipy.integrate import solve_ivp
 
-from undertow.checks.answers import alike, is_a, shaped
-from undertow.checks.finding import Finding, advice, error
+from undertow.checks.finding import Finding, advice, alike, error, is_a, shaped
 from undertow.thrusters.thruster import AbstractThruster, Powers, PropellerReport
 
 _COUNT = 3  # thrusters at once: no other size that a part may happen to have

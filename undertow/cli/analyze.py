@@ -13,8 +13,7 @@ from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
 from undertow.prediction.predict import predict, summary
 from undertow.prediction.warnings import advice
-from undertow.report.prediction_page import write_prediction
-from undertow.report.prediction_tables import Rows, tables
+from undertow.report.prediction_page import Rows, tables, write_prediction
 from undertow.scenario.build import build
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read

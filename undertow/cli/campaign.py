@@ -29,8 +29,7 @@ from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.disk import alone
 from undertow.core.errors import BadInput
-from undertow.report.campaign_page import write_campaign
-from undertow.report.campaign_tables import by_xla
+from undertow.report.campaign_page import by_xla, write_campaign
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump

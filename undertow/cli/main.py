@@ -1,6 +1,8 @@
 """The command line `undertow`: arguments and help. Each command is in its own file, imported when it runs."""
 
+import importlib.metadata
 import os
+import platform
 import sys
 import threading
 import warnings
@@ -97,9 +99,7 @@ def simulate(
 
 
 @app.command()
-def bench(
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
-) -> int:
+def bench(as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False) -> int:
     """Measure the speed of undertow on this machine, compared with plain NumPy.
 
     The workloads are W1 (ODIN with eight full motor models under the paper's controller, 1 kHz) and W2 (BlueROV2 Heavy
@@ -243,8 +243,7 @@ def describe(
 @app.command()
 def check(
     thing: Annotated[
-        str,
-        typer.Argument(metavar="THING", help="A vehicle file, a scenario, a part by name, or ./file.py:function."),
+        str, typer.Argument(metavar="THING", help="A vehicle file, a scenario, a part by name, or ./file.py:function.")
     ],
     option: Annotated[
         list[str] | None,
@@ -267,9 +266,9 @@ def check(
 @app.command()
 def version() -> None:
     """Show the versions of undertow, its dependencies and Python."""
-    from undertow.cli.version import version
-
-    version()
+    for package in ("undertow", "jax", "jaxlib", "equinox", "diffrax", "numpy", "xarray"):
+        typer.echo(f"{package} {importlib.metadata.version(package)}")
+    typer.echo(f"python {platform.python_version()}")
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -18,10 +18,7 @@ _WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios", "camp
 def reproduce(out: Path, quick: bool) -> None:
     """Write the report to `out` and print its verdicts."""
     console = wide_console()
-    with (
-        output_folder(out, out) as folder,
-        results_folder(folder, _WRITTEN, "results.json", overwrite=True) as draft,
-    ):
+    with output_folder(out, out) as folder, results_folder(folder, _WRITTEN, "results.json", overwrite=True) as draft:
         report = folder / _watched(console, draft, quick).relative_to(draft.path)
     for line in _verdicts(out / "results.json"):
         console.print(line, markup=False, highlight=False, soft_wrap=True)

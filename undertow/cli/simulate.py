@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from undertow.analysis.linearization.response import Comparison, compare_metrics
-from undertow.checks.vehicle_findings import vehicle_warnings
+from undertow.checks.vehicle_lint import vehicle_warnings
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
@@ -21,9 +21,8 @@ from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.figures import run_plots, save_all
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.execute import Executed, execute, save
-from undertow.scenario.finished_run import certificate_of, metrics_of, metrics_text
+from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of, metrics_text
 from undertow.scenario.reading import dump, read
-from undertow.scenario.reproducibility import Repetition, compare
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 

@@ -21,21 +21,14 @@ from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
 from undertow.tuning.checkpoint import has_answers
 from undertow.tuning.objective import Step
-from undertow.tuning.tune import METHODS, Tuned, tune
-from undertow.tuning.tuned_scenario import as_data, as_scenario
+from undertow.tuning.tune import METHODS, Tuned, as_data, as_scenario, tune
 
 _WRITTEN = ("tuned.yaml", "tuning.json", "figures")
 _CHECKPOINT = "tuning.jsonl"
 
 
 def tune_scenario(
-    scenario: Path,
-    out: Path | None,
-    method: str,
-    budget: float,
-    resume: bool,
-    overwrite: bool,
-    allow_code: bool,
+    scenario: Path, out: Path | None, method: str, budget: float, resume: bool, overwrite: bool, allow_code: bool
 ) -> int:
     """Tune a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
     checks.choice("--method", method, METHODS)

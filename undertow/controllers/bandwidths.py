@@ -89,13 +89,7 @@ class Law(NamedTuple):
     of_velocity: np.ndarray
 
 
-def axes_of(
-    model: Model,
-    sampling_time: float,
-    delay: float,
-    velocity_noise,
-    load_rate,
-) -> list[Axis]:
+def axes_of(model: Model, sampling_time: float, delay: float, velocity_noise, load_rate) -> list[Axis]:
     """Data of each axis of a model for the rule.
 
     Args:

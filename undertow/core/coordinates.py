@@ -4,14 +4,7 @@ from typing import Any
 
 import equinox as eqx
 
-from undertow.core.contracts import (
-    AbstractCoordinates,
-    AbstractDynamics,
-    Measurement,
-    Outputs,
-    Target,
-    TrackingError,
-)
+from undertow.core.contracts import AbstractCoordinates, AbstractDynamics, Measurement, Outputs, Target, TrackingError
 from undertow.core.status import Status
 
 

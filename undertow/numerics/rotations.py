@@ -51,11 +51,7 @@ def euler_rate_matrix(angles: Vector3) -> Matrix3:
     (sr, sp, _), (cr, cp, _) = jnp.sin(angles), jnp.cos(angles)
     zero, one = jnp.zeros_like(sr), jnp.ones_like(sr)
     return jnp.stack(
-        [
-            jnp.stack([one, sr * sp / cp, cr * sp / cp]),
-            jnp.stack([zero, cr, -sr]),
-            jnp.stack([zero, sr / cp, cr / cp]),
-        ]
+        [jnp.stack([one, sr * sp / cp, cr * sp / cp]), jnp.stack([zero, cr, -sr]), jnp.stack([zero, sr / cp, cr / cp])]
     )
 
 
@@ -89,8 +85,7 @@ def euler_from_rotation(rotation: Matrix3) -> Vector3:
     """(roll, pitch, yaw) of a rotation, roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2]."""
     level = jnp.sqrt(rotation[2, 1] ** 2 + rotation[2, 2] ** 2)
     return jnp.arctan2(
-        jnp.stack([rotation[2, 1], -rotation[2, 0], rotation[1, 0]]),
-        jnp.stack([rotation[2, 2], level, rotation[0, 0]]),
+        jnp.stack([rotation[2, 1], -rotation[2, 0], rotation[1, 0]]), jnp.stack([rotation[2, 2], level, rotation[0, 0]])
     )
 
 

@@ -12,13 +12,7 @@ from undertow.core.coordinates import AbstractOutputCoordinates
 from undertow.core.measurement import body_of, measurement_of_outputs
 from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec, partial_inverse, pseudo_inverse, regularised_sharp
-from undertow.numerics.rotations import (
-    Kinematics,
-    attitude_error,
-    cross,
-    rotation_from_quaternion,
-    turning_from_euler,
-)
+from undertow.numerics.rotations import Kinematics, attitude_error, cross, rotation_from_quaternion, turning_from_euler
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.body import Body
 

@@ -6,12 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from undertow.analysis.metrics import for_people
+from undertow.campaign.campaign_schema import Distribution
+from undertow.campaign.columns import ENDINGS
+from undertow.campaign.labels import words
 from undertow.campaign.store_results import Results
-from undertow.report.campaign_tables import asked, by_choice, by_xla, distributions, endings, named, requirements, worst
+from undertow.core.status import Status
 from undertow.report.figures.campaign import distributions_figure, sensitivity_figure
 from undertow.report.figures.writing import Plots, Saved, save_all
-from undertow.report.formats import prose
-from undertow.report.page import Html, bullets, document, figure, section, tag
+from undertow.report.formats import chip, ending, number, prose, unit
+from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
 
 _CAPTIONS = {
     "distributions": "Empirical cumulative distribution functions, with one step per trial. A curve that ends below 1 "
@@ -110,10 +114,153 @@ def _values(results: Results, found: Mapping[str, Any]) -> dict[str, dict[str, n
     """Finite values of each metric by combination."""
     values: dict[str, dict[str, np.ndarray]] = {}
     numbers = np.unique(results.combinations)
-    for number, one in zip(numbers, found["combinations"], strict=True):
-        rows = results.rows.isel(trial=results.combinations == number)
+    for combination, one in zip(numbers, found["combinations"], strict=True):
+        rows = results.rows.isel(trial=results.combinations == combination)
         for metric in one["metrics"]:
             whole = rows[metric].values
             if np.isfinite(whole).any():
                 values.setdefault(metric, {})[named(one)] = whole[np.isfinite(whole)]
     return values
+
+
+_DIGITS = 4
+
+
+def named(combination: Mapping[str, Any]) -> str:
+    """A combination of `cross` as text; numbers with the name of their key."""
+    parts = (
+        f"{key.split('.')[-1]} {value}" if _numeric(value) else value for key, value in combination["values"].items()
+    )
+    return ", ".join(parts) or "all trials"
+
+
+def endings(found: Mapping[str, Any]) -> Html:
+    """Number of trials by status and number of successes, one column per combination."""
+    several = found["combinations"]
+    rows = [(word, *(str(one["status"].get(word, 0)) for one in several)) for word in found["status"]]
+    if any(one["success"]["within"] or one["success"]["not_within"] for one in several):
+        rows.append(("within the criterion of success", *(str(one["success"]["within"]) for one in several)))
+    head = ("trials", *map(named, several))
+    return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 3)
+
+
+def by_xla(found: Mapping[str, Any]) -> str:
+    """A sentence about trials that used the XLA backend; empty where none did."""
+    if not found["by_xla"]:
+        return ""
+    consequence = "which is slower, and a single run repeats such a trial only up to rounding"
+    return (
+        f"{found['by_xla']} trials used the XLA backend, {consequence}. `undertow simulate` of one states the reason."
+    )
+
+
+def requirements(found: Mapping[str, Any]) -> Html:
+    """The requirements and their verdicts; empty where there are none."""
+    rows = []
+    for one in found["combinations"]:
+        for required in one["requirements"]:
+            low, high = required["interval"]
+            bound = f"{_metric(required['metric'])} < {required['below']:g}"
+            share = f"{100 * required['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
+            words = f"{bound} in {100 * required['share']:g} % of the trials"
+            rows.append((words, named(one), chip(required["verdict"]), share))
+    head = ("requirement", "combination", "verdict", "share of the trials [95 % interval]")
+    return table(head, rows) if rows else Html("")
+
+
+def distributions(results: Results, found: Mapping[str, Any]) -> Html:
+    """Quantiles of every metric, side by side for the combinations."""
+    several = found["combinations"]
+    names = dict.fromkeys(name for one in several for name in one["metrics"])
+    rows = []
+    for name in names:
+        cells = (_spread(results, name, one["metrics"].get(name)) for one in several)
+        rows.append((_headed(results, name), *cells))
+    head = ("median [5 %, 95 %]", *map(named, several))
+    return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 1)
+
+
+def by_choice(results: Results, found: Mapping[str, Any]) -> list[Html]:
+    """For each choice, a table of the median and the 5 % to 95 % range."""
+    tables, shown = [], [*results.tracking, "input_rms"]
+    for key, entries in found["choices"].items():
+        rows = []
+        for word, one in entries.items():
+            cells = (_spread(results, name, one["metrics"].get(name)) for name in shown)
+            rows.append((word, str(one["trials"]), str(one["failed"]), *cells))
+        head = (prose(f"`{key}`"), "trials", "failed", *(_headed(results, name) for name in shown))
+        tables.append(table(head, rows, numeric=range(1, len(head))))
+    return tables
+
+
+def worst(results: Results, found: Mapping[str, Any]) -> Html:
+    """The worst trials with their sampled values."""
+    rows = []
+    for trial in found["worst"]:
+        row, swept = results.rows.sel(trial=trial), results.swept(trial)
+        sampled = [number(one, _DIGITS) if isinstance(one, float) else one for one in results.sampled(trial).values()]
+        lasted = int(row["status"]) == int(Status.OK)
+        how = ending({"status": ENDINGS[int(row["status"])], "diverged_at": None if lasted else float(row["ended"])})
+        errors = [_shown(results, name, float(row[name]) if lasted else None) for name in results.tracking]
+        rows.append((str(trial), how, *errors, *swept, *sampled))
+    keys = [prose(f"`{key}`") for key in (*results.campaign.axes, *results.campaign.vary)]
+    heads = [_headed(results, name) for name in results.tracking]
+    return table(("trial", "ended", *heads, *keys), rows, numeric=range(2, 2 + len(heads)), wide=len(keys) > 1)
+
+
+def asked(results: Results) -> list[Html]:
+    """The configuration: sampling, versions and the campaign file."""
+    campaign, attributes = results.campaign, results.rows.attrs
+    rows = [(prose(f"`{key}`"), prose(_words(spread))) for key, spread in campaign.vary.items()]
+    rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.axes.items()]
+    sampling = f"{campaign.trials} samples ({campaign.design}), seed {campaign.seed}"
+    sampling += ", each for every combination below." if campaign.axes else "."
+    versions = ", ".join(
+        f"{key.removeprefix('version_')} {value}" for key, value in attributes.items() if key.startswith("version_")
+    )
+    file = tag("details", tag("summary", "The complete campaign file"), tag("pre", attributes["campaign"]))
+    return [
+        tag("p", sampling),
+        *([table(("key", "values"), rows)] if rows else []),
+        tag("p", f"{versions}; {attributes['machine']}", class_="small"),
+        file,
+    ]
+
+
+def _numeric(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _metric(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _words(spread: Distribution) -> str:
+    """A distribution as text."""
+    if spread.choice is not None:
+        return "one of " + ", ".join(map(words, spread.choice))
+    if spread.normal is not None:
+        return "normal, mean {:g}, standard deviation {:g}".format(*spread.normal)
+    if spread.uniform is not None:
+        return "uniform, {:g} to {:g}".format(*spread.uniform)
+    return "log-uniform, {:g} to {:g}".format(*(spread.log_uniform or ()))
+
+
+def _headed(results: Results, name: str) -> Html:
+    """A metric and its unit; angles in degrees."""
+    return join(_metric(name), " ", unit(for_people(0.0, results.unit(name))[1]))
+
+
+def _shown(results: Results, name: str, value: float | None) -> Html:
+    return number(None if value is None else for_people(value, results.unit(name))[0], _DIGITS)
+
+
+def _spread(results: Results, name: str, quantiles: Mapping[str, float] | None) -> Html:
+    if quantiles is None:
+        return number(None)
+    low, middle, high = (number(for_people(value, results.unit(name))[0]) for value in quantiles.values())
+    return join(middle, " [", low, ", ", high, "]")

@@ -2,13 +2,26 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
+
+from undertow.analysis.metrics import for_people
 from undertow.prediction.predict import Prediction
 from undertow.report.figures.prediction import prediction_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import bullets, document, figure, section, table, tag
-from undertow.report.prediction_tables import Rows, tables
+
+
+class Rows(NamedTuple):
+    """One table: title, column titles, rows, and a sentence that explains it."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    sentence: str
+
 
 _CAPTIONS = {
     "poles": "Controllable closed-loop poles of the sampled loop as continuous-time poles, with motors and coupling. "
@@ -57,3 +70,160 @@ def _section(number: int, rows: Rows):
     return section(
         f"table-{number}", rows.title, tag("p", prose(rows.sentence)), table(head, cells, wide=len(rows.head) > 3)
     )
+
+
+def tables(prediction: Prediction) -> list[Rows]:
+    """All tables, the most important first, without empty ones."""
+    made = (_points, _margins, _estimators, _errors, _noise, _closed_forms, _authority, _metrics)
+    return [table for make in made if (table := make(prediction)).rows]
+
+
+def _points(prediction: Prediction) -> Rows:
+    rows = [
+        (
+            f"{point.share:.0%}",
+            f"{point.used:.0%}" if point.used else "-",
+            _pole(point.poles[0]) if len(point.poles) else "-",
+            f"{point.radius:.6f}",
+            ("stable" if point.radius < 1 else "unstable") if point.found else "no equilibrium",
+        )
+        for point in prediction.points
+    ]
+    return Rows(
+        "Controllable closed-loop poles over the operating range",
+        ("load quantile", "input used", "rightmost pole, 1/s", "spectral radius", "verdict"),
+        rows,
+        "The whole loop, linearised at its equilibrium under loads along the reference, with constant fuzzy weights.",
+    )
+
+
+def _margins(prediction: Prediction) -> Rows:
+    known, dt = prediction.margins, prediction.operating_point.linear.dt
+    rows = [
+        ("sampling limit at these gains", _time(known["sampling_time"]), f"sampling time {_time(dt)}"),
+        ("delay margin, controller to actuators", _time(known["delay"]), "beyond the nominal model"),
+        ("margin of an additional first-order lag", _time(known["lag"]), "beyond the nominal model"),
+        ("gain margin, decreasing", _number(known["gain_low"]), "of the nominal effect of the input"),
+        ("gain margin, increasing", _number(known["gain_high"]), "of the nominal effect of the input"),
+    ]
+    return Rows(
+        "Robustness margins", ("margin", "limit", "remark"), rows, "At the operating point closest to instability."
+    )
+
+
+def _estimators(prediction: Prediction) -> Rows:
+    rows = [
+        (axis, _number(frequency), _number(damping), "-" if ramp is None else _number(ramp))
+        for axis, frequency, damping, ramp in _together(prediction.estimators)
+    ]
+    return Rows(
+        "Estimator",
+        ("axis", "bandwidth, rad/s", "damping", "|d_hat - d| per |d_dot|, s"),
+        rows,
+        "Closed forms of the controller alone, with an exact nominal model and ideal actuators.",
+    )
+
+
+def _errors(prediction: Prediction) -> Rows:
+    frequency, names = prediction.frequency, prediction.operating_point.built.closed_loop.plant.outputs
+    rows = []
+    for i, name in enumerate(names):
+        error, missed = prediction.error[:, i], prediction.estimation[:, i]
+        at = [_number(float(np.interp(w, frequency, error))) for w in (0.1, 1.0, 10.0)]
+        worse = frequency[missed > 1]
+        rows.append(
+            (
+                name,
+                *at,
+                f"{_number(error.max())} at {_number(frequency[error.argmax()])} rad/s",
+                f"{_number(worse[0])} rad/s" if worse.size else "none",
+            )
+        )
+    return Rows(
+        "Error per unit of disturbance",
+        ("axis", "at 0.1 rad/s, s^2", "at 1 rad/s", "at 10 rad/s", "maximum", "estimate increases the error above"),
+        rows,
+        "|e| per |d|, m per m/s^2 or rad per rad/s^2, under the mean load.",
+    )
+
+
+def _noise(prediction: Prediction) -> Rows:
+    noise, unit = prediction.noise, prediction.operating_point.built.closed_loop.plant.input_unit
+    rows = [
+        (f"input, {unit}, for 1 cm/s or 0.01 rad/s of noise", _number(0.01 * noise.of_input.max())),
+        ("estimate, m/s^2 or rad/s^2, for the same noise", _number(0.01 * noise.of_estimate.max())),
+        ("velocity noise at which 3 sigma of the input reach its limit, m/s or rad/s", _number(noise.largest)),
+    ]
+    return Rows(
+        "White noise on measured velocities",
+        ("quantity", "standard deviation"),
+        rows,
+        "From the discrete Lyapunov equation of the sampled loop, with independent noise at every control step.",
+    )
+
+
+def _closed_forms(prediction: Prediction) -> Rows:
+    rows = [
+        (form.meaning, _pole(form.expected), _pole(form.nearest), f"{form.departure:.2g}") for form in prediction.forms
+    ]
+    return Rows(
+        "Closed forms compared with the whole loop",
+        ("pole", "closed form, 1/s", "nearest pole of the whole loop, 1/s", "relative difference"),
+        rows,
+        "The differences show the effect of motors, coupling and sampling.",
+    )
+
+
+def _authority(prediction: Prediction) -> Rows:
+    authority = prediction.authority
+    finite = np.isfinite(authority.high).any()
+    rows = [
+        ("share of the time in which the demand is met", f"{authority.held:.0%}"),
+        ("smallest share of a demand that is met", f"{authority.share.min():.0%}"),
+        ("largest force demanded from one actuator", _number(float(authority.demand.max()))),
+        (
+            "largest force available, forward / reverse",
+            f"{_number(authority.high.min())} / {_number(-authority.low.max())}" if finite else "-",
+        ),
+    ]
+    return Rows(
+        "Actuator authority",
+        ("quantity", "value"),
+        rows,
+        "Steady forces at the limits of the input, compared with those that the loads demand.",
+    )
+
+
+def _metrics(prediction: Prediction) -> Rows:
+    known = prediction.operating_point.built.known_metrics()
+    rows = []
+    for name, value in (prediction.metrics or {}).items():
+        shown, unit = for_people(value, known[name].unit)
+        rows.append((name, _number(shown), unit))
+    return Rows(
+        "Predicted metrics of the steady window",
+        ("metric", "predicted", "unit"),
+        rows,
+        "The linearised loop, driven by the disturbance and the errors of the navigation filter along the reference. "
+        "`undertow simulate` shows the measured metrics beside these.",
+    )
+
+
+def _together(rows: Sequence[tuple]) -> list[tuple]:
+    """One row for axes with equal numbers."""
+    joined: dict[tuple, list[str]] = {}
+    for axis, *numbers in rows:
+        joined.setdefault(tuple(numbers), []).append(axis)
+    return [("all" if len(axes) == len(rows) > 1 else ", ".join(axes), *numbers) for numbers, axes in joined.items()]
+
+
+def _pole(pole: complex) -> str:
+    return f"{pole.real:.4g}" + (f" +- {abs(pole.imag):.4g}j" if abs(pole.imag) > 1e-6 * abs(pole) else "")
+
+
+def _time(value: float) -> str:
+    return "any" if np.isinf(value) else "none" if value == 0 else f"{1e3 * value:.3g} ms"
+
+
+def _number(value: float) -> str:
+    return "any" if np.isinf(value) else f"{value:.3g}"

@@ -10,8 +10,8 @@ import jax
 import numpy as np
 
 from undertow.analysis.metrics import Gathered, accumulators, results
+from undertow.campaign.batch_runner import leaves, planned, run_of
 from undertow.campaign.campaign_schema import Series
-from undertow.campaign.runs import leaves, planned, run_of
 from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run, simd_width

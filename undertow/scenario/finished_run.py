@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -17,7 +18,9 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.dataset import to_dataset
 from undertow.loop.outcome import Outcome
 from undertow.power.ledger import closure
-from undertow.scenario.provenance import checksum, content_hash, versions
+from undertow.scenario.foreign_code import changed
+from undertow.scenario.provenance import checksum, claims, content_hash, versions
+from undertow.scenario.reading import parse
 
 
 class Measuring(NamedTuple):
@@ -122,3 +125,57 @@ def _finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+_SHOWN = 3  # of what differs
+
+
+class Repetition(NamedTuple):
+    """A run compared with the result file it was repeated from."""
+
+    equal: bool
+    explained: bool  # whether other versions or changed code explain a difference
+    sentence: str
+
+
+def compare(path: Path, repeated: xr.Dataset) -> Repetition:
+    """Compare a run with the result file at `path`, whose scenario it used and whose checksum, if any, is correct."""
+    with xr.open_dataset(path, engine="netcdf4") as earlier:
+        before, held = dict(earlier.attrs), claims(earlier)
+    now = claims(repeated)
+    differing, added = [name for name, claim in held.items() if now.get(name) != claim], sorted(set(now) - set(held))
+    code = _code(path, before)
+    if not differing:
+        which = f"in all its contents; new since then: {_listed(added)}" if added else _short(repeated)
+        though = f", although {code}" if code else ""
+        unknown = "" if "checksum" in before else "; it has no checksum that could reveal changes to the file"
+        return Repetition(True, True, f"{path.name} was repeated bit for bit {which}{though}{unknown}")
+    others = [_differences(before, repeated.attrs), code, f"one without {_listed(added)}" if added else ""]
+    reasons = ", ".join(filter(None, others))
+    why = f"; other versions: {reasons}" if reasons else ", with the same versions"
+    return Repetition(
+        False, bool(reasons), f"{path.name} was not repeated bit for bit{why}. Differences: {_listed(differing)}"
+    )
+
+
+def _short(repeated: xr.Dataset) -> str:
+    return f"(content hash {repeated.attrs['content_hash'][:12]})"
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:_SHOWN]) + (f" and {len(names) - _SHOWN} more" if names[_SHOWN:] else "")
+
+
+def _code(path: Path, before: dict) -> str:
+    """Code files that have changed."""
+    scenario = parse(str(before.get("scenario") or "{}"), path.name, path.resolve().parent, "SCENARIO")
+    files = changed(before.get("code"), scenario.data, scenario.folder)
+    return ", ".join(f"{file} has changed" for file in files)
+
+
+def _differences(before: dict, now: dict) -> str:
+    names = sorted(name for name in {*before, *now} if name.startswith("version_") or name == "machine")
+    changed = [name for name in names if before.get(name) != now.get(name)]
+    return ", ".join(
+        f"{name.removeprefix('version_')} {before.get(name)} then, {now.get(name)} now" for name in changed
+    )

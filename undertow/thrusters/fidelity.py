@@ -19,11 +19,7 @@ FIDELITIES = {
 
 
 def with_fidelity(
-    motor: DCMotor,
-    fidelity: str,
-    supply: float = float(jnp.inf),
-    dead_zone: float = 0.0,
-    dead_zone_kind: str = "pass",
+    motor: DCMotor, fidelity: str, supply: float = float(jnp.inf), dead_zone: float = 0.0, dead_zone_kind: str = "pass"
 ) -> AbstractThruster:
     """Thruster with a DC motor at a fidelity level.
 

@@ -8,23 +8,76 @@ mirrored (tests/physics/test_mirror.py), creation of energy (tests/physics/test_
 leaks between runs (tests/loop/test_sampled_to_continuous.py: run twice, same bits).
 """
 
+import numpy as np
+
 from undertow.checks.finding import Finding
-from undertow.checks.vehicle_lint import copied, hydrodynamics, layout, mass, printed_matrix, statics
-from undertow.checks.vehicle_lint.derived import derived as derived
+from undertow.checks.vehicle_lint import hydrodynamics, layout, mass, statics, transcription
+from undertow.checks.vehicle_lint.layout import scaled
+from undertow.scenario.build import Built
+from undertow.scenario.vehicle_data import parse
 from undertow.vehicles.facts import Facts as Facts
 from undertow.vehicles.facts import facts_of as facts_of
+from undertow.vehicles.vehicle import Vehicle
 
-_RULES = (
-    *mass.RULES,
-    *statics.RULES,
-    *hydrodynamics.RULES,
-    *layout.RULES,
-    *printed_matrix.RULES,
-    *copied.RULES,
-)
+_RULES = (*mass.RULES, *statics.RULES, *hydrodynamics.RULES, *layout.RULES, *transcription.RULES)
 
 
 def lint(facts: Facts) -> tuple[Finding, ...]:
     """All errors and advice on a vehicle, errors first."""
     findings = [finding for rule in _RULES for finding in rule(facts)]
     return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
+
+
+def derived(facts: Facts) -> tuple[tuple[str, str, str], ...]:
+    """Rows (what, value, unit)."""
+    eigenvalues = np.linalg.eigvalsh(0.5 * (facts.mass_matrix + facts.mass_matrix.T))
+    sizes = np.linalg.svd(facts.thruster_matrix, compute_uv=False)
+    even = np.linalg.svd(scaled(facts.thruster_matrix), compute_uv=False)
+    rank = int((sizes > 1e-9 * sizes[0]).sum())
+    drag = np.diag(facts.linear_damping) + np.diag(facts.quadratic_damping)
+    righting = facts.weight * facts.r_g[2] - facts.buoyancy * facts.r_b[2]
+    return (
+        ("mass, displaced mass", _row([facts.mass, facts.displaced_mass]), "kg"),
+        ("(B - W) / W", f"{100 * (facts.buoyancy / facts.weight - 1):+.2f}", "%"),
+        ("radii of gyration, roll, pitch, yaw", _row(facts.radii_of_gyration), "m"),
+        ("eigenvalues of M", _row(eigenvalues), "kg, kg m^2"),
+        ("added mass / displaced mass", _row(np.diag(facts.added_mass)[:3] / facts.displaced_mass), ""),
+        ("drag at 1 m/s, surge, sway, heave", _row(drag[:3]), "N"),
+        ("centre of buoyancy above centre of gravity", f"{1e3 * (facts.r_g[2] - facts.r_b[2]):.4g}", "mm"),
+        ("righting moment", f"{righting:.4g}", "N m/rad"),
+        ("thrusters, rank of their matrix", f"{len(facts.positions)}, {rank}", ""),
+        ("singular values of the thruster matrix", _row(sizes), ""),
+        ("condition, moments per longest arm", f"{even[0] / even[-1]:.3g}" if len(even) == rank == 6 else "-", ""),
+    )
+
+
+def _row(values) -> str:
+    return ", ".join(f"{value:.4g}" for value in values)
+
+
+def vehicle_facts(built: Built) -> Facts | None:
+    """Facts of the vehicle of a scenario; None where its plant is not a vehicle."""
+    vehicle = getattr(built.closed_loop.plant, "vehicle", None)
+    if not isinstance(vehicle, Vehicle):
+        return None
+    description = built.resolved["plant"].get("vehicle", {})
+    return parse(description["contents"]).facts() if "contents" in description else facts_of(vehicle)
+
+
+def vehicle_warnings(built: Built) -> tuple[str, ...]:
+    """A sentence for each impossible property, and for a weight that is not that of the mass.
+
+    The latter results from changing the mass only, in a scenario or from trial to trial.
+    """
+    facts = vehicle_facts(built)
+    findings = () if facts is None else lint(facts)
+    shown = [finding for finding in findings if finding.level == "error" or finding.rule == "gravity"]
+    if _mass_alone(built):
+        stays = "With `mass` alone changed, weight and buoyancy stay: give `weight` and `buoyancy`, too"
+        shown = [finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in shown]
+    return tuple(f"{finding.says}. {finding.hint}".rstrip(". ") for finding in shown)
+
+
+def _mass_alone(built: Built) -> bool:
+    description = built.resolved["plant"].get("vehicle", {})
+    return "mass" in description and "weight" not in description

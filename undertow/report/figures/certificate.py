@@ -17,10 +17,7 @@ from undertow.report.figures.limits import fit_linear, fit_log
 _WIDTH, _LEFT, _RIGHT, _TOP, _TALL, _GAP, _FOOT = 7.2, 0.66, 0.14, 0.66, 1.5, 0.42, 0.45
 
 # Colour, opacity, and the height as shares of a panel: one as a background, one as a strip along the bottom.
-_SPANS = {
-    "input at a limit": ("#e07b00", 0.22, 1.0),
-    "weight at its bound (projection)": ("#009e73", 0.7, 0.07),
-}
+_SPANS = {"input at a limit": ("#e07b00", 0.22, 1.0), "weight at its bound (projection)": ("#009e73", 0.7, 0.07)}
 
 # Decades of dV/dt that are shown on either side of zero.
 _DECADES = 4

@@ -130,10 +130,7 @@ def identification(title: str, run: xr.Dataset) -> Figure:
     return small_multiples(
         title,
         recorded.axis_names(run),
-        [
-            Block([state, model], recorded.places(run), height=1.1, titled=True),
-            Block([apart], thousandths, height=0.9),
-        ],
+        [Block([state, model], recorded.places(run), height=1.1, titled=True), Block([apart], thousandths, height=0.9)],
     )
 
 

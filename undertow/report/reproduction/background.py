@@ -99,16 +99,8 @@ LEFT_OPEN = (
         "the electrical power.",
         "Used as printed on this page; undertow warns about it.",
     ),
-    (
-        "Eq. (34)",
-        "The approximation error $\\omega$ is counted twice.",
-        "Counted once.",
-    ),
-    (
-        "Eqs. (36), (37)",
-        "Two letters for the number of rules, two for the index of the input.",
-        "One letter for each.",
-    ),
+    ("Eq. (34)", "The approximation error $\\omega$ is counted twice.", "Counted once."),
+    ("Eqs. (36), (37)", "Two letters for the number of rules, two for the index of the input.", "One letter for each."),
     (
         "Eqs. (38)-(41)",
         "The optimal weights are defined for a $d$ that is a function of $\\varepsilon$, but $d$ is a function of "
@@ -120,11 +112,7 @@ LEFT_OPEN = (
         "The Lyapunov function and its derivative share one symbol; a term is dropped.",
         "Two symbols; all terms are kept.",
     ),
-    (
-        "Eqs. (59), (60)",
-        "The bound is 'less than infinity', which is no bound.",
-        "$2 V(0)$.",
-    ),
+    ("Eqs. (59), (60)", "The bound is 'less than infinity', which is no bound.", "$2 V(0)$."),
     (
         "Theorem, Sec. 5.1",
         "Proved with `sign`: the error goes to zero. Simulated with `tanh`: the error stays small but not zero. "
@@ -146,14 +134,6 @@ LEFT_OPEN = (
         "No vehicle matrices, no initial weights, no integrator, no time step, no disturbance formulas.",
         "Chosen as listed at the top of this page; weights and identification model start at zero.",
     ),
-    (
-        "Sec. 5",
-        "The yaw error is a plain difference of angles.",
-        "The difference is taken the short way round.",
-    ),
-    (
-        "Table 2",
-        "The table has adjectives, but no numbers.",
-        "Numbers are given above.",
-    ),
+    ("Sec. 5", "The yaw error is a plain difference of angles.", "The difference is taken the short way round."),
+    ("Table 2", "The table has adjectives, but no numbers.", "Numbers are given above."),
 )

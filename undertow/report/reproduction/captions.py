@@ -64,8 +64,7 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
             _single(two, "estimation_rms", "Rms error of the estimate"),
         ),
         "fig13": join(
-            "As Fig. 9, for RCAFC without speed sensors.",
-            _single(two, "input_peak", "Largest voltage, V", "whole"),
+            "As Fig. 9, for RCAFC without speed sensors.", _single(two, "input_peak", "Largest voltage, V", "whole")
         ),
         "fidelity": join(
             "The controllers of Table 1 on four fidelity levels of the same thruster. A cross marks a run that ended "

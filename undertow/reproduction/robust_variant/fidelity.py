@@ -33,10 +33,7 @@ _SUPPLIES = {
 _PUSHED, _LET_GO, _JUDGED = 8.0, 9.5, 17.0  # s
 _PUSH, _REST = [4.0, 4.0, -4.0, 2.0, 2.0, 2.0], [0.0] * 6
 _SAMPLES = [(0.0, _REST), (_PUSHED, _REST), (_PUSHED + 0.01, _PUSH), (_LET_GO, _PUSH), (_LET_GO + 0.01, _REST)]
-_OVERLOAD = [
-    {"kind": "u1", "scale": 0.3},
-    {"kind": "table", "samples": [[t, *size] for t, size in _SAMPLES]},
-]
+_OVERLOAD = [{"kind": "u1", "scale": 0.3}, {"kind": "table", "samples": [[t, *size] for t, size in _SAMPLES]}]
 
 # One number per axis for all gains, so that both sets of gains share one program.
 _TABLE1: dict[str, Any] = {

@@ -64,10 +64,7 @@ def _scenario(description: str, law: dict[str, Any], sensor: str) -> dict[str, A
         "model": {"vehicle": vehicle(_NOMINAL), "rate_term": True},
         "controller": law,
         "reference": {"kind": "setpoint", "position": [0] * 6},
-        "disturbance": [
-            {"kind": "current", "velocity": [0.4, 0.3, 0]},
-            {"kind": "waves", "height": 0.5, "depth": 3},
-        ],
+        "disturbance": [{"kind": "current", "velocity": [0.4, 0.3, 0]}, {"kind": "waves", "height": 0.5, "depth": 3}],
         "navigation": sensor,
         "loop": {"kind": "sampled", "dt": 0.01, "duration": _END, "record": 0.05},
         "steady": {"start": _START},
