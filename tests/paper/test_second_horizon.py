@@ -12,8 +12,8 @@ from undertow.core.status import Status
 from undertow.plants.double_integrator import double_integrator
 from undertow.reproduction import claims, drifting, horizons, lag_map
 from undertow.reproduction.all_outputs import with_all_outputs
-from undertow.reproduction.claims import c05_fuzzy_input, conditions
-from undertow.reproduction.claims.c04_chattering import perfect_variation
+from undertow.reproduction.claims import estimation
+from undertow.reproduction.claims.tracking import perfect_variation
 from undertow.reproduction.running import run_batches
 from undertow.reproduction.setup import FIDELITIES, SIX_AXES, law_of, scenario
 from undertow.scenario.build import build
@@ -106,8 +106,8 @@ def test_perfect_cancellation_moves_the_voltages_too():
 
 
 def test_limits_and_noise_decide_between_rcafc_and_rafc_at_the_same_gain():
-    found = flown(conditions.scenarios())
-    for volts in conditions.LIMITS:
+    found = flown({name: one for name, one in claims.batched(False).items() if name.startswith("c02")})
+    for volts in estimation.LIMITS:
         rcafc, rafc, bounded = (found[f"c02_{law}_{volts:g}V"].windows[0] for law in ("rcafc", "rafc", "rafc_bounded"))
         assert rcafc["tracking_rms"] == pytest.approx(1.6e-4, rel=0.02)
         # Its weights wind up, and how far it strays is chaotic: 0.3 to 16 in the last digit of a rounding.
@@ -115,7 +115,7 @@ def test_limits_and_noise_decide_between_rcafc_and_rafc_at_the_same_gain():
         assert bounded["tracking_rms"] == pytest.approx(1.58e-4, rel=0.02)
     noisy = [found[f"c02_{law}_noise"].windows[0]["estimation_rms"] for law in ("rcafc", "rafc")]
     assert noisy[1] > 4 * noisy[0]
-    assert conditions.lost_by_limits(found) and conditions.worse_by_noise(found, "estimation_rms")
+    assert estimation.lost_by_limits(found) and estimation.worse_by_noise(found, "estimation_rms")
 
 
 def test_drift_by_noise_with_the_sets_of_the_benchmark():
@@ -128,7 +128,7 @@ def test_drift_by_noise_with_the_sets_of_the_benchmark():
 
 
 def test_fuzzy_input_is_judged_on_every_level():
-    wanted = c05_fuzzy_input.batched(False)
+    wanted = {name: one for name, one in claims.batched(False).items() if name.startswith("c05")}
     assert {name.split("_")[1] for name in wanted} == set(FIDELITIES)
     one_rule = build(wanted["c05_shaft_error_1"]).closed_loop.controller
     five = paper(double_integrator(1).model())

@@ -1,34 +1,34 @@
-"""Audit of the paper's claims C1 to C14, one file each.
+"""Audit of the paper's claims C1 to C14, in a file for each subject.
 
-Each file has the claim (`CLAIM`), its runs (`scenarios(quick)`, and `batched(quick)` for runs of which metrics are
-enough), and the verdict (`judge(runs, long)`): `holds`, `holds if ...`, `fails` or `open`, with the simulated fidelity
-levels and duration.
+Each claim has its runs and a function that judges them (`finding.claim`): `holds`, `holds if ...`, `fails` or `open`,
+with the simulated fidelity levels and duration.
 """
 
-import importlib
-import pkgutil
 from collections.abc import Mapping
 from typing import Any
 
+from undertow.reproduction.claims import estimation as estimation
+from undertow.reproduction.claims import frequency as frequency
+from undertow.reproduction.claims import fuzzy_input as fuzzy_input
+from undertow.reproduction.claims import gain_matrices as gain_matrices
+from undertow.reproduction.claims import lyapunov as lyapunov
+from undertow.reproduction.claims import other_plants as other_plants
+from undertow.reproduction.claims import robustness as robustness
+from undertow.reproduction.claims import thrusters as thrusters
+from undertow.reproduction.claims import tracking as tracking
+from undertow.reproduction.claims.finding import CLAIMS, Scenarios
 from undertow.reproduction.running import BatchResult
 from undertow.scenario.execute import Executed
 
-_MODULES = [
-    importlib.import_module(f"{__name__}.{info.name}")
-    for info in sorted(pkgutil.iter_modules(__path__), key=lambda info: info.name)
-    if info.name[0] == "c" and info.name[1:3].isdigit()
-]
 
-
-def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
+def scenarios(quick: bool) -> Scenarios:
     """Runs of the audit besides the examples, by name; fewer points of the sweeps when quick."""
-    return {name: one for module in _MODULES for name, one in module.scenarios(quick).items()}
+    return {name: one for claim in CLAIMS for name, one in claim.scenarios(quick).items()}
 
 
-def batched(quick: bool) -> dict[str, dict[str, Any]]:
+def batched(quick: bool) -> Scenarios:
     """Sampled scenarios of which metrics are enough, by name."""
-    found = [module.batched(quick) for module in _MODULES if hasattr(module, "batched")]
-    return {name: one for scenarios in found for name, one in scenarios.items()}
+    return {name: one for claim in CLAIMS for name, one in claim.batched(quick).items()}
 
 
 def audit(runs: Mapping[str, Executed], long: Mapping[str, BatchResult]) -> list[dict[str, Any]]:
@@ -39,17 +39,9 @@ def audit(runs: Mapping[str, Executed], long: Mapping[str, BatchResult]) -> list
         long: runs of `batched`, of the long horizon and of the map of lags.
     """
     found = []
-    for module in _MODULES:
-        finding = module.judge(runs, long)
-        found.append(
-            {
-                "id": f"C{int(module.__name__.rsplit('.', 1)[1][1:3])}",
-                "claim": module.CLAIM,
-                "verdict": finding.verdict,
-                "evidence": finding.evidence,
-                "simulated": finding.simulated,
-                "scenario": f"scenarios/{finding.shown_by}.yaml" if finding.shown_by else None,
-                "numbers": dict(finding.numbers),
-            }
-        )
+    for claim in CLAIMS:
+        finding = claim.judge(runs, long)
+        said = {"verdict": finding.verdict, "evidence": finding.evidence, "simulated": finding.simulated}
+        shown = f"scenarios/{finding.shown_by}.yaml" if finding.shown_by else None
+        found.append({"id": claim.id, "claim": claim.text, **said, "scenario": shown, "numbers": dict(finding.numbers)})
     return found

@@ -1,6 +1,6 @@
-"""Verdict on a claim, and comparisons that several claims share."""
+"""A claim with its runs and its verdict, and comparisons that several claims share."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -9,6 +9,7 @@ from undertow.reproduction.setup import equal_gain_ratio
 from undertow.scenario.execute import Executed
 
 Runs = Mapping[str, Executed]
+Scenarios = dict[str, dict[str, Any]]
 
 
 class Finding(NamedTuple):
@@ -19,6 +20,32 @@ class Finding(NamedTuple):
     shown_by: str | None  # name of the scenario of the evidence
     simulated: str  # fidelity levels, conditions and duration
     numbers: Mapping[str, Any] = MappingProxyType({})
+
+
+class Claim(NamedTuple):
+    """A claim of the paper, and how it is judged."""
+
+    id: str  # C1 to C14
+    text: str
+    judge: Callable[[Runs, Any], Finding]  # from the runs, and the batched runs
+    scenarios: Callable[[bool], Scenarios]  # runs besides the examples, by name; fewer points of the sweeps when quick
+    batched: Callable[[bool], Scenarios]  # sampled ones of which metrics are enough
+
+
+CLAIMS: list[Claim] = []
+
+
+def claim(
+    id: str, text: str, scenarios: Any = lambda quick: {}, batched: Any = lambda quick: {}
+) -> Callable[[Any], Any]:
+    """Register the function that judges a claim; see `Claim`."""
+
+    def register(judge: Callable[[Runs, Any], Finding]) -> Callable[[Runs, Any], Finding]:
+        CLAIMS.append(Claim(id, text, judge, scenarios, batched))
+        CLAIMS.sort(key=lambda one: int(one.id[1:]))
+        return judge
+
+    return register
 
 
 # RAFC with gamma raised until its low-frequency loop gain equals that of RCAFC, for a fair comparison.

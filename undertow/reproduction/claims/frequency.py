@@ -7,18 +7,16 @@ from typing import Any
 import numpy as np
 
 from undertow.analysis.small_signal import crossing_frequency, estimation_response
-from undertow.reproduction.claims.finding import Finding, Runs, steady
+from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import CONTROLLERS, SIX_AXES, law_of, scenario
-
-CLAIM = "The scheme estimates uncertainties of large amplitude and high frequency."
 
 # rad/s; six at a time, one per axis.
 _QUICK = ((5.0, 20.0, 50.0, 95.0, 105.0, 200.0),)
 _SWEEP = (*_QUICK, (0.5, 1.0, 2.0, 10.0, 35.0, 70.0), (90.0, 100.0, 115.0, 150.0, 300.0, 400.0))
 
 
-def scenarios(quick: bool) -> dict:
+def _frequency_scenarios(quick: bool) -> dict:
     """Unit sinusoids of different frequency on six independent axes, at the goal from the start."""
     return {
         _name(controller, i): scenario(
@@ -32,7 +30,10 @@ def scenarios(quick: bool) -> dict:
     }
 
 
-def judge(runs: Runs, long: Long) -> Finding:
+@claim(
+    "C6", "The scheme estimates uncertainties of large amplitude and high frequency.", scenarios=_frequency_scenarios
+)
+def frequency(runs: Runs, long: Long) -> Finding:
     """|d_hat - d| / |d| against frequency, measured and predicted."""
     sweep = {controller: _sweep(runs, controller) for controller in CONTROLLERS}
     points = list(zip(sweep["rcafc"]["frequency"], sweep["rcafc"]["measured"], strict=True))

@@ -1,11 +1,9 @@
 """C9: square and non-square gain matrices."""
 
 from undertow.core.status import Status
-from undertow.reproduction.claims.finding import Finding, Runs, steady
+from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import plant_of, scenario
-
-CLAIM = "The scheme works for square and non-square gain matrices (Eqs. (22)-(28))."
 
 # Thrusters of ODIN that are fitted; 1-4 horizontal, 5-8 vertical.
 _SUBSETS = {
@@ -20,7 +18,7 @@ _QUICK = ("n4_rank3",)
 _SIMULATED = "level ideal, U1, 20 s"
 
 
-def scenarios(quick: bool) -> dict:
+def _gain_matrices_scenarios(quick: bool) -> dict:
     """Example 1 with subsets of the thrusters."""
     return {
         _name(key): scenario(
@@ -37,7 +35,12 @@ def scenarios(quick: bool) -> dict:
     }
 
 
-def judge(runs: Runs, long: Long) -> Finding:
+@claim(
+    "C9",
+    "The scheme works for square and non-square gain matrices (Eqs. (22)-(28)).",
+    scenarios=_gain_matrices_scenarios,
+)
+def gain_matrices(runs: Runs, long: Long) -> Finding:
     """Tracking by number of thrusters and rank."""
     everything = steady(runs["ideal_rcafc"])["tracking_rms"]
     numbers = {"n8_rank6": everything}

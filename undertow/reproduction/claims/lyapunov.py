@@ -1,18 +1,18 @@
-"""C12: the Lyapunov function never increases."""
+"""The claims of the proof: the Lyapunov function never increases, and P solves its equation."""
+
+import numpy as np
 
 from undertow.analysis.certificate import lyapunov_function, minimax_weight, share_increasing
-from undertow.reproduction.claims.finding import Finding, Runs
+from undertow.reproduction.claims.finding import Finding, Runs, claim
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import GOAL, SIX_AXES, law_of, scenario
-
-CLAIM = "V_dot <= 0 along every solution (Eqs. (46)-(58))."
 
 _SIMULATED = "constant d on six axes without a motor; level ideal, U1; 20 s"
 
 _CONSTANT = [5.0, -3.0, 2.0, 1.0, -1.0, 0.5]  # m/s^2, rad/s^2
 
 
-def scenarios(quick: bool) -> dict:
+def _lyapunov_function_decreases_scenarios(quick: bool) -> dict:
     """A constant d, to which the proof applies exactly."""
     return {
         "c12_constant": scenario(
@@ -23,7 +23,8 @@ def scenarios(quick: bool) -> dict:
     }
 
 
-def judge(runs: Runs, long: Long) -> Finding:
+@claim("C12", "V_dot <= 0 along every solution (Eqs. (46)-(58)).", scenarios=_lyapunov_function_decreases_scenarios)
+def lyapunov_function_decreases(runs: Runs, long: Long) -> Finding:
     """Share of 10 ms steps at which V_f grows: constant d with theta* = d, and suite U1 with the minimax theta*."""
     constant, varying = runs["c12_constant"], runs["ideal_rcafc"]
     law = law_of(varying)
@@ -41,3 +42,17 @@ def judge(runs: Runs, long: Long) -> Finding:
     if steps["u1"] > 0:
         return Finding("holds if d is constant", text, "ideal_rcafc", _SIMULATED, steps)
     return Finding("holds", text, "ideal_rcafc", _SIMULATED, steps)
+
+
+@claim("C13", "A positive definite P solves Eq. (21) for the gains of Table 1.")
+def lyapunov_equation(runs: Runs, long: Long) -> Finding:
+    """Residual of Eq. (21) and eigenvalues of P."""
+    law = law_of(runs["ideal_rcafc"])
+    p, (k1, k2), q = np.asarray(law.lyapunov()), np.asarray(law.feedback), np.asarray(law.weight)
+    a = np.array([[0.0, 1.0], [-k1, -k2]])
+    residual = float(np.abs(a.T @ p + p @ a + q).max())
+    smallest = float(np.linalg.eigvalsh(p).min())
+    text = f"P = {p.tolist()}, smallest eigenvalue {smallest:.3f}, residual {residual:.1g}."
+    good = residual <= 1e-12 * np.abs(q).max() and smallest > 0
+    verdict, numbers = "holds" if good else "fails", {"residual": residual, "smallest": smallest}
+    return Finding(verdict, text, "ideal_rcafc", "algebra, nothing is simulated", numbers)

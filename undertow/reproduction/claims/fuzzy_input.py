@@ -2,12 +2,10 @@
 
 from typing import Any
 
-from undertow.reproduction.claims.finding import Finding, Runs, steady
+from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
 from undertow.reproduction.horizons import Long, sampled
 from undertow.reproduction.running import BatchResult
 from undertow.reproduction.setup import FIDELITIES, same_loop_gain, scenario
-
-CLAIM = "With the modelling error as input fewer rules are needed than with the state, and the estimate is better."
 
 # Law -> words, options; all with the same gamma |xi|^2.
 _LAWS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -19,12 +17,7 @@ _LAWS: dict[str, tuple[str, dict[str, Any]]] = {
 _AS_GOOD = 1.05  # times the estimation error
 
 
-def scenarios(quick: bool) -> dict:
-    """No runs besides Table 2, which has the state as input at the same gamma."""
-    return {}
-
-
-def batched(quick: bool) -> dict:
+def _fuzzy_input_batched(quick: bool) -> dict:
     """The state, one rule and five rules at every fidelity level, at the same loop gain."""
     return {
         _name(level, law): scenario(
@@ -39,7 +32,12 @@ def batched(quick: bool) -> dict:
     }
 
 
-def judge(runs: Runs, long: Long) -> Finding:
+@claim(
+    "C5",
+    "With the modelling error as input fewer rules are needed than with the state, and the estimate is better.",
+    batched=_fuzzy_input_batched,
+)
+def fuzzy_input(runs: Runs, long: Long) -> Finding:
     """Estimation error and chattering at every fidelity level; at the printed gamma at `ideal`."""
     same_gamma = steady(runs["table2_rcafc_state"])["estimation_rms"], steady(runs["ideal_rcafc"])["estimation_rms"]
     levels = [level for level in FIDELITIES if _name(level, "error_5") in long]

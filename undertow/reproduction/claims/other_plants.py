@@ -7,12 +7,10 @@ import jax.numpy as jnp
 
 from undertow.core.status import Status
 from undertow.plants.magnetic_levitation import MagneticLevitation
-from undertow.reproduction.claims.finding import Finding, Runs, steady
+from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import scenario
 from undertow.scenario.execute import Executed
-
-CLAIM = "The method works for other systems x_ddot = f + G u + d (pendulum, magnetic levitation)."
 
 _SIMULATED = "pendulum 10 s, ball 5 s"
 
@@ -24,7 +22,7 @@ _GAPS = (5, 6, 7, 8, 10, 12, 14)
 _QUICK = (6, 10)
 
 
-def scenarios(quick: bool) -> dict:
+def _other_plants_scenarios(quick: bool) -> dict:
     """Table 1 on Wang's pendulum with a wrong nominal model, and on a levitated ball at several gaps."""
     pendulum = scenario(
         "Table 1 on an inverted pendulum whose nominal model is too light and too short",
@@ -40,7 +38,12 @@ def scenarios(quick: bool) -> dict:
     return {_PENDULUM: pendulum} | coils | ideal
 
 
-def judge(runs: Runs, long: Long) -> Finding:
+@claim(
+    "C14",
+    "The method works for other systems x_ddot = f + G u + d (pendulum, magnetic levitation).",
+    scenarios=_other_plants_scenarios,
+)
+def other_plants(runs: Runs, long: Long) -> Finding:
     """Tracking on both plants, and the lag of the coil at which it fails."""
     coils = sorted((_lag(runs[_at(gap)]), gap) for gap in _GAPS if _at(gap) in runs)
     numbers = {

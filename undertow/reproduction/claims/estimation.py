@@ -1,7 +1,9 @@
-"""Comparison of RCAFC and RAFC at equal tuning effort under voltage limits and velocity noise."""
+"""The claims on the estimate and the robust term, for RCAFC and RAFC; also under limits and noise."""
 
 from typing import Any
 
+from undertow.reproduction.all_outputs import with_all_outputs
+from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1, claim
 from undertow.reproduction.horizons import BOUND, Long, sampled
 from undertow.reproduction.running import BatchResult
 from undertow.reproduction.setup import RAFC, RCAFC, equal_gain, scenario
@@ -17,7 +19,7 @@ _LAWS: dict[str, tuple[str, float, dict[str, Any]]] = {
 }
 
 
-def scenarios() -> dict[str, dict[str, Any]]:
+def _conditions(quick: bool) -> dict[str, dict[str, Any]]:
     """Example 1 at 1 kHz with limited voltages, and with noise of 1 cm/s on the velocities."""
     found, load = {}, {"kind": "u2"}  # U1 for 20 s, as in the long runs, so that they share a program
     for law, (words, composite, gains) in _LAWS.items():
@@ -85,3 +87,54 @@ def _shown(run: BatchResult) -> str:
 
 def _listed(words: list[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _estimation_scenarios(quick: bool) -> dict:
+    """RAFC at equal loop gain."""
+    words = "RAFC with gamma raised to the loop gain of RCAFC"
+    return {EQUAL_GAIN: scenario(words, composite=RAFC, controller=equal_gain())}
+
+
+@claim(
+    "C2",
+    "RCAFC estimates the lumped uncertainty better than RAFC.",
+    scenarios=_estimation_scenarios,
+    batched=_conditions,
+)
+def estimation(runs: Runs, long: Long) -> Finding:
+    """At the paper's gains, at equal tuning effort, and at that under limits and noise."""
+    return compared(runs, long, "estimation_rms", "rms estimation error", "m/s^2")
+
+
+def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Finding:
+    """Verdict on `RCAFC has a smaller <metric> than RAFC`."""
+    text, numbers = at_table_1(runs, metric, what, unit)
+    rcafc, rafc, fair = numbers.values()
+    tracking = steady_tracking(runs)
+    text += f" Its tracking error is {100 * (1 - tracking[1] / tracking[0]):.1f} % smaller than that of RCAFC."
+    more, found = sentences(long, metric, unit)
+    numbers, text = numbers | found, f"{text} {more}"
+    simulated = "level ideal, U1, 20 s"
+    if rcafc >= rafc:
+        return Finding("fails", text, "ideal_rcafc", simulated, numbers)
+    if rcafc < fair:
+        return Finding("holds", text, "ideal_rcafc", simulated, numbers)
+    where = []
+    if lost_by_limits(long):
+        where.append(f"voltages are limited to {max(LIMITS):g} V or less and weights are not")
+    if worse_by_noise(long, metric):
+        where.append("velocities are noisy (1 cm/s)")
+    else_where = f"; at equal loop gain only where {' or '.join(where)}" if where else "; not at equal loop gain"
+    return Finding(f"holds if both use the gamma of Table 1{else_where}", text, EQUAL_GAIN, simulated, numbers)
+
+
+def steady_tracking(runs: Runs) -> tuple[float, float]:
+    """Tracking rms of RCAFC, and of RAFC at equal loop gain."""
+    of = lambda name: with_all_outputs(runs[name].steady)["tracking_rms"]
+    return of("ideal_rcafc"), of(EQUAL_GAIN)
+
+
+@claim("C3", "RCAFC needs a smaller robust control signal than RAFC.")
+def robust_term(runs: Runs, long: Long) -> Finding:
+    """As C2, since for small signals u_r is the filtered estimation error."""
+    return compared(runs, long, "robust_rms", "rms robust term", "m/s^2")

@@ -4,11 +4,9 @@ import numpy as np
 
 from undertow.analysis.drift import time_to_divergence
 from undertow.core.status import Status
-from undertow.reproduction.claims.finding import Finding, Runs, steady
+from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
 from undertow.reproduction.horizons import Long, sampled
 from undertow.reproduction.setup import SIX_AXES, law_of, scenario
-
-CLAIM = "The performance is fully robust to the design parameters and to the initial conditions."
 
 _TABLE1 = {
     "adaptation": 100.0,
@@ -22,7 +20,7 @@ _STARTS = 6
 _NOISE, _SEEDS, _NOISY = "c10_noise", 3, 200.0  # s
 
 
-def scenarios(quick: bool) -> dict:
+def _robustness_scenarios(quick: bool) -> dict:
     """Every gain halved and doubled, and random starts."""
     gains = {
         f"c10_{name}_{'half' if factor < 1 else 'double'}": scenario(
@@ -46,7 +44,7 @@ def scenarios(quick: bool) -> dict:
     return gains | starts
 
 
-def batched(quick: bool) -> dict:
+def _robustness_batched(quick: bool) -> dict:
     """1 cm/s of velocity noise, with the unchanged fuzzy sets of the benchmark."""
     return {
         f"{_NOISE}_{seed}": scenario(
@@ -61,7 +59,13 @@ def batched(quick: bool) -> dict:
     }
 
 
-def judge(runs: Runs, long: Long) -> Finding:
+@claim(
+    "C10",
+    "The performance is fully robust to the design parameters and to the initial conditions.",
+    scenarios=_robustness_scenarios,
+    batched=_robustness_batched,
+)
+def robustness(runs: Runs, long: Long) -> Finding:
     """Spread of the tracking error, and the counterexample."""
     nominal = steady(runs["ideal_rcafc"])["tracking_rms"]
     swept = {n: r for n, r in runs.items() if n.startswith("c10_")}
