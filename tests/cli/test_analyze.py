@@ -65,7 +65,7 @@ def test_a_run_is_put_beside_its_prediction(undertow, tmp_path):
         said.out
     )
     found = json.loads((tmp_path / "out" / "metrics.json").read_text())
-    for name in ("position_rms", "estimation_rms", "input_rms"):
+    for name in ("position_rms", "position_estimation_rms", "input_rms"):
         assert found["predicted"][name] == pytest.approx(found["steady"][name], rel=0.1)
 
 

@@ -2,6 +2,8 @@
 
 import json
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -129,3 +131,41 @@ def test_from_python_too():
     found = ut.simulate(plant, law, setpoint([0.0]), duration=1.0, dt=DT, position=[0.1])
     lines = {line.split()[0]: line.split()[-1] for line in repr(found).splitlines()[2:]}
     assert (lines["input_rms"], lines["input_variation"]) == ("N", "N/s")
+
+
+def test_metres_and_radians_never_make_one_number():
+    """Every metric of the outputs, of a law that has all signals, against NumPy: those in m, those in rad, and each."""
+    rng, steps, gathered = np.random.default_rng(3), 40, Metrics(units=("m", "rad", "m"))
+    names = ("error", "reference", "estimate", "uncertainty", "robust_term", "modelling_error")
+    series = {name: rng.normal(size=(steps, 3)) for name in names} | {"weights": rng.normal(size=(steps, 3, 2))}
+    series |= {name: rng.random((steps, 4)) for name in ("input", "power", "saturated")}
+    series["bad_readings"] = np.zeros(steps)
+    at = lambda k: {name: jnp.asarray(values[k]) for name, values in series.items()}
+    update, state = eqx.filter_jit(gathered.update), gathered.init(at(0))
+    for k in range(steps):
+        state = update(state, jnp.asarray(DT * k), at(k))
+    found = gathered.values(state)
+
+    parts = {"estimation": series["estimate"] - series["uncertainty"], "uncertainty": series["uncertainty"]}
+    parts |= {"robust": series["robust_term"], "model": series["modelling_error"]}
+    wanted = {}
+    for group, axes in {"position": [0, 2], "attitude": [1]}.items():
+        wanted[f"{group}_rms"] = np.sqrt((series["error"][:, axes] ** 2).mean())
+        wanted[f"{group}_max"] = np.abs(series["error"][:, axes]).max()
+        wanted[f"{group}_weights_peak"] = np.abs(series["weights"][:, axes]).max()
+        wanted |= {f"{group}_{name}_rms": np.sqrt((part[:, axes] ** 2).mean()) for name, part in parts.items()}
+    assert {name for name in found if name.startswith(("position", "attitude"))} == set(wanted)
+    for name, value in wanted.items():
+        np.testing.assert_allclose(found[name], value, rtol=1e-14, err_msg=name)
+    assert not {"estimation_rms", "weights_peak", "tracking_rms"} & set(found)
+    peaks = gathered.per_axis(state)["weights_peak_axes"]
+    np.testing.assert_array_equal(peaks, np.abs(series["weights"]).max((0, 2)))
+
+
+def test_units_of_metrics_of_the_outputs():
+    arm, law = two_link_arm(), lambda plant: rcaf(plant.model(), preset="robust", sampling_time=DT)
+    loop = ClosedLoop(arm, law(arm), setpoint(np.zeros(2)), none(), perfect())
+    units = {name: metric.unit for name, metric in meanings(loop).items()}
+    assert units["attitude_rms"] == "rad" and units["attitude_estimation_rms"] == "rad/s^2"
+    assert units["attitude_model_rms"] == "rad/s" and units["attitude_weights_peak"] == "rad/s^2"
+    assert not any(name.startswith("position") for name in units) and "estimation_rms" not in units

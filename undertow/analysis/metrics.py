@@ -43,7 +43,7 @@ class MetricsState(NamedTuple):
     span: Scalar  # s covered by steps inside the window
     energy: Scalar
     saturated: Scalar
-    weights_peak: Scalar | None  # None for a law without weights
+    weights_peak: PerAxis | None  # None for a law without weights
     bad_readings: Scalar
     settling: "Settling"
     previous: Any  # (t, input, power, inside) of the sample before
@@ -105,6 +105,13 @@ def output_groups(units: Sequence[str]) -> dict[str, tuple[str, list[int]]]:
     return {_ALL: (units[0], list(range(len(units))))} if one_kind else found
 
 
+def of_group(group: str, name: str) -> str:
+    """Name of a metric of the outputs of one group: `position_rms` of the error, else `position_estimation_rms`."""
+    if name.startswith("error_"):
+        return f"{group}_{name.removeprefix('error_')}"
+    return name if group == _ALL else f"{group}_{name}"
+
+
 class Metrics(AbstractAccumulator):
     """The metrics of every run, over start <= t <= stop.
 
@@ -129,7 +136,7 @@ class Metrics(AbstractAccumulator):
             span=zero,
             energy=zero,
             saturated=zero,
-            weights_peak=zero if "weights_peak" in signals else None,
+            weights_peak=axes if "weights" in signals else None,
             bad_readings=zero,
             settling=Settling(zero, axes, axes, axes, zero, zero),
             previous=(zero, jnp.zeros_like(signals["input"]), zero, zero),
@@ -142,7 +149,7 @@ class Metrics(AbstractAccumulator):
         size, applied = jnp.abs(signals["error"]), signals["input"]
         weights_peak = state.weights_peak
         if weights_peak is not None:
-            weights_peak = jnp.maximum(weights_peak, inside * signals["weights_peak"])
+            weights_peak = jnp.maximum(weights_peak, inside * jnp.abs(signals["weights"]).max(-1, initial=0.0))
         return MetricsState(
             samples=state.samples + inside,
             squares={name: sums + inside * _RMS[name][1](signals) ** 2 for name, sums in state.squares.items()},
@@ -163,10 +170,13 @@ class Metrics(AbstractAccumulator):
         """Metrics by name, of many runs at once where the leaves have leading axes; NaN where one is not defined."""
         state = jax.tree.map(np.asarray, state)
         count = np.where(state.samples > 0, state.samples, np.nan)
-        groups = output_groups(self.units)
-        found = {f"{group}_rms": _rms(state.squares["error"][..., axes], count) for group, (_, axes) in groups.items()}
-        found |= {f"{group}_max": state.largest_error[..., axes].max(-1) for group, (_, axes) in groups.items()}
-        found |= {f"{name}_rms": _rms(sums, count) for name, sums in state.squares.items() if name != "error"}
+        found = {}
+        for group, (_, axes) in output_groups(self.units).items():
+            for name, sums in state.squares.items():
+                found[of_group(group, f"{name}_rms")] = np.sqrt(sums[..., axes].mean(-1) / count)
+            found[of_group(group, "error_max")] = state.largest_error[..., axes].max(-1)
+            if state.weights_peak is not None:
+                found[of_group(group, "weights_peak")] = state.weights_peak[..., axes].max(-1)
         found |= {
             "input_rms": np.sqrt(state.input_squares / count),
             "input_peak": state.input_peak,
@@ -176,8 +186,6 @@ class Metrics(AbstractAccumulator):
             "saturated_fraction": state.saturated / count,
             "bad_readings": state.bad_readings,
         }
-        if state.weights_peak is not None:
-            found["weights_peak"] = state.weights_peak
         return {name: np.where(np.isnan(count), np.nan, value) for name, value in found.items()}
 
     def per_axis(self, state: MetricsState) -> dict[str, list[float]]:
@@ -187,12 +195,10 @@ class Metrics(AbstractAccumulator):
             return {}
         found = {f"{name}_rms_axes": np.sqrt(sums / state.samples).tolist() for name, sums in state.squares.items()}
         found["error_max_axes"] = state.largest_error.tolist()
+        if state.weights_peak is not None:
+            found["weights_peak_axes"] = state.weights_peak.tolist()
         settled = state.settling.times()
         return found if np.isnan(settled).all() else found | {"settling_time_axes": settled.tolist()}
-
-
-def _rms(squares: np.ndarray, count: np.ndarray) -> np.ndarray:
-    return np.sqrt(squares.mean(-1) / count)
 
 
 class Windowed(AbstractAccumulator):
@@ -271,22 +277,32 @@ def _over_series(gathered: Gathered, time: Array, signals: Signals) -> tuple[Any
     return jax.lax.scan(step, tuple(one.init(first) for one in gathered), (time, signals))[0]
 
 
-# In the order of tables. `Metrics` has those up to `bad_readings`; the others are known once a run is over.
-MEANINGS = {
-    "position_rms": Metric("m", "rms of the tracking error x_d - x over the outputs in m"),
-    "attitude_rms": Metric("rad", "rms of the tracking error over the outputs in rad, the short way round"),
-    "tracking_rms": Metric("[axis]", "rms of the tracking error of a plant whose outputs share another unit"),
-    "position_max": Metric("m", "largest tracking error of the outputs in m"),
-    "attitude_max": Metric("rad", "largest tracking error of the outputs in rad"),
-    "tracking_max": Metric("[axis]", "largest tracking error of a plant whose outputs share another unit"),
+# Metrics of the outputs: each comes for those in m, for those in rad, or for all where they share another unit; and
+# for each output, as `<name>_axes`, in its own unit.
+_OF_OUTPUTS = {
+    "error_rms": Metric("[axis]", "rms of the tracking error x_d - x"),
+    "error_max": Metric("[axis]", "largest tracking error"),
     "estimation_rms": Metric("[axis]/s^2", "rms of d_hat - d"),
     "uncertainty_rms": Metric("[axis]/s^2", "rms of the lumped uncertainty d = x_ddot - F - G u"),
     "robust_rms": Metric("[axis]/s^2", "rms of the robust term u_r"),
     "model_rms": Metric("[axis]/s", "rms of the modelling error eps = x_hat_dot - x_dot"),
+    "weights_peak": Metric("[axis]/s^2", "largest |theta|; it shows parameter drift"),
+}
+PER_AXIS = (*_OF_OUTPUTS, "settling_time")
+_WHICH = {"position": "of the outputs in m", "attitude": "of the outputs in rad, the short way round"}
+
+# In the order of tables. `Metrics` has those up to `bad_readings`; the others are known once a run is over.
+MEANINGS = {
+    of_group(group, name): Metric(
+        metric.unit.replace("[axis]", next((unit for unit, named in _GROUPS.items() if named == group), "[axis]")),
+        f"{metric.meaning}, {_WHICH.get(group, 'where all outputs share another unit')}",
+    )
+    for name, metric in _OF_OUTPUTS.items()
+    for group in (*_GROUPS.values(), _ALL)
+} | {
     "input_rms": Metric("[input]", "rms of the applied input over all inputs"),
     "input_peak": Metric("[input]", "largest applied input"),
     "input_variation": Metric("[input]/s", "total variation of the input per second, mean over inputs (chattering)"),
-    "weights_peak": Metric("[axis]/s^2", "largest |theta|; it shows parameter drift"),
     "energy": Metric("J", "electrical energy supplied"),
     # Infinite if it never settles; not defined for a reference that moves until the end.
     "settling_time": Metric("s", "time after which the reference rests and the error stays within 2 % of the step"),
@@ -297,15 +313,12 @@ MEANINGS = {
     "rules": Metric("", "fuzzy rules per axis"),
 }
 
-# Metrics that also come for each output, as `<name>_axes`, in its own unit.
-PER_AXIS = ("error_rms", "error_max", "estimation_rms", "uncertainty_rms", "robust_rms", "model_rms", "settling_time")
-
-
 # Known once a run is over, from its record or its law: campaigns keep no record, and have none of them.
 _AFTERWARDS = ("energy_balance_residual", "energy_integration_residual", "rules")
 
-# Metric -> the signal of the law that it needs, beside the first of each of `_RMS`.
-_NEEDED = {f"{name}_rms": needed[0] for name, (needed, _) in _RMS.items()} | {"weights_peak": "weights_peak"}
+# Metric of the outputs -> the signal that it needs.
+_NEEDED = {f"{name}_rms": needed[0] for name, (needed, _) in _RMS.items()}
+_NEEDED |= {"error_max": "error", "weights_peak": "weights"}
 
 
 def meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
@@ -315,10 +328,10 @@ def meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, 
         BadInput: two metrics have the same name.
     """
     plant, signals = loop.plant, loop.signals()
-    of_outputs = {f"{group}_{kind}" for group in output_groups(plant.output_units) for kind in ("rms", "max")}
-    other = {f"{group}_{kind}" for group in (*_GROUPS.values(), _ALL) for kind in ("rms", "max")} - of_outputs
-    other |= {name for name, needed in _NEEDED.items() if needed not in signals}
-    found = {name: metric for name, metric in MEANINGS.items() if name not in other}
+    possible = {name for name, needed in _NEEDED.items() if needed in signals}
+    own_groups = {of_group(group, name) for group in output_groups(plant.output_units) for name in possible}
+    others = {of_group(group, name) for group in (*_GROUPS.values(), _ALL) for name in _OF_OUTPUTS} - own_groups
+    found = {name: metric for name, metric in MEANINGS.items() if name not in others}
     for metric in own:
         for name, meaning in metric.metrics().items():
             if name in found:

@@ -11,7 +11,7 @@ from undertow.analysis.linearization.closed_loop import LinearLoop
 from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.analysis.linearization.minimal_realization import visible
-from undertow.analysis.metrics import output_groups
+from undertow.analysis.metrics import of_group, output_groups
 
 _ENTRIES = ("load", "noise")
 _START = "start"  # a column: where the states are at first
@@ -60,13 +60,14 @@ def signals_within(
 def metrics_of(signals: dict[str, np.ndarray], units: Sequence[str]) -> dict[str, float]:
     """Metrics of predicted signals, by the names of results files; `units` are those of the outputs."""
     rms = lambda values: float(np.sqrt((values**2).mean()))
+    named = {"error": "error", "uncertainty": "uncertainty", "modelling_error": "model", "robust_term": "robust"}
+    of_outputs = {metric: signals[name] for name, metric in named.items() if name in signals}
+    if "estimate" in signals:
+        of_outputs["estimation"] = signals["estimate"] - signals["uncertainty"]
     found = {}
     for group, (_, axes) in output_groups(units).items():
-        found |= {f"{group}_rms": rms(signals["error"][:, axes]), f"{group}_max": _peak(signals["error"][:, axes])}
-    if "estimate" in signals:
-        found["estimation_rms"] = rms(signals["estimate"] - signals["uncertainty"])
-    named = {"uncertainty": "uncertainty_rms", "modelling_error": "model_rms", "robust_term": "robust_rms"}
-    found |= {metric: rms(signals[name]) for name, metric in named.items() if name in signals}
+        found |= {of_group(group, f"{name}_rms"): rms(values[:, axes]) for name, values in of_outputs.items()}
+        found[of_group(group, "error_max")] = _peak(signals["error"][:, axes])
     return found | {"input_rms": rms(signals["u"]), "input_peak": _peak(signals["u"])}
 
 

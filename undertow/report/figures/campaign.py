@@ -14,6 +14,8 @@ _SHOWN = (
     "position_rms",
     "attitude_rms",
     "tracking_rms",
+    "position_estimation_rms",
+    "attitude_estimation_rms",
     "estimation_rms",
     "input_rms",
     "input_variation",

@@ -14,7 +14,7 @@ from undertow.campaign.labels import words
 from undertow.campaign.trials import trials
 from undertow.core.status import Status
 from undertow.reproduction.ablations.verdicts import Ablation
-from undertow.reproduction.all_outputs import RMS
+from undertow.reproduction.all_outputs import of_columns
 from undertow.scenario.part_cache import PartCache
 
 QUICK_SEEDS = 8
@@ -98,19 +98,12 @@ def summaries(
     for i, name in enumerate(names):
         own = {key: values[i :: len(names)] for key, values in columns.items()}
         lasted = own["status"] == int(Status.OK)
-        own |= {RMS: _over_all_outputs(own)}
+        own |= of_columns(own)
         own["share"] = own["estimation_rms"] / np.where(own["uncertainty_rms"] > 0, own["uncertainty_rms"], np.nan)
         defined = [metric for metric in metrics if not np.isnan(own[metric][lasted]).all() or not lasted.any()]
         kept = {metric: spread(np.where(lasted, own[metric], np.inf)) for metric in defined}
         settings = ", ".join(f"{key}: {words(value)}" for key, value in several.values(i).items())
         yield ", ".join(name), (settings or "Table 1", Summary(lasted.size, int((~lasted).sum()), kept))
-
-
-def _over_all_outputs(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The paper's figure over six outputs, from groups of equal size: m and, for a vehicle, rad."""
-    groups = [columns[name] for name in ("position_rms", "attitude_rms") if name in columns]
-    defined = [group for group in groups if not np.isnan(group).all()] or groups
-    return np.sqrt(np.mean(np.square(defined), axis=0))
 
 
 def spread(values: np.ndarray) -> Spread:
