@@ -32,12 +32,18 @@ def campaign():
 
 
 @pytest.fixture
-def campaign_file(tmp_path, campaign):
+def campaign_folder(tmp_path):
+    """Where campaign files stand. Of equal campaigns in one folder only the first is compiled."""
+    return tmp_path
+
+
+@pytest.fixture
+def campaign_file(campaign_folder, campaign):
     """A file of the campaign with changes."""
     from undertow.scenario.reading import dump
 
     def write(name="small", **changes):
-        path = tmp_path / f"{name}.yaml"
+        path = campaign_folder / f"{name}.yaml"
         path.write_text(dump(campaign(**changes)), encoding="utf-8")
         return path
 
