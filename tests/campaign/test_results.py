@@ -89,7 +89,9 @@ def test_rows_stand_by_what_is_crossed_and_drawn(campaign_file, tmp_path):
         assert one["metrics"]["position_rms"]["0.5"] == float(middle)
 
 
-@pytest.mark.parametrize("duration", [pytest.param(2.0, marks=pytest.mark.slow), 2.06])  # ends at a record, and between two
+@pytest.mark.parametrize(
+    "duration", [pytest.param(2.0, marks=pytest.mark.slow), 2.06]
+)  # ends at a record, and between two
 def test_the_worst_trials_are_repeated_bit_for_bit(campaign, campaign_file, tmp_path, duration):
     """Metrics and series of a scenario file from `worst/`, run alone, are those of the lane that it flew in."""
     out, scenario = tmp_path / "out", campaign()["scenario"]

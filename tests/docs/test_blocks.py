@@ -4,7 +4,8 @@ Blocks of one page run in order, in one folder, with one namespace. A block that
 an output) is not marked python or bash, or stands after a line `<!-- not run -->`. A block of Python or YAML whose
 first line is `# my_part.py` is that file: it is written into the folder.
 
-By default a run is not put beside its prediction, and blank figures are written: most of the time of a short run.
+By default a run is not put beside its prediction, and blank figures are written: most of the time of a short run. Slow
+tests run everything as it stands.
 """
 
 import re
@@ -14,6 +15,7 @@ from typing import NamedTuple
 
 import pytest
 
+from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
 from undertow.report.figures import writing
 
@@ -57,8 +59,8 @@ def quicker(arguments: list[str]) -> list[str]:
     return [*arguments, *(["--no-prediction"] if arguments[0] == "simulate" else [])]
 
 
-# Pages that run by default as users run them.
-WHOLE = {"your-own-plant"}
+# Pages that run by default as users run them, and pages whose campaign is built but not run by default.
+WHOLE, BUILT = {"your-own-plant"}, {"campaign"}
 
 
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
@@ -80,6 +82,10 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch):
     for block in blocks(page):
         if file := FILE.match(block.code):
             (tmp_path / file["name"]).write_text(block.code, encoding="utf-8")
+        elif not whole and page.stem in BUILT:
+            for arguments in commands(block.code):
+                if arguments[1].endswith(".yaml"):
+                    assert prepare(tmp_path / arguments[1]).trials.number > 0
         elif block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
         elif block.language == "bash":
