@@ -44,7 +44,7 @@ def halved(x):
     return jax.lax.while_loop(lambda y: jnp.abs(y).max() > 0.01, lambda y: y / 2 + 1e-4 * x[0], x)
 
 
-def work(x, rounds=40):
+def work(x, rounds=8):
     """Enough that it is left out where no lane needs it."""
     return jax.lax.fori_loop(0, rounds, lambda i, y: jnp.sin(y) + x[i % 5] / 3, x)
 

@@ -6,6 +6,9 @@ import pytest
 
 from undertow.campaign.task import site
 from undertow.loop import vmap_batch
+from undertow.report.figures import writing
+
+BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},
@@ -32,16 +35,35 @@ def campaign():
 
 
 @pytest.fixture
-def campaign_file(tmp_path, campaign):
+def campaign_folder(tmp_path):
+    """Where campaign files stand. Of equal campaigns in one folder only the first is compiled."""
+    return tmp_path
+
+
+@pytest.fixture
+def campaign_file(campaign_folder, campaign):
     """A file of the campaign with changes."""
     from undertow.scenario.reading import dump
 
     def write(name="small", **changes):
-        path = tmp_path / f"{name}.yaml"
+        path = campaign_folder / f"{name}.yaml"
         path.write_text(dump(campaign(**changes)), encoding="utf-8")
         return path
 
     return write
+
+
+@pytest.fixture
+def whole_figures():
+    """For tests that look at figures: they are drawn, which takes most of the time of a small campaign."""
+
+
+@pytest.fixture(autouse=True)
+def blank_figures(monkeypatch, request):
+    """Figures are made, but blank ones are written unless a test has the fixture `whole_figures`."""
+    if "whole_figures" not in request.fixturenames:
+        monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
+        monkeypatch.setattr(writing, "png", lambda figure: b"blank")
 
 
 @pytest.fixture(params=["simd", "xla"])

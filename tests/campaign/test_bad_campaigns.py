@@ -207,7 +207,7 @@ def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
 
 def test_a_mass_without_its_weight_is_told(campaign_file, tmp_path, capsys):
     """Both by a run and by a campaign, before they begin."""
-    scenario = VEHICLE | {"plant": {"vehicle": {"kind": "odin", "mass": 200.0}}}
+    scenario = VEHICLE | {"plant": {"vehicle": {"kind": "odin", "mass": 200.0}, "ledger": False}}
     said = r"`weight` must be the weight of the mass, 1962 N, but is .*"
     path = campaign_file(scenario=scenario, vary={}, trials=1, requirements={})
     assert run(["campaign", str(path), "--out", str(tmp_path / "campaign")]) == 0
@@ -244,7 +244,7 @@ def test_a_refused_overwrite_leaves_a_campaign_that_is_flying(campaign_file, tmp
 @pytest.mark.parametrize("content", ["", "[]", '{"zarr_format": 3, "node_type": "array"}'])
 def test_a_store_without_its_first_file_is_told(campaign_file, tmp_path, capsys, content):
     """Nobody can say any more what its rows are of."""
-    path, out = campaign_file(), tmp_path / "out"
+    path, out = campaign_file(trials=4, requirements={}), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     (out / STORE / "zarr.json").write_text(content)
     capsys.readouterr()

@@ -35,13 +35,13 @@ def killed(path, out, kills, longest):
         time.sleep(longest * number / max(kills, 1))
         process.send_signal(signal.SIGKILL)
         counted += process.wait() == -signal.SIGKILL
-    assert typed(path, out, *(["--resume"] if (out / STORE).exists() else [])).wait() == 0
+    assert run(["campaign", str(path), "--out", str(out), *(["--resume"] if (out / STORE).exists() else [])]) == 0
     return counted
 
 
 def test_kill_9_loses_nothing(campaign_file, tmp_path):
-    path = campaign_file(trials=400, chunk=20)
-    assert typed(path, tmp_path / "whole").wait() == 0
+    path = campaign_file(trials=200, chunk=10)
+    assert run(["campaign", str(path), "--out", str(tmp_path / "whole")]) == 0
     assert killed(path, tmp_path / "killed", kills=1, longest=0.1) == 1
     assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
 
@@ -84,7 +84,7 @@ def test_a_local_cluster_listens_on_this_machine_only():
 def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):
     """As a terminal sends it: to the process, the scheduler and the workers at once."""
     path, out = campaign_file(trials=20_000, chunk=5), tmp_path / "out"
-    process = typed(path, out, "--cluster", "local", start_new_session=True, stderr=subprocess.PIPE)
+    process = typed(path, out, "--cluster", "local", "--workers", "1", start_new_session=True, stderr=subprocess.PIPE)
     while process.poll() is None and len(list(out.rglob("c/*"))) < 20:
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)

@@ -40,11 +40,35 @@ def backwards(function, work):
         yield i, function(*work[i])
 
 
+@pytest.fixture(scope="module")
+def campaign_folder(tmp_path_factory):
+    """One for all tests, so that the campaign is compiled once."""
+    return tmp_path_factory.mktemp("campaigns")
+
+
+FLOWN = {}
+
+
 @pytest.fixture
-def small(campaign_file, tmp_path):
-    """A campaign, and the bytes of its results."""
-    path = campaign_file()
-    return path, ran(path, tmp_path / "whole")
+def flown(campaign_file, campaign_folder):
+    """Runs a campaign that no test has run before; its file, its results and their bytes, not to be touched."""
+
+    def fly(**changes):
+        path, asked = campaign_file("flown", **changes), repr(changes)
+        if asked not in FLOWN:
+            out = campaign_folder / f"out-{len(FLOWN)}"
+            FLOWN[asked] = out, ran(path, out)
+        return path, *FLOWN[asked]
+
+    return fly
+
+
+@pytest.fixture
+def small(campaign_file, flown, tmp_path):
+    """A campaign, and the bytes of its results; a copy of them in a folder `whole`."""
+    _, out, whole = flown()
+    shutil.copytree(out, tmp_path / "whole")
+    return campaign_file(), whole
 
 
 def test_two_lines_of_xarray_open_it(small, tmp_path):
@@ -116,9 +140,9 @@ def test_a_chunk_that_is_gone_is_flown_again(small, tmp_path, name):
 
 
 @pytest.mark.parametrize("harm", ["column", "its metadata", "flags", "coordinate"])
-def test_what_is_missing_of_a_store_is_made_again(campaign_file, tmp_path, harm):
-    path = campaign_file(series={"signals": ["position"], "every": 0.5})
-    whole, store = ran(path, tmp_path / "out"), tmp_path / "out" / STORE
+def test_what_is_missing_of_a_store_is_made_again(flown, tmp_path, harm):
+    path, out, whole = flown(series={"signals": ["position"], "every": 0.5})
+    store = shutil.copytree(out, tmp_path / "out") / STORE
     if harm == "its metadata":
         (store / "ended" / "zarr.json").write_text("")
     else:
@@ -194,13 +218,12 @@ def test_what_differs_is_named(campaign_file, tmp_path, before, now, said):
         other.check_same({**one.attributes, "campaign": one.asked}, tmp_path)
 
 
-def test_spelling_makes_no_other_campaign(campaign, campaign_file, tmp_path):
+def test_spelling_makes_no_other_campaign(campaign, campaign_file, small, tmp_path):
     """Neither 2 for 2.0 nor the order of the scenario's keys."""
     scenario = campaign()["scenario"]
     scenario["controller"]["frequency"] = 2
     other = campaign_file("other", scenario=dict(reversed(scenario.items())), trials=44)
-    ran(campaign_file(), tmp_path / "out")
-    assert ran(other, tmp_path / "out") == ran(other, tmp_path / "at once")
+    assert ran(other, tmp_path / "whole") == ran(other, tmp_path / "at once")
 
 
 GROWING = {"cross": {"controller.frequency": [2.0, 3.0]}, "series": {"signals": ["position"], "every": 0.5}}
@@ -215,12 +238,13 @@ GROWING = {"cross": {"controller.frequency": [2.0, 3.0]}, "series": {"signals": 
 )
 def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp_path, design, changes, before):
     """The store is the same to the byte as if all had been asked for at first; only their tasks are flown."""
-    asked = lambda trials: campaign_file(trials=trials, design=design, chunk=16 if before > 1 else 1, **changes)
+    chunk, after, kept = {1: (1, 7, 1), 40: (16, 70, 32)}[before]
+    asked = lambda trials: campaign_file(trials=trials, design=design, chunk=chunk, **changes)
     combinations, counted = 2 if changes else 1, []
     ran(asked(before), tmp_path / "out")
-    grown = ran(asked(70), tmp_path / "out", watch=lambda tally: counted.append(tally.done))
-    assert counted[0] == {1: 1, 40: 32}[before] * combinations and counted[-1] == 70 * combinations
-    assert grown == ran(asked(70), tmp_path / "at once")
+    grown = ran(asked(after), tmp_path / "out", watch=lambda tally: counted.append(tally.done))
+    assert counted[0] == kept * combinations and counted[-1] == after * combinations
+    assert grown == ran(asked(after), tmp_path / "at once")
 
 
 @pytest.mark.parametrize(
@@ -233,10 +257,12 @@ def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp
         (zarr.Group, "update_attributes", 0),
     ],
 )
-def test_a_growth_that_is_cut_short_loses_nothing(campaign_file, tmp_path, monkeypatch, kind, name, at):
+def test_a_growth_that_is_cut_short_loses_nothing(campaign_file, flown, tmp_path, monkeypatch, kind, name, at):
     """Among the flags of tasks that get more trials, among the arrays, before it is said that there are more trials."""
-    path, more, out = campaign_file(**GROWING), campaign_file("more", trials=70, **GROWING), tmp_path / "out"
-    whole, real, steps = ran(path, out), getattr(kind, name), iter(range(at))
+    _, _, at_once = flown(trials=70, **GROWING)
+    path, before, whole = flown(**GROWING)
+    more, out = campaign_file("more", trials=70, **GROWING), shutil.copytree(before, tmp_path / "out")
+    real, steps = getattr(kind, name), iter(range(at))
 
     def cut(*given):
         if next(steps, None) is None:
@@ -251,7 +277,7 @@ def test_a_growth_that_is_cut_short_loses_nothing(campaign_file, tmp_path, monke
     assert results.total == 80 and 64 <= results.rows.sizes["trial"] <= 80
     assert np.isfinite(results.rows["position_rms"]).all()
     assert ran(path, out) == whole  # nobody has been told of more
-    assert ran(more, out) == ran(more, tmp_path / "at once")
+    assert ran(more, out) == at_once
 
 
 def test_the_size_of_tasks_may_change_on_the_way(small, tmp_path, campaign_file):

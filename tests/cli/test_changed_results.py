@@ -1,7 +1,7 @@
 """A result file says of itself whether it is as it was written: numbers, metrics, how it ended, units, scenario."""
 
 import pytest
-from good_scenario import SCENARIO
+from good_scenario import SMALL
 
 from undertow.scenario.execute import execute, save
 from undertow.scenario.finished_run import compare
@@ -11,8 +11,7 @@ from undertow.scenario.reading import parse, read
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
-    text = SCENARIO.replace("seed: 3", "seed: 3\nsteady: {start: 0.05, stop: 0.1}")
-    return execute(parse(text, "s.yaml", tmp_path_factory.mktemp("none"), "SCENARIO")).dataset
+    return execute(parse(SMALL, "s.yaml", tmp_path_factory.mktemp("none"), "SCENARIO")).dataset
 
 
 @pytest.fixture
@@ -35,13 +34,15 @@ def better(dataset):
 
 
 HARM = {
-    "a number": lambda dataset: dataset["position"].values.__setitem__((3, 2), 1.0),
+    "a number": lambda dataset: dataset["position"].values.__setitem__((3, 0), 1.0),
     "a metric": better,
     "metrics that are none": lambda dataset: dataset.attrs.update(metrics="{"),
     "how it ended": lambda dataset: dataset.attrs.update(status="diverged"),
     "when it ended": lambda dataset: dataset.attrs.update(ended=0.05),
     "a unit": lambda dataset: dataset["position"].attrs.update(units="ft"),
-    "the scenario": lambda dataset: dataset.attrs.update(scenario=dataset.attrs["scenario"].replace("odin", "lauv")),
+    "the scenario": lambda dataset: dataset.attrs.update(
+        scenario=dataset.attrs["scenario"].replace("setpoint", "circle")
+    ),
 }
 
 

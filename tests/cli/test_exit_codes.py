@@ -7,13 +7,16 @@ import time
 from types import SimpleNamespace
 
 import pytest
-from good_scenario import SCENARIO
+from good_scenario import SCENARIO, SMALL
 
 from undertow.cli import simulate
 
 
 def write(tmp_path, text=SCENARIO):
     (tmp_path / "s.yaml").write_text(text)
+
+
+HOURS = SMALL.replace("duration: 0.1", "duration: 1e6").replace("record: 1e-2", "record: 100")
 
 
 def raising(error):
@@ -46,7 +49,8 @@ def test_no_command_shows_the_help(undertow):
 
 
 def test_run_that_fails_is_1_and_keeps_its_results(undertow, tmp_path):
-    text = SCENARIO.replace("feedback: [1, 2]", "composite: 1e7").replace("duration: 0.1", "duration: 1")
+    text = SMALL.replace("limit: 20", "limit: 1e30").replace("frequency: 2", "frequency: 1e4")
+    text = text.replace("duration: 0.1", "duration: 1")
     write(tmp_path, text)
     said = undertow("simulate", "s.yaml", "--out", "out")
     errors = [line for line in said.err.splitlines() if not line.startswith("Advice: ")]
@@ -99,7 +103,7 @@ def test_interrupt_is_130(undertow, tmp_path, monkeypatch):
 
 def test_interrupt_of_compiled_code(tmp_path):
     """Hours of simulated time end at once, and leave nothing."""
-    write(tmp_path, SCENARIO.replace("duration: 0.1", "duration: 9000").replace("seed: 3", ""))
+    write(tmp_path, HOURS)
     command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml", "--out", "out"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -178,10 +182,13 @@ EVERY = {
 }
 
 
+QUICK = {("list", 2), ("simulate", 15)}  # both signals, and a command that waits for compiled code
+
+
 @pytest.mark.parametrize(
     ("command", "signal"),
     [
-        pytest.param(command, signal, marks=() if command in ("list", "simulate") else pytest.mark.slow)
+        pytest.param(command, signal, marks=() if (command, signal) in QUICK else pytest.mark.slow)
         for command in EVERY
         for signal in (2, 15)
     ],
@@ -203,7 +210,7 @@ def test_signals_while_modules_are_imported_end_every_command(tmp_path, command,
 
 def test_sigterm_leaves_nothing_of_a_run(tmp_path):
     """Nor does the lock stay, nor the folder that results were to appear in."""
-    write(tmp_path, SCENARIO.replace("duration: 0.1", "duration: 9000"))
+    write(tmp_path, HOURS)
     command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

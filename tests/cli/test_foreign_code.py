@@ -4,7 +4,7 @@ import getpass
 
 import pytest
 import xarray as xr
-from good_scenario import SCENARIO
+from good_scenario import SCENARIO, SMALL
 
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
@@ -22,17 +22,17 @@ import undertow as ut
 pathlib.Path(__file__).with_name("it ran").touch()
 
 
-def my_rov(mass: float = 125.0):
-    return ut.vehicles.odin()
+def my_goal(away: float = 1.0):
+    return ut.references.setpoint([away])
 """
-QUICK = SCENARIO.replace("kind: odin, mass: 125", "kind: ./my_rov.py:my_rov").replace("duration: 0.1", "duration: 0.01")
+QUICK = SMALL.replace("{kind: setpoint, position: [1]}", "./my_goal.py:my_goal")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A result file that names code, and a campaign of it."""
     folder = tmp_path_factory.mktemp("his")
-    (folder / "my_rov.py").write_text(CODE)
+    (folder / "my_goal.py").write_text(CODE)
     save(execute(parse(QUICK, "s.yaml", folder, "SCENARIO")).dataset, folder / "run.nc")
     (folder / "campaign.yaml").write_text("scenario: run.nc\ntrials: 2\n")
     return folder
@@ -41,7 +41,7 @@ def folder(tmp_path_factory):
 @pytest.fixture
 def his(folder):
     """The same, where the code has left no trace yet."""
-    (folder / "my_rov.py").write_text(CODE)
+    (folder / "my_goal.py").write_text(CODE)
     (folder / "it ran").unlink(missing_ok=True)
     catalogue._module.cache_clear()  # else the same contents would not run twice in this process
     return folder
@@ -53,7 +53,7 @@ def test_no_command_runs_it_unasked(his, refused, command):
     assert "must not name Python code" in said and "--allow-code" in said
     user = getpass.getuser()
     assert f"run.nc, a file of {user}" in said
-    assert f"`plant.vehicle.kind` names {his / 'my_rov.py'}:my_rov, a file of {user}. " in said
+    assert f"`reference.kind` names {his / 'my_goal.py'}:my_goal, a file of {user}. " in said
     assert not (his / "it ran").exists()
 
 
@@ -73,23 +73,18 @@ def test_a_command_runs_it_when_asked(his, undertow):
 
 def test_code_that_has_changed_since_is_named(his, refused):
     """In the question, and beside the verdict: the same numbers by other code, and other numbers by other code."""
-    code, result = his / "my_rov.py", his / "run.nc"
+    code, result = his / "my_goal.py", his / "run.nc"
     code.write_text(CODE + "# a remark\n")
-    said = f"`plant.vehicle.kind` names {code}:my_rov, a file of {getpass.getuser()}, changed since that run. "
+    said = f"`reference.kind` names {code}:my_goal, a file of {getpass.getuser()}, changed since that run. "
     assert said in refused("simulate", str(result))
     same = compare(result, simulate_scenario(result, allow_code=True).dataset)
     assert same.equal and same.sentence.endswith(f"{hash_of(his)}, although {code} has changed")
-    code.write_text(CODE.replace("return ut.vehicles.odin()", HEAVIER))
+    code.write_text(CODE.replace("setpoint([away])", "setpoint([away + 1.0])"))
     other = compare(result, simulate_scenario(result, allow_code=True).dataset)
     assert not other.equal and other.explained
     assert other.sentence.startswith(
         f"run.nc was not repeated bit for bit; other versions: {code} has changed. Differences: "
     )
-
-
-HEAVIER = """
-    import equinox as eqx
-    return eqx.tree_at(lambda rov: rov.mass, ut.vehicles.odin(), 130.0)"""
 
 
 def hash_of(folder):
@@ -116,6 +111,6 @@ def test_it_is_found_wherever_it_stands(refused, tmp_path, key, old, new):
 
 
 def test_words_about_code_are_none(tmp_path):
-    made = xr.Dataset(attrs={"scenario": f"{SCENARIO}description: 'after my_rov.py: my own vehicle'\n"})
+    made = xr.Dataset(attrs={"scenario": f"{SCENARIO}description: 'after my_goal.py: my own vehicle'\n"})
     made.to_netcdf(tmp_path / "mine.nc", engine="netcdf4")
     assert read(tmp_path / "mine.nc").data["seed"] == 3

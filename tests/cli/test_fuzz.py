@@ -3,6 +3,7 @@
 import copy
 import math
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -108,10 +109,14 @@ def test_unchanged_scenario_builds():
     build(VALID)
 
 
-@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-@given(mutated())
-def test_changed_scenario(scenario):
-    built_or_refused_in_one_line(scenario)
+@pytest.mark.parametrize("examples", [40, pytest.param(400, marks=pytest.mark.slow)])
+def test_changed_scenario(examples):
+    @settings(max_examples=examples, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @given(mutated())
+    def every(scenario):
+        built_or_refused_in_one_line(scenario)
+
+    every()
 
 
 @settings(max_examples=50, deadline=None, derandomize=True)

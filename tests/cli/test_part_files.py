@@ -1,7 +1,7 @@
 """Parts from a file of the user's own: `./my_rov.py:my_rov`."""
 
 import pytest
-from good_scenario import SCENARIO
+from good_scenario import SCENARIO, SMALL
 
 GOOD = """
 import undertow as ut
@@ -21,6 +21,9 @@ def scenario(tmp_path, part="./my_rov.py:my_rov", code=GOOD):
 
 def test_part_from_a_file_runs(undertow, tmp_path):
     scenario(tmp_path)
+    plant = "{vehicle: ./my_rov.py:my_rov, thruster: {kind: paper_table3, fidelity: ideal}, ledger: false}"
+    one_axis = "{kind: double_integrator, axes: 1, limit: 20}"
+    (tmp_path / "s.yaml").write_text(SMALL.replace(one_axis, plant).replace("[1]", "[1, 0, 0, 0, 0, 0]"))
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0, said.err
     assert f"{tmp_path / 'my_rov.py'}:my_rov" in (tmp_path / "out" / "scenario.yaml").read_text()
@@ -85,10 +88,10 @@ def my_bytes():
 
 def test_a_part_that_simd_lacks_is_reported_once_with_the_reason(undertow, tmp_path):
     (tmp_path / "my_bytes.py").write_text(BYTES)
-    (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: u1", "kind: ./my_bytes.py:my_bytes"))
+    (tmp_path / "s.yaml").write_text(SMALL.replace("kind: sinusoid, amplitude: 1", "kind: ./my_bytes.py:my_bytes"))
     reason = "slower than simd (docs/simd.md): numbers of type int8."
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0, said.err
     assert said.err.count(reason) == 1
-    (tmp_path / "s.yaml").write_text(SCENARIO)
+    (tmp_path / "s.yaml").write_text(SMALL)
     assert "lack something" not in undertow("simulate", "s.yaml", "--out", "other").err

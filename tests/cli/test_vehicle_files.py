@@ -6,15 +6,20 @@ import jax
 import numpy as np
 import pytest
 import xarray as xr
-from good_scenario import SCENARIO
+from good_scenario import SCENARIO, SMALL
 from ruamel.yaml import YAML
 
 from undertow.core.errors import BadInput
+from undertow.scenario.build import build
+from undertow.scenario.reading import read
 from undertow.scenario.vehicle_file import make_vehicle, read_vehicle
 from undertow.vehicles import bluerov2_heavy
 
 ROV = (Path(__file__).parents[2] / "examples" / "my_rov.yaml").read_text()
 FLIES = SCENARIO.replace("{kind: odin, mass: 125}", "my_rov.yaml").replace("position: [2, 3", "position: [0, 0")
+
+
+SMALL_PLANT = "vehicle: {kind: vehicles/my_rov.yaml, mass: 13.6}, thruster: linear_voltage, ledger: false"
 
 
 @pytest.fixture
@@ -85,17 +90,24 @@ def test_description_needs_no_file(rov, tmp_path):
         assert np.array_equal(a, b)
 
 
-def test_scenario_and_its_repetition_without_the_file(rov, undertow, tmp_path):
-    """Kept in another folder than the scenario's, changed, and gone when the run is repeated."""
+@pytest.mark.parametrize("repeated", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_scenario_and_its_repetition_without_the_file(rov, undertow, tmp_path, repeated):
+    """Kept in another folder than the scenario's, changed, and gone when the same loop is built, and run, again."""
     (tmp_path / "vehicles").mkdir()
     rov().rename(tmp_path / "vehicles" / "my_rov.yaml")
-    (tmp_path / "s.yaml").write_text(FLIES.replace("my_rov.yaml", "{kind: vehicles/my_rov.yaml, mass: 13.6}"))
+    text = SMALL.replace("kind: double_integrator, axes: 1, limit: 20", SMALL_PLANT)
+    (tmp_path / "s.yaml").write_text(text.replace("position: [1]", "position: [1, 0, 0, 0, 0, 0]"))
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0, said.err
     resolved = YAML(typ="safe", pure=True).load((tmp_path / "out/scenario.yaml").read_text())["plant"]["vehicle"]
     assert resolved["kind"] == "my_rov.yaml" and resolved["contents"]["mass"] == 13.6
+    loop = build(read(tmp_path / "s.yaml")).closed_loop
     (tmp_path / "vehicles" / "my_rov.yaml").unlink()
     for source in ("out/run.nc", "out/scenario.yaml"):
+        one, other = (jax.tree.leaves(each) for each in (loop, build(read(tmp_path / source)).closed_loop))
+        assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+        if not repeated:
+            continue
         again = undertow("simulate", source, "--out", "again", "--overwrite")
         assert again.code == 0, again.err
         with xr.open_dataset(tmp_path / "out/run.nc") as first, xr.open_dataset(tmp_path / "again/run.nc") as second:

@@ -6,6 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from use_of_parts import NUMBERS, USES, numbers
 
 from undertow.core import catalogue
@@ -19,22 +20,75 @@ def test_every_kind_has_a_use():
     assert set(USES) == set(catalogue.KINDS)
 
 
-def test_same_values_compiled_and_batched(part):
-    """jit = no jit, vmap = loop; and the numbers are finite and not all zero for some input."""
+# Operation by operation these take longest: without compilation they are met by the slow tests only.
+LONG = {
+    ("navigation", "observer"),
+    ("disturbances", "gauss_markov_current"),
+    ("disturbances", "waves"),
+    ("controllers", "rcaf:robust"),
+}
+
+
+def moved(leaf):
+    """Another value of a parameter."""
+    return jnp.where(jnp.isfinite(leaf), 1.01 * leaf + 0.01, 1.0)
+
+
+def plain(kind, thing, v):
+    """Values without compilation."""
+    with jax.disable_jit():
+        return np.asarray(numbers(kind, thing, v))
+
+
+def test_compiled_batched_and_differentiated(part, request):
+    """jit = no jit; a batch of parts and of what comes in is a loop, without a second trace; gradients are finite.
+
+    With respect to every parameter and every number that comes in. Two programs are compiled: the values with their
+    gradients, and a batch of values.
+    """
+    kind, thing = part
+    arrays, rest = eqx.partition(thing, eqx.is_inexact_array)
+    traces = []
+
+    def total(arrays, v):
+        traces.append(kind)
+        found = numbers(kind, eqx.combine(arrays, rest), v)
+        return found.sum(), found
+
+    use = eqx.filter_jit(jax.grad(total, argnums=(0, 1), has_aux=True))
+    many, batch = jax.tree.map(lambda leaf: jnp.stack([leaf, 1.01 * leaf, leaf]), arrays), inputs(3)
+    rows = [jax.tree.map(operator.itemgetter(i), many) for i in range(3)]
+    found = [use(one, v) for one, v in zip(rows, batch, strict=True)]
+    looped = np.stack([np.asarray(values) for _, values in found])
+    _, other = use(jax.tree.map(moved, arrays), batch[0])
+    assert len(traces) == 1
+    for leaf in jax.tree.leaves([gradients for gradients, _ in found]):
+        assert np.isfinite(np.asarray(leaf)).all()
+
+    assert looped.size and np.isfinite(looped).all()
+    if request.node.callspec.params["part"] not in LONG:
+        np.testing.assert_allclose(looped[0], plain(kind, thing, batch[0]), rtol=1e-10, atol=1e-12)
+    batched = eqx.filter_jit(eqx.filter_vmap(lambda arrays, v: numbers(kind, eqx.combine(arrays, rest), v)))
+    np.testing.assert_allclose(np.asarray(batched(many, batch)), looped, rtol=1e-10, atol=1e-12)
+    if jax.tree.leaves(arrays):
+        assert (looped[0] != np.asarray(other)).any(), "the parameters have no effect at all"
+
+
+@pytest.mark.slow
+def test_values_alone_compiled_and_batched(part):
+    """Without gradients, and with one part for all that comes in; jit = no jit."""
     kind, thing = part
     batch = inputs(3)
-    with jax.disable_jit():
-        plain = np.asarray(numbers(kind, thing, batch[0]))
     compiled = eqx.filter_jit(lambda thing, v: numbers(kind, thing, v))
     looped = np.stack([np.asarray(compiled(thing, v)) for v in batch])
     batched = np.asarray(
         eqx.filter_jit(eqx.filter_vmap(lambda thing, v: numbers(kind, thing, v), in_axes=(None, 0)))(thing, batch)
     )
-    assert plain.size and np.isfinite(plain).all()
-    np.testing.assert_allclose(looped[0], plain, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(looped[0], plain(kind, thing, batch[0]), rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(batched, looped, rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_parameters_may_be_batched(part):
     """A batch of parts with parameters of their own is a loop over parts."""
     kind, thing = part
@@ -52,31 +106,3 @@ def test_parameters_may_be_batched(part):
         np.testing.assert_allclose(batched, looped, rtol=1e-10, atol=1e-12)
     else:
         np.testing.assert_array_equal(looped[0], looped[1])
-
-
-def test_finite_gradients(part):
-    """With respect to every parameter and every number that comes in."""
-    kind, thing = part
-    arrays, rest = eqx.partition(thing, eqx.is_inexact_array)
-    total = lambda arrays, v: numbers(kind, eqx.combine(arrays, rest), v).sum()
-    gradients = eqx.filter_jit(jax.grad(total, argnums=(0, 1)))(arrays, inputs(1)[0])
-    for leaf in jax.tree.leaves(gradients):
-        assert np.isfinite(np.asarray(leaf)).all()
-
-
-def test_no_retrace_for_another_value(part):
-    kind, thing = part
-    traces = []
-
-    @eqx.filter_jit
-    def use(thing, v):
-        traces.append(kind)
-        return numbers(kind, thing, v)
-
-    v = inputs(1)[0]
-    arrays, rest = eqx.partition(thing, eqx.is_inexact_array)
-    other = eqx.combine(jax.tree.map(lambda leaf: jnp.where(jnp.isfinite(leaf), 1.01 * leaf + 0.01, 1.0), arrays), rest)
-    first, second = np.asarray(use(thing, v)), np.asarray(use(other, v))
-    assert len(traces) == 1
-    if jax.tree.leaves(arrays):
-        assert (first != second).any(), "the parameters have no effect at all"

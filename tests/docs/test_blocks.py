@@ -3,6 +3,9 @@
 Blocks of one page run in order, in one folder, with one namespace. A block that cannot run here (a set-up command,
 an output) is not marked python or bash, or stands after a line `<!-- not run -->`. A block of Python or YAML whose
 first line is `# my_part.py` is that file: it is written into the folder.
+
+By default a run is not put beside its prediction, and blank figures are written: most of the time of a short run. Slow
+tests run everything as it stands.
 """
 
 import re
@@ -12,7 +15,9 @@ from typing import NamedTuple
 
 import pytest
 
+from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
+from undertow.report.figures import writing
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -23,6 +28,9 @@ FILE = re.compile(r"# (?P<name>\w+\.(?:py|yaml))\n")
 
 # Commands with tests of their own that take minutes.
 LONG = {"reproduce"}
+
+
+BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
 
 
 class Block(NamedTuple):
@@ -46,19 +54,43 @@ def commands(code: str) -> list[list[str]]:
     return [words[1:] for words in lines if words[:1] == ["undertow"] and not LONG & set(words) and "&&" not in words]
 
 
+def quicker(arguments: list[str]) -> list[str]:
+    """The same command without a prediction."""
+    return [*arguments, *(["--no-prediction"] if arguments[0] == "simulate" else [])]
+
+
+# Pages that run by default as users run them, and pages whose campaign is built but not run by default.
+WHOLE, BUILT = {"your-own-plant"}, {"campaign"}
+
+
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_blocks_run(page, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("page", "whole"),
+    [
+        pytest.param(page, whole, id=f"{page.stem}-{whole}", marks=pytest.mark.slow if slow else ())
+        for page in PAGES
+        for whole, slow in ([(True, False)] if page.stem in WHOLE else [(False, False), (True, True)])
+    ],
+)
+def test_blocks_run(page, whole, tmp_path, monkeypatch):
+    if not whole:
+        monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
+        monkeypatch.setattr(writing, "png", lambda figure: b"blank")
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}
     for block in blocks(page):
         if file := FILE.match(block.code):
             (tmp_path / file["name"]).write_text(block.code, encoding="utf-8")
+        elif not whole and page.stem in BUILT:
+            for arguments in commands(block.code):
+                if arguments[1].endswith(".yaml"):
+                    assert prepare(tmp_path / arguments[1]).trials.number > 0
         elif block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
         elif block.language == "bash":
             for arguments in commands(block.code):
+                arguments = arguments if whole else quicker(arguments)
                 assert run(arguments) in (0, 1), f"{page.name}, line {block.line}: undertow {shlex.join(arguments)}"
 
 

@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 
 from undertow.cli.main import run
+from undertow.report.figures import writing
 from undertow.reproduction.all_outputs import with_all_outputs
+from undertow.scenario.build import build
+from undertow.scenario.reading import read
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -28,6 +31,11 @@ KNOWN = {
 VEHICLES = ["my_rov"]  # not scenarios
 
 
+# Vehicles that take longest. By default these are built; what they compute is compared in tests/loop and tests/paper.
+LONG = {"bluerov2_heavy", "own_vehicle", "paper_example2", "recorded_disturbance"}
+BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
+
+
 def test_every_example_is_tested():
     assert {path.stem for path in EXAMPLES.glob("*.yaml")} == {*KNOWN, *VEHICLES}
 
@@ -38,8 +46,16 @@ def test_vehicle(name, capsys):
     assert capsys.readouterr().out.endswith("0 errors, 0 pieces of advice\n")
 
 
-@pytest.mark.parametrize("name", KNOWN)
-def test_scenario(name, tmp_path):
+@pytest.mark.parametrize("name", sorted(LONG))
+def test_long_scenario_is_built(name):
+    built = build(read(EXAMPLES / f"{name}.yaml"))
+    assert built.closed_loop.plant.inputs() == 8 and built.scenario.loop.duration >= 10
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in KNOWN])
+def test_scenario(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
+    monkeypatch.setattr(writing, "png", lambda figure: b"blank")
     assert run(["simulate", str(EXAMPLES / f"{name}.yaml"), "--out", str(tmp_path / "out"), "--no-prediction"]) == 0
     steady = with_all_outputs(json.loads((tmp_path / "out" / "metrics.json").read_text())["steady"])
     for metric, (value, tolerance) in KNOWN[name].items():

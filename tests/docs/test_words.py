@@ -3,6 +3,7 @@
 A retired word is looked for as a whole word and as a part of a name (`told`, `as_told`, `ToldLaw`), ignoring case.
 """
 
+import functools
 import re
 from pathlib import Path
 
@@ -93,9 +94,18 @@ def files() -> list[Path]:
 TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in files()}
 
 
+@functools.cache
+def all_words(name: str, text: str) -> str:
+    """What the lines of a file and its name are searched for, at once."""
+    cleaned = [PHRASES.sub("", line) for line in (name, *text.splitlines())]
+    return "\n".join([*cleaned, *map(split_names, cleaned)])
+
+
 def hits(word: str, name: str, text: str) -> list[str]:
     """Places of a word in a file, in its name too."""
     pattern = re.compile(rf"\b(?:{word})\b", re.I)
+    if not pattern.search(all_words(name, text)):
+        return []
     lines = [name, *text.splitlines()]
     found = [
         f"{name}:{number}: {line.strip()}"
