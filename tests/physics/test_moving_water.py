@@ -133,13 +133,14 @@ def test_wandering_current_has_its_variance_and_correlation():
 def test_wandering_current_is_its_samples_and_linear_between():
     process = gauss_markov_current(span=10.0, step=0.5)
     key = jax.random.PRNGKey(4)
-    path = np.asarray(process.realize(key)) + [0.3, 0.0, 0.0]
+    path = np.asarray(eqx.filter_jit(process.realize)(key)) + [0.3, 0.0, 0.0]
+    flow = jax.jit(lambda t: water_of(process, key, t, np.zeros(3)))
     for t, expected, slope in (
         (2.0, path[4], (path[5] - path[4]) / 0.5),
         (2.25, path[4:6].mean(0), (path[5] - path[4]) / 0.5),
         (99.0, path[-1], np.zeros(3)),
     ):
-        water = water_of(process, key, jnp.asarray(t), np.zeros(3))
+        water = flow(t)
         np.testing.assert_allclose(water.velocity, expected, rtol=0, atol=1e-12)
         np.testing.assert_allclose(water.acceleration, slope, rtol=0, atol=1e-12)
     assert process.jumps(1.2) == (0.5, 1.0)
@@ -153,7 +154,7 @@ def test_sheared_current(down, north):
 
 def test_currents_add_and_each_member_has_its_own_randomness():
     two = Together((gauss_markov_current(), gauss_markov_current(), current((0.0, 0.2, 0.0))))
-    path = two.realize(jax.random.PRNGKey(0))
+    path = eqx.filter_jit(two.realize)(jax.random.PRNGKey(0))
     assert np.abs(path[0] - path[1]).max() > 0.01
     water = two.at(path, jnp.asarray(3.0), at(jnp.zeros(3)), CALM).water
     np.testing.assert_allclose(water.velocity, np.array([0.6, 0.2, 0.0]) + path[0][6] + path[1][6], rtol=0, atol=1e-12)
