@@ -37,10 +37,7 @@ from undertow.campaign.store import Store
 from undertow.reproduction.setup import scenario
 from undertow.scenario.reading import dump
 
-VARY = {
-    "initial.position[0]": {"normal": [0.0, 0.1]},
-    "controller.composite": {"uniform": [10.0, 30.0]},
-}
+VARY = {"initial.position[0]": {"normal": [0.0, 0.1]}, "controller.composite": {"uniform": [10.0, 30.0]}}
 HEAVIER = {"plant.vehicle.mass": {"normal": [125.0, 3.0]}}
 
 _LARGE = 8192  # trials of the task whose memory is measured

@@ -125,11 +125,7 @@ def at_sea(name, fix_noise):
     if fix_noise != 0.05:
         fix |= {"period": 0.1, "delay": 0.01}
     sensors = ["imu", "dvl", "depth", "compass", fix]
-    return {
-        **copy.deepcopy(SEA),
-        "controller": LAWS[name],
-        "navigation": {"kind": "observer", "sensors": sensors},
-    }
+    return {**copy.deepcopy(SEA), "controller": LAWS[name], "navigation": {"kind": "observer", "sensors": sensors}}
 
 
 def tuned(name, scenario, budget):

@@ -92,10 +92,7 @@ from undertow.scenario.reading import dump
             {"requirements": {"position_rms": {"below": 1.0, "share": 1.0}}},
             r"`requirements.position_rms.share` must be less than 1, .*; 0.99, for example, but is 1.0",
         ),
-        (
-            {"cross": {"loop.dt": [0.02, 0.02]}},
-            r"`cross.loop.dt` must have entries that differ, but is twice 0.02",
-        ),
+        ({"cross": {"loop.dt": [0.02, 0.02]}}, r"`cross.loop.dt` must have entries that differ, but is twice 0.02"),
         (
             {"cross": {"loop.dt": {"choice": [0.02, 0.04]}}},
             r"`cross.loop.dt` must be a list, or values by names, but is choice alone .*write `loop.dt: \[first, second\]`",

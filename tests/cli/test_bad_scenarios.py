@@ -44,11 +44,7 @@ MISTAKES = {
         "",
         "`reference` must be given (s.yaml). Add `reference:` to the scenario",
     ),
-    "missing option": (
-        ", position: [2, 3, 4, 0, 0, 1]",
-        "",
-        "`reference.position` must be given (s.yaml, line 7)",
-    ),
+    "missing option": (", position: [2, 3, 4, 0, 0, 1]", "", "`reference.position` must be given (s.yaml, line 7)"),
     "empty key": (
         "reference: {kind: setpoint, position: [2, 3, 4, 0, 0, 1]}\n",
         "reference:\n",
@@ -59,11 +55,7 @@ MISTAKES = {
         "vehicle: [odin]",
         "`plant.vehicle` must be a name, or a mapping with `kind` and options, but is ['odin'] (s.yaml, line 2)",
     ),
-    "negative mass": (
-        "mass: 125",
-        "mass: -1",
-        "`plant.vehicle.mass` must be positive, but is -1 kg (s.yaml, line 2)",
-    ),
+    "negative mass": ("mass: 125", "mass: -1", "`plant.vehicle.mass` must be positive, but is -1 kg (s.yaml, line 2)"),
     "NaN": ("mass: 125", "mass: .nan", "`plant.vehicle.mass` must be finite, but is nan (s.yaml, line 2)"),
     "infinity": ("mass: 125", "mass: .inf", "`plant.vehicle.mass` must be finite, but is inf (s.yaml, line 2)"),
     "text for a number": (
@@ -76,11 +68,7 @@ MISTAKES = {
         "mass: true",
         "`plant.vehicle.mass` must be a number or a list of numbers, but is True (s.yaml, line 2)",
     ),
-    "no is a word": (
-        "duration: 0.1",
-        "duration: no",
-        "`loop.duration` must be a number, but is 'no' (s.yaml, line 9)",
-    ),
+    "no is a word": ("duration: 0.1", "duration: no", "`loop.duration` must be a number, but is 'no' (s.yaml, line 9)"),
     "quoted number": (
         "duration: 0.1",
         "duration: '1e-3'",
@@ -205,11 +193,7 @@ MISTAKES = {
         "steady: {start: 5, stop: 2}",
         "`steady.stop` must be later than steady.start (5 s), but is 2 s (s.yaml, line 11)",
     ),
-    "negative seed": (
-        "seed: 3",
-        "seed: -1",
-        "`seed` must be greater than or equal to 0, but is -1 (s.yaml, line 11)",
-    ),
+    "negative seed": ("seed: 3", "seed: -1", "`seed` must be greater than or equal to 0, but is -1 (s.yaml, line 11)"),
     "short initial state": (
         "position: [0, 0, 0, 0, 0, 0]",
         "position: [0, 0]",
@@ -246,11 +230,7 @@ MISTAKES = {
         "seed: 3\nseed: 4",
         f'{YAML} found duplicate key "seed" with value "4" (original value: "3") (s.yaml, line 12)',
     ),
-    "tab": (
-        "seed: 3",
-        "\tseed: 3",
-        f"{YAML} found character '\\t' that cannot start any token (s.yaml, line 11)",
-    ),
+    "tab": ("seed: 3", "\tseed: 3", f"{YAML} found character '\\t' that cannot start any token (s.yaml, line 11)"),
     "unclosed bracket": (
         "seed: 3",
         "seed: [3",

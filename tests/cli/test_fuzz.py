@@ -56,9 +56,7 @@ NUMBERS = st.one_of(st.integers(-(10**20), 10**20), st.floats(), st.sampled_from
 WORDS = st.one_of(st.sampled_from(NAMES), st.text(max_size=8))
 LEAVES = st.one_of(NUMBERS, WORDS, st.booleans(), st.none())
 VALUES = st.recursive(
-    LEAVES,
-    lambda inner: st.lists(inner, max_size=7) | st.dictionaries(WORDS, inner, max_size=3),
-    max_leaves=8,
+    LEAVES, lambda inner: st.lists(inner, max_size=7) | st.dictionaries(WORDS, inner, max_size=3), max_leaves=8
 )
 
 

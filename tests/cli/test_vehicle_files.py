@@ -145,11 +145,7 @@ MISTAKES = {
         "`r_b` must have 3 entries (forward, starboard, down), but is 2 long (my_rov.yaml, line 12)",
     ),
     "NaN": ("0.37]", ".nan]", "`inertia` must be finite, but is [0.26, 0.23, nan] (my_rov.yaml, line 14)"),
-    "text for a number": (
-        "mass: 13.5",
-        "mass: heavy",
-        "`mass` must be a number, but is 'heavy' (my_rov.yaml, line 7)",
-    ),
+    "text for a number": ("mass: 13.5", "mass: heavy", "`mass` must be a number, but is 'heavy' (my_rov.yaml, line 7)"),
     "unit in the value": (
         "mass: 13.5",
         "mass: 13.5 kg",
@@ -186,11 +182,7 @@ MISTAKES = {
         "",
         "`thruster_matrix` must have 6 rows (surge, sway, heave, roll, pitch, yaw) with one entry for each of the 8 thrusters, but is of shape (5, 8) (my_rov.yaml, line 35)",
     ),
-    "not YAML": (
-        "r_g: [0, 0, 0] ",
-        "r_g: [0, 0, 0 ",
-        None,
-    ),
+    "not YAML": ("r_g: [0, 0, 0] ", "r_g: [0, 0, 0 ", None),
     "direction of a corner": (
         "azimuth: -45}",
         "direction: [1, -1, 0]}",

@@ -24,12 +24,7 @@ HULLS = {
     ("bluerov2_heavy", "gazebo_box_drag"): {"no_added_mass": "zero in every direction"},
     ("bluerov2_heavy", "ng2024"): {"gyration": "one of 0.295 m", "balance": "6.675 N above the weight (+5.9 %)"},
 }
-RANKS = {
-    "bluerov2": "rank 5 of 6",
-    "lauv": "rank 1 of 6",
-    "npsauv2": "rank 1 of 6",
-    "remus100": "rank 1 of 6",
-}
+RANKS = {"bluerov2": "rank 5 of 6", "lauv": "rank 1 of 6", "npsauv2": "rank 1 of 6", "remus100": "rank 1 of 6"}
 
 
 def variants():

@@ -69,11 +69,7 @@ SPOILT = {
     ),
     "nothing slows roll": ({"quadratic_damping": without(SOUND.quadratic_damping, 3)}, {"undamped"}, "in roll"),
     "direction as corners": ({"directions": 1.41421356 * SOUND.directions}, {"DIRECTION"}, "1.414 long. Divide"),
-    "positions in mm": (
-        {"positions": 1e3 * SOUND.positions, "printed_matrix": None},
-        {"ARM"},
-        "another unit?",
-    ),
+    "positions in mm": ({"positions": 1e3 * SOUND.positions, "printed_matrix": None}, {"ARM"}, "another unit?"),
     "size in mm": ({"size": 1e3 * SOUND.size}, {"VOLUME", "gyration"}, "Is `size` in metres?"),
     "size in km": ({"size": 1e-3 * SOUND.size}, None, "Is `size` in metres?"),
     "four thrusters": (

@@ -36,7 +36,13 @@ def runs():
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint(np.array([1.0, -0.5])), load, white_noise())
     return {
         every: sampled.simulate(
-            loop, duration=TICKS * DT, dt=DT, record_every=every, accumulators=(Gathered(),), key=jax.random.PRNGKey(5)
+            loop,
+            duration=TICKS * DT,
+            dt=DT,
+            record_every=every,
+            accumulators=(Gathered(),),
+            key=jax.random.PRNGKey(5),
+            method="euler",
         )
         for every in (0, 1, 10)
     }

@@ -70,8 +70,17 @@ def run(law, sensor, simulate=sampled.simulate, duration=6.0, load=None):
     return simulate(loop, duration=duration, dt=DT, record_every=1)
 
 
-@pytest.mark.parametrize("back_end", BACK_ENDS)
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("law", "back_end"),
+    [
+        ("robust", "simd"),
+        ("pid", "xla"),
+        ("paper", "simd"),
+        pytest.param("robust", "xla", marks=pytest.mark.slow),
+        pytest.param("pid", "simd", marks=pytest.mark.slow),
+        pytest.param("paper", "xla", marks=pytest.mark.slow),
+    ],
+)
 def test_a_gap_costs_what_the_load_changes_meanwhile(law, back_end):
     """In T seconds without a reading the motion departs from the foreseen one by at most d_til T^2 / 2 + |d_dot| T^3 / 6."""
     simulate, gap, at = BACK_ENDS[back_end], 0.3, 3.0
@@ -113,30 +122,30 @@ def test_the_very_first_reading():
     assert int(dark.signals["bad_readings"][0]) == 1
 
 
-@pytest.mark.parametrize(("law", "within"), [("robust", 1e-2), ("pid", 3e-2)])
+@pytest.mark.parametrize(("law", "within"), [("robust", 1e-2), pytest.param("pid", 3e-2, marks=pytest.mark.slow)])
 def test_a_vehicle_in_its_own_axes(law, within):
     """Half a second without attitude and velocities, turning and pitching, costs a hundredth of a radian.
 
     Of a PID it costs more: its integral, on the way, is no estimate of a load.
     """
-    plant = hybrid_vehicle(bluerov2_heavy(), t200(fidelity="static", dead_zone=0.0))
-    controller = LAWS[law](plant.model())
-    entries = np.repeat([0.0, 1.0], [3, 9])
-    at = {"duration": 3.0, "dt": DT, "record_every": 1, "velocity": np.array([0.3, 0, 0, 0, 0.2, 0.5])}
-    sound, hit = (
-        simd_batch.simulate(
-            ClosedLoop(
-                plant, controller, setpoint([1.0, 0.5, 1.0, 0.1, 0.2, 1.0]), none(), Faulty(entries, NAN, 1, end)
-            ),
-            **at,
-        )
-        for end in (1.0, 1.5)
-    )
-    assert Status(int(hit.status)) is Status.OK and int(hit.signals["bad_readings"][-1]) == 50
-    assert np.abs(sound.signals["position"][150, 3:] - sound.signals["position"][100, 3:]).max() > 0.1, (
-        "it turns meanwhile"
-    )
-    assert np.abs(hit.signals["position"] - sound.signals["position"]).max() < within
+    plant = hybrid_vehicle(bluerov2_heavy(), t200(fidelity="static", dead_zone=0.0), ledger=False)
+    navigation = Faulty(np.repeat([0.0, 1.0], [3, 9]), NAN, 1.0, 1.0)
+    goal = setpoint([1.0, 0.5, 1.0, 0.1, 0.2, 1.0])
+    loop = ClosedLoop(plant, LAWS[law](plant.model()), goal, none(), navigation)
+    start = loop.outputs_at_start(None, np.array([0.3, 0, 0, 0, 0.2, 0.5]))
+    run = simd_batch.Run(loop, (), start, jax.random.PRNGKey(0))
+    # Both in one batch, which is compiled once; Euler's method, as only the difference between the two matters.
+    numbers = jax.tree.map(lambda leaf: np.stack([leaf, leaf]), eqx.filter(run, eqx.is_array))
+    last = lambda run: run.loop.navigation.last
+    numbers = eqx.tree_at(last, numbers, np.array([1.0, 1.5]))
+    same = jax.tree.leaves(eqx.tree_at(last, jax.tree.map(lambda leaf: True, numbers), False))
+    plan = simd_batch.Plan(300, DT, 1, ("position", "bad_readings"), "euler", 1)
+    found = simd_batch.BatchRunner(run, plan, same).run(numbers)
+    np.testing.assert_array_equal(found.status, int(Status.OK))
+    np.testing.assert_array_equal(found.series["bad_readings"][:, -1], [0, 50])
+    sound, hit = found.series["position"]
+    assert np.abs(sound[150, 3:] - sound[100, 3:]).max() > 0.1, "it turns meanwhile"
+    assert 0 < np.abs(hit - sound).max() < within
 
 
 class Broken(AbstractContinuousController):
@@ -191,6 +200,7 @@ def test_a_command_that_is_no_number_ends_the_run(way, value):
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(cut.final))
 
 
+@pytest.mark.slow
 def test_the_adaptive_integrator_says_so_too():
     cut = continuous.simulate(broken(NAN, after=-1.0), duration=1.0, record_step=0.1, tolerances=(1e-6, 1e-8))
     assert (Status(int(cut.status)), int(cut.input)) == (Status.COMMAND_NOT_FINITE, 2)

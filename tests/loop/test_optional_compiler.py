@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -34,38 +35,62 @@ class Blocked:
 HIDDEN = set(sys.argv[1].split())
 sys.meta_path.insert(0, Blocked())
 from undertow.cli.main import run
-code = run(json.loads(sys.argv[2]))
-assert not HIDDEN & set(sys.modules)
-sys.exit(code)
+for command in json.loads(sys.argv[2]):
+    code = run(command)
+    assert not HIDDEN & set(sys.modules)
+    sys.stderr.flush()
+    print("\\n--", code, file=sys.stderr, flush=True)
 """
+COMMANDS = {
+    "simulate": ["scenario.yaml", "--out", "run"],
+    "campaign": ["campaign.yaml", "--out", "trials"],
+    "check": ["scenario.yaml"],
+    "list": [],
+    "analyze": ["scenario.yaml", "--out", "prediction"],
+}
 
 
-def without(hidden, folder, *arguments):
-    """A command where some packages cannot be imported."""
-    command = [sys.executable, "-c", WITHOUT, hidden, json.dumps(arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+def without(hidden, folder, *names):
+    """Exit code and standard error of commands, one after another in a process where some packages cannot be imported."""
+    (folder / "scenario.yaml").write_text(SCENARIO)
+    (folder / "campaign.yaml").write_text(CAMPAIGN)
+    command = [sys.executable, "-c", WITHOUT, hidden, json.dumps([[name, *COMMANDS[name]] for name in names])]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    parts = re.findall(r"(.*?)\n-- (\d+)\n", done.stderr, re.DOTALL)
+    return {name: (int(code), said) for name, (said, code) in zip(names, parts, strict=True)}
 
 
-@pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "scenario.yaml").write_text(SCENARIO)
-    (tmp_path / "campaign.yaml").write_text(CAMPAIGN)
-    return tmp_path
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("without")
 
 
-@pytest.mark.parametrize("hidden", ["simdjit", pytest.param("llvmlite", marks=pytest.mark.slow)])
-def test_simulate(folder, hidden):
+@pytest.fixture(scope="module")
+def done(folder):
+    return without("simdjit", folder, "simulate", "campaign", "check", "list")
+
+
+def compare_runs(folder, code, said, hidden):
     """The figures of backend simd to rounding, and the reason on the terminal and in the result."""
     import xarray as xr
 
-    done = without(hidden, folder, "simulate", "scenario.yaml", "--out", "run")
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.count("the run used backend xla") == 1
-    assert f"the batch compiler cannot be imported (No module named '{hidden}')" in " ".join(done.stderr.split())
+    assert code == 0, said
+    assert said.count("the run used backend xla") == 1
+    assert f"the batch compiler cannot be imported (No module named '{hidden}')" in " ".join(said.split())
     with xr.open_dataset(folder / "run" / "run.nc") as found:
         assert "`pip install .`" in found.attrs["left_to_xla"]
         wanted = execute_file(folder)
         np.testing.assert_allclose(found["position"], wanted["position"], rtol=1e-9, atol=1e-12)
+
+
+def test_simulate(folder, done):
+    compare_runs(folder, *done["simulate"], "simdjit")
+
+
+@pytest.mark.slow
+def test_simulate_without_llvm(tmp_path):
+    compare_runs(tmp_path, *without("llvmlite", tmp_path, "simulate")["simulate"], "llvmlite")
 
 
 def execute_file(folder):
@@ -76,17 +101,17 @@ def execute_file(folder):
     return executed.dataset
 
 
-def test_campaign(folder):
-    done = without("simdjit", folder, "campaign", "campaign.yaml", "--out", "trials")
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.count("trials are computed by backend xla") == 1
-    assert "the batch compiler cannot be imported" in " ".join(done.stderr.split())
+def test_campaign(done):
+    code, said = done["campaign"]
+    assert code == 0, said
+    assert said.count("trials are computed by backend xla") == 1
+    assert "the batch compiler cannot be imported" in " ".join(said.split())
 
 
 @pytest.mark.slow
-def test_analyze(folder):
-    done = without("simdjit", folder, "analyze", "scenario.yaml", "--out", "prediction")
-    assert done.returncode == 0, done.stderr
+def test_analyze(tmp_path):
+    code, said = without("simdjit", tmp_path, "analyze")["analyze"]
+    assert code == 0, said
 
 
 def test_bench_leaves_out_what_it_cannot_measure(monkeypatch, capsys):
@@ -106,9 +131,8 @@ def test_bench_leaves_out_what_it_cannot_measure(monkeypatch, capsys):
     assert not [key for key in found if key.startswith(("single_ns", "batch", "gpu", "w2"))]
 
 
-def test_check_and_list(folder):
-    assert without("simdjit", folder, "check", "scenario.yaml").returncode == 0
-    assert without("simdjit", folder, "list").returncode == 0
+def test_check_and_list(done):
+    assert done["check"][0] == done["list"][0] == 0
 
 
 def test_one_module_knows_the_compiler():

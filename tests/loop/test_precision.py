@@ -67,6 +67,7 @@ def test_one_after_the_other(fresh):
         assert jax.config.jax_enable_x64, "a run leaves the process as it was"
 
 
+@pytest.mark.slow
 def test_beside_each_other(fresh):
     """Two threads, each going from one precision to the other against the other one."""
     orders = [("float64", "float32"), ("float32", "float64")]

@@ -9,6 +9,7 @@ from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
+from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
 from undertow.thrusters.paper_table3 import paper_table3
@@ -19,24 +20,33 @@ STEPS = RECORD / np.array([50, 100, 400])  # 1 ms, 1/2 ms, 1/8 ms
 PRECISE = (1e-11, 1e-13)
 
 
-def odin_loop():
+def on_axes():
+    plant = double_integrator(2)
+    load = sinusoid(np.array([2.0, 1.0]), np.array([1.0, 5.0]))
+    return ClosedLoop(plant, rcaf(plant.model(), sets=3), setpoint(np.array([0.2, 0.3])), load, perfect())
+
+
+def on_odin():
     plant = hybrid_vehicle(odin(), paper_table3("ideal"))
     goal = setpoint(np.array([0.2, 0.3, -0.2, 0.1, -0.1, 0.2]))
     load = sinusoid(np.array([2.0, 1.0, 3.0, 1.0, 0.5, 1.0]), np.array([1.0, 5.0, 2.0, 3.0, 7.0, 4.0]))
     return ClosedLoop(plant, rcaf(plant.model(), sets=3), goal, load, perfect())
 
 
+@pytest.fixture(scope="module", params=[on_axes, pytest.param(on_odin, marks=pytest.mark.slow)])
+def loop(request):
+    return request.param()
+
+
 @pytest.fixture(scope="module")
-def truth():
+def truth(loop):
     """The loop as one differential equation, all but exactly."""
-    found = continuous.simulate(odin_loop(), duration=DURATION, record_step=RECORD, tolerances=PRECISE)
+    found = continuous.simulate(loop, duration=DURATION, record_step=RECORD, tolerances=PRECISE)
     assert int(found.status) == 0
     return found
 
 
-def test_first_order(truth):
-    loop = odin_loop()
-
+def test_first_order(loop, truth):
     def gaps(dt):
         outcome = sampled.simulate(loop, duration=DURATION, dt=dt, record_every=round(RECORD / dt))
         assert int(outcome.status) == 0
@@ -52,8 +62,7 @@ def test_first_order(truth):
     assert (errors[2] < errors[0] / 6).all(), errors
 
 
-def test_run_twice_same_bits(truth):
-    loop = odin_loop()
+def test_run_twice_same_bits(loop, truth):
     once, again = (sampled.simulate(loop, duration=DURATION, dt=STEPS[0], record_every=50) for _ in range(2))
     repeated = continuous.simulate(loop, duration=DURATION, record_step=RECORD, tolerances=PRECISE)
     for pair in ((once, again), (truth, repeated)):
@@ -61,9 +70,8 @@ def test_run_twice_same_bits(truth):
             np.testing.assert_array_equal(np.asarray(one), np.asarray(other))
 
 
-def test_fixed_and_adaptive_steps_agree(truth):
+def test_fixed_and_adaptive_steps_agree(loop, truth):
     """Two ways to the same answer: the fixed-step ODE converges to the adaptive one at fourth order."""
-    loop = odin_loop()
     errors = []
     for dt in (RECORD / 20, RECORD / 40):
         fixed = continuous.simulate(loop, duration=DURATION, record_step=RECORD, dt=dt)

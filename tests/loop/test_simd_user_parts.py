@@ -31,6 +31,7 @@ LEFT = {
 def scenario(name, backend):
     return {
         "plant": "inverted_pendulum",
+        "controller": {"kind": "pid", "frequency": 4.0},
         "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},
         "initial": {"position": [0.05]},
         "loop": {"duration": 0.3, "dt": 1e-3, "record": 1e-2, "backend": backend},
@@ -38,7 +39,8 @@ def scenario(name, backend):
     }
 
 
-SLOW = ("chosen", "of_bytes", "by_python")
+# Each compiles a loop twice; the operations themselves are those of batch_compiler/test_primitives.
+SLOW = ("network", "table", "ordered", "chosen", "of_bytes", "by_python")
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in PARTS])

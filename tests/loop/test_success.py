@@ -77,7 +77,7 @@ SCENARIO = {
     "controller": {"kind": "pid", "frequency": 2.0},
     "reference": {"kind": "setpoint", "position": [0.0]},
     "disturbance": {"kind": "sinusoid", "amplitude": 1.0},
-    "loop": {"duration": 4.0, "dt": 0.02, "record": 0.1},
+    "loop": {"duration": 4.0, "dt": 0.02, "record": 0.1, "backend": "xla"},  # compiled once for all of them
 }
 
 

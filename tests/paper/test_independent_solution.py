@@ -27,7 +27,9 @@ def check(run, solution):
         np.testing.assert_allclose(run[metric], np.sqrt((series**2).mean()), rtol=0.02)
 
 
-# From 10 s to 12 s with steps of 2 ms, because plain NumPy takes its time; the slow run does the whole of it.
+# From 10 s to 12 s with steps of 2 ms, because plain NumPy takes its time. By default a second of the full motor model is
+# compared with it, in studies/test_speed.
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_example_2_agrees_with_plain_numpy(controller):
     loop = {"kind": "continuous", "duration": 12.0}

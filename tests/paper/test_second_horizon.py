@@ -76,6 +76,7 @@ def test_five_sets_bear_a_lag_that_one_rule_does_not():
     assert one["tracking_rms"] > 100 * five["tracking_rms"] and one["input_variation"] > 1e5
 
 
+@pytest.mark.slow
 def test_the_winding_breaks_it():
     """U2: 1 mH is there after 20 s and lost after 60, 3 mH lost within 5 s; theory knows why."""
     wanted = {f"map_winding_{value}mH_five": value for value in (1, 3)}
@@ -105,6 +106,7 @@ def test_perfect_cancellation_moves_the_voltages_too():
     assert perfect_variation(run) == pytest.approx(48.5, abs=0.05)
 
 
+@pytest.mark.slow
 def test_limits_and_noise_decide_between_rcafc_and_rafc_at_the_same_gain():
     found = flown({name: one for name, one in claims.batched(False).items() if name.startswith("c02")})
     for volts in estimation.LIMITS:

@@ -10,6 +10,8 @@ from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.interop.mujoco_engine import Submerged, Water, run_in_mujoco
 from undertow.interop.mujoco_engine.mujoco_run import Propellers
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.integrators import rk4
 
 FLOW = [0.2, -0.1, 0.0]
@@ -18,7 +20,7 @@ FLOW = [0.2, -0.1, 0.0]
 @pytest.fixture(scope="module")
 def parts():
     thruster = ut.thrusters.t200(supply=16.0)
-    plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster)
+    plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster, ledger=False)
     law = ut.rcaf(
         plant.model(rate_term=True),
         feedback=[[4, 7]] * 3 + [[20, 13]] * 3,
@@ -36,15 +38,16 @@ def test_closed_loops_agree(parts):
     """Five seconds in a current at 100 Hz: 1e-8 m and rad, 1e-6 V, mostly of undertow's steps of 10 ms."""
     plant, thruster, law, reference = parts
     current = ut.disturbances.current(FLOW)
-    run = ut.simulate(plant, law, reference, disturbance=current, duration=5.0, dt=0.01, record=0.01)
+    loop = ClosedLoop(plant, law, reference, current, ut.navigation.perfect())
+    run = sampled.simulate(loop, duration=5.0, dt=0.01, record_every=1)
     body = Submerged(plant.vehicle, water=Water(FLOW))
     mujoco_run = run_in_mujoco(body, thruster, law, reference, duration=5.0, dt=0.01)
     assert mujoco_run.status == Status.OK
-    np.testing.assert_allclose(mujoco_run.time, run.dataset.time, atol=1e-12)
+    np.testing.assert_allclose(mujoco_run.time, run.time, atol=1e-12)
     assert np.ptp(mujoco_run.position[:, 0]) > 0.9 and np.abs(mujoco_run.voltage).max() > 3
-    np.testing.assert_allclose(mujoco_run.position, run.dataset.position, atol=1e-7)
-    np.testing.assert_allclose(mujoco_run.velocity, run.dataset.velocity, atol=1e-6)
-    np.testing.assert_allclose(mujoco_run.voltage, run.dataset["input"], atol=1e-5)
+    np.testing.assert_allclose(mujoco_run.position, run.signals["position"], atol=1e-7)
+    np.testing.assert_allclose(mujoco_run.velocity, run.signals["velocity"], atol=1e-6)
+    np.testing.assert_allclose(mujoco_run.voltage, run.signals["input"], atol=1e-5)
 
 
 def test_runs_repeat_bit_for_bit(parts):

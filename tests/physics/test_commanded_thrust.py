@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from simdjit import Loop
 from undertow.analysis.metrics import Metrics, results
 from undertow.controllers import pid, rcaf
 from undertow.core.contracts import AbstractController, Model, Target
@@ -92,7 +93,9 @@ def test_metrics_count_each_limit():
     asked = jnp.array([100.0, -100.0, 15.0, -11.0, 0.0, 0.0, 0.0, 0.0])
     law = Asking(plant.model(), asked, pid(plant.model(), sampling_time=0.02))
     loop = ClosedLoop(plant, law, setpoint([0.0] * 6), none(), perfect())
-    run = sampled.simulate(loop, duration=1.0, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 1.0),))
+    run = sampled.simulate(
+        loop, duration=1.0, dt=0.02, record_every=5, accumulators=(Metrics(0.0, 1.0),), method="euler"
+    )
     found = results((Metrics(0.0, 1.0),), run.accumulated)
     assert found["saturated_fraction"] == pytest.approx(2 / 8)
     assert found["input_peak"] == pytest.approx(FORWARD)
@@ -152,8 +155,15 @@ def test_a_drive_predicts_the_thrust_behind_its_lag(name):
         np.testing.assert_allclose(true.thrust, wanted * (1 - left), rtol=1e-6)
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("name", ["newtons", "volts"])
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("newtons", "robust"),
+        ("volts", "pid"),
+        pytest.param("newtons", "pid", marks=pytest.mark.slow),
+        pytest.param("volts", "robust", marks=pytest.mark.slow),
+    ],
+)
 def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
     """With the direction of the wanted acceleration kept, its share is that of a linear programme in the true box."""
     thruster, (low, high) = THRUSTERS[name]
@@ -170,12 +180,7 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
         unfiltered = eqx.tree_at(lambda c: c.filter, controller, None)
         z = unfiltered.init(y, r)
         u, signals = unfiltered.command(z, y, r)
-        return (
-            u,
-            signals["attained_share"],
-            unfiltered._plan(z, y, r).forces,
-            own.dynamics.gain(y),
-        )
+        return (u, signals["attained_share"], unfiltered._plan(z, y, r).forces, own.dynamics.gain(y))
 
     for _ in range(6):
         position = jnp.asarray(rng.normal(size=6) * [3.0, 3.0, 3.0, 0.3, 0.3, 0.6])
@@ -195,13 +200,13 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
     assert min(shares) < 0.9, "limits bind"
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", [pytest.param("robust", marks=pytest.mark.slow), "pid"])
 def test_a_vehicle_comes_to_its_place_within_both_limits(law):
     """3 m up, which the reverse side of all vertical thrusters limits, as without that limit; no overshoot of 5 cm."""
     plant = hybrid_vehicle(bluerov2_heavy(), commanded_thrust(40.0, 4.0, time_constant=0.05), ledger=False)
     controller = LAWS[law](plant.model(), sampling_time=0.05)
     loop = ClosedLoop(plant, controller, setpoint([3.0, 0.0, 1.0, 0.0, 0.0, 0.0]), none(), perfect())
-    how = dict(duration=30.0, dt=0.05, record_every=5)
+    how = dict(duration=30.0, dt=0.05, record_every=5, method="euler", substeps=10)
     run = sampled.simulate(loop, **how)
     error, u = np.asarray(run.signals["error"]), np.asarray(run.signals["input"])
     assert int(run.status) == 0
@@ -210,7 +215,25 @@ def test_a_vehicle_comes_to_its_place_within_both_limits(law):
     assert error[:, :3].min() > -0.05
 
 
-@pytest.mark.parametrize("law", [pytest.param("robust", marks=pytest.mark.slow), "pid"])
+def test_the_thruster_alone_in_a_batch_and_by_xla():
+    """Limits on both sides, rate limit and lag: 30 steps under a command that swings beyond them all."""
+    thruster = commanded_thrust(40.0, 5.0, time_constant=0.05, thrust_rate_max=60.0)
+
+    def step(size, state, k):
+        command = jnp.clip(size * jnp.cos(0.3 * k.astype(float) + jnp.arange(4.0)), *thruster.limits())
+        return rk4(lambda t, x: thruster.dynamics(x, command), 0.0, state, 0.02)
+
+    start, thrust = lambda size: thruster.initial_state(4), lambda size, state, k: state.thrust
+    program = Loop(lambda size: size, start, step, thrust, jnp.zeros(()), [False])
+    _, found = program.run(np.array([60.0, 10.0]), steps=30, every=1)
+    by_xla = jax.jit(lambda size: jax.lax.scan(lambda x, k: (step(size, x, k),) * 2, start(size), jnp.arange(30))[1])
+    for size, series in zip((60.0, 10.0), np.asarray(found), strict=True):
+        np.testing.assert_allclose(series[1:], by_xla(size).thrust, rtol=1e-12, atol=1e-12)
+    assert np.asarray(found).max() > 5.0 and np.abs(np.diff(found[0], axis=0)).max() > 0.99 * 60.0 * 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS)
 def test_batches_and_xla_agree(law):
     """What four thrusters at their limits give together: how redundant ones share is settled by a weight of 1e-6."""
     plant = hybrid_vehicle(bluerov2_heavy(), commanded_thrust(40.0, 0.5, time_constant=0.05, thrust_rate_max=60.0))

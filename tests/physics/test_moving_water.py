@@ -91,14 +91,16 @@ def water_of(disturbance, key, t, position):
 def test_wave_acceleration_is_the_rate_of_the_velocity():
     sea = waves(spreading=0.3)
     key, position = jax.random.PRNGKey(5), jnp.array([3.0, -2.0, 1.0])
+    water = jax.jit(lambda t: water_of(sea, key, t, position))
+    slope = jax.jit(jax.jacfwd(lambda t: water(t).velocity))
     for t in (0.0, 7.3, 100.0):
-        rate = jax.jacfwd(lambda t: water_of(sea, key, t, position).velocity)(jnp.asarray(t))
-        np.testing.assert_allclose(water_of(sea, key, t, position).acceleration, rate, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(water(t).acceleration, slope(t), rtol=0, atol=1e-12)
 
 
 def test_waves_are_incompressible_and_free_of_rotation():
     sea = waves(spreading=0.5)
-    gradient = jax.jacfwd(lambda p: water_of(sea, jax.random.PRNGKey(1), 4.0, p).velocity)(jnp.array([3.0, -2.0, 1.0]))
+    flow = lambda p: water_of(sea, jax.random.PRNGKey(1), 4.0, p).velocity
+    gradient = jax.jit(jax.jacfwd(flow))(jnp.array([3.0, -2.0, 1.0]))
     assert abs(np.trace(gradient)) < 1e-12 and np.abs(gradient).max() > 1e-3
     np.testing.assert_allclose(gradient, gradient.T, rtol=0, atol=1e-12)
 
@@ -121,7 +123,7 @@ def test_variance_of_orbital_velocity(depth):
 
 def test_wandering_current_has_its_variance_and_correlation():
     process = gauss_markov_current(mean=(0.3, 0.0, 0.0), deviation=(0.1, 0.2, 0.0), correlation_time=10.0, step=0.5)
-    paths = np.asarray(jax.vmap(process.realize)(jax.random.split(jax.random.PRNGKey(3), 500)))
+    paths = np.asarray(jax.jit(jax.vmap(process.realize))(jax.random.split(jax.random.PRNGKey(3), 500)))
     np.testing.assert_allclose(paths.std(axis=(0, 1)), [0.1, 0.2, 0.0], rtol=0.02)
     lag = 20  # 10 s
     correlation = (paths[:, :-lag, :2] * paths[:, lag:, :2]).mean(axis=(0, 1)) / paths[..., :2].var(axis=(0, 1))
@@ -131,13 +133,14 @@ def test_wandering_current_has_its_variance_and_correlation():
 def test_wandering_current_is_its_samples_and_linear_between():
     process = gauss_markov_current(span=10.0, step=0.5)
     key = jax.random.PRNGKey(4)
-    path = np.asarray(process.realize(key)) + [0.3, 0.0, 0.0]
+    path = np.asarray(eqx.filter_jit(process.realize)(key)) + [0.3, 0.0, 0.0]
+    flow = jax.jit(lambda t: water_of(process, key, t, np.zeros(3)))
     for t, expected, slope in (
         (2.0, path[4], (path[5] - path[4]) / 0.5),
         (2.25, path[4:6].mean(0), (path[5] - path[4]) / 0.5),
         (99.0, path[-1], np.zeros(3)),
     ):
-        water = water_of(process, key, jnp.asarray(t), np.zeros(3))
+        water = flow(t)
         np.testing.assert_allclose(water.velocity, expected, rtol=0, atol=1e-12)
         np.testing.assert_allclose(water.acceleration, slope, rtol=0, atol=1e-12)
     assert process.jumps(1.2) == (0.5, 1.0)
@@ -151,7 +154,7 @@ def test_sheared_current(down, north):
 
 def test_currents_add_and_each_member_has_its_own_randomness():
     two = Together((gauss_markov_current(), gauss_markov_current(), current((0.0, 0.2, 0.0))))
-    path = two.realize(jax.random.PRNGKey(0))
+    path = eqx.filter_jit(two.realize)(jax.random.PRNGKey(0))
     assert np.abs(path[0] - path[1]).max() > 0.01
     water = two.at(path, jnp.asarray(3.0), at(jnp.zeros(3)), CALM).water
     np.testing.assert_allclose(water.velocity, np.array([0.6, 0.2, 0.0]) + path[0][6] + path[1][6], rtol=0, atol=1e-12)

@@ -56,21 +56,23 @@ def integrate(plant, x, u, duration, dt):
 def test_a_model_told_the_truth_gives_the_acceleration(name):
     """x_ddot = F + G u + d, with d the load, at random states; and G G# a = a as far as the range of G goes."""
     plant = PLANTS[name]
-    model, rng = plant.model(), np.random.default_rng(1)
-    for seed in range(20):
-        x = start(plant, seed)
+    dynamics, rng = plant.model().dynamics, np.random.default_rng(1)
+
+    @jax.jit
+    def evaluate(x, u, load):
         y = plant.output(0.0, x)
-        u = jnp.asarray(rng.uniform(0.1, 2.0, plant.inputs()))
-        load = plant.no_load()._replace(acceleration=jnp.asarray(rng.normal(size=len(plant.outputs))))
-        found = plant.acceleration(0.0, x, u, load)
-        np.testing.assert_allclose(
-            found, model.dynamics.drift(y) + model.dynamics.gain(y) @ u + load.acceleration, rtol=1e-12, atol=1e-12
-        )
         rates = plant.dynamics(0.0, x, u, load)
         _, second = jax.jvp(lambda x: plant.output(0.0, x).velocity, (x,), (rates,))
+        reached = dynamics.gain(y) @ dynamics.invert(y, dynamics.gain(y) @ u)
+        return plant.acceleration(0.0, x, u, load), second, dynamics.drift(y), dynamics.gain(y) @ u, reached
+
+    for seed in range(20):
+        u = jnp.asarray(rng.uniform(0.1, 2.0, plant.inputs()))
+        load = plant.no_load()._replace(acceleration=jnp.asarray(rng.normal(size=len(plant.outputs))))
+        found, second, drift, push, reached = evaluate(start(plant, seed), u, load)
+        np.testing.assert_allclose(found, drift + push + load.acceleration, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(second, found, rtol=1e-14, err_msg="the state moves as `acceleration` says")
-        reached = model.dynamics.gain(y) @ model.dynamics.invert(y, model.dynamics.gain(y) @ u)
-        np.testing.assert_allclose(reached, model.dynamics.gain(y) @ u, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(reached, push, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", PLANTS)
@@ -257,13 +259,19 @@ def test_arm_moves_by_lagrange():
     links = plant.links
     still = jnp.zeros(2)
     lagrangian = lambda q, rate: links.energy(q, rate) - 2 * links.energy(q, still)
+    by_rate = jax.grad(lagrangian, argnums=1)
+
+    @jax.jit
+    def both(q, rate):
+        forces = jax.grad(lagrangian)(q, rate) - jax.jacfwd(by_rate)(q, rate) @ rate
+        return forces, jax.jacfwd(by_rate, argnums=1)(q, rate), jax.grad(links.energy)(q, still)
+
     for _ in range(20):
         q, rate = jnp.asarray(rng.uniform(-3, 3, 2)), jnp.asarray(rng.normal(size=2))
-        by_rate = jax.grad(lagrangian, argnums=1)
-        forces = jax.grad(lagrangian)(q, rate) - jax.jacfwd(by_rate)(q, rate) @ rate
-        expected = np.linalg.solve(jax.jacfwd(by_rate, argnums=1)(q, rate), forces)
+        forces, mass, weight = both(q, rate)
+        expected = np.linalg.solve(mass, forces)
         np.testing.assert_allclose(links.drift(Measurement(q, rate)), expected, rtol=1e-10, atol=1e-12)
-        np.testing.assert_allclose(jax.grad(links.energy)(q, still), links.weight(q), rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(weight, links.weight(q), rtol=1e-12, atol=1e-13)
 
 
 def test_arm_keeps_its_energy_and_gains_the_work_of_its_torques():

@@ -214,10 +214,7 @@ def test_first_order_tends_to_the_static_models():
     volts = lambda t: jnp.array([6.0, 12.0]) * (1 + 0.5 * jnp.sin(5 * t))
     models = (
         (linear_voltage(4.0), {"thrust_per_volt": 4.0}),
-        (
-            quadratic_voltage(0.3),
-            {"thrust_per_volt": 0.3, "power": 2.0, "linear_gain": 3.0},
-        ),
+        (quadratic_voltage(0.3), {"thrust_per_volt": 0.3, "power": 2.0, "linear_gain": 3.0}),
     )
     for static, options in models:
         expected = static.thrust((), volts(1.0))

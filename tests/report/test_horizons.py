@@ -37,12 +37,7 @@ MAP = [
     row("", "five", 0, False, 2.0, kind="winding", value=0.003, damping=None),
 ]
 TIME = np.linspace(0.2, 20, 100)
-CURVES = {
-    "time": TIME,
-    "gain": [500 * (1 - np.exp(-TIME))] * 6,
-    "input_variation": 1 / TIME,
-    "tracking": np.exp(-TIME),
-}
+CURVES = {"time": TIME, "gain": [500 * (1 - np.exp(-TIME))] * 6, "input_variation": 1 / TIME, "tracking": np.exp(-TIME)}
 DRIFTING = {"lag": 0.05, "needed": 453.0, "runs": {"free": CURVES, "bounded": CURVES}}
 RESULTS = {"fidelity": {}, "horizons": {"duration": 200.0, "windows": WINDOWS, "rows": ROWS_OF_FIDELITIES}, "lags": MAP}
 

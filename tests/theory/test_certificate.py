@@ -143,7 +143,7 @@ def test_rises_only_where_the_basis_moves():
     assert hypothesis(run, "basis")["whole"] == pytest.approx(1 - moved.mean())
 
 
-@pytest.mark.parametrize("preset", ["paper", "robust"])
+@pytest.mark.parametrize("preset", ["paper", pytest.param("robust", marks=pytest.mark.slow)])
 def test_rises_at_a_jump_of_the_disturbance_only(preset):
     """Negative control: d jumps by 4 m/s^2 at 1 s."""
     dt, loop = (1e-4, "continuous") if preset == "paper" else (1e-3, "sampled")

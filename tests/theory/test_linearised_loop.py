@@ -14,7 +14,7 @@ from undertow.disturbances import none, sinusoid
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.sampled import simulate
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle
+from undertow.plants import double_integrator, hybrid_vehicle, linear_plant
 from undertow.prediction.operating_point import operating_point, predicted
 from undertow.references import setpoint
 from undertow.scenario.build import build
@@ -22,6 +22,7 @@ from undertow.scenario.execute import execute
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2, odin, remus100
 
+UNDER = ((1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # pushes x1 and x2 alike
 THREE_SETS = {"sets": 3, "reach": (1.0,), "width": 1.0}
 LAWS = {
     "rcafc": THREE_SETS,
@@ -68,24 +69,29 @@ def test_poles_and_responses_are_those_of_the_small_model(name):
     assert np.abs(response[:, 0, 1]).max() < 1e-12  # axes do not touch each other
 
 
-def test_what_the_loop_bears():
-    """Sections 3.6 and 3.9: 7.03 ms of sampling time, 7.2 ms of lag; delays are those of test_bad_measurements."""
+def continuous(margin, name):
+    """A margin without sampling, which eats of it in proportion to the step: two steps tell."""
+    coarse, half = (margin(at_rest(on_axes(LAWS[name], axes=1), step, [0.5]), step, 1.0) for step in (4e-4, 2e-4))
+    assert coarse < half
+    return 2 * half - coarse
+
+
+def test_sampling_time_and_lag_that_the_loop_tolerates():
+    """Sections 3.6 and 3.9: 7.03 ms of sampling time, 7.2 ms of lag."""
     sampled = at_rest(on_axes(LAWS["rcafc"]), 1e-3)
-    longest = small_signal.largest_sampling_time(sampled.parts.loop.controller)
-    assert margins.largest_sampling_time(sampled, 1e-3, 1.0) == pytest.approx(longest, rel=2e-3)
-
-    def continuous(tolerated_status, name):
-        """Sampling eats of it in proportion to the step: two steps tell what there is without it."""
-        coarse, half = (
-            tolerated_status(at_rest(on_axes(LAWS[name], axes=1), step, [0.5]), step, 1.0) for step in (2e-4, 1e-4)
-        )
-        assert coarse < half
-        return 2 * half - coarse
-
-    for name, delay in {"rcafc": 5.055e-3, "rafc": 15.10e-3, "no robust term": 7.87e-3}.items():
-        assert continuous(margins.largest_delay, name) == pytest.approx(delay, rel=5e-3), name
     law = sampled.parts.loop.controller
+    longest = small_signal.largest_sampling_time(law)
+    assert margins.largest_sampling_time(sampled, 1e-3, 1.0) == pytest.approx(longest, rel=2e-3)
     assert continuous(margins.largest_lag, "rcafc") == pytest.approx(motor_loop.critical_lag(law), rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "delay"),
+    [("rcafc", 5.055e-3), pytest.param("rafc", 15.10e-3, marks=pytest.mark.slow), ("no robust term", 7.87e-3)],
+)
+def test_delay_that_the_loop_tolerates(name, delay):
+    """Those of test_bad_measurements."""
+    assert continuous(margins.largest_delay, name) == pytest.approx(delay, rel=5e-3)
 
 
 def test_a_delay_of_whole_ticks_is_that_many_held_inputs():
@@ -137,6 +143,23 @@ def test_counters_and_idle_weights_are_not_poles():
     assert poles.real.max() < 0
 
 
+def test_what_no_input_moves_rests_where_the_plant_lets_it():
+    """Two outputs that one input pushes alike, on springs: their difference is held by the springs, as in a run."""
+    load, dt = np.array([0.3, -0.1, 0.2]), 0.01
+    plant = linear_plant(UNDER, -4 * np.eye(3), -2 * np.eye(3))
+    law = rcaf(plant.model(), preset="robust", sampling_time=dt)
+    still = setpoint([0.0] * 3)
+    found = equilibrium(ClosedLoop(plant, law, still, none(), perfect()), dt, np.zeros(3), load)
+    assert found.found, found.moving
+    pushed = ClosedLoop(plant, law, still, sinusoid(0.0, offset=load), perfect())
+    run = simulate(pushed, duration=60.0, dt=dt, record_every=100)
+    last = jax.tree.map(lambda series: np.asarray(series)[-1], run.signals)
+    assert abs(last["error"][0] - last["error"][1]) > 0.05
+    np.testing.assert_allclose(found.local.values["error"], last["error"], atol=2e-4)
+    np.testing.assert_allclose(found.at["u"], last["input"], atol=2e-3)
+
+
+@pytest.mark.slow
 def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
     """BlueROV2 cannot pitch: its weight holds the load, the rest of the loop settles about that, as a run does."""
     load, dt = np.array([0.1, 0.05, -0.05, 0.0, 0.4, 0.0]), 0.02
@@ -154,6 +177,14 @@ def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
 
 
 def test_a_load_that_no_input_holds_is_told():
+    plant = linear_plant(UNDER)
+    loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([0.0] * 3), none(), perfect())
+    assert not equilibrium(loop, 1e-3, np.zeros(3), np.array([0.1, -0.1, 0.0])).found
+    assert equilibrium(loop, 1e-3, np.zeros(3), np.array([0.1, 0.1, 0.2])).found, "but one that they can hold is found"
+
+
+@pytest.mark.slow
+def test_a_load_that_no_thruster_holds_is_told():
     plant = hybrid_vehicle(remus100(), paper_table3("static"))
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([0.0] * 6), none(), perfect())
     assert not equilibrium(loop, 1e-3, np.zeros(6), np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])).found
@@ -201,7 +232,9 @@ def test_runs_do_what_was_foretold(name):
             assert one.departure < 0.10, one
 
 
-@pytest.mark.parametrize(("sets", "said"), [(5, "adapting weights may change that"), (1, "")])
+@pytest.mark.parametrize(
+    ("sets", "said"), [(5, "adapting weights may change that"), pytest.param(1, "", marks=pytest.mark.slow)]
+)
 def test_what_is_said_of_moving_weights(sets, said):
     """Table 1 on `shaft`: five sets last 2,000 s where one does not, and both have these poles at fixed weights."""
     _, why_not = predicted(operating_point(build(_odin("shaft", {"sets": sets}))))

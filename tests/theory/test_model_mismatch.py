@@ -7,17 +7,18 @@ The KTH-like case (a first-order lag of nominally 0.1 s that is 0.03 to 0.3 s), 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from undertow.controllers import pid
 from undertow.controllers.presets.robust import robust
 from undertow.core.contracts import AbstractNavigation
-from undertow.disturbances import current, waves
+from undertow.disturbances import current, sinusoid, waves
 from undertow.disturbances.adding import Together
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect, white_noise
-from undertow.plants import hybrid_vehicle
+from undertow.plants import double_integrator, hybrid_vehicle
 from undertow.references import setpoint
 from undertow.thrusters import first_order, t200
 from undertow.vehicles import bluerov2_heavy
@@ -72,7 +73,7 @@ def error(thruster, nominal, make=robust, navigation=None):
     return float(rms), float(swings)
 
 
-@pytest.mark.parametrize("make", [lagged, motor])
+@pytest.mark.parametrize("make", [lagged, pytest.param(motor, marks=pytest.mark.slow)])
 def test_a_lag_that_is_wrong_by_three_costs_little(make):
     """At most three times the error of the right nominal lag, and no limit cycle: the thrusters vary as they must."""
     cases = ((0.1, 0.03), (0.1, 0.3)) if make is lagged else ((0.05, 0.15),)
@@ -87,6 +88,27 @@ def test_a_lag_that_is_wrong_by_three_costs_little(make):
         assert swings < 2 * needed + 1.0
 
 
+# Noise by itself is that of test_noise_gain.
+@pytest.mark.parametrize(
+    "navigation", [Late(4), pytest.param(white_noise(0.0, 0.01), marks=pytest.mark.slow)], ids=["delay", "noise"]
+)
+def test_delay_and_noise_on_independent_axes(navigation):
+    """Four sampling times of delay, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
+
+    def error(make, navigation):
+        plant = double_integrator(2)
+        law = make(plant.model(), sampling_time=DT)
+        loop = ClosedLoop(plant, law, setpoint([2.0, 1.0]), sinusoid([0.3, 0.5], [1.3, 0.7]), navigation)
+        run = sampled.simulate(loop, duration=30.0, dt=DT, record_every=5, method="euler")
+        assert int(run.status) == 0
+        return float(np.sqrt((np.asarray(run.signals["error"])[300:] ** 2).mean()))
+
+    own, other, exact = error(robust, navigation), error(pid, navigation), error(robust, perfect())
+    print(f"{type(navigation).__name__}: robust {own:.3g}, pid {other:.3g}, robust without {exact:.3g}")
+    assert own < other and own < 3 * exact
+
+
+@pytest.mark.slow
 def test_delay_and_noise_that_nobody_tells_of():
     """Four sampling times of delay, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
     for navigation in (Late(4), white_noise(0.0, 0.01)):

@@ -49,7 +49,9 @@ def test_deviations_within_five_percent(name):
     np.testing.assert_allclose(found, expected, rtol=0.05)
 
 
-@pytest.mark.parametrize(("bound", "gain", "deviation"), [(6.0, 50.0, 1.55), (20.0, 169.0, 2.9)])
+@pytest.mark.parametrize(
+    ("bound", "gain", "deviation"), [pytest.param(6.0, 50.0, 1.55, marks=pytest.mark.slow), (20.0, 169.0, 2.9)]
+)
 def test_deviations_once_weights_have_drifted_to_their_bounds(bound, gain, deviation):
     """Section 3.8: sets 0.1 apart at 1 cm/s; c and the deviation of u as printed there."""
     law, found, drifted = simulated({"sets": 3, "reach": (0.1,), "weights_bound": bound}, 1e-2)

@@ -29,7 +29,7 @@ def tracking(loop):
     return float(np.sqrt((late**2).mean())), int(run.status), run
 
 
-@pytest.mark.parametrize(("speed_sensor", "bar"), [(True, 5e-4), (False, 1.5e-3)])
+@pytest.mark.parametrize(("speed_sensor", "bar"), [pytest.param(True, 5e-4, marks=pytest.mark.slow), (False, 1.5e-3)])
 def test_whole_motor_at_24_volts(speed_sensor, bar):
     """Suite U1 scaled by 0.3, which is attainable; Table 1 limit-cycles there."""
     plant = hybrid_vehicle(odin(), paper_table3("electromechanical", supply=24.0), ledger=False)
@@ -102,12 +102,13 @@ def _angle(t):
     return turn(t), jax.jacfwd(turn)(t), jax.jacfwd(jax.jacfwd(turn))(t)
 
 
+@pytest.mark.slow
 def test_a_somersault_is_uneventful():
     """Through pitch 90 degrees twice, where a run in Euler angles ends."""
     plant = hybrid_vehicle(bluerov2_heavy(), t200(supply=16.0), ledger=False)
     law = rcaf(plant.model(), preset="robust", sampling_time=1e-2, reference_frequency=0.0)
     turned = ClosedLoop(plant, law, Somersault(), none(), perfect())
-    run = sampled.simulate(turned, duration=10.0, dt=1e-2, record_every=1)
+    run = sampled.simulate(turned, duration=10.0, dt=1e-2, record_every=1, method="euler", substeps=4)
     assert int(run.status) == 0
     at = jax.vmap(lambda t: rotation_from_euler(Somersault().at(t).position[3:]))(run.time)
     rotation = jax.vmap(lambda p: rotation_from_euler(p[3:]))(run.signals["position"])

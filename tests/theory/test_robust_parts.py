@@ -1,5 +1,6 @@
 """What preset `robust` is made of: estimator, allocation, reference filter, drives, body axes. Closed forms throughout."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -56,10 +57,15 @@ def test_one_step_moves_the_estimate_by_a_given_amount_whatever_the_sets():
 
 def test_the_estimate_stays_in_its_box():
     estimator = Estimator(gaussian_sets(5), bandwidth=50.0, bound=3.0)
-    state = estimator.init(jnp.zeros(1))
-    for _ in range(200):  # a body that stands still under 10 m/s^2: d = -10, more than the box holds
+
+    @jax.jit
+    def step(state):  # a body that stands still under 10 m/s^2: d = -10, more than the box holds
         seen = estimator.estimate(state, jnp.zeros(1))
-        state = estimator.advance(state, seen, jnp.full(1, 10.0), jnp.zeros(1), 1e-2)
+        return seen, estimator.advance(state, seen, jnp.full(1, 10.0), jnp.zeros(1), 1e-2)
+
+    state = estimator.init(jnp.zeros(1))
+    for _ in range(200):
+        seen, state = step(state)
         assert abs(float(seen.uncertainty[0])) <= 3.0 * (1 + 1e-15)
     assert float(seen.uncertainty[0]) == pytest.approx(-3.0)
 
@@ -157,17 +163,24 @@ def test_one_sided_limits():
 
 def followed(chosen, at, start, dt, steps, share=1.0):
     """Filtered reference at every step."""
-    coordinates, state, found = double_integrator(1).model().coordinates, chosen.init(jnp.asarray([start])), []
-    for k in range(steps):
-        found.append(np.ravel(chosen.smoothed(state, at(k * dt), coordinates)))
-        state = chosen.advance(state, at(k * dt), coordinates, share, dt)
-    return np.array(found)
+    coordinates = double_integrator(1).model().coordinates
+    targets = jax.tree.map(lambda *values: np.stack(values), *(at(k * dt) for k in range(steps)))
+    return np.asarray(_followed(chosen, targets, jnp.asarray([start]), coordinates, share, dt))
+
+
+@eqx.filter_jit
+def _followed(chosen, targets, start, coordinates, share, dt):
+    def step(state, target):
+        smoothed = jnp.concatenate(chosen.smoothed(state, target, coordinates))
+        return chosen.advance(state, target, coordinates, share, dt), smoothed
+
+    return jax.lax.scan(step, chosen.init(start), targets)[1]
 
 
 def polynomial(*coefficients):
     """A reference a + b t + c t^2 + ..., with its derivatives."""
     p = np.polynomial.Polynomial(coefficients)
-    return lambda t: Target(*(jnp.asarray([float(p.deriv(k)(t))]) if k else jnp.asarray([p(t)]) for k in range(3)))
+    return lambda t: Target(*(np.asarray([float(p.deriv(k)(t) if k else p(t))]) for k in range(3)))
 
 
 def test_a_jump_dies_out_like_three_equal_poles():
@@ -187,7 +200,7 @@ def test_a_smooth_reference_passes_as_it_is():
 
 def test_what_is_left_of_a_sinusoid_falls_with_the_square_of_the_sampling_time():
     """Once the start from rest has died out."""
-    sine = lambda t: Target(*jnp.asarray([[np.sin(3 * t)], [3 * np.cos(3 * t)], [-9 * np.sin(3 * t)]]))
+    sine = lambda t: Target(*np.asarray([[np.sin(3 * t)], [3 * np.cos(3 * t)], [-9 * np.sin(3 * t)]]))
     left = []
     for dt in (0.02, 0.01):
         found = followed(ReferenceFilter(4.0), sine, 0.0, dt, round(8.0 / dt))
