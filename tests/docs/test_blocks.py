@@ -4,8 +4,8 @@ Blocks of one page run in order, in one folder, with one namespace. A block that
 an output) is not marked python or bash, or stands after a line `<!-- not run -->`. A block of Python or YAML whose
 first line is `# my_part.py` is that file: it is written into the folder.
 
-By default a run is not put beside its prediction, and blank figures are written: most of the time of a short run. Slow
-tests run everything as it stands.
+By default a run is not put beside its prediction, blank figures are written, and PID stands for the preset `robust`:
+most of the time of a short run. Slow tests run everything as it stands.
 """
 
 import re
@@ -54,6 +54,9 @@ def commands(code: str) -> list[list[str]]:
     return [words[1:] for words in lines if words[:1] == ["undertow"] and not LONG & set(words) and "&&" not in words]
 
 
+ROBUST, QUICKER = "{kind: rcaf, preset: robust}", "{kind: pid, frequency: 1}"
+
+
 def quicker(arguments: list[str]) -> list[str]:
     """The same command without a prediction."""
     return [*arguments, *(["--no-prediction"] if arguments[0] == "simulate" else [])]
@@ -81,7 +84,8 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch):
     namespace = {"__name__": "__docs__"}
     for block in blocks(page):
         if file := FILE.match(block.code):
-            (tmp_path / file["name"]).write_text(block.code, encoding="utf-8")
+            code = block.code if whole or not file["name"].endswith(".yaml") else block.code.replace(ROBUST, QUICKER)
+            (tmp_path / file["name"]).write_text(code, encoding="utf-8")
         elif not whole and page.stem in BUILT:
             for arguments in commands(block.code):
                 if arguments[1].endswith(".yaml"):
