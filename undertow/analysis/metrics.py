@@ -191,7 +191,7 @@ class Metrics(AbstractAccumulator):
         return found if np.isnan(settled).all() else found | {"settling_time_axes": settled.tolist()}
 
 
-def _rms(squares: np.ndarray, count: np.ndarray) -> np.ndarray:
+def _rms(squares: np.ndarray, count: np.ndarray) -> np.ndarray | float:
     return np.sqrt(squares.mean(-1) / count)
 
 

@@ -70,10 +70,10 @@ class RCAF(AbstractContinuousController):
     model: Model
     fuzzy: FuzzySystem
     identification: SeriesParallel
-    feedback: Float[Array, "*n 2"] = param(
+    feedback: Float[Array, "*#n 2"] = param(
         "1/s^2, 1/s", "state feedback", symbol="K", default=(1.0, 2.0), source="Table 1"
     )
-    weight: Float[Array, "*n 2 2"] = param(
+    weight: Float[Array, "*#n 2 2"] = param(
         "", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)), source="Table 1"
     )
     adaptation: Float[Array, "..."] = param("1/s^2", "adaptation gain", symbol="gamma", default=100.0, source="Table 1")
@@ -163,13 +163,13 @@ class RCAF(AbstractContinuousController):
     def signals(self):
         return ADAPTIVE_LAW | _PREDICTED
 
-    def lyapunov(self) -> Float[Array, "*n 2 2"]:
+    def lyapunov(self) -> Float[Array, "*#n 2 2"]:
         """P of Eq. (21)."""
         return companion_lyapunov(self.feedback, self.weight)
 
     def _box(self) -> Float[Array, "..."]:
         """theta_max, shaped to broadcast with theta."""
-        return self.weights_bound[..., None]
+        return self.weights_bound if self.weights_bound.ndim == 0 else self.weights_bound[:, None]
 
     def _tracking(self, y: Measurement, r: Target) -> Tracking:
         return tracking(self.model.coordinates, self.lyapunov(), y, r)

@@ -37,7 +37,7 @@ class INDI(AbstractInformedController):
     model: Model
     bandwidth: Float[Array, "..."] = param("rad/s", "natural frequency of the filter", symbol="w")
     damping: Float[Array, "..."] = param("", "damping ratio of the filter", symbol="zeta")
-    feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
+    feedback: Float[Array, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
 
     def __check_init__(self):
         checks.positive("bandwidth", self.bandwidth, "rad/s")

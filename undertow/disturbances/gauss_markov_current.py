@@ -45,7 +45,7 @@ class GaussMarkovCurrent(AbstractDisturbance):
         # Steps x -> kept x + news are associative, so that a parallel scan computes them.
         news = (fresh * noise).at[0].set(noise[0])
         after = lambda first, second: (first[0] * second[0], first[1] * second[0] + second[1])
-        return self.deviation * jax.lax.associative_scan(after, (jnp.full((self.samples, 1), kept), news))[1]
+        return self.deviation[None, :] * jax.lax.associative_scan(after, (jnp.full((self.samples, 1), kept), news))[1]
 
     def at(self, realization, t, pose, load: Load) -> Load:
         index = jnp.clip(t / self.step, 0.0, self.samples - 1.0)

@@ -31,7 +31,7 @@ class ThrusterLoss(AbstractDisturbance):
     def realize(self, key) -> Float[Array, " N"]:
         """Remaining share of each thruster's thrust."""
         chance = jax.random.uniform(key, self.failing.shape, dtype=self.remaining.dtype)
-        rank = (chance[:, None] > chance).sum(1)
+        rank = (chance[:, None] > chance[None, :]).sum(1)
         return jnp.where((rank < self.number.astype(int)) | (self.failing > 0), self.remaining, 1.0)
 
     def at(self, realization, t, pose, load: Load) -> Load:

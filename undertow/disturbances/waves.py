@@ -13,13 +13,14 @@ from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.disturbances.adding import body_of, with_water
+from undertow.numerics.number import Number
 from undertow.numerics.random_keys import keys_for
 
 # Frequencies in units of the peak frequency; the range holds all but 1e-4 of the energy.
 _LOWEST, _HIGHEST, _POINTS = 0.4, 8.0, 4000
 
 
-def spectrum(frequency: Float[Array, "..."], period: Float[Array, ""], peakedness: Float[Array, ""]):
+def spectrum(frequency: Float[Array, "..."], period: Number, peakedness: Number) -> Float[Array, "..."]:
     """Energy per frequency, up to a factor; Hasselmann et al. (1973).
 
     Args:

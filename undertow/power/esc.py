@@ -8,7 +8,7 @@ from undertow.core import checks
 from undertow.core.param import param
 
 Scalar = Float[Array, ""]
-PerThruster = Float[Array, " N"]
+PerThruster = Float[Array, " N"] | Float[Array, ""]
 
 
 class ESC(eqx.Module):

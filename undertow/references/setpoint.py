@@ -11,6 +11,7 @@ from undertow.core.contracts import AbstractOpenReference, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import param
 from undertow.numerics.motion_laws import quintic, with_rates
+from undertow.numerics.number import Number
 
 
 class Transition(eqx.Module):
@@ -70,7 +71,7 @@ class Setpoint(AbstractOpenReference):
         return Setpoint(self.position, Transition(self.transition.settling, position))
 
 
-def setpoint(position, settling: float = 0.0, start=None) -> Setpoint:
+def setpoint(position, settling: Number = 0.0, start=None) -> Setpoint:
     """Go to a position and stay.
 
     A step saturates the motors. A slow enough transition does not, and the law knows its velocity and acceleration in

@@ -59,8 +59,8 @@ class RobustRCAF(AbstractInformedController):
     model: Model
     estimator: Estimator
     filter: ReferenceFilter | None
-    feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
-    weight: Float[Array, "*n 2 2"] = param("", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)))
+    feedback: Float[Array, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
+    weight: Float[Array, "*#n 2 2"] = param("", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)))
     tracking_share: Float[Array, "..."] = param(
         "", "share of the filtered tracking error in the adaptation, 1 / gamma_eps", symbol="mu", default=0.0
     )
@@ -128,7 +128,8 @@ class RobustRCAF(AbstractInformedController):
     def _room(self, y: Measurement, off: Tracking) -> Room:
         """Authority of the actuators for each output, and the part of the error that exceeds it."""
         dynamics, coordinates, actuators = self.model
-        force, effect = largest_forces(actuators), dynamics.gain(y)
+        effect = dynamics.gain(y)
+        force = largest_forces(actuators, effect.shape[1])
         reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
         away = jnp.abs(off.error) > reach
         outward = lambda motion: coordinates.output_velocity(y, motion)
@@ -144,7 +145,7 @@ class RobustRCAF(AbstractInformedController):
     def signals(self):
         return ADAPTIVE_LAW
 
-    def lyapunov(self) -> Float[Array, "*n 2 2"]:
+    def lyapunov(self) -> Float[Array, "*#n 2 2"]:
         """P of Eq. (21)."""
         return companion_lyapunov(self.feedback, self.weight)
 
