@@ -56,7 +56,9 @@ def trajectory(plant, start, world=STILL, length=1.0, voltage=1.0):
     A step of 5 ms would not do: between its stages a quaternion is not quite of unit length, and the matrix made
     from it turns with the world only up to the error of the integrator (1.4e-10 at 5 ms).
     """
-    return compiled(plant, start, jnp.asarray(world), jnp.asarray(length), jnp.asarray(voltage))
+    return jax.tree.map(
+        np.asarray, compiled(plant, start, jnp.asarray(world), jnp.asarray(length), jnp.asarray(voltage))
+    )
 
 
 def test_turning_the_world_about_the_vertical_and_shifting_it_maps_trajectories():

@@ -269,7 +269,7 @@ BENCH = np.array(
 @pytest.fixture(scope="module")
 def bench():
     """Settled thrust, torque and speed over those measured, and the settled thrust, by command."""
-    thruster, volts = axial_flow(), BENCH[:, 0]
+    thruster, volts = axial_flow(), jnp.asarray(BENCH[:, 0])
     state = simulate(thruster, held(volts), 30.0, 2e-3)
     assert all(np.abs(rate).max() < 1e-6 for rate in thruster.dynamics(state, volts))
     thrust = np.asarray(thruster.thrust(state, volts))
@@ -318,7 +318,7 @@ def test_rotor_alone_has_a_time_constant_of_73_ms():
     thruster = axial_flow()
     np.testing.assert_allclose(1 / thruster.speed_decay, 0.0732, atol=5e-5)
     at_rest = thruster.initial_state(4)
-    rates = thruster.dynamics(at_rest, np.array([-0.84, -0.82, 0.85, 0.87])).speed
+    rates = thruster.dynamics(at_rest, jnp.array([-0.84, -0.82, 0.85, 0.87])).speed
     np.testing.assert_allclose(rates, [-7.25469, 0.0, 0.0, 7.37156], rtol=1e-9)
 
 
