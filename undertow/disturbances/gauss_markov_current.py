@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import with_water
 
 _LONGEST = 1_000_000  # samples of a realisation
@@ -24,10 +24,10 @@ class GaussMarkovCurrent(AbstractDisturbance):
         BadInput: a time not positive, a deviation negative, too many samples.
     """
 
-    mean: Float[Array, "3"] = param("m/s", "mean velocity: north, east, down")
-    deviation: Float[Array, "3"] = param("m/s", "standard deviation: north, east, down", symbol="sigma")
-    correlation_time: Float[Array, ""] = param("s", "time in which the correlation falls to 1/e", symbol="1/mu")
-    step: Float[Array, ""] = param("s", "time between samples")
+    mean: Float[Param, "3"] = param("m/s", "mean velocity: north, east, down")
+    deviation: Float[Param, "3"] = param("m/s", "standard deviation: north, east, down", symbol="sigma")
+    correlation_time: Float[Param, ""] = param("s", "time in which the correlation falls to 1/e", symbol="1/mu")
+    step: Float[Param, ""] = param("s", "time between samples")
     samples: int = eqx.field(static=True, default=1201)
 
     def __check_init__(self):

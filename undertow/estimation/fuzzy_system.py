@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 # Largest exponent that `even_memberships` may meet inside the grid; exp overflows at 709.
 _LARGEST_EXPONENT = 600.0
@@ -61,8 +61,8 @@ class FuzzySystem(eqx.Module):
         BadInput: widths not positive, or shapes that do not match.
     """
 
-    centres: Float[Array, "p M"] = param("unit of the input", "centres of the sets", symbol="c")
-    widths: Float[Array, "p M"] = param("unit of the input", "widths of the sets", symbol="sigma")
+    centres: Float[Param, "p M"] = param("unit of the input", "centres of the sets", symbol="c")
+    widths: Float[Param, "p M"] = param("unit of the input", "widths of the sets", symbol="sigma")
     evenly_spaced: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):

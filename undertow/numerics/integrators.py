@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, PyTree
+from jaxtyping import PyTree
 
 from undertow.numerics.number import Number
 
@@ -12,7 +12,7 @@ from undertow.numerics.number import Number
 # step boundary is then evaluated on the inner side in both steps, and the jump is not smeared.
 _INWARD = 1e-9
 
-Field = Callable[[Array, PyTree], PyTree]
+Field = Callable[[Number, PyTree], PyTree]
 
 
 def euler(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 Scalar = Float[Array, ""]
 Values = Float[Array, "*#n"]  # one, or one for each instant
@@ -30,10 +30,10 @@ class Battery(eqx.Module):
         BadInput: a value that is not positive (resistance: negative), or the empty voltage above the full one.
     """
 
-    full_voltage: Scalar = param("V", "open-circuit voltage when full", symbol="E_1")
-    empty_voltage: Scalar = param("V", "open-circuit voltage when empty", symbol="E_0")
-    resistance: Scalar = param("ohm", "internal resistance, leads included", symbol="R")
-    capacity: Scalar = param("A h", "charge from full to empty", symbol="Q")
+    full_voltage: Float[Param, ""] = param("V", "open-circuit voltage when full", symbol="E_1")
+    empty_voltage: Float[Param, ""] = param("V", "open-circuit voltage when empty", symbol="E_0")
+    resistance: Float[Param, ""] = param("ohm", "internal resistance, leads included", symbol="R")
+    capacity: Float[Param, ""] = param("A h", "charge from full to empty", symbol="Q")
 
     def __check_init__(self):
         for name in ("full_voltage", "empty_voltage", "capacity"):

@@ -3,9 +3,10 @@
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.param import param, sources_field
+from undertow.core.param import Param, Sources, param, sources_field
 from undertow.thrusters.thruster import PerThruster, Powers
 
 
@@ -19,17 +20,21 @@ class DCMotor(eqx.Module):
         BadInput: a constant is not positive (inductance, friction: negative).
     """
 
-    resistance: PerThruster = param("ohm", "winding resistance", symbol="R")
-    inductance: PerThruster = param("H", "winding inductance", symbol="L")
-    torque_constant: PerThruster = param("N m/A", "torque per current", symbol="k_t")
-    back_emf_constant: PerThruster = param("V s/rad", "voltage per speed", symbol="k_e")
-    friction: PerThruster = param("N m s/rad", "viscous friction", symbol="k_f")
-    rotor_inertia: PerThruster = param("kg m^2", "inertia of rotor and propeller", symbol="J")
-    thrust_coefficient: PerThruster = param("N s^2/rad^2", "thrust per speed squared", symbol="c_t")
-    torque_coefficient: PerThruster = param("N m s^2/rad^2", "shaft torque per speed squared", symbol="c_q")
-    reverse_thrust_coefficient: PerThruster = param("N s^2/rad^2", "the same in reverse", symbol="c_t-", default=None)
-    reverse_torque_coefficient: PerThruster = param("N m s^2/rad^2", "the same in reverse", symbol="c_q-", default=None)
-    sources: tuple = sources_field()
+    resistance: Float[Param, "..."] = param("ohm", "winding resistance", symbol="R")
+    inductance: Float[Param, "..."] = param("H", "winding inductance", symbol="L")
+    torque_constant: Float[Param, "..."] = param("N m/A", "torque per current", symbol="k_t")
+    back_emf_constant: Float[Param, "..."] = param("V s/rad", "voltage per speed", symbol="k_e")
+    friction: Float[Param, "..."] = param("N m s/rad", "viscous friction", symbol="k_f")
+    rotor_inertia: Float[Param, "..."] = param("kg m^2", "inertia of rotor and propeller", symbol="J")
+    thrust_coefficient: Float[Param, "..."] = param("N s^2/rad^2", "thrust per speed squared", symbol="c_t")
+    torque_coefficient: Float[Param, "..."] = param("N m s^2/rad^2", "shaft torque per speed squared", symbol="c_q")
+    reverse_thrust_coefficient: Float[Param, "..."] = param(
+        "N s^2/rad^2", "the same in reverse", symbol="c_t-", default=None
+    )
+    reverse_torque_coefficient: Float[Param, "..."] = param(
+        "N m s^2/rad^2", "the same in reverse", symbol="c_q-", default=None
+    )
+    sources: Sources = sources_field()
 
     def __post_init__(self):
         if self.reverse_thrust_coefficient is None:

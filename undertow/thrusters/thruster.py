@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
+from undertow.core.param import Param
 
 PerThruster = Float[Array, " N"] | Float[Array, ""]  # one entry per thruster, or one that holds for each
 
@@ -36,8 +37,8 @@ class Powers(NamedTuple):
 class AbstractThruster(eqx.Module):
     """A set of N thrusters of one kind; an array has one entry per thruster, or a single one that holds for each."""
 
-    supply: eqx.AbstractVar[PerThruster]  # V; the drive can give -supply ... supply
-    dead_zone: eqx.AbstractVar[PerThruster]  # V; smaller voltages have no effect
+    supply: eqx.AbstractVar[Float[Param, "..."]]  # V; the drive can give -supply ... supply
+    dead_zone: eqx.AbstractVar[Float[Param, "..."]]  # V; smaller voltages have no effect
     dead_zone_kind = "pass"  # one of DEAD_ZONES; a field where a thruster offers both
     input_unit = "V"  # unit of the command; where this is not V, every voltage below has that unit
     # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, `ideal` and `static`.

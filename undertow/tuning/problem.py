@@ -81,7 +81,8 @@ def problem(text: Text) -> Problem:
         raise BadInput("tune.start", must, f"{start:g} s", where=text.where(("tune", "start")))
     scales = np.where(angles, tune.angle_scale, tune.position_scale)
     sums = CostSums(start, scales, _input_scale(loop.plant, loop.controller))
-    places = tuple(None if place is None else np.asarray(place, dtype=float) for _, place in scenario.initial)
+    made = lambda place: None if place is None else np.asarray(place, dtype=float)
+    places = made(scenario.initial.position), made(scenario.initial.velocity)
     training_loop = TrainingLoop(loop, scenario.loop, duration, places, sums, tune.weights)
     model = loop.controller.model
     law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from undertow.core.arrays import as_array
 from undertow.reproduction.claims.finding import Finding, Runs
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import plant_of
@@ -20,7 +21,7 @@ def judge(runs: Runs, long: Long) -> Finding:
     thruster = plant_of(run).thruster
     late = run.dataset.sel(time=slice(run.built.window()[0], None))
     voltage = late["input"].values
-    thrust = np.asarray(thruster.thrust(np.zeros(0), voltage))
+    thrust = np.asarray(thruster.thrust(np.zeros(0), as_array(voltage)))
     assumed = float(thruster.voltage_gain()) * voltage
     share = float(np.sqrt(((thrust - assumed) ** 2).mean() / (thrust**2).mean()))
     text = (
