@@ -7,9 +7,43 @@ prepare()
 import os
 
 import jax
+import jaxtyping
 import pytest
+from jaxtyping import install_import_hook
 
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+# Annotations of arrays are checked at every call of the rooms that compute. `process` comes before JAX; the models of
+# `scenario` and the commands of `cli` are checked by pydantic and typer.
+CHECKED = (
+    "numerics",
+    "core",
+    "sensors",
+    "vehicles",
+    "thrusters",
+    "power",
+    "disturbances",
+    "references",
+    "navigation",
+    "estimation",
+    "plants",
+    "controllers",
+    "loop",
+    "analysis",
+)
+# Folders of tests where they are, and where arrays of different rank are an error: together they trace every part and
+# both loops. Elsewhere the same code runs again, and checking it once more would cost time and find nothing.
+STRICT = ("numerics", "physics", "conformance")
+install_import_hook([f"undertow.{room}" for room in CHECKED], "beartype.beartype")
+jaxtyping.config.update("jaxtyping_disable", True)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """Before the fixtures of the test are made."""
+    strict = item.path.parent.name in STRICT
+    jaxtyping.config.update("jaxtyping_disable", not strict)
+    jax.config.update("jax_numpy_rank_promotion", "raise" if strict else "allow")
 
 
 def pytest_configure(config):

@@ -180,7 +180,7 @@ def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool
     """
     text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
     _, outcome, *labelled = execute.execute(text)
-    return _run(outcome, *labelled)
+    return _run(outcome, *labelled)  # pyright: ignore[reportArgumentType] - five values in this order
 
 
 def _run(

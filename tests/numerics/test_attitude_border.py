@@ -17,7 +17,7 @@ RNG = np.random.default_rng(11)
 STARTS = 1000
 QUATERNIONS = RNG.normal(size=(STARTS, 4))
 QUATERNIONS /= np.linalg.norm(QUATERNIONS, axis=1, keepdims=True)
-UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+UPRIGHT = jnp.array([1.0, 0.0, 0.0, 0.0])
 
 
 def about(axis, angle):
@@ -41,7 +41,9 @@ def test_quaternion_error_is_the_short_turn_in_body_axes(degrees):
     w0, v0, w1, v1 = base[0], base[1:], turn[0], turn[1:]
     target = np.concatenate([[w0 * w1 - v0 @ v1], w0 * v1 + w1 * v0 + np.cross(v0, v1)])  # base, then the turn
     short = np.radians(degrees if degrees <= 180 else degrees - 360)
-    np.testing.assert_allclose(attitude_error(target, base), 2 * np.sin(short / 2) * axis, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        attitude_error(jnp.asarray(target), jnp.asarray(base)), 2 * np.sin(short / 2) * axis, rtol=0, atol=1e-14
+    )
 
 
 @pytest.fixture(scope="module")

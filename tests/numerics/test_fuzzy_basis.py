@@ -1,6 +1,7 @@
 """I11: the fuzzy basis sums to one, stays finite however far the input, and is the printed formula where that exists."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -87,7 +88,7 @@ def test_quick_way_is_taken_only_where_it_holds():
 )
 def test_estimate_stays_within_the_weights(weights, x, layout):
     system = EVEN[layout]
-    theta = np.array([weights])
+    theta = jnp.array([weights])
     d_hat = float(system.output(theta, basis(system, np.array([x])))[0])
     slack = 8 * EPSILON * np.abs(theta).max()
     assert theta.min() - slack <= d_hat <= theta.max() + slack

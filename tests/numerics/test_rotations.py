@@ -77,7 +77,7 @@ def test_skew_matrix_and_cross_product_agree_with_numpy():
 
 def test_wrapped_angle_differs_by_whole_turns_and_lies_in_half_open_range():
     angles = np.concatenate([RNG.uniform(-50, 50, 1000), [np.pi, -np.pi, 0.0]])
-    wrapped = np.asarray(wrap_angle(angles))
+    wrapped = np.asarray(wrap_angle(jnp.asarray(angles)))
     assert ((wrapped >= -np.pi) & (wrapped < np.pi)).all()
     turns = (angles - wrapped) / (2 * np.pi)
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-14)

@@ -55,7 +55,7 @@ def test_inner_knots_are_smooth():
 
 def test_gradients_reach_every_knot():
     knots, values = rows(4)
-    t = 0.5 * (knots[1] + knots[2])
+    t = jnp.asarray(0.5 * (knots[1] + knots[2]))
     gradients = jax.jit(jax.grad(lambda *data: sum(part.sum() for part in spline(t, *data)), argnums=(0, 1, 2)))(
         knots, values, clamped_slopes(knots, values)
     )

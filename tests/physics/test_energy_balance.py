@@ -15,7 +15,7 @@ from undertow.thrusters import paper_table3
 from undertow.vehicles import odin
 
 ODIN = hybrid_vehicle(odin(), paper_table3("shaft"))
-START = np.array([[0.0, 0, 0, 0.5, -0.4, 1.0], [0.4, -0.3, 0.2, 0.3, -0.2, 0.5]])
+START = jnp.array([[0.0, 0, 0, 0.5, -0.4, 1.0], [0.4, -0.3, 0.2, 0.3, -0.2, 0.5]])
 
 
 class Ledger(NamedTuple):

@@ -12,7 +12,7 @@ from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage
 from undertow.thrusters.fidelity import FIDELITIES, with_fidelity
 
 MOTOR = paper_table3("shaft").motor
-VOLTS = np.array([-24.0, -6.0, 0.5, 3.0, 12.0])
+VOLTS = jnp.array([-24.0, -6.0, 0.5, 3.0, 12.0])
 
 
 def fidelity(name, motor=MOTOR, **limits):
@@ -106,7 +106,9 @@ def test_dynamic_rungs_settle_on_the_static_one(name):
 def test_speed_term_and_thrust_add_up_to_the_voltage():
     """Eq. (15): T = alpha V + phi + Delta_V, with Delta_V = -alpha L I_dot."""
     thruster, rng = fidelity("electromechanical"), np.random.default_rng(9)
-    state = thruster.initial_state(5)._replace(speed=30 * rng.normal(size=5), current=8 * rng.normal(size=5))
+    state = thruster.initial_state(5)._replace(
+        speed=jnp.asarray(30 * rng.normal(size=5)), current=jnp.asarray(8 * rng.normal(size=5))
+    )
     rates = thruster.dynamics(state, VOLTS)
     report = thruster.report(state)
     np.testing.assert_allclose(report.speed, state.speed, rtol=0)
@@ -121,7 +123,7 @@ def test_nothing_turns_inside_the_dead_zone(name):
     """A voltage inside acts as none, a voltage outside as itself."""
     loose, limited = fidelity(name), fidelity(name, dead_zone=4.0)
     state = jax.tree.map(lambda leaf: leaf + jnp.linspace(-20.0, 20.0, leaf.size), loose.initial_state(5))
-    outside = np.where(np.abs(VOLTS) > 4, VOLTS, 0.0)
+    outside = jnp.where(jnp.abs(VOLTS) > 4, VOLTS, 0.0)
     for of in ("thrust", "dynamics", "current"):
         for a, b in zip(
             *(jax.tree.leaves(getattr(x, of)(state, v)) for x, v in ((limited, VOLTS), (loose, outside))), strict=True
@@ -131,7 +133,7 @@ def test_nothing_turns_inside_the_dead_zone(name):
 
 def test_memoryless_models_go_through_the_static_motor_at_ten_volts():
     """T = c_0 V and T = c_V V|V| of Fig. 2, with their currents, to the three digits of their defaults."""
-    static, ten = fidelity("static"), np.array([-10.0, 10.0])
+    static, ten = fidelity("static"), jnp.array([-10.0, 10.0])
     for model in (linear_voltage(), quadratic_voltage()):
         np.testing.assert_allclose(model.thrust((), ten), static.thrust((), ten), rtol=5e-3)
         np.testing.assert_allclose(model.current((), ten), static.current((), ten), rtol=5e-3)

@@ -72,7 +72,7 @@ def accelerations(pose, velocity, speed, current, volts, wrench):
     direct = j_rate @ nu + j @ jnp.linalg.solve(nominal.mass_matrix, tau - own(nominal) - wrench - delta)
 
     coriolis = coriolis_matrix(nominal.mass_matrix, nu)
-    damping = nominal.linear_damping + nominal.quadratic_damping * jnp.abs(nu)
+    damping = nominal.linear_damping + nominal.quadratic_damping * jnp.abs(nu)[None, :]
     m_j = inverse.T @ nominal.mass_matrix @ inverse
     inverse_rate = -inverse @ j_rate @ inverse
     moving = inverse.T @ (nominal.mass_matrix @ inverse_rate + (coriolis + damping) @ inverse) @ velocity

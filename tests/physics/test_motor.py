@@ -25,7 +25,7 @@ CONSTANTS = dict(
     torque_coefficient=3.45e-6,
 )
 RNG = np.random.default_rng(6)
-SPEED, CURRENT, VOLTS = (scale * RNG.normal(size=(200, 8)) for scale in (40.0, 10.0, 15.0))
+SPEED, CURRENT, VOLTS = (jnp.asarray(scale) * RNG.normal(size=(200, 8)) for scale in (40.0, 10.0, 15.0))
 
 
 def test_table_3_gains():
@@ -80,7 +80,7 @@ def test_advice_names_the_ratio_and_the_worst_of_several_motors():
     assert "0.5" in mixed.advice()[0]
 
 
-voltages = np.concatenate([-np.logspace(-6, 3, 100)[::-1], [0.0], np.logspace(-6, 3, 100)])
+voltages = jnp.concatenate([-jnp.logspace(-6, 3, 100)[::-1], jnp.zeros(1), jnp.logspace(-6, 3, 100)])
 
 
 @pytest.mark.parametrize("motor", [MOTOR, DCMotor(**CONSTANTS)], ids=["paper", "consistent"])
@@ -115,7 +115,7 @@ def test_misprint_in_k2_would_give_a_third_more_thrust():
     np.testing.assert_allclose(printed, 0.02112, rtol=3e-3)
     quadratic = float(MOTOR.k3 * MOTOR.torque_coefficient)
     speed = (-float(printed) + np.sqrt(float(printed) ** 2 + 40 * quadratic)) / (2 * quadratic)
-    np.testing.assert_allclose(MOTOR.thrust(speed), 148.3, rtol=0, atol=0.05)
+    np.testing.assert_allclose(MOTOR.thrust(jnp.asarray(speed)), 148.3, rtol=0, atol=0.05)
     state = PAPER.initial_state(1)._replace(
         speed=MOTOR.steady_speed(jnp.array([10.0])), current=MOTOR.steady_current(MOTOR.steady_speed(jnp.array([10.0])))
     )

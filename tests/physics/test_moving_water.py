@@ -113,7 +113,7 @@ def test_variance_of_orbital_velocity(depth):
     times = jnp.linspace(0.0, 50.0, 20)
     velocity = jax.jit(jax.vmap(lambda k: jax.vmap(lambda t: water_of(sea, k, t, jnp.zeros(3)).velocity)(times)))(keys)
     omega = np.linspace(0.4, 8.0, 20_000) * 2 * np.pi / 5
-    energy = np.array(spectrum(omega, 5.0, 3.3))
+    energy = np.array(spectrum(jnp.asarray(omega), 5.0, 3.3))
     energy *= (0.5 / 4) ** 2 / np.trapezoid(energy, omega)
     expected = np.trapezoid(omega**2 * energy * np.exp(-2 * omega**2 / 9.81 * depth), omega)
     found = np.asarray(velocity).var(axis=(0, 1))

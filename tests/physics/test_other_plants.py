@@ -176,7 +176,7 @@ def test_levitation_meets_the_twelve_measured_points():
     held = np.sqrt(rig.gravity / pull)
     off = np.abs(held / current - 1)
     assert off.max() < 0.021 and np.median(off) < 0.005, off
-    np.testing.assert_allclose(rig.duty(current**2), duty, atol=0.0125)
+    np.testing.assert_allclose(jax.vmap(rig.duty)(jnp.stack([current, current], 1) ** 2)[:, 0], duty, atol=0.0125)
     np.testing.assert_allclose(2 * rig.mass * pull, slope, rtol=0.039)
     np.testing.assert_allclose(2 * 0.038 * 9.81 / current**2, slope, rtol=3e-4)
     without_half = np.sqrt(rig.gravity / (2 * pull))
@@ -243,7 +243,7 @@ def test_arm_mass_and_coriolis_matrices():
     """M symmetric positive definite, inverse right, M_dot - 2 C skew, along the motion."""
     links, rng = two_link_arm().links, np.random.default_rng(2)
     for _ in range(30):
-        q, rate = rng.uniform(-3, 3, 2), rng.normal(size=2)
+        q, rate = jnp.asarray(rng.uniform(-3, 3, 2)), jnp.asarray(rng.normal(size=2))
         mass, coriolis = np.asarray(links.mass_matrix(q)), np.asarray(links.coriolis_matrix(q, rate))
         np.testing.assert_array_equal(mass, mass.T)
         assert np.linalg.eigvalsh(mass).min() > 0
@@ -340,7 +340,7 @@ def test_under_actuated_error_equation_holds_along_the_controlled_rows():
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), sinusoid(1.0, 2.0), perfect())
     drawn, rng = loop.realize(jax.random.PRNGKey(0)), np.random.default_rng(6)
     basis = np.linalg.svd(np.asarray(UNDER))[0][:, :2]
-    for t in rng.uniform(0, 5, 10):
+    for t in jnp.asarray(rng.uniform(0, 5, 10)):
         x, z = drawn.start(jnp.asarray(rng.normal(size=3)), jnp.asarray(rng.normal(size=3)))
         z = z._replace(weights=jnp.asarray(rng.normal(size=z.weights.shape)))
         seen = drawn.decide(t, x, z)

@@ -14,8 +14,8 @@ from undertow.vehicles import odin
 
 RNG = np.random.default_rng(4)
 COUNT = 200
-POSE = RNG.uniform(-1, 1, (COUNT, 6)) * np.array([10, 10, 10, np.pi, 1.3, np.pi])
-VELOCITY, PUSH, WRENCH = RNG.normal(size=(COUNT, 6)), RNG.normal(size=(COUNT, 6)), 30 * RNG.normal(size=(COUNT, 6))
+POSE = jnp.asarray(RNG.uniform(-1, 1, (COUNT, 6)) * np.array([10, 10, 10, np.pi, 1.3, np.pi]))
+VELOCITY, PUSH, WRENCH = (jnp.asarray(scale * RNG.normal(size=(COUNT, 6))) for scale in (1, 1, 30))
 VOLTS, NOISE = 10 * RNG.normal(size=(COUNT, 8)), RNG.normal(size=(COUNT, 8))
 
 

@@ -76,7 +76,7 @@ def recorded(outcome):
 def test_rates_of_the_ledger_cancel_at_every_instant(name, fidelity):
     """source + conversion = copper + friction + water + d(stored)/dt at random states, in both directions."""
     thruster, rng = THRUSTERS[name](fidelity), np.random.default_rng(1)
-    volts = 12 * rng.normal(size=400)
+    volts = jnp.asarray(12 * rng.normal(size=400))
     state = jax.tree.map(lambda leaf: leaf + 30 * rng.normal(size=leaf.shape), thruster.initial_state(400))
     flows = thruster.powers(state, volts)
     _, stored = jax.jvp(thruster.stored, (state,), (thruster.dynamics(state, volts),))
@@ -202,17 +202,18 @@ def test_books_change_nothing_else():
 # --------------------------------------------------------------------------------------------------- the battery
 
 CELLS = battery(full_voltage=16.8, empty_voltage=13.2, resistance=0.05, capacity=10.0)
-DRAWN = np.linspace(0.0, 36000.0, 7)  # C, full to empty
+DRAWN = jnp.linspace(0.0, 36000.0, 7)  # C, full to empty
 
 
 def test_open_circuit_voltage_is_linear_in_the_charge():
-    np.testing.assert_allclose(CELLS.open_circuit_voltage(np.array([0.0, 18000.0, 36000.0])), [16.8, 15.0, 13.2])
-    np.testing.assert_allclose(CELLS.state_of_charge(np.array([0.0, 18000.0, 36000.0])), [1.0, 0.5, 0.0], atol=1e-15)
+    np.testing.assert_allclose(CELLS.open_circuit_voltage(jnp.array([0.0, 18000.0, 36000.0])), [16.8, 15.0, 13.2])
+    np.testing.assert_allclose(CELLS.state_of_charge(jnp.array([0.0, 18000.0, 36000.0])), [1.0, 0.5, 0.0], atol=1e-15)
 
 
 @pytest.mark.parametrize("power", [-500.0, 0.0, 1.0, 400.0, 860.0])
 def test_bus_voltage_solves_its_quadratic(power):
     """v^2 - E v + R P = 0, the larger root; current P / v, heat R i^2."""
+    power = jnp.asarray(power)
     emf, v = CELLS.open_circuit_voltage(DRAWN), CELLS.bus_voltage(DRAWN, power)
     assert (v >= emf / 2).all()
     np.testing.assert_allclose(v**2 - emf * v + 0.05 * power, 0.0, atol=1e-10)
@@ -223,7 +224,7 @@ def test_bus_voltage_solves_its_quadratic(power):
 
 def test_no_more_than_the_largest_power_can_be_drawn():
     """E^2 / (4 R) at half the voltage; the search for the limit stops there."""
-    emf = np.asarray(CELLS.open_circuit_voltage(DRAWN))
+    emf = CELLS.open_circuit_voltage(DRAWN)
     most = emf**2 / (4 * 0.05)
     np.testing.assert_allclose(CELLS.bus_voltage(DRAWN, most), emf / 2, rtol=1e-5)
     np.testing.assert_allclose(CELLS.bus_voltage(DRAWN, 2 * most), emf / 2, rtol=1e-5)
@@ -234,14 +235,14 @@ def test_no_more_than_the_largest_power_can_be_drawn():
 
 def test_energy_of_the_cells_is_the_integral_of_voltage_over_charge():
     for drawn in DRAWN[1:]:
-        expected, _ = quad(lambda q: float(CELLS.open_circuit_voltage(q)), 0.0, drawn)
+        expected, _ = quad(lambda q: float(CELLS.open_circuit_voltage(jnp.asarray(q))), 0.0, float(drawn))
         np.testing.assert_allclose(CELLS.energy(drawn), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("ohms", [0.5, 4.0, 60.0])
 def test_limit_for_a_resistor_is_the_voltage_divider(ohms):
     """P = v^2 / r behind R gives v = E r / (r + R), tight to the search's 20 nV; less is given as it is."""
-    expected = CELLS.open_circuit_voltage(9000.0) * ohms / (ohms + 0.05)
+    expected = CELLS.open_circuit_voltage(jnp.asarray(9000.0)) * ohms / (ohms + 0.05)
     found = CELLS.limit(jnp.asarray(9000.0), lambda v: v**2 / ohms, jnp.asarray(40.0))
     assert expected - 1e-7 < found <= expected + 1e-12
     low = CELLS.limit(jnp.asarray(9000.0), lambda v: v**2 / ohms, jnp.asarray(5.0))
@@ -304,14 +305,14 @@ def test_limit_holds_along_a_run_and_the_battery_sags(fidelity):
 
 def test_pulses_are_whole_clipped_and_dead_near_neutral():
     part, bus = esc(), jnp.asarray(16.0)
-    volts = np.array([0.0, 8.0, 8.013, 8.03, -8.0, 16.0, 99.0, -99.0])
+    volts = jnp.array([0.0, 8.0, 8.013, 8.03, -8.0, 16.0, 99.0, -99.0])
     np.testing.assert_array_equal(part.pulse(volts, bus), [1500, 1700, 1700, 1701, 1300, 1900, 1900, 1100])
-    pulses = np.array([1500.0, 1525.0, 1475.0, 1526.0, 1474.0, 1900.0, 2000.0, 1000.0])
+    pulses = jnp.array([1500.0, 1525.0, 1475.0, 1526.0, 1474.0, 1900.0, 2000.0, 1000.0])
     np.testing.assert_allclose(part.voltage(pulses, bus), [0, 0, 0, 1.04, -1.04, 16, 16, -16], rtol=1e-14)
-    inward = part.pulse(np.array([8.03, -8.03, 8.0, -16.0]), bus, True)
+    inward = part.pulse(jnp.array([8.03, -8.03, 8.0, -16.0]), bus, True)
     np.testing.assert_array_equal(inward, [1700, 1300, 1700, 1100], err_msg="towards neutral when there is no more")
     coarse = esc(resolution=4.0, dead_band=0.0)
-    np.testing.assert_array_equal(coarse.pulse(np.array([0.05, 0.09, -0.09]), bus), [1500, 1504, 1496])
+    np.testing.assert_array_equal(coarse.pulse(jnp.array([0.05, 0.09, -0.09]), bus), [1500, 1504, 1496])
 
 
 def test_applied_voltages_are_whole_pulses_and_pass_unchanged_a_second_time():

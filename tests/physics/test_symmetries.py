@@ -17,8 +17,8 @@ from undertow.references import setpoint
 from undertow.thrusters import paper_table3
 from undertow.vehicles import odin
 
-POSE = np.array([1.0, -2.0, 3.0, 0.2, -0.3, 0.5])
-VELOCITY = np.array([0.3, -0.2, 0.1, 0.1, 0.2, -0.1])
+POSE = jnp.array([1.0, -2.0, 3.0, 0.2, -0.3, 0.5])
+VELOCITY = jnp.array([0.3, -0.2, 0.1, 0.1, 0.2, -0.1])
 STILL = np.eye(3)
 ORDER = (3, 8, 1, 5, 7, 2, 6, 4)  # thrusters, from 1
 
@@ -56,15 +56,17 @@ def trajectory(plant, start, world=STILL, length=1.0, voltage=1.0):
     A step of 5 ms would not do: between its stages a quaternion is not quite of unit length, and the matrix made
     from it turns with the world only up to the error of the integrator (1.4e-10 at 5 ms).
     """
-    return compiled(plant, start, jnp.asarray(world), jnp.asarray(length), jnp.asarray(voltage))
+    return jax.tree.map(
+        np.asarray, compiled(plant, start, jnp.asarray(world), jnp.asarray(length), jnp.asarray(voltage))
+    )
 
 
 def test_turning_the_world_about_the_vertical_and_shifting_it_maps_trajectories():
     plant = hybrid_vehicle(odin(), paper_table3("electromechanical"))
     turn, shift = 1.1, np.array([5.0, -7.0, 11.0])
     about = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-    moved = np.concatenate([about @ POSE[:3] + shift, POSE[3:] + np.array([0, 0, turn])])
-    rates = np.concatenate([about @ VELOCITY[:3], VELOCITY[3:]])
+    moved = jnp.concatenate([about @ POSE[:3] + shift, POSE[3:] + np.array([0, 0, turn])])
+    rates = jnp.concatenate([about @ VELOCITY[:3], VELOCITY[3:]])
     here = trajectory(plant, plant.initial_state(POSE, VELOCITY))
     there = trajectory(plant, plant.initial_state(moved, rates), about)
     assert np.ptp(np.asarray(here.position), axis=0).min() > 0.5

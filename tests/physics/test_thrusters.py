@@ -37,7 +37,7 @@ UNEVEN = DCMotor(
     reverse_torque_coefficient=5e-6,
 )
 MOTORS = {"uneven": UNEVEN, "t200": t200().motor, "t500": t500().motor, "table3": paper_table3().motor}
-VOLTS = np.array([-20.0, -12.0, -3.0, -0.1, 0.1, 3.0, 12.0, 20.0])
+VOLTS = jnp.array([-20.0, -12.0, -3.0, -0.1, 0.1, 3.0, 12.0, 20.0])
 
 
 def simulate(thruster, volts, duration, dt, method="rk4"):
@@ -61,10 +61,10 @@ def held(volts):
 
 
 def test_each_direction_has_its_own_coefficients():
-    speed = np.array([-100.0, 100.0])
+    speed = jnp.array([-100.0, 100.0])
     np.testing.assert_allclose(UNEVEN.thrust(speed), [-3.0, 4.0], rtol=1e-14)
     np.testing.assert_allclose(UNEVEN.torque(speed), [-0.05, 0.04], rtol=1e-14)
-    np.testing.assert_allclose(UNEVEN.ideal_thrust(np.array([-1.0, 1.0])), [-0.02 * 60 / 0.4, 0.02 * 100 / 0.4])
+    np.testing.assert_allclose(UNEVEN.ideal_thrust(jnp.array([-1.0, 1.0])), [-0.02 * 60 / 0.4, 0.02 * 100 / 0.4])
     even = MOTORS["table3"]
     np.testing.assert_array_equal(even.thrust(speed), -even.thrust(speed)[::-1])
 
@@ -80,7 +80,7 @@ def test_steady_speed_solves_eq_13_in_both_directions(name):
 
 @pytest.mark.parametrize("name", MOTORS)
 def test_thrust_and_speed_are_inverse(name):
-    speed = np.linspace(-300, 300, 61)
+    speed = jnp.linspace(-300, 300, 61)
     np.testing.assert_allclose(MOTORS[name].speed_at(MOTORS[name].thrust(speed)), speed, rtol=1e-13)
 
 
@@ -125,7 +125,8 @@ def test_ideal_rung_is_the_static_one_without_speed_term_in_both_directions():
 def test_speed_term_and_thrust_add_up_in_reverse_too():
     """Eq. (15), T = alpha V + phi - alpha L I_dot, with the one alpha of forward motion."""
     thruster, rng = with_fidelity(UNEVEN, "electromechanical"), np.random.default_rng(3)
-    state = thruster.initial_state(8)._replace(speed=100 * rng.normal(size=8), current=8 * rng.normal(size=8))
+    speed, current = jnp.asarray(100 * rng.normal(size=8)), jnp.asarray(8 * rng.normal(size=8))
+    state = thruster.initial_state(8)._replace(speed=speed, current=current)
     assert (state.speed < 0).any() and (state.speed > 0).any()
     rates, report = thruster.dynamics(state, VOLTS), thruster.report(state)
     np.testing.assert_array_equal(report.speed, state.speed)
@@ -139,12 +140,12 @@ def test_speed_term_and_thrust_add_up_in_reverse_too():
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_dead_zone_of_real_thrusters(make, fidelity):
     thruster = make(fidelity)
-    inside = np.array([-1.2, -0.6, 0.0, 0.6, 1.2])
+    inside = jnp.array([-1.2, -0.6, 0.0, 0.6, 1.2])
     state = thruster.initial_state(5)
     np.testing.assert_array_equal(thruster.thrust(state, inside), 0.0)
     for rate in jax.tree.leaves(thruster.dynamics(state, inside)):
         np.testing.assert_array_equal(rate, 0.0)
-    just = np.array([-1.21, 1.21])
+    just = jnp.array([-1.21, 1.21])
     outside = thruster.thrust(simulate(thruster, held(just), 0.2, 1e-4), just)
     assert outside[0] < 0 < outside[1]
 
@@ -228,8 +229,8 @@ def test_first_order_tends_to_the_static_models():
 
 def test_first_order_draws_the_current_of_its_steady_state():
     thruster = first_order(current_per_thrust=0.1, dead_zone=1.0)
-    volts = np.array([-5.0, -0.5, 0.5, 5.0])
-    moving = thruster.initial_state(4)._replace(thrust=np.array([30.0, 30.0, -30.0, -30.0]))
+    volts = jnp.array([-5.0, -0.5, 0.5, 5.0])
+    moving = thruster.initial_state(4)._replace(thrust=jnp.array([30.0, 30.0, -30.0, -30.0]))
     np.testing.assert_allclose(thruster.current(moving, volts), [-5.45, 0.0, 0.0, 5.45])
     assert (thruster.terminal(volts) * thruster.current(moving, volts) >= 0).all(), "nothing comes back"
 
@@ -265,7 +266,7 @@ BENCH = np.array(
 @pytest.fixture(scope="module")
 def bench():
     """Settled thrust, torque and speed over those measured, and the settled thrust, by command."""
-    thruster, volts = axial_flow(), BENCH[:, 0]
+    thruster, volts = axial_flow(), jnp.asarray(BENCH[:, 0])
     state = simulate(thruster, held(volts), 30.0, 2e-3)
     assert all(np.abs(rate).max() < 1e-6 for rate in thruster.dynamics(state, volts))
     thrust = np.asarray(thruster.thrust(state, volts))
@@ -314,7 +315,7 @@ def test_rotor_alone_has_a_time_constant_of_73_ms():
     thruster = axial_flow()
     np.testing.assert_allclose(1 / thruster.speed_decay, 0.0732, atol=5e-5)
     at_rest = thruster.initial_state(4)
-    rates = thruster.dynamics(at_rest, np.array([-0.84, -0.82, 0.85, 0.87])).speed
+    rates = thruster.dynamics(at_rest, jnp.array([-0.84, -0.82, 0.85, 0.87])).speed
     np.testing.assert_allclose(rates, [-7.25469, 0.0, 0.0, 7.37156], rtol=1e-9)
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from undertow.core.contracts import AbstractPlant
 from undertow.core.errors import BadInput
 from undertow.core.metric import AbstractMetric, Metric
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
@@ -120,8 +120,8 @@ class Metrics(AbstractAccumulator):
         units: of the outputs.
     """
 
-    start: Scalar = param("s", "first time that counts", default=0.0)
-    stop: Scalar = param("s", "last time that counts", default=jnp.inf)
+    start: Float[Param, ""] = param("s", "first time that counts", default=0.0)
+    stop: Float[Param, ""] = param("s", "last time that counts", default=jnp.inf)
     units: tuple[str, ...] = eqx.field(static=True, default=("m",))
 
     def init(self, signals: Signals) -> MetricsState:
@@ -205,8 +205,8 @@ class Windowed(AbstractAccumulator):
     """A metric of somebody's own over start <= t <= stop, s."""
 
     metric: AbstractMetric
-    start: Scalar = param("s", "first time that counts", default=0.0)
-    stop: Scalar = param("s", "last time that counts", default=jnp.inf)
+    start: Float[Param, ""] = param("s", "first time that counts", default=0.0)
+    stop: Float[Param, ""] = param("s", "last time that counts", default=jnp.inf)
 
     def init(self, signals: Signals) -> Any:
         return self.metric.init(signals)

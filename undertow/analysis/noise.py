@@ -12,6 +12,7 @@ import numpy as np
 from undertow.analysis.small_signal import gains
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput
 
 _SEEN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0], [0.0, 0.0]])  # S
@@ -127,7 +128,7 @@ def _robust(law: RobustRCAF, dt: float, axis: int) -> Steps:
     at = lambda value, *shape: np.broadcast_to(np.asarray(value, dtype=float), (axes, *shape))[axis]
     filtered = np.append(at(law.lyapunov(), 2, 2)[:, 1], [0.0, 0.0])
     slope = at(law.robust_gain) / at(law.layer)
-    of_rates, of_estimate = (float(at(value)) for value in law.estimator.gains(np.asarray(dt)))
+    of_rates, of_estimate = (float(at(value)) for value in law.estimator.gains(as_array(dt)))
     return Steps(
         dt=dt,
         push=np.append(at(law.feedback, 2), [0.0, -1.0]) + slope * filtered,

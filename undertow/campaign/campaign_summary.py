@@ -55,7 +55,9 @@ def correlations(results: Results) -> dict[str, dict[str, float]]:
             finite = [group & np.isfinite(values) for group in groups]
             pairs = [(column.values[group], values[group]) for group in finite]
             known = [
-                float(spearmanr(*pair)[0]) for pair in pairs if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
+                float(spearmanr(*pair)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
+                for pair in pairs
+                if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
             ]
             if known:
                 found.setdefault(key, {})[name] = sum(known) / len(known)
@@ -92,7 +94,7 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
         "done": results.rows.sizes["trial"],
         "status": endings(results.rows),
         "by_xla": int((results.rows["backend"].values == XLA).sum()),
-        "invalid": [one._asdict() for one in reasons(several, invalid)],
+        "invalid": [one._asdict() for one in reasons(several, invalid)],  # pyright: ignore[reportArgumentType] - an array serves as rows
         "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
         "sensitivity": correlations(results),
         "choices": by_choice(results),

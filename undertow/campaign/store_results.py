@@ -129,7 +129,7 @@ def _rows(group: Any, campaign: Campaign, stored: Layout, names: Iterable[str]) 
 def _done(group: Any, campaign: Campaign, stored: Layout, path: Path, names: Iterable[str]) -> np.ndarray:
     """Which trials belong to finished tasks."""
     done = np.zeros(campaign.number, dtype=bool)
-    for task in np.flatnonzero(flags(group[DONE], stored.tasks)) if DONE in group else ():
+    for task in np.flatnonzero(flags(group[DONE], stored.tasks)).tolist() if DONE in group else ():
         block = stored.block(task)
         if all(chunk_file(path, name, block, len(block)).exists() for name in names):
             done[stored.trials(task)] = True

@@ -15,9 +15,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.actuator_model import AbstractActuatorModel, Forces
+from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.contracts import Model
 from undertow.numerics.linear_algebra import matvec
 
@@ -112,9 +113,8 @@ def axes_of(model: Model, sampling_time: float, delay: float, velocity_noise, lo
         known = actuators.time_constant()
         lag = None if known is None else float(jnp.max(known))
         max_bandwidth = float(actuators.max_bandwidth(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
-        reached = np.asarray(
-            matvec(jnp.abs(model.dynamics.gain(model.coordinates.measurement(still, still))), largest_forces(actuators))
-        )
+        gain = jnp.abs(model.dynamics.gain(model.coordinates.measurement(still, still)))
+        reached = np.asarray(matvec(gain, largest_forces(actuators, gain.shape[1])))
     authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
     rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
@@ -127,11 +127,11 @@ def alike(values: Sequence[float]):
     return values[0] if len(set(values)) == 1 else jnp.asarray(values, dtype=float)
 
 
-def largest_forces(actuators: AbstractActuatorModel) -> Forces:
-    """Largest steady force of each actuator in its stronger direction; a very large number where there is no limit."""
+def largest_forces(actuators: AbstractActuatorModel, count: int) -> Float[Array, " m"]:
+    """Largest steady force of each of `count` actuators in its stronger direction; very large without a limit."""
     held = actuators.quasi_static()
     low, high = held.range(held.init(), jnp.ones(()))
-    return jnp.minimum(jnp.maximum(-low, high), _UNLIMITED)
+    return jnp.broadcast_to(jnp.minimum(jnp.maximum(-low, high), _UNLIMITED), (count,))
 
 
 @functools.lru_cache(maxsize=4096)

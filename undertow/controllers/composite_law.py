@@ -16,7 +16,7 @@ from undertow.core import checks
 from undertow.core.continuous import AbstractContinuousController
 from undertow.core.contracts import Measurement, Model, Target
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.estimation.fuzzy_system import FuzzySystem
 from undertow.estimation.series_parallel import SeriesParallel
@@ -70,23 +70,23 @@ class RCAF(AbstractContinuousController):
     model: Model
     fuzzy: FuzzySystem
     identification: SeriesParallel
-    feedback: Float[Array, "*n 2"] = param(
+    feedback: Float[Param, "*#n 2"] = param(
         "1/s^2, 1/s", "state feedback", symbol="K", default=(1.0, 2.0), source="Table 1"
     )
-    weight: Float[Array, "*n 2 2"] = param(
+    weight: Float[Param, "*#n 2 2"] = param(
         "", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)), source="Table 1"
     )
-    adaptation: Float[Array, "..."] = param("1/s^2", "adaptation gain", symbol="gamma", default=100.0, source="Table 1")
-    composite: Float[Array, "..."] = param(
+    adaptation: Float[Param, "..."] = param("1/s^2", "adaptation gain", symbol="gamma", default=100.0, source="Table 1")
+    composite: Float[Param, "..."] = param(
         "", "share of the modelling error; 0 is RAFC, Eq. (61)", symbol="gamma_eps", default=500.0, source="Table 1"
     )
-    robust_gain: Float[Array, "..."] = param(
+    robust_gain: Float[Param, "..."] = param(
         "m/s^2, rad/s^2", "amplitude of the robust term", symbol="w_bar", default=10.0, source="Table 1"
     )
-    layer: Float[Array, "..."] = param(
+    layer: Float[Param, "..."] = param(
         "unit of s", "boundary layer of the robust term", symbol="phi", default=0.5, source="Table 1"
     )
-    weights_bound: Float[Array, "..."] = param(
+    weights_bound: Float[Param, "..."] = param(
         "m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=jnp.inf
     )
     modification: RobustModification | None = None
@@ -163,13 +163,13 @@ class RCAF(AbstractContinuousController):
     def signals(self):
         return ADAPTIVE_LAW | _PREDICTED
 
-    def lyapunov(self) -> Float[Array, "*n 2 2"]:
+    def lyapunov(self) -> Float[Array, "*#n 2 2"]:
         """P of Eq. (21)."""
         return companion_lyapunov(self.feedback, self.weight)
 
     def _box(self) -> Float[Array, "..."]:
         """theta_max, shaped to broadcast with theta."""
-        return self.weights_bound[..., None]
+        return self.weights_bound if self.weights_bound.ndim == 0 else self.weights_bound[:, None]
 
     def _tracking(self, y: Measurement, r: Target) -> Tracking:
         return tracking(self.model.coordinates, self.lyapunov(), y, r)

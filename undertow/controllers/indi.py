@@ -10,7 +10,7 @@ from undertow.controllers.tracking_error import check_gains, demanded_accelerati
 from undertow.core import checks
 from undertow.core.actuator_model import input_for
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 PerAxis = Float[Array, " n"]
 
@@ -35,9 +35,9 @@ class INDI(AbstractInformedController):
     """
 
     model: Model
-    bandwidth: Float[Array, "..."] = param("rad/s", "natural frequency of the filter", symbol="w")
-    damping: Float[Array, "..."] = param("", "damping ratio of the filter", symbol="zeta")
-    feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
+    bandwidth: Float[Param, "..."] = param("rad/s", "natural frequency of the filter", symbol="w")
+    damping: Float[Param, "..."] = param("", "damping ratio of the filter", symbol="zeta")
+    feedback: Float[Param, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
 
     def __check_init__(self):
         checks.positive("bandwidth", self.bandwidth, "rad/s")

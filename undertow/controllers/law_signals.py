@@ -28,7 +28,7 @@ ADAPTIVE_LAW = ESTIMATE | ROBUST_TERM | MODELLING_ERROR | WEIGHTS | LYAPUNOV | A
 
 
 def lyapunov_signals(
-    off: Tracking, lyapunov: Float[Array, "*n 2 2"], weight: Float[Array, "*n 2 2"]
+    off: Tracking, lyapunov: Float[Array, "*#n 2 2"], weight: Float[Array, "*#n 2 2"]
 ) -> dict[str, Scalar]:
     """1/2 E^T P E of Eq. (46) and 1/2 E^T Q E of Eq. (58), with the law's own E, summed over axes."""
     return {"lyapunov_tracking": _half(off, lyapunov), "lyapunov_decay": _half(off, weight)}
@@ -52,6 +52,6 @@ def share_given(desired: PerAxis, given: PerAxis) -> Scalar:
     return jnp.where(size > 0, jnp.clip(share, 0.0, 1.0), 1.0)
 
 
-def _half(off: Tracking, matrix: Float[Array, "*n 2 2"]) -> Scalar:
+def _half(off: Tracking, matrix: Float[Array, "*#n 2 2"]) -> Scalar:
     diagonal = matrix[..., 0, 0] * off.error**2 + matrix[..., 1, 1] * off.rate**2
     return (diagonal / 2 + matrix[..., 0, 1] * off.error * off.rate).sum()

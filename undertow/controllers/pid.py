@@ -16,7 +16,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
@@ -49,11 +49,11 @@ class PID(AbstractInformedController):
 
     model: Model
     filter: ReferenceFilter | None
-    proportional: Float[Array, "..."] = param("1/s^2", "acceleration per error", symbol="k_p")
-    integral: Float[Array, "..."] = param("1/s^3", "rate of the acceleration per error", symbol="k_i")
-    derivative: Float[Array, "..."] = param("1/s", "acceleration per error of the rates", symbol="k_d")
-    actuator_rate: Float[Array, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda")
-    direction: Float[Array, ""] = param("", "cost of a departure from the desired direction relative to a loss of size")
+    proportional: Float[Param, "..."] = param("1/s^2", "acceleration per error", symbol="k_p")
+    integral: Float[Param, "..."] = param("1/s^3", "rate of the acceleration per error", symbol="k_i")
+    derivative: Float[Param, "..."] = param("1/s", "acceleration per error of the rates", symbol="k_d")
+    actuator_rate: Float[Param, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda")
+    direction: Float[Param, ""] = param("", "cost of a departure from the desired direction relative to a loss of size")
     feedforward: bool = eqx.field(static=True, default=True)
     motor: str = eqx.field(static=True, default="steady")
 
@@ -92,7 +92,7 @@ class PID(AbstractInformedController):
         return PIDState(
             integral=z.integral + dt * (self.integral * plan.error + back),
             actuators=actuators.advance(plan.actuators, u_applied, dt),
-            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model.coordinates, share, dt),
+            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model.coordinates, share, dt),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         )
 
     def known_acceleration(self, z: PIDState, y: Measurement, u_applied) -> PerAxis:
@@ -112,7 +112,7 @@ class PID(AbstractInformedController):
 
     def _plan(self, z: PIDState, y: Measurement, r: Target) -> Plan:
         dynamics, coordinates, _ = self.model
-        target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)
+        target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         error, rate, acceleration = coordinates.tracking_error(y, target)
         demand = acceleration + self.proportional * error + self.derivative * rate + z.integral - self._drift(y)
         return Plan(self._actuators().update_from_report(z.actuators, y.actuator), error, dynamics.invert(y, demand))

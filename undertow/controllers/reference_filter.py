@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractCoordinates, Outputs, Target
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 
 class FilterState(NamedTuple):
@@ -44,7 +44,7 @@ class ReferenceFilter(eqx.Module):
         BadInput: frequency not positive.
     """
 
-    frequency: Float[Array, "..."] = param("rad/s", "frequency of the three poles", symbol="w_r")
+    frequency: Float[Param, "..."] = param("rad/s", "frequency of the three poles", symbol="w_r")
 
     def __check_init__(self):
         checks.positive("frequency", self.frequency, "rad/s")

@@ -7,7 +7,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 Weights = Float[Array, "n rules"]
 
@@ -21,9 +21,9 @@ class RobustModification(eqx.Module):
         BadInput: a value negative.
     """
 
-    leakage: Float[Array, "..."] = param("", "of the sigma-modification", symbol="kappa")
-    e_modification: Float[Array, "..."] = param("s/m, s/rad", "factor of |eps|", symbol="nu")
-    dead_zone: Float[Array, "..."] = param("m/s, rad/s", "largest |eps| that is treated as noise")
+    leakage: Float[Param, "..."] = param("", "of the sigma-modification", symbol="kappa")
+    e_modification: Float[Param, "..."] = param("s/m, s/rad", "factor of |eps|", symbol="nu")
+    dead_zone: Float[Param, "..."] = param("m/s, rad/s", "largest |eps| that is treated as noise")
 
     def __check_init__(self):
         for name in ("leakage", "e_modification", "dead_zone"):

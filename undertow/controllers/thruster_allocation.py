@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.law_signals import share_given
+from undertow.core.actuator_model import Forces
 from undertow.numerics.box_quadratic import box_minimum
 from undertow.numerics.linear_algebra import matvec
 
@@ -13,11 +14,7 @@ _USE = 1e-6
 
 
 def allocate(
-    effect: Float[Array, "n m"],
-    forces: Float[Array, " m"],
-    low: Float[Array, " m"],
-    high: Float[Array, " m"],
-    direction: Float[Array, ""],
+    effect: Float[Array, "n m"], forces: Float[Array, " m"], low: Forces, high: Forces, direction: Float[Array, ""]
 ) -> Float[Array, " m"]:
     """Forces within [low, high] that give as much as possible of the desired acceleration a = effect forces.
 
@@ -28,7 +25,7 @@ def allocate(
     Args:
         effect: acceleration per force.
         forces: smallest ones that give the desired acceleration, without limits.
-        low, high: limits.
+        low, high: limits, one per force or one that holds for each.
         direction: cost of a departure from the direction of a relative to a loss of size; up to 1e6, which keeps it.
     """
     fits = ((forces >= low) & (forces <= high)).all()
@@ -47,7 +44,8 @@ def _programme(effect, forces, low, high, direction) -> Float[Array, " m"]:
     desired = matvec(effect, forces)
     size = jnp.sqrt((desired**2).sum())
     size = jnp.where(size > 0, size, 1.0)
-    aside = jnp.concatenate([effect * unit, -desired[:, None]], axis=1) / size
+    scaled = effect * (unit if unit.ndim == 0 else unit[None, :])
+    aside = jnp.concatenate([scaled, -desired[:, None]], axis=1) / size
     m = forces.shape[0]
     use = jnp.full(m + 1, _USE).at[m].set(1.0)
     matrix = direction * aside.T @ aside + jnp.diag(use)

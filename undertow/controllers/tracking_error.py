@@ -10,8 +10,9 @@ from undertow.core.contracts import AbstractCoordinates, Inputs, Measurement, Mo
 from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
-Feedback = Float[Array, "*n 2"]
-Matrices = Float[Array, "*n 2 2"]
+# One for all axes, or one per axis.
+Feedback = Float[Array, "*#n 2"]
+Matrices = Float[Array, "*#n 2 2"]
 
 
 class Tracking(NamedTuple):
@@ -44,7 +45,7 @@ def modelled_acceleration(model: Model, y: Measurement, u_applied: Inputs) -> Pe
     return model.dynamics.drift(y) + matvec(model.dynamics.gain(y), force_of(model.actuators, u_applied))
 
 
-def check_gains(feedback: Feedback, weight: Matrices, per_axis: dict[str, Any], axes: int) -> None:
+def check_gains(feedback: Array, weight: Array, per_axis: dict[str, Any], axes: int) -> None:
     """Check that K, Q and other gains fit the axes, and that K and Q satisfy Eq. (21).
 
     Raises:

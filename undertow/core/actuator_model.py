@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
 Inputs = Float[Array, " m"]
-Forces = Float[Array, " m"]
+Forces = Float[Array, " m"] | Float[Array, ""]  # one per input, or one that holds for each
 
 
 class AbstractActuatorModel(eqx.Module):
@@ -57,9 +57,9 @@ class AbstractActuatorModel(eqx.Module):
 class DirectActuator(AbstractActuatorModel):
     """The force is proportional to the input, within limits of the input."""
 
-    gain: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
-    low: Inputs = eqx.field(converter=jnp.asarray, default=-jnp.inf)
-    high: Inputs = eqx.field(converter=jnp.asarray, default=jnp.inf)
+    gain: Forces = eqx.field(converter=jnp.asarray, default=1.0)
+    low: Forces = eqx.field(converter=jnp.asarray, default=-jnp.inf)
+    high: Forces = eqx.field(converter=jnp.asarray, default=jnp.inf)
     at_once: bool = eqx.field(static=True, default=True)  # whether the force is known to follow the input at once
 
     def max_bandwidth(self, sampled):

@@ -1,13 +1,35 @@
 """Declaration of a parameter with its unit, symbol, meaning and source."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Array, ArrayLike
 
 from undertow.core.arrays import as_array
+
+if TYPE_CHECKING:
+
+    class Param:
+        """What a type checker is told of a field `name: Float[Param, "3"] = param(...)`: numbers in, an array out."""
+
+        @overload
+        def __get__(self, instance: None, owner: Any) -> "Param": ...
+        @overload
+        def __get__(self, instance: object, owner: Any) -> Array: ...
+        def __get__(self, instance: Any, owner: Any) -> Any: ...
+        def __set__(self, instance: object, value: ArrayLike | Sequence[Any] | None) -> None: ...
+
+    class Sources:
+        """The same of a field of sources: a mapping in, pairs out."""
+
+        def __get__(self, instance: Any, owner: Any) -> tuple[tuple[str, str], ...]: ...
+        def __set__(self, instance: object, value: Mapping[str, str] | tuple[tuple[str, str], ...]) -> None: ...
+
+else:
+    Param, Sources = Array, tuple
 
 
 class Parameter(NamedTuple):

@@ -1,18 +1,18 @@
 """A constant, uniform current."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import with_water
 
 
 class Current(AbstractDisturbance):
     """Water of constant, uniform velocity."""
 
-    velocity: Float[Array, "3"] = param("m/s", "velocity of the water: north, east, down", symbol="v_c")
+    velocity: Float[Param, "3"] = param("m/s", "velocity of the water: north, east, down", symbol="v_c")
 
     def __check_init__(self):
         checks.length("velocity", self.velocity, 3, "north, east, down")

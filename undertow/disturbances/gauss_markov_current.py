@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import with_water
 
 _LONGEST = 1_000_000  # samples of a realisation
@@ -24,10 +24,10 @@ class GaussMarkovCurrent(AbstractDisturbance):
         BadInput: a time not positive, a deviation negative, too many samples.
     """
 
-    mean: Float[Array, "3"] = param("m/s", "mean velocity: north, east, down")
-    deviation: Float[Array, "3"] = param("m/s", "standard deviation: north, east, down", symbol="sigma")
-    correlation_time: Float[Array, ""] = param("s", "time in which the correlation falls to 1/e", symbol="1/mu")
-    step: Float[Array, ""] = param("s", "time between samples")
+    mean: Float[Param, "3"] = param("m/s", "mean velocity: north, east, down")
+    deviation: Float[Param, "3"] = param("m/s", "standard deviation: north, east, down", symbol="sigma")
+    correlation_time: Float[Param, ""] = param("s", "time in which the correlation falls to 1/e", symbol="1/mu")
+    step: Float[Param, ""] = param("s", "time between samples")
     samples: int = eqx.field(static=True, default=1201)
 
     def __check_init__(self):
@@ -45,7 +45,7 @@ class GaussMarkovCurrent(AbstractDisturbance):
         # Steps x -> kept x + news are associative, so that a parallel scan computes them.
         news = (fresh * noise).at[0].set(noise[0])
         after = lambda first, second: (first[0] * second[0], first[1] * second[0] + second[1])
-        return self.deviation * jax.lax.associative_scan(after, (jnp.full((self.samples, 1), kept), news))[1]
+        return self.deviation[None, :] * jax.lax.associative_scan(after, (jnp.full((self.samples, 1), kept), news))[1]
 
     def at(self, realization, t, pose, load: Load) -> Load:
         index = jnp.clip(t / self.step, 0.0, self.samples - 1.0)

@@ -4,12 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import with_scaling
 
 _RANGES = ("mass", "damping", "restoring", "thrust")
@@ -22,10 +22,10 @@ class ParameterError(AbstractDisturbance):
         BadInput: a range that is not low <= high, or a mass not positive.
     """
 
-    mass: Float[Array, "2"] = param("", "range of the factor on M and C")
-    damping: Float[Array, "2"] = param("", "range of the factor on D")
-    restoring: Float[Array, "2"] = param("", "range of the factor on g")
-    thrust: Float[Array, "2"] = param("", "range of the factor on thrust")
+    mass: Float[Param, "2"] = param("", "range of the factor on M and C")
+    damping: Float[Param, "2"] = param("", "range of the factor on D")
+    restoring: Float[Param, "2"] = param("", "range of the factor on g")
+    thrust: Float[Param, "2"] = param("", "range of the factor on thrust")
 
     def __check_init__(self):
         for name in _RANGES:

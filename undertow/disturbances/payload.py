@@ -3,12 +3,12 @@
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks, contracts
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import with_payload
 
 
@@ -21,11 +21,11 @@ class PickedUp(AbstractDisturbance):
         BadInput: mass negative, heavier in water than in air, or stop not after start.
     """
 
-    mass: Float[Array, ""] = param("kg", "mass")
-    weight: Float[Array, ""] = param("N", "weight in water; negative if it floats")
-    point: Float[Array, "3"] = param("m", "where it is held, body axes")
-    start: Float[Array, ""] = param("s", "when it is picked up")
-    stop: Float[Array, ""] = param("s", "when it is put down")
+    mass: Float[Param, ""] = param("kg", "mass")
+    weight: Float[Param, ""] = param("N", "weight in water; negative if it floats")
+    point: Float[Param, "3"] = param("m", "where it is held, body axes")
+    start: Float[Param, ""] = param("s", "when it is picked up")
+    stop: Float[Param, ""] = param("s", "when it is put down")
 
     def __check_init__(self):
         checks.not_negative("mass", self.mass, "kg")

@@ -4,12 +4,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.random_keys import keys_for
 
 _SINUSOIDS = 3  # per axis
@@ -22,11 +22,11 @@ class RandomSuite(AbstractDisturbance):
         BadInput: a size negative, a frequency or `hold` not positive, or `fastest` below `slowest`.
     """
 
-    amplitude: Float[Array, "..."] = param("m/s^2, rad/s^2", "rms of the sinusoids together")
-    slowest: Float[Array, ""] = param("rad/s", "lowest frequency")
-    fastest: Float[Array, ""] = param("rad/s", "highest frequency")
-    step: Float[Array, "..."] = param("m/s^2, rad/s^2", "standard deviation of the levels")
-    hold: Float[Array, ""] = param("s", "time for which a level is held")
+    amplitude: Float[Param, "..."] = param("m/s^2, rad/s^2", "rms of the sinusoids together")
+    slowest: Float[Param, ""] = param("rad/s", "lowest frequency")
+    fastest: Float[Param, ""] = param("rad/s", "highest frequency")
+    step: Float[Param, "..."] = param("m/s^2, rad/s^2", "standard deviation of the levels")
+    hold: Float[Param, ""] = param("s", "time for which a level is held")
     axes: int = eqx.field(static=True, default=6)
     levels: int = eqx.field(static=True, default=31)
 

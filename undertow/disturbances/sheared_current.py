@@ -4,12 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import body_of, with_water
 
 
@@ -22,8 +22,8 @@ class ShearedCurrent(AbstractDisturbance):
         BadInput: depths that do not increase, or another number of velocities.
     """
 
-    depths: Float[Array, " k"] = param("m", "depths, increasing")
-    velocities: Float[Array, "k 2"] = param("m/s", "velocity there: north, east")
+    depths: Float[Param, " k"] = param("m", "depths, increasing")
+    velocities: Float[Param, "k 2"] = param("m/s", "velocity there: north, east")
 
     def __check_init__(self):
         shape = np.shape(self.depths)

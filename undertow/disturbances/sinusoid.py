@@ -1,19 +1,19 @@
 """A constant plus a sinusoid on every axis, to test frequency and amplitude."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core.contracts import AbstractDisturbance, Load
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 
 class Sinusoid(AbstractDisturbance):
     """offset + amplitude sin(frequency t + phase), the same arguments for all axes or one per axis."""
 
-    amplitude: Float[Array, "..."] = param("m/s^2, rad/s^2", "amplitude")
-    frequency: Float[Array, "..."] = param("rad/s", "angular frequency")
-    offset: Float[Array, "..."] = param("m/s^2, rad/s^2", "constant part")
-    phase: Float[Array, "..."] = param("rad", "phase at t = 0")
+    amplitude: Float[Param, "..."] = param("m/s^2, rad/s^2", "amplitude")
+    frequency: Float[Param, "..."] = param("rad/s", "angular frequency")
+    offset: Float[Param, "..."] = param("m/s^2, rad/s^2", "constant part")
+    phase: Float[Param, "..."] = param("rad", "phase at t = 0")
 
     def realize(self, key) -> tuple[()]:
         return ()

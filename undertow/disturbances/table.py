@@ -4,12 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 
 class Table(AbstractDisturbance):
@@ -19,7 +19,7 @@ class Table(AbstractDisturbance):
         BadInput: fewer than two samples, not finite, or times that do not increase.
     """
 
-    samples: Float[Array, "rows columns"] = param("s, then m/s^2 or rad/s^2", "rows (t, d1, d2, ...)")
+    samples: Float[Param, "rows columns"] = param("s, then m/s^2 or rad/s^2", "rows (t, d1, d2, ...)")
 
     def __check_init__(self):
         shape = np.shape(self.samples)

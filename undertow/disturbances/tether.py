@@ -1,11 +1,11 @@
 """A cable to a fixed point: slack, or elastic under tension."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import body_of, with_force
 from undertow.numerics.linear_algebra import matvec
 
@@ -21,11 +21,11 @@ class Tether(AbstractDisturbance):
         BadInput: length or stiffness not positive, drag negative.
     """
 
-    anchor: Float[Array, "3"] = param("m", "fixed end, world axes")
-    point: Float[Array, "3"] = param("m", "attachment on the vehicle, body axes")
-    length: Float[Array, ""] = param("m", "length without load", symbol="l_0")
-    stiffness: Float[Array, ""] = param("N/m", "tension per extension", symbol="k")
-    drag: Float[Array, ""] = param("N s^2/m^3", "drag per length and speed squared, rho C_d d / 2")
+    anchor: Float[Param, "3"] = param("m", "fixed end, world axes")
+    point: Float[Param, "3"] = param("m", "attachment on the vehicle, body axes")
+    length: Float[Param, ""] = param("m", "length without load", symbol="l_0")
+    stiffness: Float[Param, ""] = param("N/m", "tension per extension", symbol="k")
+    drag: Float[Param, ""] = param("N s^2/m^3", "drag per length and speed squared, rho C_d d / 2")
 
     def __check_init__(self):
         for name, what in (("anchor", "north, east, down"), ("point", "forward, starboard, down")):

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import with_scaling
 
 
@@ -19,10 +19,10 @@ class ThrusterLoss(AbstractDisturbance):
         BadInput: `start` or `number` negative.
     """
 
-    remaining: Float[Array, ""] = param("", "share of the thrust that remains; 0 for off, -1 for reversed")
-    start: Float[Array, ""] = param("s", "when they fail")
-    number: Float[Array, ""] = param("", "number of randomly chosen thrusters that fail")
-    failing: Float[Array, " N"] = param("", "1 for a thruster that fails in any case, else 0")
+    remaining: Float[Param, ""] = param("", "share of the thrust that remains; 0 for off, -1 for reversed")
+    start: Float[Param, ""] = param("s", "when they fail")
+    number: Float[Param, ""] = param("", "number of randomly chosen thrusters that fail")
+    failing: Float[Param, " N"] = param("", "1 for a thruster that fails in any case, else 0")
 
     def __check_init__(self):
         checks.not_negative("start", self.start, "s")
@@ -31,7 +31,7 @@ class ThrusterLoss(AbstractDisturbance):
     def realize(self, key) -> Float[Array, " N"]:
         """Remaining share of each thruster's thrust."""
         chance = jax.random.uniform(key, self.failing.shape, dtype=self.remaining.dtype)
-        rank = (chance[:, None] > chance).sum(1)
+        rank = (chance[:, None] > chance[None, :]).sum(1)
         return jnp.where((rank < self.number.astype(int)) | (self.failing > 0), self.remaining, 1.0)
 
     def at(self, realization, t, pose, load: Load) -> Load:

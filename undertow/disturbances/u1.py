@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 # Arguments of the seven sines, rate t + sweep t^2 (rad/s, rad/s^2): one vector, which costs little more than one sine.
 _RATES = np.array([1.0, 2.0, 20.0, 0.5, np.pi / 2, 3.0, 0.0])
@@ -20,7 +20,7 @@ _SWEEPS = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25])
 class SuiteU1(AbstractDisturbance):
     """Six lumped accelerations: steps on a swell, high frequency, square wave, pulse, ramp and reset, chirp."""
 
-    scale: Float[Array, ""] = param("", "factor on all six", default=1.0)
+    scale: Float[Param, ""] = param("", "factor on all six", default=1.0)
     period: float = eqx.field(static=True, default=math.inf)  # s, after which it repeats
 
     def realize(self, key) -> tuple[()]:

@@ -11,15 +11,16 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.disturbances.adding import body_of, with_water
+from undertow.numerics.number import Number
 from undertow.numerics.random_keys import keys_for
 
 # Frequencies in units of the peak frequency; the range holds all but 1e-4 of the energy.
 _LOWEST, _HIGHEST, _POINTS = 0.4, 8.0, 4000
 
 
-def spectrum(frequency: Float[Array, "..."], period: Float[Array, ""], peakedness: Float[Array, ""]):
+def spectrum(frequency: Float[Array, "..."], period: Number, peakedness: Number) -> Float[Array, "..."]:
     """Energy per frequency, up to a factor; Hasselmann et al. (1973).
 
     Args:
@@ -64,12 +65,12 @@ class Waves(AbstractDisturbance):
         BadInput: height or period not positive, peakedness below 1, spreading negative.
     """
 
-    height: Float[Array, ""] = param("m", "significant wave height", symbol="H_s")
-    period: Float[Array, ""] = param("s", "peak period", symbol="T_p")
-    heading: Float[Array, ""] = param("rad", "direction of propagation, from north")
-    spreading: Float[Array, ""] = param("rad", "standard deviation of the heading")
-    peakedness: Float[Array, ""] = param("", "peak enhancement", symbol="gamma")
-    depth: Float[Array, ""] = param("m", "depth of the world's origin")
+    height: Float[Param, ""] = param("m", "significant wave height", symbol="H_s")
+    period: Float[Param, ""] = param("s", "peak period", symbol="T_p")
+    heading: Float[Param, ""] = param("rad", "direction of propagation, from north")
+    spreading: Float[Param, ""] = param("rad", "standard deviation of the heading")
+    peakedness: Float[Param, ""] = param("", "peak enhancement", symbol="gamma")
+    depth: Float[Param, ""] = param("m", "depth of the world's origin")
     components: int = eqx.field(static=True, default=32)
 
     def __check_init__(self):

@@ -1,18 +1,18 @@
 """A constant external force and moment: w_d of Eq. (2)."""
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 
 class ConstantWrench(AbstractDisturbance):
     """w_d is on the left side of Eq. (2), so a positive surge force opposes forward motion."""
 
-    value: Float[Array, " n"] = param("N, N m", "force and moment", symbol="w_d")
+    value: Float[Param, " n"] = param("N, N m", "force and moment", symbol="w_d")
 
     def __check_init__(self):
         checks.finite("value", self.value)

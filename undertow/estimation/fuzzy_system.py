@@ -8,20 +8,20 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 # Largest exponent that `even_memberships` may meet inside the grid; exp overflows at 709.
 _LARGEST_EXPONENT = 600.0
 
 
-def memberships(x: Float[Array, "*n"], centres: Float[Array, " M"], widths: Float[Array, " M"]) -> Float[Array, "*n M"]:
+def memberships(x: Float[Array, " n"], centres: Float[Array, " M"], widths: Float[Array, " M"]) -> Float[Array, "n M"]:
     """exp(-((x - c_l) / sigma_l)^2) / sum of the same; finite however far x lies from every set."""
-    return jax.nn.softmax(-(((x[..., None] - centres) / widths) ** 2), axis=-1)
+    return jax.nn.softmax(-(((x[:, None] - centres[None, :]) / widths[None, :]) ** 2), axis=-1)
 
 
 def even_memberships(
-    x: Float[Array, "*n"], centres: Float[Array, " M"], widths: Float[Array, " M"]
-) -> Float[Array, "*n M"]:
+    x: Float[Array, " n"], centres: Float[Array, " M"], widths: Float[Array, " M"]
+) -> Float[Array, "n M"]:
     """`memberships` for equal spacing h and width sigma, with one exponential instead of M.
 
     Relative to the outermost set on the side of x, the set j steps further in weighs
@@ -36,9 +36,9 @@ def even_memberships(
     powers = [jnp.ones_like(ratio)]
     for _ in range(1, count):
         powers.append(powers[-1] * ratio)
-    weights = jnp.stack(powers, -1) * inward
+    weights = jnp.stack(powers, -1) * inward[None, :]
     weights = weights / weights.sum(-1, keepdims=True)
-    return jnp.where((offset >= 0)[..., None], weights[..., ::-1], weights)
+    return jnp.where((offset >= 0)[:, None], weights[:, ::-1], weights)
 
 
 def is_even(centres: np.ndarray, widths: np.ndarray) -> bool:
@@ -61,8 +61,8 @@ class FuzzySystem(eqx.Module):
         BadInput: widths not positive, or shapes that do not match.
     """
 
-    centres: Float[Array, "p M"] = param("unit of the input", "centres of the sets", symbol="c")
-    widths: Float[Array, "p M"] = param("unit of the input", "widths of the sets", symbol="sigma")
+    centres: Float[Param, "p M"] = param("unit of the input", "centres of the sets", symbol="c")
+    widths: Float[Param, "p M"] = param("unit of the input", "widths of the sets", symbol="sigma")
     evenly_spaced: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):

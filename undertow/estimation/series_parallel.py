@@ -4,7 +4,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.smoothing import SWITCHES, switch
 
 PerAxis = Float[Array, " n"]
@@ -17,11 +17,11 @@ class SeriesParallel(eqx.Module):
         BadInput: a gain negative, the pole or layer not positive.
     """
 
-    pole: Float[Array, "..."] = param("1/s", "filter pole", symbol="alpha_F", default=150.0, source="Table 1")
-    compensation_gain: Float[Array, "..."] = param(
+    pole: Float[Param, "..."] = param("1/s", "filter pole", symbol="alpha_F", default=150.0, source="Table 1")
+    compensation_gain: Float[Param, "..."] = param(
         "m/s^2, rad/s^2", "amplitude of the compensation", symbol="omega_bar", default=0.1, source="Table 1"
     )
-    compensation_layer: Float[Array, "..."] = param(
+    compensation_layer: Float[Param, "..."] = param(
         "m/s, rad/s", "boundary layer of the compensation", symbol="phi", default=0.5, source="Table 1"
     )
     switching: str = eqx.field(static=True, default="tanh")

@@ -12,6 +12,7 @@ from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.outcome import Ending, status_of, wrong_input
 from undertow.loop.recorded_signals import Signals
+from undertow.numerics.number import Number
 
 
 def record(
@@ -71,6 +72,6 @@ def freeze_on_failure(
     return jax.tree.map(lambda n, o: jnp.where(valid, n, o), new, old), ending
 
 
-def instant(control_step: Int[Array, ""], dt: Float[Array, ""]) -> Float[Array, ""]:
+def instant(control_step: Int[Array, ""] | int, dt: Number) -> Float[Array, ""]:
     """Time of a control step, s."""
     return jnp.asarray(control_step, dtype=float) * dt

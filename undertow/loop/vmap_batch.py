@@ -62,4 +62,4 @@ def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
     )
     series = {name: outcome.signals[name] for name in plan.signals}
     ending = outcome.status, outcome.ended, outcome.input
-    return Ended(outcome.accumulated, outcome.final, *ending, outcome.time, series)
+    return Ended(outcome.accumulated, outcome.final, *ending, outcome.time, series)  # pyright: ignore[reportArgumentType] - the caller converts the leaves

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractNavigation, Measurement
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.random_keys import numbered
 from undertow.sensors.sampling import Sampling, SensorState
 
@@ -30,8 +30,8 @@ class Degraded(AbstractNavigation):
 
     position: Sampling
     velocity: Sampling
-    position_bias: Float[Array, "..."] = param("m, rad", "constant error of position")
-    velocity_bias: Float[Array, "..."] = param("m/s, rad/s", "constant error of velocity")
+    position_bias: Float[Param, "..."] = param("m, rad", "constant error of position")
+    velocity_bias: Float[Param, "..."] = param("m/s, rad/s", "constant error of velocity")
     smooth: bool = eqx.field(static=True, default=False)
 
     def realize(self, key):
@@ -89,4 +89,4 @@ def degraded(
     period = sampling_time if period is None else period
     position = Sampling(period, noise=position_noise, resolution=position_resolution, delay=delay)
     velocity = Sampling(period, noise=velocity_noise, resolution=velocity_resolution, delay=delay)
-    return Degraded(position, velocity, position_bias, velocity_bias)
+    return Degraded(position=position, velocity=velocity, position_bias=position_bias, velocity_bias=velocity_bias)

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int
 from undertow.core import checks
 from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.measurement import with_outputs
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.random_keys import numbered
 
 
@@ -19,8 +19,8 @@ class WhiteNoise(AbstractInformedNavigation):
         BadInput: a standard deviation negative.
     """
 
-    position: Float[Array, "..."] = param("m, rad", "standard deviation on position")
-    velocity: Float[Array, "..."] = param("m/s, rad/s", "standard deviation on velocity")
+    position: Float[Param, "..."] = param("m, rad", "standard deviation on position")
+    velocity: Float[Param, "..."] = param("m/s, rad/s", "standard deviation on velocity")
 
     smooth: bool = eqx.field(static=True, default=False)
 
@@ -54,4 +54,4 @@ def white_noise(position=0.0, velocity=0.01) -> WhiteNoise:
         position: standard deviation, m and rad; one number or one per output.
         velocity: standard deviation, m/s and rad/s; likewise.
     """
-    return WhiteNoise(position, velocity)
+    return WhiteNoise(position=position, velocity=velocity)

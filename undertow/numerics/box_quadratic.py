@@ -60,7 +60,7 @@ def _derivative(primals, tangents):
 
 def _among(free: Bool[Array, " n"], matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
     """Matrix of the free variables; the identity for the others."""
-    return jnp.where(free[:, None] & free, matrix, jnp.eye(matrix.shape[0]))
+    return jnp.where(free[:, None] & free[None, :], matrix, jnp.eye(matrix.shape[0]))
 
 
 def _step(matrix, linear, low, high, search: _Search) -> _Search:

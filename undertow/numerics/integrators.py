@@ -4,21 +4,23 @@ from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PyTree
+from jaxtyping import PyTree
+
+from undertow.numerics.number import Number
 
 # Stage times are moved into the step by this share of it. A disturbance or reference that jumps exactly at a
 # step boundary is then evaluated on the inner side in both steps, and the jump is not smeared.
 _INWARD = 1e-9
 
-Field = Callable[[Array, PyTree], PyTree]
+Field = Callable[[Number, PyTree], PyTree]
 
 
-def euler(field: Field, t: Float[Array, ""], y: PyTree, dt: Float[Array, ""]) -> PyTree:
+def euler(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:
     """Explicit Euler step y(t) -> y(t + dt) of dy/dt = field(t, y); order 1."""
     return _move(y, field(t + _INWARD * dt, y), dt)
 
 
-def rk4(field: Field, t: Float[Array, ""], y: PyTree, dt: Float[Array, ""]) -> PyTree:
+def rk4(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:
     """Classical Runge-Kutta step y(t) -> y(t + dt) of dy/dt = field(t, y); order 4."""
     k1 = field(t + _INWARD * dt, y)
     k2 = field(t + dt / 2, _move(y, k1, dt / 2))
@@ -27,7 +29,7 @@ def rk4(field: Field, t: Float[Array, ""], y: PyTree, dt: Float[Array, ""]) -> P
     return jax.tree.map(lambda y, a, b, c, d: y + dt / 6 * (a + 2 * b + 2 * c + d), y, k1, k2, k3, k4)
 
 
-def rk4_compact(field: Field, t: Float[Array, ""], y: PyTree, dt: Float[Array, ""]) -> PyTree:
+def rk4_compact(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:
     """The step of `rk4` with its stages in a loop: it compiles four times as fast and runs slightly slower."""
 
     def stage(carry, row):
@@ -47,5 +49,5 @@ def rk4_compact(field: Field, t: Float[Array, ""], y: PyTree, dt: Float[Array, "
 METHODS = {"euler": euler, "rk4": rk4}
 
 
-def _move(y: PyTree, slope: PyTree, dt: Float[Array, ""]) -> PyTree:
+def _move(y: PyTree, slope: PyTree, dt: Number) -> PyTree:
     return jax.tree.map(lambda y, k: y + dt * k, y, slope)

@@ -9,6 +9,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.numerics.number import Number
+
 
 def matvec(matrix: Float[Array, "m n"], vector: Float[Array, " n"]) -> Float[Array, " m"]:
     """Product of a small matrix and a vector.
@@ -17,7 +19,7 @@ def matvec(matrix: Float[Array, "m n"], vector: Float[Array, " n"]) -> Float[Arr
     matrix costs more than the arithmetic. XLA fuses this form with the elementwise code around it, so that one
     closed-loop step becomes one compiled function.
     """
-    return (matrix * vector).sum(-1)
+    return (matrix * vector[None, :]).sum(-1)
 
 
 Gain = Float[Array, "n m"]
@@ -59,7 +61,7 @@ def partial_inverse(gain: Gain, scale: Float[Array, " n"], rank: int) -> Inverse
     if rank == gain.shape[0]:
         return inverse
     lost = jnp.eye(gain.shape[0]) - gain @ inverse
-    left, rows = lost * scale[:, None] * scale, []
+    left, rows = lost * scale[:, None] * scale[None, :], []
     for _ in range(gain.shape[0] - rank):
         row = jnp.argmax(jnp.diagonal(left))
         left = left - jnp.outer(left[:, row], left[row]) / left[row, row]
@@ -69,13 +71,13 @@ def partial_inverse(gain: Gain, scale: Float[Array, " n"], rank: int) -> Inverse
     return inverse - inverse[:, rows] @ given_up
 
 
-def regularised_inverse(square: Square, delta: Float[Array, ""]) -> Square:
+def regularised_inverse(square: Square, delta: Number) -> Square:
     """H^r = H^T (delta I + H H^T)^-1, Definition 2."""
     identity = jnp.eye(square.shape[0])
     return square.T @ jnp.linalg.inv(delta * identity + square @ square.T)
 
 
-def regularised_sharp(gain: Gain, delta: Float[Array, ""]) -> Inverse:
+def regularised_sharp(gain: Gain, delta: Number) -> Inverse:
     """reg G# of Eq. (27), in its three cases.
 
     It loses the share delta / (delta + sigma^4) of the demand along a singular value sigma of G (m > n); for
@@ -90,7 +92,7 @@ def regularised_sharp(gain: Gain, delta: Float[Array, ""]) -> Inverse:
     return gain.T @ regularised_inverse(gain @ gain.T, delta)
 
 
-def companion_lyapunov(feedback: Float[Array, "*n 2"], weight: Float[Array, "*n 2 2"]) -> Float[Array, "*n 2 2"]:
+def companion_lyapunov(feedback: Float[Array, "*#n 2"], weight: Float[Array, "*#n 2 2"]) -> Float[Array, "*#n 2 2"]:
     """P of A^T P + P A + Q = 0, A = [[0, 1], [-k1, -k2]], Eq. (21), in closed form for every axis.
 
     Args:
@@ -123,7 +125,7 @@ def _eliminated(matrix: Float[Array, "n n"], right: Float[Array, "n k"]) -> Floa
     def eliminate(k, rows):
         pivot = rows[k] / rows[k, k]
         column = rows[:, k].at[k].set(0.0)
-        return (rows - column[:, None] * pivot).at[k].set(pivot)
+        return (rows - column[:, None] * pivot[None, :]).at[k].set(pivot)
 
     n = matrix.shape[0]
     return jax.lax.fori_loop(0, n, eliminate, jnp.concatenate([matrix, right], axis=1))[:, n:]

@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-Scalar = Float[Array, ""] | float
+from undertow.numerics.number import Number
+
 Curve = Callable[[Array], Array]
 
 
@@ -19,7 +20,9 @@ def quintic(x: Float[Array, "..."]) -> Float[Array, "..."]:
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
-def rounded_ramp(t: Scalar, height: Scalar, slope: Scalar, rounding: Scalar) -> Float[Array, "..."]:
+def rounded_ramp(
+    t: Float[Array, "..."] | float, height: Number, slope: Number, rounding: Number
+) -> Float[Array, "..."]:
     """0 before t = 0, `height` after t = height / slope + rounding; both corners of the ramp rounded, C2 everywhere.
 
     The corner is the quintic between rest and motion (its highest coefficient vanishes). Where the ramp is
@@ -41,7 +44,7 @@ def rounded_ramp(t: Scalar, height: Scalar, slope: Scalar, rounding: Scalar) -> 
     return slope * (one_corner(t) - one_corner(t - apart))
 
 
-def with_rates(curve: Curve, t: Scalar) -> tuple[Array, Array, Array]:
+def with_rates(curve: Curve, t: Number) -> tuple[Array, Array, Array]:
     """Value, first and second derivative of a curve at t, exact: forward-mode differentiation, twice."""
     t = jnp.asarray(t, dtype=float)
     one = jnp.ones_like(t)

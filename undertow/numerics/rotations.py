@@ -8,6 +8,8 @@ z-y-x; quaternion (w, x, y, z), rotating body vectors into the world.
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.numerics.linear_algebra import matvec
+
 Vector3 = Float[Array, "3"]
 Vector6 = Float[Array, "6"]
 Matrix3 = Float[Array, "3 3"]
@@ -26,7 +28,7 @@ _SMALLEST_COSINE = 1e-12
 
 def cross(a: Vector3, b: Vector3) -> Vector3:
     """Cross product a x b."""
-    return (jnp.array(_LEVI_CIVITA, dtype=float) * (a[:, None] * b)).sum((1, 2))
+    return (jnp.array(_LEVI_CIVITA, dtype=float) * (a[:, None] * b[None, :])[None]).sum((1, 2))
 
 
 def skew(a: Vector3) -> Matrix3:
@@ -133,7 +135,7 @@ class Kinematics:
         across = self.sin_roll * nu[4] + self.cos_roll * nu[5]
         return jnp.concatenate(
             [
-                (self.rotation * nu[:3]).sum(-1),
+                matvec(self.rotation, nu[:3]),
                 jnp.stack(
                     [
                         nu[3] - self.minus_sin_pitch / self.cos_pitch * across,
@@ -148,7 +150,7 @@ class Kinematics:
         """J^-1 rates: (world velocity, Euler rates) -> body rates."""
         return jnp.concatenate(
             [
-                (self.rotation.T * rates[:3]).sum(-1),
+                matvec(self.rotation.T, rates[:3]),
                 jnp.stack(
                     [
                         rates[3] + self.minus_sin_pitch * rates[5],
@@ -168,7 +170,7 @@ class Kinematics:
         roll_rate = omega[0] + tan_pitch * across
         return jnp.concatenate(
             [
-                (self.rotation * cross(omega, velocity)).sum(-1),
+                matvec(self.rotation, cross(omega, velocity)),
                 jnp.stack(
                     [
                         pitch_rate * across / self.cos_pitch**2 + tan_pitch * roll_rate * pitch_rate,

@@ -6,6 +6,6 @@ from jaxtyping import Array, Float
 SWITCHES = ("tanh", "sign")
 
 
-def switch(value: Float[Array, "..."], layer: Float[Array, "..."], kind: str) -> Float[Array, "..."]:
+def switch(value: Float[Array, "..."], layer: Float[Array, "..."] | float, kind: str) -> Float[Array, "..."]:
     """sign(value), or tanh(value / layer) with boundary layer `layer` (unit of `value`)."""
     return jnp.sign(value) if kind == "sign" else jnp.tanh(value / layer)

@@ -10,7 +10,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.core.status import Status
 from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero
 
@@ -40,7 +40,7 @@ class UnitMasses(AbstractDynamics):
 class DoubleIntegrator(AbstractMechanism):
     """Unit masses on independent axes; inputs are accelerations, optionally limited to +-limit m/s^2."""
 
-    limit: Float[Array, ""] = param("m/s^2", "largest input")
+    limit: Float[Param, ""] = param("m/s^2", "largest input")
     outputs: tuple[str, ...] = eqx.field(static=True)
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True, default="m/s^2")

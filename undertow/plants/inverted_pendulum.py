@@ -10,7 +10,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.core.status import Status
 from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
 
@@ -26,10 +26,10 @@ class CartPole(AbstractDynamics):
         BadInput: a constant is not positive.
     """
 
-    cart_mass: Float[Array, ""] = param("kg", "mass of the cart", symbol="m_c", source=_WANG)
-    pole_mass: Float[Array, ""] = param("kg", "mass of the pole", symbol="m", source=_WANG)
-    half_length: Float[Array, ""] = param("m", "half the length of the pole", symbol="l", source=_WANG)
-    gravity: Float[Array, ""] = param("m/s^2", "gravity", symbol="g", source=_WANG)
+    cart_mass: Float[Param, ""] = param("kg", "mass of the cart", symbol="m_c", source=_WANG)
+    pole_mass: Float[Param, ""] = param("kg", "mass of the pole", symbol="m", source=_WANG)
+    half_length: Float[Param, ""] = param("m", "half the length of the pole", symbol="l", source=_WANG)
+    gravity: Float[Param, ""] = param("m/s^2", "gravity", symbol="g", source=_WANG)
 
     def __check_init__(self):
         for name in ("cart_mass", "pole_mass", "half_length", "gravity"):
@@ -79,7 +79,7 @@ class InvertedPendulum(AbstractMechanism):
     """Angle of a pole on a cart; a positive force on the cart turns the pole towards positive angles."""
 
     cart_pole: CartPole
-    limit: Float[Array, ""] = param("N", "largest force")
+    limit: Float[Param, ""] = param("N", "largest force")
     outputs: tuple[str, ...] = eqx.field(static=True, default=("angle",))
     output_units: tuple[str, ...] = eqx.field(static=True, default=("rad",))
     input_unit: str = eqx.field(static=True, default="N")

@@ -12,7 +12,7 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec, pseudo_inverse
 from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
@@ -27,9 +27,9 @@ class LinearSystem(eqx.Module):
         BadInput: shapes that do not match, or entries that are not finite.
     """
 
-    gain: Float[Array, "n m"] = param("m/s^2", "acceleration per input", symbol="G")
-    position_term: Float[Array, "n n"] = param("1/s^2", "acceleration per position", symbol="F")
-    velocity_term: Float[Array, "n n"] = param("1/s", "acceleration per velocity", symbol="H")
+    gain: Float[Param, "n m"] = param("m/s^2", "acceleration per input", symbol="G")
+    position_term: Float[Param, "n n"] = param("1/s^2", "acceleration per position", symbol="F")
+    velocity_term: Float[Param, "n n"] = param("1/s", "acceleration per velocity", symbol="H")
 
     def __check_init__(self):
         if np.ndim(self.gain) != 2 or not np.size(self.gain):
@@ -73,7 +73,7 @@ class LinearPlant(AbstractMechanism):
     """Coupled axes with inputs without unit; directions outside the range of G stay in open loop."""
 
     system: LinearSystem
-    limit: Float[Array, ""] = param("1", "largest input")
+    limit: Float[Param, ""] = param("1", "largest input")
     outputs: tuple[str, ...] = eqx.field(static=True)
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True, default="1")

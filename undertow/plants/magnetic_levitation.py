@@ -10,7 +10,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
-from undertow.core.param import param, sources_field
+from undertow.core.param import Param, Sources, param, sources_field
 from undertow.core.status import Status
 from undertow.plants.mechanism import AbstractMechanism, given_or_zero, nominal
 
@@ -37,28 +37,28 @@ class LevitationRig(eqx.Module):
         BadInput: a constant is not positive, or the ball does not fit between the magnets.
     """
 
-    mass: Float[Array, ""] = param("kg", "mass of the ball", symbol="m")
-    diameter: Float[Array, ""] = param("m", "diameter of the ball", symbol="2 r")
-    magnet_distance: Float[Array, ""] = param("m", "distance between the magnets", symbol="H")
-    force_factor: Float[Array, ""] = param("", "1/2 of F = 1/2 dL/dz I^2; the manual omits it", symbol="k_f")
-    current_gain: Float[Array, ""] = param("A", "current per duty cycle", symbol="k_i")
-    current_offset: Float[Array, ""] = param("A", "current at zero duty cycle, extrapolated", symbol="c_i")
-    smallest_current: Float[Array, ""] = param("A", "smallest current", symbol="I_min")
-    largest_current: Float[Array, ""] = param("A", "largest current of the drive", symbol="I_max")
-    inductance: Float[Array, ""] = param(
+    mass: Float[Param, ""] = param("kg", "mass of the ball", symbol="m")
+    diameter: Float[Param, ""] = param("m", "diameter of the ball", symbol="2 r")
+    magnet_distance: Float[Param, ""] = param("m", "distance between the magnets", symbol="H")
+    force_factor: Float[Param, ""] = param("", "1/2 of F = 1/2 dL/dz I^2; the manual omits it", symbol="k_f")
+    current_gain: Float[Param, ""] = param("A", "current per duty cycle", symbol="k_i")
+    current_offset: Float[Param, ""] = param("A", "current at zero duty cycle, extrapolated", symbol="c_i")
+    smallest_current: Float[Param, ""] = param("A", "smallest current", symbol="I_min")
+    largest_current: Float[Param, ""] = param("A", "largest current of the drive", symbol="I_max")
+    inductance: Float[Param, ""] = param(
         "H", "inductance gained by a coil in contact with the ball", symbol="FemP1", default=1.7521e-2
     )
-    inductance_reach: Float[Array, ""] = param(
+    inductance_reach: Float[Param, ""] = param(
         "m", "gap over which it falls by the factor e", symbol="FemP2", default=5.8231e-3
     )
-    lag_slope: Float[Array, ""] = param(
+    lag_slope: Float[Param, ""] = param(
         "m s", "time constant at contact times `lag_reach`", symbol="fiP1", default=1.4142e-4
     )
-    lag_reach: Float[Array, ""] = param("m", "gap for a fall by the factor e", symbol="fiP2", default=4.5626e-3)
-    lag_range: Float[Array, ""] = param("m", "largest gap at which the lag is known; constant beyond", default=0.016)
-    resistance: Float[Array, ""] = param("ohm", "of a coil", symbol="R", default=4.17, source=_MILAN)
-    gravity: Float[Array, ""] = param("m/s^2", "gravity", symbol="g", default=9.81)
-    sources: tuple = sources_field()
+    lag_reach: Float[Param, ""] = param("m", "gap for a fall by the factor e", symbol="fiP2", default=4.5626e-3)
+    lag_range: Float[Param, ""] = param("m", "largest gap at which the lag is known; constant beyond", default=0.016)
+    resistance: Float[Param, ""] = param("ohm", "of a coil", symbol="R", default=4.17, source=_MILAN)
+    gravity: Float[Param, ""] = param("m/s^2", "gravity", symbol="g", default=9.81)
+    sources: Sources = sources_field()
 
     def __check_init__(self):
         for name in self.__dataclass_fields__:

@@ -11,7 +11,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec
 from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
@@ -28,15 +28,15 @@ class Links(AbstractDynamics):
         BadInput: a mass, length or inertia is not positive, or the offset or gravity is not finite.
     """
 
-    inner_mass: Float[Array, ""] = param("kg", "mass of the inner link", symbol="m_1", source=_BOOK)
-    inner_length: Float[Array, ""] = param("m", "joint to joint", symbol="l_1", source=_BOOK)
-    inner_centre: Float[Array, ""] = param("m", "shoulder to centre of mass", symbol="l_c1", source=_BOOK)
-    inner_inertia: Float[Array, ""] = param("kg m^2", "about its centre of mass", symbol="I_1", source=_BOOK)
-    outer_mass: Float[Array, ""] = param("kg", "mass of outer link and load", symbol="m_e", source=_BOOK)
-    outer_centre: Float[Array, ""] = param("m", "elbow to their centre of mass", symbol="l_ce", source=_BOOK)
-    outer_inertia: Float[Array, ""] = param("kg m^2", "about their centre of mass", symbol="I_e", source=_BOOK)
-    outer_offset: Float[Array, ""] = param("rad", "its lag behind the link", symbol="delta_e", source=_BOOK)
-    gravity: Float[Array, ""] = param("m/s^2", "gravity in the plane of motion; 0 for a horizontal arm", symbol="g")
+    inner_mass: Float[Param, ""] = param("kg", "mass of the inner link", symbol="m_1", source=_BOOK)
+    inner_length: Float[Param, ""] = param("m", "joint to joint", symbol="l_1", source=_BOOK)
+    inner_centre: Float[Param, ""] = param("m", "shoulder to centre of mass", symbol="l_c1", source=_BOOK)
+    inner_inertia: Float[Param, ""] = param("kg m^2", "about its centre of mass", symbol="I_1", source=_BOOK)
+    outer_mass: Float[Param, ""] = param("kg", "mass of outer link and load", symbol="m_e", source=_BOOK)
+    outer_centre: Float[Param, ""] = param("m", "elbow to their centre of mass", symbol="l_ce", source=_BOOK)
+    outer_inertia: Float[Param, ""] = param("kg m^2", "about their centre of mass", symbol="I_e", source=_BOOK)
+    outer_offset: Float[Param, ""] = param("rad", "its lag behind the link", symbol="delta_e", source=_BOOK)
+    gravity: Float[Param, ""] = param("m/s^2", "gravity in the plane of motion; 0 for a horizontal arm", symbol="g")
 
     def __check_init__(self):
         for name in ("inner", "outer"):
@@ -104,7 +104,7 @@ class TwoLinkArm(AbstractMechanism):
     """Shoulder and elbow driven by torques; the elbow angle is relative to the inner link."""
 
     links: Links
-    limit: Float[Array, ""] = param("N m", "largest torque")
+    limit: Float[Param, ""] = param("N m", "largest torque")
     outputs: tuple[str, ...] = eqx.field(static=True, default=("shoulder", "elbow"))
     output_units: tuple[str, ...] = eqx.field(static=True, default=("rad", "rad"))
     input_unit: str = eqx.field(static=True, default="N m")

@@ -11,9 +11,10 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 Scalar = Float[Array, ""]
+Values = Float[Array, "*#n"]  # one, or one for each instant
 
 _HALVINGS = 30  # of the interval in which the voltage limit is sought: 20 V / 2^30 is 20 nV
 _KNEE = 1e-12  # share of E^2; keeps the gradient finite at the largest power
@@ -29,10 +30,10 @@ class Battery(eqx.Module):
         BadInput: a value that is not positive (resistance: negative), or the empty voltage above the full one.
     """
 
-    full_voltage: Scalar = param("V", "open-circuit voltage when full", symbol="E_1")
-    empty_voltage: Scalar = param("V", "open-circuit voltage when empty", symbol="E_0")
-    resistance: Scalar = param("ohm", "internal resistance, leads included", symbol="R")
-    capacity: Scalar = param("A h", "charge from full to empty", symbol="Q")
+    full_voltage: Float[Param, ""] = param("V", "open-circuit voltage when full", symbol="E_1")
+    empty_voltage: Float[Param, ""] = param("V", "open-circuit voltage when empty", symbol="E_0")
+    resistance: Float[Param, ""] = param("ohm", "internal resistance, leads included", symbol="R")
+    capacity: Float[Param, ""] = param("A h", "charge from full to empty", symbol="Q")
 
     def __check_init__(self):
         for name in ("full_voltage", "empty_voltage", "capacity"):
@@ -43,33 +44,33 @@ class Battery(eqx.Module):
             must = f"be at most the full voltage ({float(self.full_voltage):g} V)"
             raise BadInput("empty_voltage", must, f"{float(self.empty_voltage):g} V")
 
-    def state_of_charge(self, charge: Scalar) -> Scalar:
+    def state_of_charge(self, charge: Values) -> Values:
         """1 when full, 0 when empty."""
         return 1 - charge / (3600 * self.capacity)
 
-    def open_circuit_voltage(self, charge: Scalar) -> Scalar:
+    def open_circuit_voltage(self, charge: Values) -> Values:
         """E, V, linear in the state of charge."""
         return self.empty_voltage + (self.full_voltage - self.empty_voltage) * self.state_of_charge(charge)
 
-    def bus_voltage(self, charge: Scalar, power: Scalar) -> Scalar:
+    def bus_voltage(self, charge: Values, power: Values) -> Values:
         """v, V, while the converters take a power in W: the larger root; E / 2 from E^2 / (4 R) on."""
         emf = self.open_circuit_voltage(charge)
         under_root = emf**2 - 4 * self.resistance * power
         return (emf + jnp.sqrt(jnp.maximum(under_root, _KNEE * emf**2))) / 2
 
-    def current(self, charge: Scalar, power: Scalar) -> Scalar:
+    def current(self, charge: Values, power: Values) -> Values:
         """dq/dt = P / v, A."""
         return power / self.bus_voltage(charge, power)
 
-    def loss(self, charge: Scalar, power: Scalar) -> Scalar:
+    def loss(self, charge: Values, power: Values) -> Values:
         """Heat in the battery, W: E i - P, which is R i^2 up to the largest power."""
         return self.open_circuit_voltage(charge) * self.current(charge, power) - power
 
-    def energy(self, charge: Scalar) -> Scalar:
+    def energy(self, charge: Values) -> Values:
         """Energy that the cells have given with a charge: the integral of E dq, J."""
         return charge * (self.full_voltage + self.open_circuit_voltage(charge)) / 2
 
-    def allows(self, charge: Scalar, voltage: Scalar, power: Scalar) -> Array:
+    def allows(self, charge: Values, voltage: Values, power: Values) -> Array:
         """Whether a power, in W, leaves at least this voltage on the bus."""
         emf = self.open_circuit_voltage(charge)
         lowest = jnp.maximum(voltage, emf / 2)

@@ -5,10 +5,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 Scalar = Float[Array, ""]
-PerThruster = Float[Array, " N"]
+PerThruster = Float[Array, " N"] | Float[Array, ""]
 
 
 class ESC(eqx.Module):
@@ -18,10 +18,10 @@ class ESC(eqx.Module):
         BadInput: neutral, span or resolution not positive, dead band negative.
     """
 
-    neutral: Scalar = param("us", "pulse that means stop")
-    span: Scalar = param("us", "from stop to full voltage in either direction")
-    dead_band: Scalar = param("us", "distance from neutral up to which the output is zero")
-    resolution: Scalar = param("us", "step of the pulses")
+    neutral: Float[Param, ""] = param("us", "pulse that means stop")
+    span: Float[Param, ""] = param("us", "from stop to full voltage in either direction")
+    dead_band: Float[Param, ""] = param("us", "distance from neutral up to which the output is zero")
+    resolution: Float[Param, ""] = param("us", "step of the pulses")
 
     def __check_init__(self):
         for name in ("neutral", "span", "resolution"):

@@ -11,6 +11,7 @@ from undertow.analysis.linearization.disturbance_profile import DisturbanceProfi
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.response import from_start, metrics_of, signals_within
 from undertow.analysis.theory import theory_of
+from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractController
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
@@ -37,7 +38,7 @@ def operating_point(built: Built) -> OperatingPoint:
     """
     loop, settings = built.closed_loop, built.scenario.loop
     start, stop = built.window()
-    position = np.asarray(loop.reference.at((start + min(stop, settings.duration)) / 2).position)
+    position = np.asarray(loop.reference.at(as_array((start + min(stop, settings.duration)) / 2)).position)
     unloaded = equilibrium(loop, settings.dt, position, np.zeros(len(position)))
     steps = min(round(settings.duration / settings.dt) + 1, _MAX_STEPS)
     around = disturbance_profile(loop, unloaded, key_of_seed(built.scenario.seed), steps, settings.dt)

@@ -11,6 +11,7 @@ from undertow.analysis.linearization.closed_forms import ClosedForm, closed_form
 from undertow.analysis.linearization.closed_loop import LinearLoop
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.theory import theory_of
+from undertow.core.arrays import as_array
 from undertow.plants.reachability import open_loop_advice
 from undertow.prediction.operating_point import OperatingPoint, operating_point, predicted
 from undertow.scenario.build import Built, in_its_precision
@@ -102,7 +103,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     law, names = loop.controller, loop.plant.outputs
     metrics, why_not = predicted(known)
     axes, theory = range(len(names)), theory_of(law)
-    gains = np.asarray(law.model.dynamics.gain(loop.plant.output(0.0, worst.parts.states(worst.at)[0])))
+    gains = np.asarray(law.model.dynamics.gain(loop.plant.output(as_array(0.0), worst.parts.states(worst.at)[0])))
     return Prediction(
         operating_point=known,
         points=points,
@@ -157,7 +158,7 @@ def _noise(known: OperatingPoint) -> Noise:
 def _limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest input that reaches the actuators."""
     plant, (x, _) = built.closed_loop.plant, at.parts.states(at.at)
-    ask = np.full(plant.inputs(), 1e9)
+    ask = as_array(np.full(plant.inputs(), 1e9))
     low, high = (np.asarray(plant.admissible(x, side * ask)) for side in (-1, 1))
     return np.where(low < -1e8, -np.inf, low), np.where(high > 1e8, np.inf, high)
 

@@ -2,11 +2,11 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 
 class Circle(AbstractReference):
@@ -16,9 +16,9 @@ class Circle(AbstractReference):
         BadInput: radius or period not positive, or unknown heading.
     """
 
-    radius: Float[Array, ""] = param("m", "radius")
-    period: Float[Array, ""] = param("s", "time of one turn")
-    depth: Float[Array, ""] = param("m", "depth below the origin")
+    radius: Float[Param, ""] = param("m", "radius")
+    period: Float[Param, ""] = param("s", "time of one turn")
+    depth: Float[Param, ""] = param("m", "depth below the origin")
     heading: str = eqx.field(static=True, default="fixed")
 
     def __check_init__(self):

@@ -1,11 +1,11 @@
 """A helix about a vertical axis: a circle with growing depth."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.references.circle import Circle
 
 
@@ -17,7 +17,7 @@ class Helix(AbstractReference):
     """
 
     circle: Circle
-    sink_rate: Float[Array, ""] = param("m/s", "downward velocity")
+    sink_rate: Float[Param, ""] = param("m/s", "downward velocity")
 
     def __check_init__(self):
         checks.finite("sink_rate", self.sink_rate, "m/s")

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.motion_laws import rounded_ramp, with_rates
 
 # The rate of yaw along the path jumps where an arc begins; yaw is rounded over this share of the arc.
@@ -25,11 +25,11 @@ class LawnMower(AbstractReference):
             unknown heading.
     """
 
-    length: Float[Array, ""] = param("m", "length of a leg")
-    spacing: Float[Array, ""] = param("m", "distance between legs")
-    speed: Float[Array, ""] = param("m/s", "speed between start and stop")
-    ramp: Float[Array, ""] = param("s", "time to reach the speed, and to stop")
-    depth: Float[Array, ""] = param("m", "depth below the origin")
+    length: Float[Param, ""] = param("m", "length of a leg")
+    spacing: Float[Param, ""] = param("m", "distance between legs")
+    speed: Float[Param, ""] = param("m/s", "speed between start and stop")
+    ramp: Float[Param, ""] = param("s", "time to reach the speed, and to stop")
+    depth: Float[Param, ""] = param("m", "depth below the origin")
     count: int = eqx.field(static=True, default=4)
     heading: str = eqx.field(static=True, default="fixed")
 

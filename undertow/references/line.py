@@ -4,12 +4,12 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.motion_laws import rounded_ramp, with_rates
 
 _AXES = "north, east, down"
@@ -23,10 +23,10 @@ class Line(AbstractReference):
             heading because the line is vertical.
     """
 
-    goal: Float[Array, "3"] = param("m", f"where it ends: {_AXES}")
-    speed: Float[Array, ""] = param("m/s", "speed between start and stop")
-    start: Float[Array, "3"] = param("m", f"where it starts: {_AXES}")
-    ramp: Float[Array, ""] = param("s", "time to reach the speed, and to stop")
+    goal: Float[Param, "3"] = param("m", f"where it ends: {_AXES}")
+    speed: Float[Param, ""] = param("m/s", "speed between start and stop")
+    start: Float[Param, "3"] = param("m", f"where it starts: {_AXES}")
+    ramp: Float[Param, ""] = param("s", "time to reach the speed, and to stop")
     heading: str = eqx.field(static=True, default="fixed")
 
     def __check_init__(self):

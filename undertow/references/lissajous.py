@@ -1,11 +1,11 @@
 """A Lissajous figure: a sinusoid of its own on every axis, so that all axes are excited."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 _AXES = "north, east, down, yaw"
 
@@ -17,10 +17,10 @@ class Lissajous(AbstractReference):
         BadInput: not four entries, or not finite.
     """
 
-    amplitude: Float[Array, "4"] = param("m, rad", f"amplitude of {_AXES}")
-    frequency: Float[Array, "4"] = param("rad/s", f"angular frequency of {_AXES}")
-    phase: Float[Array, "4"] = param("rad", f"phase at t = 0 of {_AXES}")
-    depth: Float[Array, ""] = param("m", "depth of the centre below the origin")
+    amplitude: Float[Param, "4"] = param("m, rad", f"amplitude of {_AXES}")
+    frequency: Float[Param, "4"] = param("rad/s", f"angular frequency of {_AXES}")
+    phase: Float[Param, "4"] = param("rad", f"phase at t = 0 of {_AXES}")
+    depth: Float[Param, ""] = param("m", "depth of the centre below the origin")
 
     def __check_init__(self):
         for name in ("amplitude", "frequency", "phase"):

@@ -2,12 +2,12 @@
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.spline import clamped_slopes, spline
 
 
@@ -18,8 +18,8 @@ class Recorded(AbstractReference):
         BadInput: fewer than two samples, not finite, or times that do not increase.
     """
 
-    samples: Float[Array, "rows columns"] = param("s, then m or rad", "rows (t, p1, p2, ...)")
-    velocities: Float[Array, "rows n"] = param("m/s, rad/s", "velocity at each row, computed from all rows")
+    samples: Float[Param, "rows columns"] = param("s, then m or rad", "rows (t, p1, p2, ...)")
+    velocities: Float[Param, "rows n"] = param("m/s, rad/s", "velocity at each row, computed from all rows")
 
     def __init__(self, samples):
         rows = np.asarray(samples, dtype=float)

@@ -9,8 +9,9 @@ from undertow.core import checks
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractOpenReference, Target
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.motion_laws import quintic, with_rates
+from undertow.numerics.number import Number
 
 
 class Transition(eqx.Module):
@@ -20,7 +21,7 @@ class Transition(eqx.Module):
         BadInput: not finite, or a negative settling time.
     """
 
-    settling: Float[Array, ""] = param("s", "time of the transition; 0 for a step")
+    settling: Float[Param, ""] = param("s", "time of the transition; 0 for a step")
     # Position at t = 0, m and rad; None for the initial position of the plant.
     start: Float[Array, " n"] | None = eqx.field(
         converter=lambda at: None if at is None else as_array(at), default=None
@@ -48,7 +49,7 @@ class Setpoint(AbstractOpenReference):
         BadInput: not finite, or a transition with another number of outputs.
     """
 
-    position: Float[Array, " n"] = param("m, rad", "desired position", symbol="x_d")
+    position: Float[Param, " n"] = param("m, rad", "desired position", symbol="x_d")
     transition: Transition | None = None
 
     def __check_init__(self):
@@ -70,7 +71,7 @@ class Setpoint(AbstractOpenReference):
         return Setpoint(self.position, Transition(self.transition.settling, position))
 
 
-def setpoint(position, settling: float = 0.0, start=None) -> Setpoint:
+def setpoint(position, settling: Number = 0.0, start=None) -> Setpoint:
     """Go to a position and stay.
 
     A step saturates the motors. A slow enough transition does not, and the law knows its velocity and acceleration in

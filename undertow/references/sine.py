@@ -2,12 +2,12 @@
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 
 class Sine(AbstractReference):
@@ -17,10 +17,10 @@ class Sine(AbstractReference):
         BadInput: not finite, or numbers of entries that do not match.
     """
 
-    amplitude: Float[Array, " n"] = param("m, rad", "amplitude")
-    frequency: Float[Array, " n"] = param("rad/s", "angular frequency")
-    offset: Float[Array, " n"] = param("m, rad", "middle")
-    phase: Float[Array, " n"] = param("rad", "phase at t = 0")
+    amplitude: Float[Param, " n"] = param("m, rad", "amplitude")
+    frequency: Float[Param, " n"] = param("rad/s", "angular frequency")
+    offset: Float[Param, " n"] = param("m, rad", "middle")
+    phase: Float[Param, " n"] = param("rad", "phase at t = 0")
 
     def __init__(self, amplitude, frequency, offset, phase):
         given = {"amplitude": amplitude, "frequency": frequency, "offset": offset, "phase": phase}

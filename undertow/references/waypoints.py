@@ -2,12 +2,12 @@
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.spline import clamped_slopes, spline
 
 
@@ -19,9 +19,9 @@ class Waypoints(AbstractReference):
             unknown heading, or an undefined one because the path is vertical.
     """
 
-    path: Float[Array, "rows 7"] = param("m, then m and rad", "rows (straight distance from the first, six outputs)")
-    slopes: Float[Array, "rows 6"] = param("1, rad/m", "change per distance at each row, computed from all rows")
-    speed: Float[Array, ""] = param("m/s", "mean speed from one waypoint to the next")
+    path: Float[Param, "rows 7"] = param("m, then m and rad", "rows (straight distance from the first, six outputs)")
+    slopes: Float[Param, "rows 6"] = param("1, rad/m", "change per distance at each row, computed from all rows")
+    speed: Float[Param, ""] = param("m/s", "mean speed from one waypoint to the next")
 
     def __init__(self, points, speed, heading: str = "fixed"):
         rows = np.asarray(points, dtype=float)

@@ -133,12 +133,12 @@ class Tune(Strict):
     position_scale: float = Field(0.05, gt=0, description="position error with a cost of one, m")
     angle_scale: float = Field(0.05, gt=0, description="angle error with a cost of one, rad")
     iterations: int = Field(100, ge=1, le=100_000, description="largest number of iterations")
-    train: TrainingRuns = Field(default_factory=TrainingRuns, description="training runs")
+    train: TrainingRuns = Field(default_factory=TrainingRuns, description="training runs")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     held_out: TrainingRuns = Field(
         default_factory=lambda: TrainingRuns.model_validate({"seeds": 4}),
         description="held-out runs for the final evaluation; default: 4 seeds",
     )
-    weights: Weights = Field(default_factory=Weights, description="weights of the cost")
+    weights: Weights = Field(default_factory=Weights, description="weights of the cost")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
 
 
 class Scenario(Strict):
@@ -157,8 +157,8 @@ class Scenario(Strict):
     navigation: NamedPart = Field(
         Part(kind="perfect"), description="the navigation filter, which computes the measurement of the controller"
     )
-    loop: Loop = Field(default_factory=Loop, description="settings of the simulation")
-    initial: Initial = Field(default_factory=Initial, description="state at t = 0")
+    loop: Loop = Field(default_factory=Loop, description="settings of the simulation")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
+    initial: Initial = Field(default_factory=Initial, description="state at t = 0")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     steady: Window = Field(default_factory=Window, description="window of the steady metrics")
     metrics: list[NamedPart] = Field(
         default_factory=list, description="further metrics, each ./file.py:function that returns an AbstractMetric"
@@ -168,7 +168,7 @@ class Scenario(Strict):
         description="metric -> what it must stay below in the steady window; position_rms 0.05 m and attitude_rms "
         "0.05 rad unless given",
     )
-    tune: Tune = Field(default_factory=Tune, description="settings of `undertow tune`")
+    tune: Tune = Field(default_factory=Tune, description="settings of `undertow tune`")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all random numbers")
     precision: Literal["float64", "float32"] = Field("float64", description="precision of all arithmetic")
 

@@ -9,6 +9,7 @@ from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement
 from undertow.core.measurement import body_of, measurement_of_pose
 from undertow.numerics.linear_algebra import matvec
+from undertow.numerics.number import Number
 from undertow.numerics.rotations import (
     Matrix3,
     Quaternion,
@@ -53,7 +54,7 @@ class Estimate(NamedTuple):
         nu = jnp.concatenate([matvec(self.rotation().T, self.velocity), self.rates])
         return measurement_of_pose(self.position, self.attitude, nu, self.actuator)
 
-    def predicted(self, elapsed: Float[Array, ""]) -> "Estimate":
+    def predicted(self, elapsed: Number) -> "Estimate":
         """The estimate `elapsed` (s) later, with constant rates and acceleration."""
         turned = self.attitude + elapsed * quaternion_rate(self.attitude, self.rates)
         return self._replace(

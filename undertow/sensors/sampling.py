@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 
 Reading = Float[Array, " width"]
 
@@ -48,12 +48,12 @@ class Sampling(eqx.Module):
         BadInput: a period not positive, a probability of one or more, anything else negative.
     """
 
-    period: Float[Array, ""] = param("s", "between two samples")
-    noise: Float[Array, "..."] = param("as read", "standard deviation, new for every sample", default=0.0)
-    bias: Float[Array, "..."] = param("as read", "standard deviation of an offset, sampled once per run", default=0.0)
-    resolution: Float[Array, "..."] = param("as read", "step of the reading; 0 for none", default=0.0)
-    delay: Float[Array, ""] = param("s", "from taking a sample to delivering it", default=0.0)
-    dropout: Float[Array, ""] = param("", "probability that a sample is lost", default=0.0)
+    period: Float[Param, ""] = param("s", "between two samples")
+    noise: Float[Param, "..."] = param("as read", "standard deviation, new for every sample", default=0.0)
+    bias: Float[Param, "..."] = param("as read", "standard deviation of an offset, sampled once per run", default=0.0)
+    resolution: Float[Param, "..."] = param("as read", "step of the reading; 0 for none", default=0.0)
+    delay: Float[Param, ""] = param("s", "from taking a sample to delivering it", default=0.0)
+    dropout: Float[Param, ""] = param("", "probability that a sample is lost", default=0.0)
     slots: int = eqx.field(static=True, default=0)  # undelivered samples at most; from delay and period
 
     def __post_init__(self):

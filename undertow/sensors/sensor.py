@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.sensors.estimate import Estimate, Motion
 from undertow.sensors.sampling import Reading, Sampling
 
@@ -20,7 +20,7 @@ class AbstractSensor(eqx.Module):
     """
 
     sampling: Sampling
-    blend: Float[Array, ""] = param("", "share of each new reading in the estimate")
+    blend: Float[Param, ""] = param("", "share of each new reading in the estimate")
 
     def __check_init__(self):
         checks.positive("blend", self.blend)

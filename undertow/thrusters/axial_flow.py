@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param, sources_field
+from undertow.core.param import Param, Sources, param, sources_field
 from undertow.thrusters.memoryless import AbstractMotorlessThruster
 from undertow.thrusters.thruster import PerThruster
 
@@ -34,27 +34,27 @@ class AxialFlowThruster(AbstractMotorlessThruster):
         BadInput: a value that is not positive (losses, linear terms, dead zones, current: negative).
     """
 
-    thrust_coefficient: Float[Array, ""] = param("N s^2/rad^2", "thrust per speed squared", symbol="c_T")
-    thrust_loss: Float[Array, ""] = param("N s^2/(rad m)", "thrust lost per flow and speed", symbol="c_Tv")
-    torque_coefficient: Float[Array, ""] = param("N m s^2/rad^2", "torque per speed squared", symbol="c_Q")
-    torque_loss: Float[Array, ""] = param("N m s^2/(rad m)", "torque lost per flow and speed", symbol="c_Qv")
-    speed_decay: Float[Array, ""] = param("1/s", "back-EMF and friction", symbol="k_n")
-    torque_load: Float[Array, ""] = param("rad/(N m s^2)", "deceleration per torque", symbol="k_q")
-    forward_drive: Float[Array, ""] = param("rad/(s^2 V)", "acceleration per volt beyond the dead zone", symbol="k_V+")
-    reverse_drive: Float[Array, ""] = param("rad/(s^2 V)", "the same in reverse", symbol="k_V-")
-    forward_dead_zone: Float[Array, ""] = param("V", "voltage below which the propeller stands still")
-    reverse_dead_zone: Float[Array, ""] = param("V", "the same in reverse")
-    flow_decay: Float[Array, ""] = param("1/s", "linear loss of flow", symbol="k_v")
-    flow_drag: Float[Array, ""] = param("1/m", "quadratic loss of flow", symbol="k_vv")
-    flow_drive: Float[Array, ""] = param("1/kg", "acceleration of the flow per thrust", symbol="k_t")
-    ambient_decay: Float[Array, ""] = param("1/s", "linear loss of ambient flow", symbol="k_a")
-    ambient_drag: Float[Array, ""] = param("1/m", "quadratic loss of ambient flow", symbol="k_aa")
-    ambient_drive: Float[Array, ""] = param("1/kg", "acceleration of the ambient flow per thrust", symbol="k_ta")
-    current_per_torque: Float[Array, ""] = param("A/(N m)", "current per propeller torque")
-    linear_gain: Float[Array, ""] = param("N/V", "gain in the nominal model", symbol="alpha")
-    supply: Float[Array, ""] = param("V", "largest drive voltage")
-    dead_zone: Float[Array, ""] = param("V", "largest command that the drive ignores", default=0.0)
-    sources: tuple = sources_field()
+    thrust_coefficient: Float[Param, ""] = param("N s^2/rad^2", "thrust per speed squared", symbol="c_T")
+    thrust_loss: Float[Param, ""] = param("N s^2/(rad m)", "thrust lost per flow and speed", symbol="c_Tv")
+    torque_coefficient: Float[Param, ""] = param("N m s^2/rad^2", "torque per speed squared", symbol="c_Q")
+    torque_loss: Float[Param, ""] = param("N m s^2/(rad m)", "torque lost per flow and speed", symbol="c_Qv")
+    speed_decay: Float[Param, ""] = param("1/s", "back-EMF and friction", symbol="k_n")
+    torque_load: Float[Param, ""] = param("rad/(N m s^2)", "deceleration per torque", symbol="k_q")
+    forward_drive: Float[Param, ""] = param("rad/(s^2 V)", "acceleration per volt beyond the dead zone", symbol="k_V+")
+    reverse_drive: Float[Param, ""] = param("rad/(s^2 V)", "the same in reverse", symbol="k_V-")
+    forward_dead_zone: Float[Param, ""] = param("V", "voltage below which the propeller stands still")
+    reverse_dead_zone: Float[Param, ""] = param("V", "the same in reverse")
+    flow_decay: Float[Param, ""] = param("1/s", "linear loss of flow", symbol="k_v")
+    flow_drag: Float[Param, ""] = param("1/m", "quadratic loss of flow", symbol="k_vv")
+    flow_drive: Float[Param, ""] = param("1/kg", "acceleration of the flow per thrust", symbol="k_t")
+    ambient_decay: Float[Param, ""] = param("1/s", "linear loss of ambient flow", symbol="k_a")
+    ambient_drag: Float[Param, ""] = param("1/m", "quadratic loss of ambient flow", symbol="k_aa")
+    ambient_drive: Float[Param, ""] = param("1/kg", "acceleration of the ambient flow per thrust", symbol="k_ta")
+    current_per_torque: Float[Param, ""] = param("A/(N m)", "current per propeller torque")
+    linear_gain: Float[Param, ""] = param("N/V", "gain in the nominal model", symbol="alpha")
+    supply: Float[Param, ""] = param("V", "largest drive voltage")
+    dead_zone: Float[Param, ""] = param("V", "largest command that the drive ignores", default=0.0)
+    sources: Sources = sources_field()
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):

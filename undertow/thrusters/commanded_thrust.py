@@ -4,12 +4,12 @@ import math
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.thrusters.first_order import LaggedThrust
 from undertow.thrusters.memoryless import AbstractMotorlessThruster
 from undertow.thrusters.thruster import PerThruster
@@ -22,11 +22,11 @@ class CommandedThrust(AbstractMotorlessThruster):
         BadInput: a limit or the time constant is not positive, or the power negative.
     """
 
-    thrust_forward_max: Float[Array, ""] = param("N", "largest thrust forward", symbol="T+")
-    thrust_reverse_max: Float[Array, ""] = param("N", "largest thrust in reverse, as a positive number", symbol="T-")
-    time_constant: Float[Array, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
-    thrust_rate_max: Float[Array, ""] = param("N/s", "fastest change of thrust", default=jnp.inf)
-    power_per_thrust: Float[Array, ""] = param("W/N", "electrical power per commanded thrust", default=0.0)
+    thrust_forward_max: Float[Param, ""] = param("N", "largest thrust forward", symbol="T+")
+    thrust_reverse_max: Float[Param, ""] = param("N", "largest thrust in reverse, as a positive number", symbol="T-")
+    time_constant: Float[Param, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
+    thrust_rate_max: Float[Param, ""] = param("N/s", "fastest change of thrust", default=jnp.inf)
+    power_per_thrust: Float[Param, ""] = param("W/N", "electrical power per commanded thrust", default=0.0)
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
     input_unit = "N"
 
@@ -108,4 +108,4 @@ def commanded_thrust(
         thrust_rate_max: fastest change of thrust, N/s; infinite by default.
         power_per_thrust: electrical power per commanded newton in either direction, W/N; 0 where it is unknown.
     """
-    return CommandedThrust(thrust_forward_max, thrust_reverse_max, time_constant, thrust_rate_max, power_per_thrust)
+    return CommandedThrust(thrust_forward_max, thrust_reverse_max, time_constant, thrust_rate_max, power_per_thrust)  # pyright: ignore[reportArgumentType] - abstract fields are no arguments

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.motor_speed_control import SpeedControlledMotor
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
@@ -23,8 +23,8 @@ class ElectromechanicalThruster(AbstractThruster):
     """L I_dot + R I + k_e Om = V, J Om_dot + k_f Om + c_q Om|Om| = k_t I, T = c_t Om|Om|."""
 
     motor: DCMotor
-    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
+    supply: Float[Param, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Param, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
@@ -56,7 +56,7 @@ class ElectromechanicalThruster(AbstractThruster):
         return self.motor.voltage_gain
 
     def speed_term(self, report: PropellerReport) -> PerThruster:
-        return self.motor.speed_term(report.speed, report.acceleration)
+        return self.motor.speed_term(report.speed, report.acceleration)  # pyright: ignore[reportArgumentType] - `report` gives it
 
     def actuator_model(self, count: int, measured: bool) -> SpeedControlledMotor:
         return SpeedControlledMotor(self, count, measured)

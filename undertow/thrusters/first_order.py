@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import LaggedActuator
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.thrusters.memoryless import AbstractMotorlessThruster, MemorylessThruster
 from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import PerThruster
@@ -40,14 +40,14 @@ class FirstOrderThruster(AbstractMotorlessThruster):
         BadInput: a coefficient is not positive.
     """
 
-    thrust_per_volt: Float[Array, ""] = param("N/V^p", "steady thrust coefficient", symbol="c")
-    power: Float[Array, ""] = param("", "power of the voltage", symbol="p")
-    time_constant: Float[Array, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
-    reverse_share: Float[Array, ""] = param("", "thrust in reverse as a share of forward thrust")
-    current_per_thrust: Float[Array, ""] = param("A/N", "current per steady thrust", symbol="c_I")
-    linear_gain: Float[Array, ""] = param("N/V", "gain that preset `paper` assumes", symbol="alpha")
-    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
+    thrust_per_volt: Float[Param, ""] = param("N/V^p", "steady thrust coefficient", symbol="c")
+    power: Float[Param, ""] = param("", "power of the voltage", symbol="p")
+    time_constant: Float[Param, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
+    reverse_share: Float[Param, ""] = param("", "thrust in reverse as a share of forward thrust")
+    current_per_thrust: Float[Param, ""] = param("A/N", "current per steady thrust", symbol="c_I")
+    linear_gain: Float[Param, ""] = param("N/V", "gain that preset `paper` assumes", symbol="alpha")
+    supply: Float[Param, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Param, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
@@ -127,4 +127,4 @@ def first_order(
             raise BadInput("linear_gain", "be given when `power` is not 1", hint=hint)
         linear_gain = thrust_per_volt
     known = (thrust_per_volt, power, time_constant, reverse_share, current_per_thrust, linear_gain)
-    return FirstOrderThruster(*known, supply, dead_zone, dead_zone_kind)
+    return FirstOrderThruster(*known, supply, dead_zone, dead_zone_kind)  # pyright: ignore[reportArgumentType] - abstract fields are no arguments

@@ -2,9 +2,9 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers
@@ -14,8 +14,8 @@ class IdealThruster(AbstractThruster):
     """T = alpha V: Eq. (15) once a perfect speed sensor has cancelled phi. The paper's Example 1."""
 
     motor: DCMotor
-    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
+    supply: Float[Param, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Param, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 

@@ -22,4 +22,4 @@ def linear_voltage(
         dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
     """
     known = (thrust_per_volt, 1.0, current_per_thrust, thrust_per_volt)
-    return MemorylessThruster(*known, supply, dead_zone, dead_zone_kind)
+    return MemorylessThruster(*known, supply, dead_zone, dead_zone_kind)  # pyright: ignore[reportArgumentType] - abstract fields are no arguments

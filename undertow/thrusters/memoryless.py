@@ -2,11 +2,11 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
 from undertow.thrusters.thruster import AbstractThruster, PerThruster
 
@@ -14,7 +14,7 @@ from undertow.thrusters.thruster import AbstractThruster, PerThruster
 class AbstractMotorlessThruster(AbstractThruster):
     """A thruster without a motor model: no energy balance, no speed to report, and a given nominal gain."""
 
-    linear_gain: eqx.AbstractVar[Float[Array, ""]]  # N/V
+    linear_gain: eqx.AbstractVar[Float[Param, ""]]  # N/V
 
     def powers(self, state, voltage) -> None:
         return None
@@ -39,14 +39,14 @@ class MemorylessThruster(AbstractMotorlessThruster):
         BadInput: a coefficient is not positive.
     """
 
-    thrust_per_volt: Float[Array, ""] = param("N/V^p", "thrust coefficient", symbol="c_0, c_V")
-    power: Float[Array, ""] = param("", "power of the voltage", symbol="p")
-    current_per_thrust: Float[Array, ""] = param("A/N", "current coefficient", symbol="c_I")
-    linear_gain: Float[Array, ""] = param("N/V", "gain in the nominal model", symbol="alpha")
-    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
+    thrust_per_volt: Float[Param, ""] = param("N/V^p", "thrust coefficient", symbol="c_0, c_V")
+    power: Float[Param, ""] = param("", "power of the voltage", symbol="p")
+    current_per_thrust: Float[Param, ""] = param("A/N", "current coefficient", symbol="c_I")
+    linear_gain: Float[Param, ""] = param("N/V", "gain in the nominal model", symbol="alpha")
+    supply: Float[Param, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Param, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
-    reverse_share: Float[Array, ""] = param("", "thrust in reverse as a share of forward thrust", default=1.0)
+    reverse_share: Float[Param, ""] = param("", "thrust in reverse as a share of forward thrust", default=1.0)
     has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):

@@ -3,13 +3,11 @@
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.param import param, sources_field
+from undertow.core.param import Param, Sources, param, sources_field
 from undertow.thrusters.thruster import PerThruster, Powers
-
-Scalar = Float[Array, ""]
 
 
 class DCMotor(eqx.Module):
@@ -22,17 +20,21 @@ class DCMotor(eqx.Module):
         BadInput: a constant is not positive (inductance, friction: negative).
     """
 
-    resistance: Scalar = param("ohm", "winding resistance", symbol="R")
-    inductance: Scalar = param("H", "winding inductance", symbol="L")
-    torque_constant: Scalar = param("N m/A", "torque per current", symbol="k_t")
-    back_emf_constant: Scalar = param("V s/rad", "voltage per speed", symbol="k_e")
-    friction: Scalar = param("N m s/rad", "viscous friction", symbol="k_f")
-    rotor_inertia: Scalar = param("kg m^2", "inertia of rotor and propeller", symbol="J")
-    thrust_coefficient: Scalar = param("N s^2/rad^2", "thrust per speed squared", symbol="c_t")
-    torque_coefficient: Scalar = param("N m s^2/rad^2", "shaft torque per speed squared", symbol="c_q")
-    reverse_thrust_coefficient: Scalar = param("N s^2/rad^2", "the same in reverse", symbol="c_t-", default=None)
-    reverse_torque_coefficient: Scalar = param("N m s^2/rad^2", "the same in reverse", symbol="c_q-", default=None)
-    sources: tuple = sources_field()
+    resistance: Float[Param, "..."] = param("ohm", "winding resistance", symbol="R")
+    inductance: Float[Param, "..."] = param("H", "winding inductance", symbol="L")
+    torque_constant: Float[Param, "..."] = param("N m/A", "torque per current", symbol="k_t")
+    back_emf_constant: Float[Param, "..."] = param("V s/rad", "voltage per speed", symbol="k_e")
+    friction: Float[Param, "..."] = param("N m s/rad", "viscous friction", symbol="k_f")
+    rotor_inertia: Float[Param, "..."] = param("kg m^2", "inertia of rotor and propeller", symbol="J")
+    thrust_coefficient: Float[Param, "..."] = param("N s^2/rad^2", "thrust per speed squared", symbol="c_t")
+    torque_coefficient: Float[Param, "..."] = param("N m s^2/rad^2", "shaft torque per speed squared", symbol="c_q")
+    reverse_thrust_coefficient: Float[Param, "..."] = param(
+        "N s^2/rad^2", "the same in reverse", symbol="c_t-", default=None
+    )
+    reverse_torque_coefficient: Float[Param, "..."] = param(
+        "N m s^2/rad^2", "the same in reverse", symbol="c_q-", default=None
+    )
+    sources: Sources = sources_field()
 
     def __post_init__(self):
         if self.reverse_thrust_coefficient is None:
@@ -50,27 +52,27 @@ class DCMotor(eqx.Module):
             checks.positive(f"reverse_{name}", getattr(self, f"reverse_{name}"))
 
     @property
-    def k1(self) -> Scalar:
+    def k1(self) -> PerThruster:
         """R J / k_t, V s^2/rad. Eq. (13)."""
         return self.resistance * self.rotor_inertia / self.torque_constant
 
     @property
-    def k2(self) -> Scalar:
+    def k2(self) -> PerThruster:
         """k_e + R k_f / k_t, V s/rad. Eq. (13); the paper prints k_e where Eqs. (8), (9) give k_f."""
         return self.back_emf_constant + self.resistance * self.friction / self.torque_constant
 
     @property
-    def k3(self) -> Scalar:
+    def k3(self) -> PerThruster:
         """R / k_t, V/(N m). Eq. (13)."""
         return self.resistance / self.torque_constant
 
     @property
-    def torque_per_thrust(self) -> Scalar:
+    def torque_per_thrust(self) -> PerThruster:
         """c_tq = c_q / c_t, m. Eq. (12)."""
         return self.torque_coefficient / self.thrust_coefficient
 
     @property
-    def voltage_gain(self) -> Scalar:
+    def voltage_gain(self) -> PerThruster:
         """alpha = 1 / (k_3 c_tq), N/V. Eq. (15)."""
         return 1 / (self.k3 * self.torque_per_thrust)
 

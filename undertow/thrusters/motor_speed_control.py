@@ -4,8 +4,10 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from undertow.core.actuator_model import AbstractActuatorModel
+from undertow.core.param import Param
 from undertow.numerics.integrators import rk4
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
@@ -31,8 +33,8 @@ class WithMotor(Protocol):
     """A thruster with a motor model."""
 
     motor: DCMotor
-    supply: PerThruster
-    dead_zone: PerThruster
+    supply: Float[Param, "..."]
+    dead_zone: Float[Param, "..."]
     dead_zone_kind: str
 
     def terminal(self, voltage: PerThruster) -> PerThruster:

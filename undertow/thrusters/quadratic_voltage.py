@@ -24,4 +24,4 @@ def quadratic_voltage(
         dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
     """
     known = (thrust_per_volt_squared, 2.0, current_per_thrust, linear_gain)
-    return MemorylessThruster(*known, supply, dead_zone, dead_zone_kind)
+    return MemorylessThruster(*known, supply, dead_zone, dead_zone_kind)  # pyright: ignore[reportArgumentType] - abstract fields are no arguments

@@ -3,8 +3,10 @@
 from typing import Protocol, runtime_checkable
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from undertow.core.actuator_model import AbstractActuatorModel
+from undertow.core.param import Param
 from undertow.thrusters.thruster import PerThruster
 
 
@@ -12,7 +14,7 @@ from undertow.thrusters.thruster import PerThruster
 class Invertible(Protocol):
     """A thruster whose thrust depends on the voltage alone."""
 
-    supply: PerThruster
+    supply: Float[Param, "..."]
 
     def thrust(self, state, voltage: PerThruster) -> PerThruster:
         """T, N."""

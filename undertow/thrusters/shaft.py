@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from undertow.core.errors import BadInput
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.thrusters.motor import DCMotor
 from undertow.thrusters.motor_speed_control import SpeedControlledMotor
 from undertow.thrusters.thruster import AbstractThruster, PerThruster, Powers, PropellerReport
@@ -23,8 +23,8 @@ class ShaftThruster(AbstractThruster):
     """k_1 Om_dot + k_2 Om + k_3 Q = V: Eq. (14) with L = 0."""
 
     motor: DCMotor
-    supply: Float[Array, ""] = param("V", "supply voltage", default=jnp.inf)
-    dead_zone: Float[Array, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
+    supply: Float[Param, ""] = param("V", "supply voltage", default=jnp.inf)
+    dead_zone: Float[Param, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 

@@ -9,8 +9,9 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
+from undertow.core.param import Param
 
-PerThruster = Float[Array, " N"]
+PerThruster = Float[Array, " N"] | Float[Array, ""]  # one entry per thruster, or one that holds for each
 
 # Effect of a voltage outside the dead zone: all of it (`pass`), or its part beyond the zone (`subtract`).
 DEAD_ZONES = ("pass", "subtract")
@@ -34,10 +35,10 @@ class Powers(NamedTuple):
 
 
 class AbstractThruster(eqx.Module):
-    """A set of N thrusters of one kind; every array has one entry per thruster."""
+    """A set of N thrusters of one kind; an array has one entry per thruster, or a single one that holds for each."""
 
-    supply: eqx.AbstractVar[Float[Array, ""]]  # V; the drive can give -supply ... supply
-    dead_zone: eqx.AbstractVar[Float[Array, ""]]  # V; smaller voltages have no effect
+    supply: eqx.AbstractVar[Float[Param, "..."]]  # V; the drive can give -supply ... supply
+    dead_zone: eqx.AbstractVar[Float[Param, "..."]]  # V; smaller voltages have no effect
     dead_zone_kind = "pass"  # one of DEAD_ZONES; a field where a thruster offers both
     input_unit = "V"  # unit of the command; where this is not V, every voltage below has that unit
     # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, `ideal` and `static`.
@@ -76,11 +77,11 @@ class AbstractThruster(eqx.Module):
         """Report of a speed sensor; None where speed is not a state."""
 
     @abc.abstractmethod
-    def voltage_gain(self) -> Float[Array, ""]:
+    def voltage_gain(self) -> PerThruster:
         """alpha of Eq. (7), N/V, in the nominal model."""
 
     @abc.abstractmethod
-    def speed_term(self, report: Any) -> PerThruster | Float[Array, ""]:
+    def speed_term(self, report: Any) -> PerThruster:
         """phi of Eq. (15), N, from a speed sensor."""
 
     def actuator_model(self, count: int, measured: bool) -> AbstractActuatorModel:
@@ -96,7 +97,7 @@ class AbstractThruster(eqx.Module):
     def advice(self) -> tuple[str, ...]:
         """Advice on implausible parameters."""
 
-    def limits(self) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+    def limits(self) -> tuple[PerThruster, PerThruster]:
         """Smallest and largest command of the drive, V."""
         return -self.supply, self.supply
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.loop.recorded_signals import Signals
 from undertow.loop.sampled import AbstractAccumulator
 from undertow.scenario.schema import Weights
@@ -49,9 +49,9 @@ class Shares(NamedTuple):
 class CostSums(AbstractAccumulator):
     """Accumulates what `Shares` needs, step by step from `start` on."""
 
-    start: Scalar = param("s", "start of the evaluated window")
-    error_scale: Float[Array, " n"] = param("m, rad", "errors with a cost of one")
-    input_scale: Scalar = param("unit of the input", "input with a cost of one")
+    start: Float[Param, ""] = param("s", "start of the evaluated window")
+    error_scale: Float[Param, " n"] = param("m, rad", "errors with a cost of one")
+    input_scale: Float[Param, ""] = param("unit of the input", "input with a cost of one")
 
     def init(self, signals: Signals) -> Sums:
         zero = jnp.zeros(())

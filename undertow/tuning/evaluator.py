@@ -22,7 +22,7 @@ from undertow.core.contracts import (
     Payload,
     Water,
 )
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.schema import Loop, Weights
@@ -34,7 +34,7 @@ class Scaled(AbstractDisturbance):
     """`size` times a disturbance: loads and water in proportion, factors on the body as powers."""
 
     inner: AbstractDisturbance
-    size: Float[Array, ""] = param("", "1 leaves the disturbance as it is")
+    size: Float[Param, ""] = param("", "1 leaves the disturbance as it is")
 
     def realize(self, key):
         return self.inner.realize(key)
@@ -209,7 +209,7 @@ class Evaluation:
         return self._compiling(name, function, *arguments).result()
 
     def _compiling(self, name: str, function: Callable[..., Any], *arguments: Any) -> concurrent.futures.Future[Any]:
-        compiled = lambda: jax.jit(function).lower(*arguments).compile(compiler_options=_COMPILER)
+        compiled = lambda: jax.jit(function).lower(*arguments).compile(compiler_options=_COMPILER)  # pyright: ignore[reportArgumentType] - options of XLA
         with self._lock:
             if name not in self._programs:
                 self._programs[name] = self._compilers.submit(compiled)

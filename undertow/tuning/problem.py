@@ -79,7 +79,8 @@ def _problem(text: Text, built: Built) -> Problem:
         raise BadInput("tune.start", f"be earlier than the end of a run ({duration:g} s)", f"{start:g} s")
     scales = np.where(angles, tune.angle_scale, tune.position_scale)
     sums = CostSums(start, scales, _input_scale(loop.plant, loop.controller))
-    places = tuple(None if place is None else np.asarray(place, dtype=float) for _, place in scenario.initial)
+    made = lambda place: None if place is None else np.asarray(place, dtype=float)
+    places = made(scenario.initial.position), made(scenario.initial.velocity)
     training_loop = TrainingLoop(loop, scenario.loop, duration, places, sums, tune.weights)
     model = loop.controller.model
     law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))

@@ -107,7 +107,7 @@ def search(objective: Objective, start: np.ndarray, iterations: int, seed: int) 
     differential_evolution(
         lambda points: np.minimum(objective.costs(points.T), _HOPELESS),
         [(0.0, 1.0)] * parameters,
-        init=first,
+        init=first,  # pyright: ignore[reportArgumentType] - SciPy takes an array
         maxiter=iterations,
         tol=_SPREAD,
         rng=np.random.default_rng(seed),

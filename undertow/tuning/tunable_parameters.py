@@ -97,7 +97,7 @@ def whole(chosen: Sequence[TunableParameter], key: str = "tune.parameters") -> N
         entries = {parameter.entry for parameter in chosen if parameter.option == option}
         missing = [f"{option}[{i}]" for i in range(width) if i not in entries] if entries else []
         if missing:
-            raise BadInput(key, f"include {', '.join(missing)}", f"given with {option}[{min(entries)}] only")
+            raise BadInput(key, f"include {', '.join(missing)}", f"given with {option}[{min(entries)}] only")  # pyright: ignore[reportArgumentType] - entries of one option are numbers
 
 
 def _parsed(name: str) -> tuple[str, int | None]:

@@ -161,7 +161,7 @@ def _evaluate(
     laws: list[AbstractController] = [own if options is None else task.law(options) for _, options in chosen]
     train, held_out = (evaluation.shares(laws, trials) for trials in (task.train, task.held_out))
     costs = [evaluation.total(parts).mean(axis=1) for parts in (train, held_out)]
-    row = lambda parts, i: Shares(*(np.asarray(part)[i] for part in parts))
+    row = lambda parts, i: Shares(*(np.asarray(part)[i] for part in parts))  # pyright: ignore[reportArgumentType] - NumPy's means
     return tuple(
         Evaluated(
             name, options, row(train, i), row(held_out, i), float(costs[0][i]), float(costs[1][i]), certifier(laws[i])

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import Water
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross, skew
 
@@ -23,15 +23,15 @@ class Body(eqx.Module):
     Body axes forward, starboard, down. Added mass is part of `mass_matrix`; damping matrices are positive.
     """
 
-    mass_matrix: Matrix6 = param("kg, kg m, kg m^2", "mass and added mass", symbol="M")
-    inverse_mass_matrix: Matrix6 = param("1/kg, ...", "inverse of the mass matrix", symbol="M^-1")
-    linear_damping: Matrix6 = param("N s/m, ...", "linear damping", symbol="D_l")
-    quadratic_damping: Matrix6 = param("N s^2/m^2, ...", "quadratic damping", symbol="D_q")
-    weight: Float[Array, ""] = param("N", "weight", symbol="W")
-    buoyancy: Float[Array, ""] = param("N", "buoyancy", symbol="B")
-    r_g: Vector3 = param("m", "centre of gravity", symbol="r_g")
-    r_b: Vector3 = param("m", "centre of buoyancy", symbol="r_b")
-    gravity: Float[Array, ""] = param("m/s^2", "gravity, weight per dry mass", symbol="g", default=9.81)
+    mass_matrix: Float[Param, "6 6"] = param("kg, kg m, kg m^2", "mass and added mass", symbol="M")
+    inverse_mass_matrix: Float[Param, "6 6"] = param("1/kg, ...", "inverse of the mass matrix", symbol="M^-1")
+    linear_damping: Float[Param, "6 6"] = param("N s/m, ...", "linear damping", symbol="D_l")
+    quadratic_damping: Float[Param, "6 6"] = param("N s^2/m^2, ...", "quadratic damping", symbol="D_q")
+    weight: Float[Param, ""] = param("N", "weight", symbol="W")
+    buoyancy: Float[Param, ""] = param("N", "buoyancy", symbol="B")
+    r_g: Float[Param, "3"] = param("m", "centre of gravity", symbol="r_g")
+    r_b: Float[Param, "3"] = param("m", "centre of buoyancy", symbol="r_b")
+    gravity: Float[Param, ""] = param("m/s^2", "gravity, weight per dry mass", symbol="g", default=9.81)
 
     def coriolis(self, nu: Vector6) -> Vector6:
         """C(nu) nu, N and N m, which does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, expanded."""

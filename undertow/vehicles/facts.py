@@ -84,5 +84,5 @@ def facts_of(vehicle: Vehicle) -> Facts:
         inertia=inertia_about_origin(np.asarray(vehicle.inertia), -mass, numbers["r_g"]),  # shift back from origin
         positions=np.asarray(vehicle.thruster_positions, dtype=float),
         directions=np.asarray(vehicle.thruster_directions, dtype=float),
-        **numbers,
+        **numbers,  # pyright: ignore[reportArgumentType] - arrays and numbers in one mapping
     )

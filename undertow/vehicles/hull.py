@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-Scalar = Float[Array, ""] | float
+from undertow.numerics.number import Number
+
 Vector6 = Float[Array, "6"]
 
 SEAWATER = 1026.0  # kg/m^3
@@ -26,7 +27,7 @@ _CROSS_FLOW_COEFFICIENT = np.array(
 )
 
 
-def cross_flow_coefficient(beam: Scalar, draft: Scalar) -> Float[Array, ""]:
+def cross_flow_coefficient(beam: Number, draft: Number) -> Float[Array, ""]:
     """Drag coefficient of a section in cross flow; beam and draft in m."""
     return jnp.interp(jnp.asarray(beam / (2 * draft)), _HALF_BEAM_TO_DRAFT, _CROSS_FLOW_COEFFICIENT)
 
@@ -51,7 +52,7 @@ def cross_flow_drag(
 
 
 def lift_and_drag(
-    span: float, area: float, parasitic: float, attack: Scalar, speed: Scalar, *, density: float = SEAWATER
+    span: float, area: float, parasitic: float, attack: Number, speed: Number, *, density: float = SEAWATER
 ) -> Vector6:
     """Body-frame force of a wing-like body at an angle of attack (N), without stall.
 

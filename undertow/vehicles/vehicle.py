@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.param import param, sources_field
+from undertow.core.param import Param, Sources, param, sources_field
 from undertow.core.runtime import double_outside_runs
 from undertow.vehicles.body import Body, rigid_body_mass
 
@@ -23,20 +23,20 @@ class Vehicle(eqx.Module):
     """
 
     name: str = eqx.field(static=True)
-    mass: Float[Array, ""] = param("kg", "dry mass", symbol="m")
-    weight: Float[Array, ""] = param("N", "weight in air", symbol="W")
-    buoyancy: Float[Array, ""] = param("N", "buoyancy, fully submerged", symbol="B")
-    r_g: Float[Array, "3"] = param("m", "centre of gravity", symbol="r_g")
-    r_b: Float[Array, "3"] = param("m", "centre of buoyancy", symbol="r_b")
-    inertia: Float[Array, "3 3"] = param("kg m^2", "inertia about the body origin", symbol="I_o")
-    added_mass: Float[Array, "6 6"] = param("kg, kg m, kg m^2", "added mass, positive", symbol="M_A")
-    linear_damping: Float[Array, "6 6"] = param("N s/m, N s, N m s", "linear damping, positive", symbol="D_l")
-    quadratic_damping: Float[Array, "6 6"] = param(
+    mass: Float[Param, ""] = param("kg", "dry mass", symbol="m")
+    weight: Float[Param, ""] = param("N", "weight in air", symbol="W")
+    buoyancy: Float[Param, ""] = param("N", "buoyancy, fully submerged", symbol="B")
+    r_g: Float[Param, "3"] = param("m", "centre of gravity", symbol="r_g")
+    r_b: Float[Param, "3"] = param("m", "centre of buoyancy", symbol="r_b")
+    inertia: Float[Param, "3 3"] = param("kg m^2", "inertia about the body origin", symbol="I_o")
+    added_mass: Float[Param, "6 6"] = param("kg, kg m, kg m^2", "added mass, positive", symbol="M_A")
+    linear_damping: Float[Param, "6 6"] = param("N s/m, N s, N m s", "linear damping, positive", symbol="D_l")
+    quadratic_damping: Float[Param, "6 6"] = param(
         "N s^2/m^2, N s^2, N m s^2", "quadratic damping, positive", symbol="D_q"
     )
-    thruster_positions: Float[Array, "N 3"] = param("m", "position of each thruster", symbol="r_j")
-    thruster_directions: Float[Array, "N 3"] = param("", "unit vector of positive thrust", symbol="e_j")
-    sources: tuple = sources_field()
+    thruster_positions: Float[Param, "N 3"] = param("m", "position of each thruster", symbol="r_j")
+    thruster_directions: Float[Param, "N 3"] = param("", "unit vector of positive thrust", symbol="e_j")
+    sources: Sources = sources_field()
 
     @double_outside_runs
     def __check_init__(self):

@@ -12,6 +12,7 @@ import xarray as xr
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.core.arrays import as_array
 
 PerRecord = np.ndarray  # (time,)
 
@@ -52,7 +53,7 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
 
 def transition(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
     """Matrix of (eps, d_hat - d) from one step to the next, per axis, for constant d and basis: poles at exp(p T)."""
-    of_rates, of_estimate = (np.broadcast_to(gain, axes) for gain in estimator.gains(np.asarray(dt)))
+    of_rates, of_estimate = (np.broadcast_to(gain, axes) for gain in estimator.gains(as_array(dt)))
     one = np.ones(axes)
     return np.stack([np.stack([1 - of_rates, dt * one], -1), np.stack([-of_estimate, one], -1)], -2)
 

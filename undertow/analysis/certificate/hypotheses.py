@@ -11,6 +11,7 @@ import xarray as xr
 from undertow.analysis.certificate.set_point import minimax_weight
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.core.arrays import as_array
 from undertow.core.contracts import Model
 
 # Smaller departures are rounding: shares, or m/s^2 and rad/s^2.
@@ -40,7 +41,7 @@ def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterat
     yield Hypothesis("rank", "G has full rank: every axis can be accelerated", _full_rank(law.model, run), unknown)
     yield Hypothesis("measurement", "the measurement is the truth", true("position") & true("velocity"))
     yield Hypothesis("weights", "no weight is at its bound (projection idle)", run["weights_at_bound"].values == 0)
-    yield Hypothesis("box", "|d| is inside the box of the weights", (np.abs(d) <= bound).all(-1))
+    yield Hypothesis("box", "|d| is inside the box of the weights", np.all(np.abs(d) <= bound, axis=-1))
     yield Hypothesis("constant", "d is constant: theta* = d does not move", _constant(d))
 
 
@@ -54,13 +55,13 @@ def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     if law.modification is not None or law.identification_input != "applied":
         sentence = "the weights follow Eq. (44), Eq. (32) is driven by the applied input"
         yield Hypothesis("adaptation", sentence, np.zeros(run.sizes["time"], bool))
-    yield Hypothesis("compensation_gain", "omega_bar >= |omega|, Eq. (33)", (omega <= amplitude).all(-1))
+    yield Hypothesis("compensation_gain", "omega_bar >= |omega|, Eq. (33)", np.all(omega <= amplitude, axis=-1))
 
 
 def of_robust(law: RobustRCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """What the discrete function asks of the basis, and what bounds the estimation error where d moves."""
     fuzzy, eps = law.estimator.fuzzy, run["modelling_error"].values
-    rho = (np.asarray(fuzzy.basis(eps.reshape(-1, 1))) ** 2).sum(-1).reshape(eps.shape)
+    rho = (np.asarray(fuzzy.basis(as_array(eps.reshape(-1, 1)))) ** 2).sum(-1).reshape(eps.shape)
     still = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
     yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", still)
     yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records")

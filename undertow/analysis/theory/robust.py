@@ -49,7 +49,7 @@ def _certificate(
     rate = fastest_uncertainty(lived)
     allowed = estimation_bound(law.estimator, dt, rate)
     error = np.abs(lived["estimate"].values - lived["uncertainty"].values)
-    kept = (error <= allowed + hypotheses.ROUNDING).all(-1)
+    kept = np.all(error <= allowed + hypotheses.ROUNDING, axis=-1)
     numbers = {
         "uncertainty_rate": rate.tolist(),
         "estimation_bound": allowed.tolist(),

@@ -118,7 +118,7 @@ def robust(
 def _bandwidths(axes: list[Axis], bandwidth, tracking, actuator_rate):
     """Bandwidth and tracking (one entry per axis) and actuator rate, each chosen if not given, rad/s and 1/s."""
     rates, *of_axes = zip(*(robust_bandwidths(axis) for axis in axes), strict=True)
-    chosen = Bandwidths(max(rates), *(alike(values) for values in of_axes))
+    chosen = Bandwidths(max(rates), *(alike(values) for values in of_axes))  # pyright: ignore[reportArgumentType] - one number or one per axis
     if bandwidth is None:
         rate, bandwidth, beside = chosen
     else:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.estimation.fuzzy_system import FuzzySystem
 
 PerAxis = Float[Array, " n"]
@@ -48,10 +48,10 @@ class Estimator(eqx.Module):
     """
 
     fuzzy: FuzzySystem
-    bandwidth: Float[Array, "..."] = param("rad/s", "natural frequency of the estimator", symbol="w_o")
-    damping: Float[Array, "..."] = param("", "damping ratio of the estimator", symbol="zeta", default=1.0)
-    bound: Float[Array, "..."] = param("m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=50.0)
-    leakage: Float[Array, "..."] = param(
+    bandwidth: Float[Param, "..."] = param("rad/s", "natural frequency of the estimator", symbol="w_o")
+    damping: Float[Param, "..."] = param("", "damping ratio of the estimator", symbol="zeta", default=1.0)
+    bound: Float[Param, "..."] = param("m/s^2, rad/s^2", "largest size of a weight", symbol="theta_max", default=50.0)
+    leakage: Float[Param, "..."] = param(
         "1/s", "decay rate of differences between weights", symbol="kappa", default=0.01
     )
 

@@ -14,7 +14,7 @@ from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
 from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
-from undertow.core.param import param
+from undertow.core.param import Param, param
 from undertow.estimation.fuzzy_system import FuzzySystem
 from undertow.numerics.linear_algebra import companion_lyapunov, matvec
 
@@ -59,18 +59,18 @@ class RobustRCAF(AbstractInformedController):
     model: Model
     estimator: Estimator
     filter: ReferenceFilter | None
-    feedback: Float[Array, "*n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
-    weight: Float[Array, "*n 2 2"] = param("", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)))
-    tracking_share: Float[Array, "..."] = param(
+    feedback: Float[Param, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
+    weight: Float[Param, "*#n 2 2"] = param("", "weight of Eq. (21)", symbol="Q", default=((10.0, 0.0), (0.0, 10.0)))
+    tracking_share: Float[Param, "..."] = param(
         "", "share of the filtered tracking error in the adaptation, 1 / gamma_eps", symbol="mu", default=0.0
     )
-    robust_gain: Float[Array, "..."] = param(
+    robust_gain: Float[Param, "..."] = param(
         "m/s^2, rad/s^2", "amplitude of the robust term", symbol="w_bar", default=0.0
     )
-    layer: Float[Array, "..."] = param("unit of s", "boundary layer of the robust term", symbol="phi", default=0.5)
-    actuator_rate: Float[Array, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda", default=100.0)
+    layer: Float[Param, "..."] = param("unit of s", "boundary layer of the robust term", symbol="phi", default=0.5)
+    actuator_rate: Float[Param, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda", default=100.0)
 
-    direction: Float[Array, ""] = param(
+    direction: Float[Param, ""] = param(
         "", "cost of a departure from the desired direction, where limits bind, relative to a loss of size", default=1.0
     )
 
@@ -122,13 +122,14 @@ class RobustRCAF(AbstractInformedController):
             estimator=self.estimator.advance(z.estimator, plan.seen, known, learnt, dt),
             actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=self.filter
-            and self.filter.advance(z.filter, r, self.model.coordinates, share, dt, self._room(y, plan.off)),
+            and self.filter.advance(z.filter, r, self.model.coordinates, share, dt, self._room(y, plan.off)),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         )
 
     def _room(self, y: Measurement, off: Tracking) -> Room:
         """Authority of the actuators for each output, and the part of the error that exceeds it."""
         dynamics, coordinates, actuators = self.model
-        force, effect = largest_forces(actuators), dynamics.gain(y)
+        effect = dynamics.gain(y)
+        force = largest_forces(actuators, effect.shape[1])
         reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
         away = jnp.abs(off.error) > reach
         outward = lambda motion: coordinates.output_velocity(y, motion)
@@ -144,7 +145,7 @@ class RobustRCAF(AbstractInformedController):
     def signals(self):
         return ADAPTIVE_LAW
 
-    def lyapunov(self) -> Float[Array, "*n 2 2"]:
+    def lyapunov(self) -> Float[Array, "*#n 2 2"]:
         """P of Eq. (21)."""
         return companion_lyapunov(self.feedback, self.weight)
 
@@ -155,7 +156,7 @@ class RobustRCAF(AbstractInformedController):
     def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
         dynamics, coordinates, actuators = self.model
         reported = actuators.update_from_report(z.actuators, y.actuator)
-        target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)
+        target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         off = tracking(coordinates, self.lyapunov(), y, target)
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
         seen = self.estimator.estimate(z.estimator, coordinates.velocity(y))

@@ -148,7 +148,7 @@ def run_in_mujoco(
     start = np.zeros(6) if position is None else np.asarray(position, dtype=float)
     body.place(start, np.zeros(6))
     reference = starting_at(reference, jnp.asarray(start))
-    command, advance, desired = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))
+    command, advance, desired = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))  # pyright: ignore[reportArgumentType] - overloads of filter_jit
     z, rows, control_steps, status = None, [], round(duration / dt), Status.OK
     for step in range(control_steps + 1):
         t = step * dt

@@ -85,7 +85,8 @@ def key(figure: Figure, keys: dict[str, Look], top: float, columns: int) -> None
 def _legend(figure: Figure, keys: dict[str, Look], columns: int, **place) -> None:
     figure.legend(
         handles=[
-            Line2D([], [], color=k.colour, linestyle=k.dashes, linewidth=1.6, label=name) for name, k in keys.items()
+            Line2D([], [], color=k.colour, linestyle=k.dashes, linewidth=1.6, label=name)  # pyright: ignore[reportArgumentType] - dashes as Matplotlib takes them
+            for name, k in keys.items()
         ],
         ncols=columns,
         fontsize=TEXT,

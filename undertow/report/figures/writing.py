@@ -38,7 +38,7 @@ class Saved(NamedTuple):
 def svg(figure: Figure) -> str:
     """The figure as SVG, without date, with text as outlines (equal on every machine)."""
     text = io.StringIO()
-    with _WRITING, matplotlib.rc_context(_SETTINGS):
+    with _WRITING, matplotlib.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType] - keys of Matplotlib
         FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": "undertow"})
     # A hundredth of a point is finer than any printer; further digits would be most of the file.
     return _PATH.sub(lambda m: m[1] + _DIGITS.sub(r"\1", m[2]) + m[3], text.getvalue())
@@ -47,7 +47,7 @@ def svg(figure: Figure) -> str:
 def png(figure: Figure) -> bytes:
     """The figure as PNG, 150 dots per inch."""
     data = io.BytesIO()
-    with _WRITING, matplotlib.rc_context(_SETTINGS):
+    with _WRITING, matplotlib.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType] - keys of Matplotlib
         canvas = FigureCanvasAgg(figure)
         before = figure.dpi
         figure.dpi = DOTS_PER_INCH

@@ -18,7 +18,7 @@ def _lyapunov_function_decreases_scenarios(quick: bool) -> dict:
         "c12_constant": scenario(
             "RCAFC under constant uncertainty: the Lyapunov function never increases",
             disturbance={"kind": "sinusoid", "amplitude": 0.0, "frequency": [1.0] * 6, "offset": _CONSTANT},
-            **(SIX_AXES | {"reference": {"kind": "setpoint", "position": GOAL}}),
+            **(SIX_AXES | {"reference": {"kind": "setpoint", "position": GOAL}}),  # pyright: ignore[reportArgumentType] - options in one mapping
         )
     }
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from undertow.core.arrays import as_array
 from undertow.core.status import Status
 from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
 from undertow.reproduction.horizons import Long, name_of
@@ -65,7 +66,7 @@ def voltage_as_input(runs: Runs, long: Long) -> Finding:
     thruster = plant_of(run).thruster
     late = run.dataset.sel(time=slice(run.built.window()[0], None))
     voltage = late["input"].values
-    thrust = np.asarray(thruster.thrust(np.zeros(0), voltage))
+    thrust = np.asarray(thruster.thrust(np.zeros(0), as_array(voltage)))
     assumed = float(thruster.voltage_gain()) * voltage
     share = float(np.sqrt(((thrust - assumed) ** 2).mean() / (thrust**2).mean()))
     text = (
