@@ -5,6 +5,7 @@ obeys y+ = A y + B n. d_hat = z - c eps, where c is the gain that drift adds (se
 position and velocity are new at every step; the law takes y - S n for the truth. Both laws have this form.
 """
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -39,14 +40,18 @@ class Deviations(NamedTuple):
     input: float  # u, m/s^2
 
 
+@functools.singledispatch
 def steps(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> Steps:
-    """One step of one axis, sampled every dt seconds.
+    """One step of one axis, sampled every dt seconds; each class of laws registers its own.
 
     Raises:
-        BadInput: the paper's law with several steps per step, or with a `sign` switch.
+        BadInput: the paper's law with several steps per step, or with a `sign` switch; a law of another class.
     """
-    if isinstance(law, RobustRCAF):
-        return _robust(law, dt, axis)
+    raise BadInput("law", "be the paper's or the robust one", f"a {type(law).__name__}")
+
+
+@steps.register
+def _paper(law: RCAF, dt: float, axis: int = 0) -> Steps:
     if (law.method, law.substeps) != ("euler", 1):
         raise BadInput("method", "be euler with one step per step", f"{law.method} with {law.substeps}")
     g = gains(law, axis)
@@ -123,7 +128,8 @@ def input_rule(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> float:
     return float(np.hypot(steps(law, dt, axis).push[1], estimate_rule(law, dt, axis)))
 
 
-def _robust(law: RobustRCAF, dt: float, axis: int) -> Steps:
+@steps.register
+def _robust(law: RobustRCAF, dt: float, axis: int = 0) -> Steps:
     axes = len(law.model.coordinates.angles)
     at = lambda value, *shape: np.broadcast_to(np.asarray(value, dtype=float), (axes, *shape))[axis]
     filtered = np.append(at(law.lyapunov(), 2, 2)[:, 1], [0.0, 0.0])

@@ -1,20 +1,11 @@
-"""Checks of parameter values at construction, and of options by their annotation.
+"""Checks of parameter values at construction. Traced values pass: their numbers were checked before tracing."""
 
-Traced values pass: their numbers were checked before tracing.
-"""
-
-import math
-import typing
 from typing import Any
 
 import numpy as np
 from jax.core import Tracer
 
 from undertow.core.errors import BadInput
-
-_WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "text", type(None): "null"}
-# Integers are sizes and counts that compiled code is unrolled over.
-_LARGEST_COUNT = 100
 
 
 def positive(name: str, value: Any, unit: str = "", finite: bool = True) -> None:
@@ -82,50 +73,6 @@ def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
         smallest = float(np.linalg.eigvalsh(block).min())
         if not smallest > 0:
             raise BadInput(name, "be positive definite", f"a matrix with smallest eigenvalue {smallest:.3g}")
-
-
-def option(name: str, value: Any, hint: Any, default: Any) -> Any:
-    """The value of an option, if it is of the annotated type; numbers finite unless the default is infinite.
-
-    Args:
-        name: of the option.
-        value: as read from a scenario.
-        hint: its annotation; anything but plain words and numbers means numbers or lists of them.
-        default: of the option.
-
-    Raises:
-        BadInput: it is not.
-    """
-    if value is None and default is None:
-        return None
-    kinds = typing.get_args(hint) or (hint,)
-    plain = all(kind in _WORDS for kind in kinds)
-    if not (any(_is(value, kind) for kind in kinds) if plain else _numbers(value)):
-        must = " or ".join(_WORDS[kind] for kind in kinds) if plain else "a number or a list of numbers"
-        raise BadInput(name, f"be {must}", repr(value))
-    if int in kinds and value is not None and abs(value) > _LARGEST_COUNT:
-        raise BadInput(name, f"be at most {_LARGEST_COUNT}", value)
-    if not isinstance(value, str):
-        try:
-            numbers = np.asarray(value, dtype=float)
-        except (ValueError, OverflowError):
-            raise BadInput(name, "have rows of equal length and numbers of ordinary size", value) from None
-        endless = isinstance(default, float) and math.isinf(default)
-        if np.isnan(numbers).any() or (np.isinf(numbers).any() and not endless):
-            raise BadInput(name, "be finite", value)
-    return value
-
-
-def _is(value: Any, kind: type) -> bool:
-    """Whether a value is of a kind: integers are numbers, but true and false are neither."""
-    return isinstance(value, (int, float) if kind is float else kind) and (kind is bool or not isinstance(value, bool))
-
-
-def _numbers(value: Any, depth: int = 3) -> bool:
-    """Whether a value is a number, or lists of numbers to a depth."""
-    if isinstance(value, list):
-        return depth > 0 and all(_numbers(one, depth - 1) for one in value)
-    return _is(value, float)
 
 
 def _each(name: str, value: Any, good: Any, must: str, unit: str) -> None:

@@ -16,6 +16,7 @@ from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import fault_of
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
+from undertow.scenario.values import checked
 from undertow.scenario.vehicle_file import is_vehicle_file, make_vehicle
 from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster
@@ -117,7 +118,7 @@ def call(
             made = (None, None) if description is parameter.default is None else _inner(name, description, folder)
             arguments[name], resolved[name] = made
         elif name in options:
-            arguments[name] = resolved[name] = checks.option(name, options[name], hints.get(name), parameter.default)
+            arguments[name] = resolved[name] = checked(name, options[name], hints.get(name), parameter.default)
         elif parameter.default is inspect.Parameter.empty:
             raise BadInput(name, "be given")
         else:
@@ -150,7 +151,7 @@ def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -
             with within(key):
                 values[key] = adjust(values[key], change)
         else:
-            number = np.asarray(checks.option(key, change, None, 0.0), dtype=float)
+            number = np.asarray(checked(key, change, None, 0.0), dtype=float)
             if number.shape != np.shape(values[key]):
                 raise BadInput(
                     key, _sized(np.shape(values[key])), f"of shape {number.shape}" if number.shape else change

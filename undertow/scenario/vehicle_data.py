@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.scenario.values import checked
 from undertow.vehicles.facts import Facts
 from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
 from undertow.vehicles.vehicle import Vehicle
@@ -53,12 +54,12 @@ def check_keys(contents: Mapping[str, Any]) -> None:
 
 def text_at(contents: Mapping[str, Any], key: str, default: str) -> str:
     """Text, or the default."""
-    return str(checks.option(key, contents.get(key, default), str, default))
+    return str(checked(key, contents.get(key, default), str, default))
 
 
 def _ordinary(key: str, value: Any) -> NDArray:
     """Numbers whose squares are finite."""
-    array = np.asarray(checks.option(key, value, None, 0.0), dtype=float)
+    array = np.asarray(checked(key, value, None, 0.0), dtype=float)
     if array.size and np.abs(array).max() > _LARGEST:
         raise BadInput(key, f"hold numbers below {_LARGEST:g}", value)
     return array
@@ -66,7 +67,7 @@ def _ordinary(key: str, value: Any) -> NDArray:
 
 def number_at(contents: Mapping[str, Any], key: str) -> float:
     """A positive number."""
-    number = float(_ordinary(key, checks.option(key, contents[key], float, 0.0)))
+    number = float(_ordinary(key, checked(key, contents[key], float, 0.0)))
     checks.positive(key, number, SCALARS[key])
     if number < 1 / _LARGEST:
         raise BadInput(key, f"be above {1 / _LARGEST:g}", number)
@@ -146,7 +147,7 @@ def _vector(name: str, entry: Mapping[str, Any], key: str) -> NDArray:
     if key not in entry:
         hint = "" if key == "position" else "Or give `azimuth` and `elevation` in degrees"
         raise BadInput(f"{name}.{key}", "be given", hint=hint)
-    value = checks.option(f"{name}.{key}", entry[key], None, 0.0)
+    value = checked(f"{name}.{key}", entry[key], None, 0.0)
     checks.length(f"{name}.{key}", value, 3, _AXES)
     if np.abs(np.asarray(value, dtype=float)).max() > _FARTHEST:
         raise BadInput(f"{name}.{key}", f"hold numbers below {_FARTHEST:g}", value)
@@ -154,7 +155,7 @@ def _vector(name: str, entry: Mapping[str, Any], key: str) -> NDArray:
 
 
 def _angle(name: str, entry: Mapping[str, Any], key: str) -> float:
-    return float(checks.option(f"{name}.{key}", entry.get(key, 0.0), float, 0.0))
+    return float(checked(f"{name}.{key}", entry.get(key, 0.0), float, 0.0))
 
 
 def _pointing(azimuth: float, elevation: float) -> NDArray:
