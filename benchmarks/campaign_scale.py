@@ -22,18 +22,18 @@ from typing import Any
 
 import numpy as np
 
-from undertow import process
+from undertow import process_setup
 
-process.prepare()
+process_setup.prepare()
 
 from undertow.campaign import task
 from undertow.campaign.columns import labels
 from undertow.campaign.executors import by_dask, cluster, in_threads
 from undertow.campaign.fingerprint import Identity
-from undertow.campaign.layout import Layout
 from undertow.campaign.prepare import prepare
 from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.campaign.store import Store
+from undertow.campaign.store_layout import Layout
 from undertow.reproduction.setup import scenario
 from undertow.scenario.reading import dump
 

@@ -1,6 +1,6 @@
 """Strict arithmetic for every test: double precision outside of runs, no silent promotion of types."""
 
-from undertow.process import prepare  # isort: skip  (before JAX is imported
+from undertow.process_setup import prepare  # isort: skip  (before JAX is imported
 
 prepare()
 

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from undertow import process
+from undertow import process_setup
 from undertow.bench import measure
 from undertow.cli.main import run
 from undertow.loop import simd_batch
@@ -142,7 +142,7 @@ def test_one_module_knows_the_compiler():
 
     import simdjit
 
-    root, found = Path(process.__file__).parent, {}
+    root, found = Path(process_setup.__file__).parent, {}
     for path in root.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
@@ -168,9 +168,9 @@ def test_where_there_is_one():
 def test_code_of_xla_is_kept_where_nobody_else_may_write(tmp_path, monkeypatch):
     monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("JAX_COMPILATION_CACHE_DIR", raising=False)
-    process._keep_xla_code()
+    process_setup._keep_xla_code()
     place = os.environ.pop("JAX_COMPILATION_CACHE_DIR")
     assert os.stat(place).st_mode & 0o077 == 0
     os.chmod(place, 0o777)
-    process._keep_xla_code()
+    process_setup._keep_xla_code()
     assert "JAX_COMPILATION_CACHE_DIR" not in os.environ

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from undertow.campaign.campaign_schema import read_text
-from undertow.campaign.layout import layout
+from undertow.campaign.store_layout import layout
 from undertow.campaign.task import run_trials, site
 from undertow.core import runtime
 from undertow.core.contracts import Load, Pose

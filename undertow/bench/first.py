@@ -1,6 +1,6 @@
 """A new process up to its first result: python -m undertow.bench.first"""
 
-from undertow.process import prepare
+from undertow.process_setup import prepare
 
 prepare()
 

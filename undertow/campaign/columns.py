@@ -9,7 +9,7 @@ import xarray as xr
 from undertow.campaign.batch_runner import SIMD, XLA, planned
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.labels import is_number, words
-from undertow.campaign.layout import SAMPLES
+from undertow.campaign.store_layout import SAMPLES
 from undertow.campaign.task import INVALID, NOT_JUDGED
 from undertow.campaign.trials import Trials, varied_keys
 from undertow.core.metric import Metric

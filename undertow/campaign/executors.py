@@ -1,6 +1,10 @@
-"""Executors of the tasks of a campaign: threads of this process, or the workers of a Dask cluster."""
+"""Executors of the tasks of a campaign: threads of this process unless a cluster is named, else its Dask workers.
+
+A cluster `local` is processes on this machine; others are machines reached by SSH, or jobs of SLURM.
+"""
 
 import contextlib
+import functools
 import itertools
 import logging
 import os
@@ -16,12 +20,28 @@ from undertow.core.errors import BadInput, nearest
 
 Columns = dict[str, np.ndarray]
 Work = tuple[Any, ...]  # arguments of the function
+Executor = Callable[[Callable[..., Columns], Sequence[Work]], Iterator[tuple[int, Columns]]]
 
 # Tasks per worker that run or wait: enough to keep it busy, few enough to fit in memory.
 _AHEAD = 2
 
 # Switch interval of threads, s; with Python's default of 5 ms, writing a task takes half a second, not a tenth.
 _TURN = 2e-4
+
+
+@contextlib.contextmanager
+def chosen(where: str | None, count: int) -> Iterator[Executor]:
+    """The executor for a cluster, or threads where none is named.
+
+    Args:
+        where: see `cluster`; None for threads.
+        count: of threads or workers.
+    """
+    if where is None:
+        yield functools.partial(in_threads, threads=count)
+        return
+    with cluster(where, count) as client:
+        yield functools.partial(by_dask, client=client)
 
 
 def in_threads(function: Callable[..., Columns], work: Sequence[Work], threads: int) -> Iterator[tuple[int, Columns]]:

@@ -1,7 +1,7 @@
 """Run the missing tasks of a campaign with an executor and write their results to the store."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,15 +9,13 @@ import numpy as np
 
 from undertow.campaign import task as tasks
 from undertow.campaign.columns import METRICS, coordinates, labels
-from undertow.campaign.executors import Columns, Work
+from undertow.campaign.executors import Executor
 from undertow.campaign.fingerprint import identity
-from undertow.campaign.layout import layout
 from undertow.campaign.prepare import Prepared
 from undertow.campaign.store import Store
+from undertow.campaign.store_layout import layout
 
 STORE = "trials.zarr"
-
-Executor = Callable[[Callable[..., Columns], Sequence[Work]], Iterator[tuple[int, Columns]]]
 
 
 class Tally(NamedTuple):

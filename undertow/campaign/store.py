@@ -15,7 +15,7 @@ import xarray as xr
 
 from undertow.campaign.columns import DONE, FLAGS, Label
 from undertow.campaign.fingerprint import Identity, samples
-from undertow.campaign.layout import Layout
+from undertow.campaign.store_layout import Layout
 from undertow.core.disk import alone, sync
 from undertow.core.errors import BadInput
 

@@ -11,9 +11,9 @@ import xarray as xr
 
 from undertow.campaign.campaign_schema import Campaign, read_text
 from undertow.campaign.columns import DONE, FLAGS, METRICS, trial_labels
-from undertow.campaign.layout import SAMPLES, Layout, layout
 from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store import check_array, chunk_file, flags, to_be_read
+from undertow.campaign.store_layout import SAMPLES, Layout, layout
 from undertow.campaign.task import INVALID
 from undertow.core.errors import BadInput
 from undertow.core.metric import Metric

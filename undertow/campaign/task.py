@@ -11,7 +11,7 @@ import numpy as np
 from undertow.analysis.metrics import gathered_meanings
 from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.campaign_schema import read_text
-from undertow.campaign.layout import Layout
+from undertow.campaign.store_layout import Layout
 from undertow.campaign.trials import Trials, trials
 from undertow.core import runtime
 from undertow.core.errors import BadInput, within

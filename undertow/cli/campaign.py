@@ -5,7 +5,6 @@ import os
 import shutil
 import time
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -15,9 +14,9 @@ from rich.table import Table
 
 from undertow.analysis.metrics import for_people
 from undertow.campaign.campaign_summary import endings, summary
-from undertow.campaign.executors import by_dask, check_cluster, cluster, in_threads
+from undertow.campaign.executors import check_cluster, chosen
 from undertow.campaign.prepare import Prepared, prepare
-from undertow.campaign.run_campaign import STORE, Executor, Tally, Watch, run_campaign
+from undertow.campaign.run_campaign import STORE, Tally, Watch, run_campaign
 from undertow.campaign.store_results import Results, load
 from undertow.campaign.task import build_trial
 from undertow.cli import results_folder
@@ -60,7 +59,7 @@ def campaign(
             typer.echo(f"Advice: {sentence}", err=True)
         if not resume:
             clear_folder(folder)
-        with _executor(where, count) as executor, _live(console) as watch:
+        with chosen(where, count) as executor, _live(console) as watch:
             try:
                 interruptible(lambda: run_campaign(prepared, folder, executor, watch))
             except (KeyboardInterrupt, OSError):
@@ -113,15 +112,6 @@ def status(folder: Path, options: Sequence[str]) -> int:
     for word, number in ended.items():
         console.print(f"  {word}: {number}", highlight=False)
     return DONE
-
-
-@contextlib.contextmanager
-def _executor(where: str | None, count: int) -> Iterator[Executor]:
-    if where is None:
-        yield partial(in_threads, threads=count)
-        return
-    with cluster(where, count) as client:
-        yield partial(by_dask, client=client)
 
 
 @contextlib.contextmanager

@@ -14,7 +14,7 @@ import typer
 
 from undertow.cli.exit_codes import run_guarded
 from undertow.cli.interruptible import remember_interrupts
-from undertow.process import prepare
+from undertow.process_setup import prepare
 
 AllowCode = Annotated[
     bool,

@@ -21,7 +21,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.loop.recording import instant
 from undertow.numerics.integrators import METHODS
-from undertow.process import cache_folder
+from undertow.process_setup import cache_folder
 
 if TYPE_CHECKING:
     from simdjit import Driver, Unsupported

@@ -6,9 +6,9 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 
 from undertow.analysis.linearization import margins
-from undertow.analysis.linearization.closed_loop import LinearLoop
 from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile, disturbance_profile
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.linearization.response import from_start, metrics_of, signals_within
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array

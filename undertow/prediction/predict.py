@@ -8,8 +8,8 @@ import numpy as np
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.actuator_authority import ActuatorAuthority, actuator_authority
 from undertow.analysis.linearization.closed_forms import ClosedForm, closed_form_poles
-from undertow.analysis.linearization.closed_loop import LinearLoop
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.plants.reachability import open_loop_advice

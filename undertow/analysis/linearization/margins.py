@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from undertow.analysis.linearization.closed_loop import LinearLoop, close_continuous, close_sampled
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.analysis.linearization.linear_loop import LinearLoop, close_continuous, close_sampled
 from undertow.analysis.linearization.minimal_realization import multipliers, visible
 from undertow.analysis.small_signal import first_crossing
 from undertow.core.errors import BadInput

@@ -5,7 +5,7 @@ from typing import cast
 import numpy as np
 from scipy.linalg import eig, matrix_balance
 
-from undertow.analysis.linearization.closed_loop import LinearLoop
+from undertow.analysis.linearization.linear_loop import LinearLoop
 
 # Of the size of the system: a direction reached by less than this is reached by rounding.
 _REACHED = 1e-9

@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.analysis.linearization.closed_loop import LinearLoop
 from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile
 from undertow.analysis.linearization.equilibrium import Equilibrium
+from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.linearization.minimal_realization import visible
 from undertow.analysis.metrics import of_group, output_groups
 
