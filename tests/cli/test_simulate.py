@@ -28,8 +28,9 @@ def test_files_of_a_run(ran, whole_figures, tmp_path):
     assert {".png", ".svg"} == {path.suffix for path in (folder / "figures").iterdir()}
     metrics = json.loads((folder / "metrics.json").read_text())
     assert metrics["status"] == "completed" and metrics["ended"] == pytest.approx(0.1)
-    defined = set(MEANINGS) - {"tracking_rms", "tracking_max"}  # of plants with other units
-    assert set(metrics["whole"]) == {*defined, *(f"{name}_axes" for name in PER_AXIS)} == set(metrics["steady"])
+    units = ("[axis]", "[axis]/s", "[axis]/s^2")  # of plants whose outputs are neither in m nor in rad
+    defined = {name for name, metric in MEANINGS.items() if metric.unit not in units}
+    assert set(metrics["whole"]) == {*defined, *PER_AXIS.values()} == set(metrics["steady"])
     assert metrics["success"]["criterion"] == {"position_rms": 0.05, "attitude_rms": 0.05}
     resolved = YAML(typ="safe", pure=True).load((folder / "scenario.yaml").read_text())
     assert resolved["controller"]["adaptation"] == 100.0

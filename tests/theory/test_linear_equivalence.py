@@ -76,7 +76,7 @@ def test_departure_after_a_while_is_the_gain_that_drift_adds(record):
     plain = np.abs(small_signal.estimation_response(law, FREQUENCIES))
     assert (np.abs(measured / plain - 1)[FAST] > 0.01).all()
     sets = law.fuzzy
-    slope = np.asarray(jax.jacfwd(lambda x: memberships(x, sets.centres[0], sets.widths[0]))(jnp.zeros(())))
+    slope = np.asarray(jax.jacfwd(lambda x: memberships(x[None], sets.centres[0], sets.widths[0])[0])(jnp.zeros(())))
     added = -samples["weights"][1500] @ slope  # c, 1/s
     assert (added[FAST] > 1).all() and (added > -1e-9).all()
     for axis in FAST:

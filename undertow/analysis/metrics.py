@@ -277,25 +277,24 @@ def _over_series(gathered: Gathered, time: Array, signals: Signals) -> tuple[Any
     return jax.lax.scan(step, tuple(one.init(first) for one in gathered), (time, signals))[0]
 
 
-# Metrics of the outputs: each comes for those in m, for those in rad, or for all where they share another unit; and
-# for each output, as `<name>_axes`, in its own unit.
+# Metrics of the outputs: each comes for those in m, for those in rad (the short way round), or for all where they
+# share another unit.
 _OF_OUTPUTS = {
     "error_rms": Metric("[axis]", "rms of the tracking error x_d - x"),
     "error_max": Metric("[axis]", "largest tracking error"),
     "estimation_rms": Metric("[axis]/s^2", "rms of d_hat - d"),
-    "uncertainty_rms": Metric("[axis]/s^2", "rms of the lumped uncertainty d = x_ddot - F - G u"),
+    "uncertainty_rms": Metric("[axis]/s^2", "rms of the uncertainty d = x_ddot - F - G u"),
     "robust_rms": Metric("[axis]/s^2", "rms of the robust term u_r"),
-    "model_rms": Metric("[axis]/s", "rms of the modelling error eps = x_hat_dot - x_dot"),
-    "weights_peak": Metric("[axis]/s^2", "largest |theta|; it shows parameter drift"),
+    "model_rms": Metric("[axis]/s", "rms of the modelling error x_hat_dot - x_dot"),
+    "weights_peak": Metric("[axis]/s^2", "largest |theta|, which shows parameter drift"),
 }
-PER_AXIS = (*_OF_OUTPUTS, "settling_time")
-_WHICH = {"position": "of the outputs in m", "attitude": "of the outputs in rad, the short way round"}
+_WHICH = {"position": "outputs in m", "attitude": "outputs in rad", _ALL: "outputs that share another unit"}
 
 # In the order of tables. `Metrics` has those up to `bad_readings`; the others are known once a run is over.
 MEANINGS = {
     of_group(group, name): Metric(
         metric.unit.replace("[axis]", next((unit for unit, named in _GROUPS.items() if named == group), "[axis]")),
-        f"{metric.meaning}, {_WHICH.get(group, 'where all outputs share another unit')}",
+        f"{metric.meaning}; {_WHICH[group]}",
     )
     for name, metric in _OF_OUTPUTS.items()
     for group in (*_GROUPS.values(), _ALL)
@@ -312,6 +311,10 @@ MEANINGS = {
     "energy_integration_residual": Metric("", "the same computed from the state: error of the integrator"),
     "rules": Metric("", "fuzzy rules per axis"),
 }
+
+# Metric -> the same of each output, in its own unit.
+PER_AXIS = {of_group(group, name): f"{name}_axes" for group in _WHICH for name in _OF_OUTPUTS}
+PER_AXIS |= {"settling_time": "settling_time_axes"}
 
 # Known once a run is over, from its record or its law: campaigns keep no record, and have none of them.
 _AFTERWARDS = ("energy_balance_residual", "energy_integration_residual", "rules")

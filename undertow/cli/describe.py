@@ -27,10 +27,10 @@ def describe(name: str) -> None:
         _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
     elif name == "metrics":
         rows = [
-            (key, one.unit.replace("[axis]", "[output]"), "yes" if key in PER_AXIS else "", one.meaning)
+            (key, one.unit.replace("[axis]", "[output]"), PER_AXIS.get(key, ""), one.meaning)
             for key, one in MEANINGS.items()
         ]
-        _show_table(console, "Metrics", ("metric", "unit", "also <metric>_axes", "meaning"), rows)
+        _show_table(console, "Metrics", ("metric", "unit", "of each output", "meaning"), rows)
     elif name == "signals":
         _show_signals(console, "Signals of every run; see `undertow describe NAME` for those of a part", RECORDED)
     else:

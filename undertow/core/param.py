@@ -13,7 +13,7 @@ from undertow.core.arrays import as_array
 if TYPE_CHECKING:
 
     class Param:
-        """What a type checker is told of a field `name: Float[Param, "3"] = param(...)`: numbers in, an array out."""
+        """For type checkers: a field `name: Float[Param, "3"] = param(...)` takes numbers and gives an array."""
 
         @overload
         def __get__(self, instance: None, owner: Any) -> "Param": ...
