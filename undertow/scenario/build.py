@@ -73,11 +73,11 @@ class Built(NamedTuple):
 
     def criterion(self) -> dict[str, float]:
         """What success is judged by: metric -> what it must stay below in the steady window."""
-        return criterion_of(self.scenario.success, self.known_metrics())
+        return self.resolved["success"]
 
     def window(self) -> tuple[float, float]:
         """Start and stop of the steady metrics, s."""
-        return self.scenario.steady.of_run(self.scenario.loop.duration)
+        return self.resolved["steady"]["start"], self.resolved["steady"]["stop"]
 
 
 def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None) -> Built:
@@ -152,4 +152,5 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     with within("controller.signals"):
         loop.signals()
     with within("success"):
-        return built._replace(resolved=resolved | {"success": built.criterion()})
+        criterion = criterion_of(scenario.success, built.known_metrics())
+    return built._replace(resolved=resolved | {"success": criterion})

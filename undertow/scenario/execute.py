@@ -54,9 +54,9 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
 
 @in_its_precision
 def _execute(built: Built) -> Executed:
-    scenario, text = built.scenario, dump(built.resolved)
+    scenario, text, window = built.scenario, dump(built.resolved), built.window()
     plant = built.closed_loop.plant
-    gathered = accumulators(plant, built.metrics, *built.window()) if scenario.steady.every_step else ()
+    gathered = accumulators(plant, built.metrics, *window) if scenario.steady.every_step else ()
     outcome, left_to_xla = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
     why = step_failure(built.closed_loop, scenario.loop, outcome)
     attributes = (
@@ -70,7 +70,7 @@ def _execute(built: Built) -> Executed:
             "seed": scenario.seed,
         }
     )
-    how = Measuring(built.window(), scenario.loop.dt, built.metrics, built.criterion(), gathered)
+    how = Measuring(window, scenario.loop.dt, built.metrics, built.criterion(), gathered)
     finished = label(built.closed_loop, outcome, how, attributes)
     return Executed(built, outcome, *finished)
 

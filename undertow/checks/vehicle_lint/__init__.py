@@ -8,13 +8,14 @@ mirrored (tests/physics/test_mirror.py), creation of energy (tests/physics/test_
 leaks between runs (tests/loop/test_sampled_to_continuous.py: run twice, same bits).
 """
 
+from typing import Any
+
 import numpy as np
 
 from undertow.checks.finding import Finding
 from undertow.checks.vehicle_lint import hydrodynamics, layout, mass, statics, transcription
 from undertow.checks.vehicle_lint.layout import scaled
 from undertow.scenario.build import Built
-from undertow.scenario.vehicle_data import parse
 from undertow.vehicles.facts import Facts as Facts
 from undertow.vehicles.facts import facts_of as facts_of
 from undertow.vehicles.vehicle import Vehicle
@@ -56,12 +57,19 @@ def _row(values) -> str:
 
 
 def vehicle_facts(built: Built) -> Facts | None:
-    """Facts of the vehicle of a scenario; None where its plant is not a vehicle."""
+    """Facts of the vehicle of a scenario, with the thrusters that it runs with; None where its plant is no vehicle."""
     vehicle = getattr(built.closed_loop.plant, "vehicle", None)
     if not isinstance(vehicle, Vehicle):
         return None
-    description = built.resolved["plant"].get("vehicle", {})
-    return parse(description["contents"]).facts() if "contents" in description else facts_of(vehicle)
+    plant = built.resolved["plant"]
+    file = plant.get("vehicle", {}).get("contents", {})
+    known: dict[str, Any] = {
+        key: np.asarray(file[key], dtype=float) for key in ("size", "water_density") if key in file
+    }
+    if "thruster_matrix" in file:
+        running = [number - 1 for number in plant.get("thrusters") or range(1, vehicle.thrusters + 1)]
+        known["printed_matrix"] = np.asarray(file["thruster_matrix"], dtype=float)[:, running]
+    return facts_of(vehicle)._replace(**known)
 
 
 def vehicle_warnings(built: Built) -> tuple[str, ...]:
