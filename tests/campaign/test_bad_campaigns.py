@@ -202,6 +202,7 @@ def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
     assert contents(out) == before
 
 
+@pytest.mark.slow
 def test_a_mass_without_its_weight_is_told(campaign_file, tmp_path, capsys):
     """Both by a run and by a campaign, before they begin."""
     scenario = VEHICLE | {"plant": {"vehicle": {"kind": "odin", "mass": 200.0}, "ledger": False}}

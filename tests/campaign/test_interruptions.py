@@ -81,6 +81,7 @@ def test_a_local_cluster_listens_on_this_machine_only():
     assert len(found) >= 3 and {one.laddr.ip for one in found} == {"127.0.0.1"}
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):
     """As a terminal sends it: to the process, the scheduler and the workers at once."""
     path, out = campaign_file(trials=20_000, chunk=5), tmp_path / "out"

@@ -232,7 +232,7 @@ GROWING = {"cross": {"controller.frequency": [2.0, 3.0]}, "series": {"signals": 
 @pytest.mark.parametrize(
     ("design", "changes", "before"),  # also where not even the first few samples are there
     [
-        pytest.param(*one, marks=() if one in (("random", GROWING, 1), ("sobol", {}, 40)) else pytest.mark.slow)
+        pytest.param(*one, marks=() if one in (("sobol", {}, 40),) else pytest.mark.slow)
         for one in itertools.product(("random", "sobol"), ({}, GROWING), (1, 40))
     ],
 )
@@ -250,7 +250,7 @@ def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp
 @pytest.mark.parametrize(
     "kind, name, at",
     [
-        (zarr.Array, "__setitem__", 0),
+        pytest.param(zarr.Array, "__setitem__", 0, marks=pytest.mark.slow),
         (zarr.Array, "__setitem__", 1),
         (zarr.Array, "resize", 0),
         (zarr.Array, "resize", 9),

@@ -47,6 +47,7 @@ def test_predictions_are_written_and_shown(undertow, whole_figures, tmp_path):
     assert {path.name for path in (tmp_path / "out" / "figures").iterdir()} >= {"poles.png", "frequency.svg"}
 
 
+@pytest.mark.slow
 def test_what_is_doubtful_is_advised(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(LAGGING)
     said = undertow("analyze", "s.yaml", "--out", "out")

@@ -8,6 +8,7 @@ from good_scenario import SCENARIO, SMALL
 from undertow.core import catalogue
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+SLOW = {("disturbances", "gauss_markov_current"), ("disturbances", "random_suite")}  # long to compile
 PARTS = [(kind, name) for kind in ("plants", "controllers", "disturbances") for name in catalogue.names(kind)]
 
 CIRCLE = """
@@ -99,7 +100,9 @@ def test_bad_scenario(refused, tmp_path):
     assert refused("check", "s.yaml", "--option", "seed=4") == said
 
 
-@pytest.mark.parametrize(("kind", "name"), PARTS)
+@pytest.mark.parametrize(
+    ("kind", "name"), [pytest.param(*one, marks=pytest.mark.slow) if one in SLOW else one for one in PARTS]
+)
 def test_parts_of_the_catalogue_keep_their_contract(undertow, kind, name):
     needed = {"table": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]"]}
     said = undertow("check", f"{kind}/{name}", *needed.get(name, []))

@@ -19,7 +19,7 @@ BASE = {
     ("preset", "velocity", "precision"),
     [
         ("paper", 1e30, "float32"),
-        ("robust", 1e200, "float64"),
+        pytest.param("robust", 1e200, "float64", marks=pytest.mark.slow),
         pytest.param("paper", 1e200, "float64", marks=pytest.mark.slow),
         pytest.param("robust", 1e30, "float32", marks=pytest.mark.slow),
     ],

@@ -21,6 +21,7 @@ def ran(undertow, tmp_path, request):
     return said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ran", [NOISY], indirect=True, ids=["vehicle"])
 def test_files_of_a_run(ran, whole_figures, tmp_path):
     folder = tmp_path / "runs" / "s"

@@ -42,7 +42,8 @@ def test_advice_says_how_many_substeps_are_enough():
     )
 
 
-@pytest.mark.parametrize(("substeps", "code"), [(8, 1), pytest.param(9, 0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("substeps", "code"), [(8, 1), (9, 0)])
 def test_the_number_is_right(undertow, tmp_path, substeps, code):
     (tmp_path / "s.yaml").write_text(SCENARIO.format(substeps=substeps))
     said = undertow("simulate", "s.yaml")
@@ -89,6 +90,7 @@ def test_an_unstable_loop_is_still_called_one():
         assert "the loop is unstable" in failed.dataset.attrs["status_sentence"]
 
 
+@pytest.mark.slow
 def test_a_law_too_stiff_for_one_ode():
     """Filter pole 150 / s of the identification model in steps of 50 ms: 7.5 beyond 2.785; with 10 ms it lasts."""
     scenario = {

@@ -15,6 +15,7 @@ tune: {parameters: {frequency: [0.5, 8]}, iterations: 3, train: {seeds: 1}, held
 """
 
 
+@pytest.mark.slow
 def test_interrupted_and_resumed_its_result_can_be_flown(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     with pytest.MonkeyPatch.context() as patch:

@@ -90,7 +90,8 @@ def test_description_needs_no_file(rov, tmp_path):
         assert np.array_equal(a, b)
 
 
-@pytest.mark.parametrize("repeated", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("repeated", [False, True])
 def test_scenario_and_its_repetition_without_the_file(rov, undertow, tmp_path, repeated):
     """Kept in another folder than the scenario's, changed, and gone when the same loop is built, and run, again."""
     (tmp_path / "vehicles").mkdir()

@@ -51,9 +51,11 @@ ALL = [(kind, which) for kind in catalogue.KINDS for name in catalogue.names(kin
 
 
 def pytest_generate_tests(metafunc):
-    """Tests with the argument `part` run for every part there is."""
+    """Tests with the argument `part` run for every part there is; those that the module calls HEAVY are slow tests."""
+    heavy = getattr(metafunc.module, "HEAVY", ())
     if "part" in metafunc.fixturenames:
-        metafunc.parametrize("part", ALL, ids=["/".join(pair) for pair in ALL], indirect=True)
+        marked = [pytest.param(pair, marks=pytest.mark.slow) if pair in heavy else pair for pair in ALL]
+        metafunc.parametrize("part", marked, ids=["/".join(pair) for pair in ALL], indirect=True)
     if "part_name" in metafunc.fixturenames:
         metafunc.parametrize("part_name", ALL, ids=["/".join(pair) for pair in ALL])
 

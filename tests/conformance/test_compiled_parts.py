@@ -20,6 +20,20 @@ def test_every_kind_has_a_use():
     assert set(USES) == set(catalogue.KINDS)
 
 
+# Their gradients take long to compile, and the quicker parts of their kind meet the same operations: slow tests.
+HEAVY = {
+    ("navigation", "observer"),
+    ("navigation", "white_noise"),
+    ("navigation", "degraded"),
+    ("controllers", "rcaf:paper"),
+    ("controllers", "indi"),
+    ("vehicles", "bluerov2"),
+    ("sensors", "imu"),
+    ("disturbances", "random_suite"),
+    ("disturbances", "gauss_markov_current"),
+    ("disturbances", "waves"),
+}
+
 # Operation by operation these take longest: without compilation they are met by the slow tests only.
 LONG = {
     ("navigation", "observer"),

@@ -4,8 +4,8 @@ Blocks of one page run in order, in one folder, with one namespace. A block that
 an output) is not marked python or bash, or stands after a line `<!-- not run -->`. A block of Python or YAML whose
 first line is `# my_part.py` is that file: it is written into the folder.
 
-By default a run is not put beside its prediction, blank figures are written, and PID stands for the preset `robust`:
-most of the time of a short run. Slow tests run everything as it stands.
+By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures are
+written, and PID stands for the preset `robust`: most of the time of a short run. Slow tests run everything as it stands.
 """
 
 import re
@@ -57,13 +57,16 @@ def commands(code: str) -> list[list[str]]:
 ROBUST, QUICKER = "{kind: rcaf, preset: robust}", "{kind: pid, frequency: 1}"
 
 
-def quicker(arguments: list[str]) -> list[str]:
-    """The same command without a prediction."""
-    return [*arguments, *(["--no-prediction"] if arguments[0] == "simulate" else [])]
+def quicker(arguments: list[str], page: str) -> list[str]:
+    """The same command without a prediction; or the check of its scenario, which builds everything and runs nothing."""
+    if arguments[0] != "simulate":
+        return arguments
+    return [*arguments, "--no-prediction"] if page in SIMULATED else ["check", arguments[1]]
 
 
-# Pages that run by default as users run them, and pages whose campaign is built but not run by default.
-WHOLE, BUILT = {"your-own-plant"}, {"campaign"}
+# Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built
+# but not run.
+WHOLE, SIMULATED, BUILT = {"your-own-plant"}, {"README", "your-own-controller", "your-own-vehicle"}, {"campaign"}
 
 
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
@@ -94,7 +97,7 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch):
             exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
         elif block.language == "bash":
             for arguments in commands(block.code):
-                arguments = arguments if whole else quicker(arguments)
+                arguments = arguments if whole else quicker(arguments, page.stem)
                 assert run(arguments) in (0, 1), f"{page.name}, line {block.line}: undertow {shlex.join(arguments)}"
 
 

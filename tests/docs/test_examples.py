@@ -78,6 +78,7 @@ def test_python_api(capsys):
     assert "position_rms" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_mujoco_comparison(capsys, tmp_path):
     """Not worse than docs/independent-physics.md says."""
     found = example("mujoco_comparison").main(fast=True, figure=str(tmp_path / "agreement.png"))

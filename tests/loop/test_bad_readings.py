@@ -122,7 +122,8 @@ def test_the_very_first_reading():
     assert int(dark.signals["bad_readings"][0]) == 1
 
 
-@pytest.mark.parametrize(("law", "within"), [("robust", 1e-2), pytest.param("pid", 3e-2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "within"), [("robust", 1e-2), ("pid", 3e-2)])
 def test_a_vehicle_in_its_own_axes(law, within):
     """Half a second without attitude and velocities, turning and pitching, costs a hundredth of a radian.
 

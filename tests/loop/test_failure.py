@@ -83,6 +83,7 @@ def test_last_sound_state_is_kept(batch):
             assert outcome.final[0].position[0] == pytest.approx(at_break, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_continuous_loop_ends_when_nothing_is_finite():
     """The adaptive integrator rejects every step into the undefined; it gives up, and says so."""
     outcome = RUNS["continuous"](loop_with(float("nan")))

@@ -111,6 +111,7 @@ SCENARIO = {
 }
 
 
+@pytest.mark.slow
 def test_the_table_of_a_run_says_newtons(tmp_path, capsys):
     """And how many rules the law has."""
     (tmp_path / "cart.yaml").write_text(dump(SCENARIO), encoding="utf-8")

@@ -110,7 +110,7 @@ def swimming():
 
 
 @pytest.mark.parametrize(
-    "make", [swinging, reaching, *(pytest.param(make, marks=pytest.mark.slow) for make in (balancing, swimming))]
+    "make", [swinging, *(pytest.param(make, marks=pytest.mark.slow) for make in (reaching, balancing, swimming))]
 )
 def test_fourth_order_in_the_step_of_the_plant(make):
     """1, 2 and 4 steps of RK4 per step; the control rate stays 20 Hz."""

@@ -60,6 +60,7 @@ def fresh(tmp_path_factory):
     return {precision: alone(precision) for precision in ("float64", "float32")}
 
 
+@pytest.mark.slow
 def test_one_after_the_other(fresh):
     assert fresh["float64"] != fresh["float32"]
     for precision in ("float64", "float32", "float64"):
@@ -76,6 +77,7 @@ def test_beside_each_other(fresh):
     assert found == [[fresh[precision] for precision in order] for order in orders]
 
 
+@pytest.mark.slow
 def test_by_xla_too():
     double = content("float64", "xla")
     assert content("float32", "xla") != double == content("float64", "xla")

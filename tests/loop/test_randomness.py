@@ -87,7 +87,7 @@ def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
         assert abs((part[1:] * part[:-1]).mean()) < 4 * DEVIATION**2 / np.sqrt(m)
 
 
-@pytest.mark.parametrize("precision", ["float64", "float32"])
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 def test_instruments_are_heard_and_noisy_at_any_time(precision):
     """After 1e7 s at 10 s, and in double precision at a tenth of a microsecond."""
     with runtime.in_precision(precision):

@@ -30,6 +30,7 @@ def shortened(one, seconds):
     return one | {"loop": one["loop"] | {"duration": seconds}}
 
 
+@pytest.mark.slow
 def test_a_batch_is_its_runs_one_by_one():
     """Metrics of every window, ends and series; runs of two lengths and of two programs."""
     gains = {

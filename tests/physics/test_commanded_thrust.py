@@ -87,6 +87,7 @@ class Asking(AbstractController):
         return self.inner.advance(z, y, r, u_applied, dt)
 
 
+@pytest.mark.slow
 def test_metrics_count_each_limit():
     """Two of eight thrusters are at a limit, one forward and one in reverse; peak and rms are of what was applied."""
     plant = hybrid_vehicle(odin(), ONE_TO_FOUR)
@@ -200,7 +201,8 @@ def test_a_law_asks_for_no_more_than_each_side_gives(name, law):
     assert min(shares) < 0.9, "limits bind"
 
 
-@pytest.mark.parametrize("law", [pytest.param("robust", marks=pytest.mark.slow), "pid"])
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["robust", "pid"])
 def test_a_vehicle_comes_to_its_place_within_both_limits(law):
     """3 m up, which the reverse side of all vertical thrusters limits, as without that limit; no overshoot of 5 cm."""
     plant = hybrid_vehicle(bluerov2_heavy(), commanded_thrust(40.0, 4.0, time_constant=0.05), ledger=False)

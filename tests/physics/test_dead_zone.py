@@ -162,7 +162,8 @@ def station(kind, law, **loads):
 
 
 # `pass` is that of every run of test_power.
-@pytest.mark.parametrize("kind", [pytest.param("pass", marks=pytest.mark.slow), "subtract"])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["pass", "subtract"])
 def test_energy_is_accounted_for(kind):
     """What the drives take goes into copper, water and rotors, to the error of the integrator."""
     law = lambda model: pid(model, sampling_time=0.02)

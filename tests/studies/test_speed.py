@@ -36,6 +36,7 @@ def test_the_workload_is_that_of_plain_numpy():
     assert abs(np.sqrt(plain_numpy.workload_w1(1000, bound=np.inf)) / bounded - 1) > 1e-3, "the bound is met"
 
 
+@pytest.mark.slow
 def test_runs_of_a_batch_start_from_different_places():
     run = W1.run
     rms = workload.tracking(workload.batch(short(W1, 11_000)).run(workload.several(run, 9)).accumulated)
@@ -70,6 +71,7 @@ def test_operations_are_counted():
     assert workload.batch(short(W1, 1), width=1).operations > 2_000
 
 
+@pytest.mark.slow
 def test_what_a_gpu_would_do(monkeypatch):
     """What is measured on a GPU, by threads, for which this processor stands in."""
     monkeypatch.setattr(nvidia, "ptx", lambda assembly, *rest: assembly)

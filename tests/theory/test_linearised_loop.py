@@ -130,6 +130,7 @@ def test_motors_are_in_it():
     assert margins.spectral_radius(margins.closed(found, 1e-4, "continuous")) > 1
 
 
+@pytest.mark.slow
 def test_counters_and_idle_weights_are_not_poles():
     """The ledger of energies integrates for ever, and is neither a pole nor a matter of stability."""
     plant = hybrid_vehicle(odin(), paper_table3("shaft"), ledger=True)
@@ -242,7 +243,7 @@ def test_what_is_said_of_moving_weights(sets, said):
     assert ("only a run shows" in why_not) == (sets > 1)
 
 
-@pytest.mark.parametrize("bound", [None, 20.0])
+@pytest.mark.parametrize("bound", [pytest.param(None, marks=pytest.mark.slow), 20.0])
 def test_no_figure_is_predicted_that_the_law_forbids(bound):
     """W1: the linear model's robust term passes 10 m/s^2, which tanh cannot."""
     choices = {"composite": 20} | ({} if bound is None else {"weights_bound": bound})

@@ -80,7 +80,7 @@ def layouts(*quick):
     return [name if name in quick else pytest.param(name, marks=pytest.mark.slow) for name in LAYOUTS]
 
 
-@pytest.mark.parametrize("layout", layouts("one set", "state input"))
+@pytest.mark.parametrize("layout", layouts("one set"))
 def test_never_increases_for_constant_disturbance(rails, layout):
     worst, peak, error, d_til = watched(rails, layout)
     assert (worst <= 1e-10).all(), worst

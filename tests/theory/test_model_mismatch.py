@@ -73,7 +73,8 @@ def error(thruster, nominal, make=robust, navigation=None):
     return float(rms), float(swings)
 
 
-@pytest.mark.parametrize("make", [lagged, pytest.param(motor, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [lagged, motor])
 def test_a_lag_that_is_wrong_by_three_costs_little(make):
     """At most three times the error of the right nominal lag, and no limit cycle: the thrusters vary as they must."""
     cases = ((0.1, 0.03), (0.1, 0.3)) if make is lagged else ((0.05, 0.15),)

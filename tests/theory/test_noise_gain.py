@@ -35,7 +35,7 @@ def simulated(law_of, velocity, position=0.0):
     return law, found, float(drift.gain_of(law, outcome.signals["weights"][-1]).mean())
 
 
-SLOW = {"robust, with a tracking share", "Table 1 without robust term"}
+SLOW = {"robust, with a tracking share", "Table 1", "Table 1 without robust term"}
 NAMES = [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in LAWS]
 
 

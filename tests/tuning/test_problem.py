@@ -46,6 +46,7 @@ def axis():
     return found, Evaluation(found.training_loop, make, make(found.start), found.train)
 
 
+@pytest.mark.slow
 def test_slope_equals_finite_differences(axis):
     _, evaluation = axis
     point, step = np.array([0.5, 0.4]), 1e-5
