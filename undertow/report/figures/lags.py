@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
 
 from undertow.report.figures import style
 
@@ -55,10 +54,9 @@ def _of(rows: Rows, **where: str) -> list[Mapping[str, Any]]:
 
 
 def _logarithmic(panel: Axes) -> None:
-    for axis, scale in ((panel.xaxis, panel.set_xscale), (panel.yaxis, panel.set_yscale)):
-        scale("log")
-        axis.set_major_locator(LogLocator(numticks=5))
-        axis.set_minor_locator(NullLocator())
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    style.few_log_ticks(panel.xaxis, panel.yaxis)
 
 
 def _metric(panel: Axes, rows: Rows, metric: str, dashes: Sequence[Any]) -> None:
@@ -119,6 +117,5 @@ def drifting_figure(shown: Mapping[str, Any]) -> Figure:
         style.label(panel, "time, s", "", title, style.TINY)
     for panel in panels[1:]:
         panel.set_yscale("log")
-        panel.yaxis.set_major_locator(LogLocator(numticks=5))
-        panel.yaxis.set_minor_locator(NullLocator())
+        style.few_log_ticks(panel.yaxis)
     return figure

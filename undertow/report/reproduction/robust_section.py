@@ -56,11 +56,12 @@ def robust_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> l
         "in the folder of this page: `undertow simulate` with the file named below each controller. Each ablation is a "
         "file of campaigns/ for `undertow campaign`."
     )
-    levels = [tag("h3", "Fidelity levels"), tag("p", prose(text)), *_figure(figures, "robust_fidelity")]
     return [
         tag("p", prose(conditions)),
         *lists,
-        *levels,
+        tag("h3", "Fidelity levels"),
+        tag("p", prose(text)),
+        figures.get("robust_fidelity", Html("")),
         fidelity_table(results["fidelity"]),
         *_ablations(results, figures),
     ]
@@ -78,7 +79,7 @@ def _ablations(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[
         tag("h3", "Ablations"),
         tag("p", prose(text)),
         answers_table(results["ablations"]),
-        *_figure(figures, "ablations"),
+        figures.get("ablations", Html("")),
         tag("details", tag("summary", "Every variant in numbers"), numbers_table(results["ablations"])),
     ]
 
@@ -90,10 +91,6 @@ def _sentences(conclusions: list[str]) -> Html:
         about, rest = sentence.split(". ", 1)
         items.append(Html(f"<b>{prose(about)}.</b> {prose(rest)}"))
     return bullets(items)
-
-
-def _figure(figures: Mapping[str, Html], name: str) -> list[Html]:
-    return [figures[name]] if name in figures else []
 
 
 _FIDELITY = ("tracking_rms", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
@@ -108,7 +105,7 @@ def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
         steady = row["steady"] or {}
         place = tag("b", row["words"]) if row["words"] != last else ""
         last = row["words"]
-        ended = tag("span", ending(dict(row)), class_=f"chip {'holds' if row['status'] == 'completed' else 'fails'}")
+        ended = tag("span", ending(row), class_=f"chip {'holds' if row['status'] == 'completed' else 'fails'}")
         name = join(row["name"], tag("div", tag("code", row["scenario"]), class_="small"))
         shown.append((place, name, ended, *(number(steady.get(metric)) for metric in _FIDELITY)))
     head = (
