@@ -2,10 +2,11 @@
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Any
 
 from undertow.report.mathml import with_symbols
-from undertow.report.page import Html, join, tag, text
+from undertow.report.page import Html, join, marked, tag, text
 
 _DIGITS = 3
 _KINDS = {"holds": "holds", "fails": "fails", "open": "open"}
@@ -32,10 +33,11 @@ def percent(value: float | None) -> Html:
 
 def prose(content: Any) -> Html:
     """Plain text with formulas and symbols typeset, powers of units raised (m/s^2) and `code` set as code."""
-    parts = []
-    for number, part in enumerate(re.split(r"`([^`]+)`", content)) if not isinstance(content, Html) else ():
-        parts.append(tag("code", part) if number % 2 else _typeset(part))
-    return join(*parts) if parts else text(content)
+    return (
+        content
+        if isinstance(content, Html)
+        else marked(r"`([^`]+)`", content, lambda code: tag("code", code), _typeset)
+    )
 
 
 def _typeset(plain: str) -> Html:
@@ -64,7 +66,7 @@ def condition(verdict: str) -> str:
     return verdict.removeprefix("holds if").strip() if kind(verdict) == "partly" else ""
 
 
-def ending(entry: dict[str, Any]) -> str:
+def ending(entry: Mapping[str, Any]) -> str:
     """Status of a run, with the time if it ended early."""
     word, when = str(entry.get("status", "completed")).replace("_", " "), entry.get("diverged_at")
     return word if when is None else f"{word} at {when:.3g} s"
