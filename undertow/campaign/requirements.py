@@ -43,8 +43,7 @@ def too_few(campaign: Campaign) -> tuple[str, ...]:
     """A sentence for each requirement that the number of trials cannot demonstrate."""
     return tuple(
         f"`requirements.{name}.share` is {required.share:g}, which takes at least {enough(required.share)} trials "
-        "without a "
-        f"failure to demonstrate; `trials` is {campaign.trials}"
+        f"without a failure to demonstrate; `trials` is {campaign.trials}"
         for name, required in campaign.requirements.items()
         if campaign.trials < enough(required.share)
     )

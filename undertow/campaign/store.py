@@ -175,10 +175,8 @@ class Store:
             # In one write, so that no process is killed between two; and last, because growing may be interrupted.
             asked = {"campaign": identity.asked, "chunk": list(self.layout.chunk)}
             self._group.update_attributes({**attributes, **identity.attributes, **asked})
-        for (
-            name,
-            one,
-        ) in coordinates.items():  # always: an earlier process may have been killed before it wrote the values
+        # Always: an earlier process may have been killed before it wrote the values.
+        for name, one in coordinates.items():
             label = Label((name,), one.attrs, one.dtype.str)
             new_array(self._group, name, one.shape, one.shape, label)[:] = one.values
         if DONE not in self._arrays:

@@ -12,7 +12,7 @@ from undertow.analysis.metrics import gathered_meanings
 from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.campaign_schema import read_text
 from undertow.campaign.store_layout import Layout
-from undertow.campaign.trials import Trials, trials
+from undertow.campaign.trials import Trials, trials, varied_keys
 from undertow.core import runtime
 from undertow.core.errors import BadInput, within
 from undertow.core.metric import Metric
@@ -149,7 +149,7 @@ def _built(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Itera
 def _columns(several: Trials, rows: Sequence[int]) -> Iterable[tuple[str, np.ndarray]]:
     """Sampled values; the index of the choice where they are not numbers."""
     values = [several.values(row) for row in rows]
-    for key, entries in several.columns():
+    for key, entries in varied_keys(several.campaign):
         pick: Any = float if entries is None else list(entries.values()).index
         yield key, np.array([pick(one[key]) for one in values], dtype=float)
 

@@ -66,7 +66,7 @@ class Trials(NamedTuple):
 
     def alternatives(self) -> Iterator[dict[str, Any]]:
         """The scenario of the first trial with each entry of every choice that is not numeric."""
-        for key, entries in self.columns():
+        for key, entries in varied_keys(self.campaign):
             for entry in (entries or {}).values():
                 data = self.data(0)
                 _put(data, key, copy.deepcopy(entry))
@@ -74,19 +74,14 @@ class Trials(NamedTuple):
 
     def location(self, name: str) -> str:
         """Line that sets a key of the scenario: of the campaign file, or of the scenario's own."""
-        for section, keys in (("vary", self.campaign.vary), ("cross", self.campaign.cross)):
+        campaign = self.campaign
+        sections = {("vary",): campaign.vary, ("cross",): campaign.cross}
+        sections |= {("variants", variant): keys for variant, keys in campaign.variants.items()}
+        for section, keys in sections.items():
             for key in keys:
                 if name == key or name.startswith((f"{key}.", f"{key}[")):
-                    return self.text.where((section, key))
-        for variant, keys in self.campaign.variants.items():
-            for key in keys:
-                if name == key or name.startswith((f"{key}.", f"{key}[")):
-                    return self.text.where(("variants", variant, key))
+                    return self.text.where((*section, key))
         return self.scenario.location(name)
-
-    def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
-        """See `varied_keys`."""
-        return varied_keys(self.campaign)
 
 
 def varied_keys(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None]]:

@@ -54,11 +54,6 @@ class Scaled(AbstractDisturbance):
         return self.inner.jumps(duration)
 
 
-def scaled(inner: AbstractDisturbance, size) -> Scaled:
-    """A disturbance times a size, which may be traced."""
-    return Scaled(inner, jnp.asarray(size, dtype=float))
-
-
 # Compiling dominates a short tuning; a lower optimisation level halves its time at the same speed.
 _COMPILER = {"xla_backend_optimization_level": "1"}
 
@@ -89,7 +84,7 @@ class TrainingLoop(NamedTuple):
     def with_parts(self, plant: AbstractPlant, law: AbstractController, size: Any = 1.0) -> ClosedLoop:
         """The loop with a plant, a controller, and a scaled disturbance."""
         loop = self.loop
-        return ClosedLoop(plant, law, loop.reference, scaled(loop.disturbance, size), loop.navigation)
+        return ClosedLoop(plant, law, loop.reference, Scaled(loop.disturbance, size), loop.navigation)
 
     def run(
         self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""], smooth: bool = False
