@@ -25,14 +25,11 @@ _ON_GPU = 65_536
 # Control steps of the NumPy comparison, which is slow.
 _NUMPY_STEPS = 2_000
 
-Watch = Callable[[str, float], None]
+Watch = Callable[[str, float], None]  # called with the current stage and the share done
 
 
 def measure(watch: Watch) -> dict[str, Any]:
     """Nanoseconds per step, and per run where several execute at once; seconds of compiling; operations of one step.
-
-    Args:
-        watch: called with the current stage and the share done.
 
     Returns:
         Figures of W1 by their names, those of W2 under names that begin with `w2_`.

@@ -64,13 +64,7 @@ _DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "backend": "in
 
 
 def labels(several: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict[str, Label]:
-    """Labels of all columns, by name.
-
-    Args:
-        several: the trials.
-        built: one of them.
-        metrics: that any of them may have.
-    """
+    """Labels of all columns, by name; `built` is one of the trials, `metrics` are those that any of them may have."""
     found, along = trial_labels(several.campaign, metrics), (*several.campaign.axes, SAMPLES)
     loop = built.closed_loop
     for name in several.campaign.series.signals if several.campaign.series else ():
@@ -92,12 +86,7 @@ def trial_labels(campaign: Campaign, metrics: Mapping[str, Metric]) -> dict[str,
 
 
 def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
-    """Coordinates of the dimensions: values of `cross`, or their names; and those of recorded series.
-
-    Args:
-        several: the trials.
-        built: one of them.
-    """
+    """Coordinates of the dimensions: values of `cross`, or their names; and those of recorded series."""
     axes = several.campaign.axes
     found = {key: xr.Variable((key,), _swept(entries), {"long_name": key}) for key, entries in axes.items()}
     if several.campaign.series is None:

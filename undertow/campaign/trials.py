@@ -16,21 +16,13 @@ _PROBES = 4
 
 
 class Trials(NamedTuple):
-    """All trials by number: every combination of `cross` with the first sample, then with the next one, and so on.
-
-    Attributes:
-        campaign: the campaign.
-        text: text of the campaign file.
-        scenario: the scenario that it varies, and the folder of relative paths in it.
-        samples: points of the unit cube, for `vary`, and seeds.
-        combinations: values of `cross`, one tuple per combination.
-    """
+    """All trials by number: every combination of `cross` with the first sample, then with the next one, and so on."""
 
     campaign: Campaign
-    text: Text
-    scenario: Text
-    samples: Samples
-    combinations: tuple[tuple[Any, ...], ...]
+    text: Text  # of the campaign file
+    scenario: Text  # that it varies, and the folder of relative paths in it
+    samples: Samples  # points of the unit cube, for `vary`, and seeds
+    combinations: tuple[tuple[Any, ...], ...]  # values of `cross`, one tuple per combination
 
     @property
     def number(self) -> int:
@@ -92,12 +84,7 @@ def varied_keys(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None
 
 
 def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
-    """The trials of a campaign.
-
-    Args:
-        campaign: the campaign.
-        text: text of its file.
-        allow_code: whether the code that an earlier run.nc names may run, if the scenario is one.
+    """The trials of a campaign; `allow_code` lets the code run that an earlier run.nc names, if the scenario is one.
 
     Raises:
         BadInput: the scenario cannot be read, or there are too many trials.

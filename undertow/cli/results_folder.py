@@ -13,15 +13,10 @@ from undertow.core.errors import BadInput
 
 
 class Draft(NamedTuple):
-    """Results being written.
+    """Results being written."""
 
-    Attributes:
-        path: the staging folder.
-        publish: moves its contents to the results folder; it may be called again for later files.
-    """
-
-    path: Path
-    publish: Callable[[], None]
+    path: Path  # the staging folder
+    publish: Callable[[], None]  # moves its contents to the results folder; may be called again for later files
 
 
 @contextlib.contextmanager

@@ -24,7 +24,7 @@ _HIGHEST = 1.0  # frequency times sampling time: a third of the Nyquist frequenc
 _NOISE = 0.01  # m/s and rad/s, for gains per unit of noise
 _DEVIATIONS = 3.0  # standard deviations of noise between the input at rest and its limit
 
-Progress = Callable[[str, float], None]
+Progress = Callable[[str, float], None]  # called with a message and the share done
 
 
 class Point(NamedTuple):
@@ -83,12 +83,7 @@ class Prediction(NamedTuple):
 
 @in_its_precision
 def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
-    """Predict a scenario from its linearised closed loop.
-
-    Args:
-        built: the scenario.
-        progress: called with a message and the share done.
-    """
+    """Predict a scenario from its linearised closed loop."""
     progress("equilibrium", 0.0)
     known = operating_point(built)
     loop, settings = built.closed_loop, built.scenario.loop

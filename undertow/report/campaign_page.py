@@ -35,12 +35,6 @@ _INTERVALS = (
 def write_campaign(title: str, results: Results, found: Mapping[str, Any], folder: Path) -> tuple[Path, list[str]]:
     """Write `campaign.html`, and every figure as SVG and PNG into `figures/`; return a sentence for each failed figure.
 
-    Args:
-        title: title of the page.
-        results: the trials.
-        found: their summary.
-        folder: the results folder.
-
     Raises:
         OSError: the folder cannot be written.
     """

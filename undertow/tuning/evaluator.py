@@ -63,21 +63,12 @@ _WORKERS = 2
 
 
 class TrainingLoop(NamedTuple):
-    """Everything that stays the same while the gains change.
+    """Everything that stays the same while the gains change."""
 
-    Attributes:
-        loop: reference, disturbance and navigation; plant and controller are replaced.
-        settings: settings of the loop.
-        duration: duration of every run, s.
-        start: outputs at t = 0, and their rates.
-        sums: accumulator of the cost.
-        weights: weights of the cost.
-    """
-
-    loop: ClosedLoop
+    loop: ClosedLoop  # reference, disturbance and navigation; plant and controller are replaced
     settings: Loop
-    duration: float
-    start: tuple[Any, Any]
+    duration: float  # of every run, s
+    start: tuple[Any, Any]  # outputs at t = 0, and their rates
     sums: CostSums
     weights: Weights
 
