@@ -9,7 +9,6 @@ from undertow.report.mathml import with_symbols
 from undertow.report.page import Html, join, marked, tag, text
 
 _DIGITS = 3
-_KINDS = {"holds": "holds", "fails": "fails", "open": "open"}
 
 
 def number(value: Any, digits: int = _DIGITS) -> Html:
@@ -52,13 +51,15 @@ def unit(value: str) -> Html:
 
 def kind(verdict: str) -> str:
     """Class of a verdict: holds, partly, fails or open."""
-    return _KINDS.get(verdict, "partly" if verdict.startswith("holds") else "open")
+    if verdict in ("holds", "fails"):
+        return verdict
+    return "partly" if verdict.startswith("holds") else "open"
 
 
 def chip(verdict: str) -> Html:
     """A verdict in one or two words, coloured."""
-    word = {"partly": "holds if", "holds": "holds", "fails": "fails", "open": "open"}[kind(verdict)]
-    return tag("span", word, class_=f"chip {kind(verdict)}")
+    word = kind(verdict)
+    return tag("span", "holds if" if word == "partly" else word, class_=f"chip {word}")
 
 
 def condition(verdict: str) -> str:

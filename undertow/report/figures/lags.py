@@ -14,7 +14,7 @@ _METRICS = {
     "input_variation": "voltage variation, V/s",
     "weights_peak": "largest weight, m/s$^2$, rad/s$^2$",
 }
-_KINDS = {"lag": ("first-order lag, ms", 1e3), "winding": ("inductance of the winding, mH", 1e3)}
+_KINDS = {"lag": "first-order lag, ms", "winding": "inductance of the winding, mH"}
 _LAWS = {"five": ("five sets", "#0072b2", "o"), "one": ("one rule, same loop gain", "#e07b00", "s")}
 _DASHES = ((0, (1, 1.2)), (0, (4, 1.6)), "-")  # the shorter the horizon, the shorter the dashes
 
@@ -37,7 +37,7 @@ def lags_figure(rows: Rows, windows: Sequence[Sequence[float]]) -> Figure:
     figure = style.blank(9.6, 0.5 + 2.05 * len(kinds))
     style.head(figure, "Table 1 behind a lag", keys)
     for number, kind in enumerate(kinds):
-        words, _ = _KINDS[kind]
+        words = _KINDS[kind]
         top = 0.6 + 2.05 * number
         for column, (metric, title) in enumerate(_METRICS.items()):
             panel = style.place(figure, 0.56 + 2.38 * column, top, 1.75, 1.3)

@@ -88,6 +88,4 @@ def _titled(run: xr.Dataset, what: str) -> str:
 
 def _columns(count: int) -> int:
     """Three columns, or two where that fills the rows better."""
-    if count % 3 == 0:
-        return 3
-    return min(count, 2)
+    return 3 if count % 3 == 0 else min(count, 2)

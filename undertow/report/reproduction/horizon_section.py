@@ -6,8 +6,6 @@ from typing import Any
 from undertow.report.formats import number, prose, round_time
 from undertow.report.page import Html, join, table, tag
 
-FIGURES = ("horizons", "lags", "drifting")
-
 CAPTIONS = {
     "horizons": prose(
         "The upper panels show the largest weight against time; a cross marks a run that ended early. Thin grey lines "

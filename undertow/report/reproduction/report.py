@@ -17,13 +17,13 @@ from undertow.report.page import Html, bullets, document, figure, section, table
 from undertow.report.reproduction import horizon_section, tables
 from undertow.report.reproduction.background import ASSUMED, INTRODUCTION, LEFT_OPEN
 from undertow.report.reproduction.captions import captions
-from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, robust_section
+from undertow.report.reproduction.robust_section import CAPTIONS, TITLE, robust_section
 from undertow.reproduction.reproduce import Reproduction
 
 _TITLE = "Reproduction of the paper and check of its claims"
 
 # Figures with a section of their own; all others are in the first section.
-_ELSEWHERE = ("fidelity", "sweep", *horizon_section.FIGURES, *FIGURES)
+_ELSEWHERE = ("fidelity", "sweep", *horizon_section.CAPTIONS, *CAPTIONS)
 
 
 def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path) -> Path:

@@ -8,8 +8,6 @@ from undertow.report.formats import ending, number, prose, unit
 from undertow.report.page import Html, bullets, join, table, tag
 from undertow.reproduction.all_outputs import unit_of
 
-FIGURES = ("robust_fidelity", "ablations")
-
 TITLE = "The robust variant"
 
 CAPTIONS = {
@@ -95,7 +93,6 @@ def _sentences(conclusions: list[str]) -> Html:
 
 _FIDELITY = ("tracking_rms", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
 _KINDS = {"yes": "holds", "partly": "partly", "no": "fails"}
-_OWN_UNITS = {"share": "", "lost_axes": ""}
 
 
 def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
@@ -108,12 +105,8 @@ def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
         ended = tag("span", ending(row), class_=f"chip {'holds' if row['status'] == 'completed' else 'fails'}")
         name = join(row["name"], tag("div", tag("code", row["scenario"]), class_="small"))
         shown.append((place, name, ended, *(number(steady.get(metric)) for metric in _FIDELITY)))
-    head = (
-        "case",
-        "controller",
-        "status",
-        *(join(metric.replace("_", " "), " ", _unit(metric)) for metric in _FIDELITY),
-    )
+    metrics = (join(metric.replace("_", " "), " ", unit(unit_of(metric))) for metric in _FIDELITY)
+    head = ("case", "controller", "status", *metrics)
     return table(head, shown, numeric=range(3, 3 + len(_FIDELITY)), wide=True)
 
 
@@ -155,7 +148,3 @@ def _metric(name: str, spread: Mapping[str, float]) -> Html:
 
 def _number(value: float) -> Html:
     return number(value) if math.isfinite(value) else Html("&infin;")
-
-
-def _unit(metric: str) -> Html:
-    return unit(_OWN_UNITS[metric] if metric in _OWN_UNITS else unit_of(metric))
