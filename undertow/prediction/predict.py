@@ -31,20 +31,10 @@ class Point(NamedTuple):
     """One operating point."""
 
     share: float  # quantile of the load
-    at: Equilibrium
+    at: Equilibrium  # with its load, m/s^2 or rad/s^2, and its input
     used: float  # largest |u| as a share of its limit; 0 without a limit
     poles: np.ndarray  # 1/s
     radius: float  # spectral radius over one control step; stable below 1
-
-    @property
-    def load(self) -> np.ndarray:
-        """m/s^2, rad/s^2."""
-        return self.at.at["load"]
-
-    @property
-    def u(self) -> np.ndarray:
-        """Input at the operating point."""
-        return self.at.at["u"]
 
     @property
     def found(self) -> bool:
@@ -180,8 +170,8 @@ def summary(prediction: Prediction) -> dict[str, Any]:
         "points": [
             {
                 "share": point.share,
-                "load": point.load.tolist(),
-                "input": point.u.tolist(),
+                "load": point.at.at["load"].tolist(),
+                "input": point.at.at["u"].tolist(),
                 "input_used": point.used,
                 "held": point.found,
                 "spectral_radius": point.radius,
