@@ -46,11 +46,9 @@ class Identity(NamedTuple):
 
 
 def identity(asked: str, named: Sequence[Mapping[str, Any]]) -> Identity:
-    """Fingerprint of a campaign.
+    """Fingerprint of a campaign: of its complete file, and of scenarios with the contents of all files they name.
 
-    Args:
-        asked: the complete campaign file.
-        named: scenarios that include the contents of all files they name, because these may change too.
+    These files may change too.
     """
     deciding = {"campaign": _decisive(asked), "scenario": _as_floats(list(named))}
     hashes = {f"{name}_hash": text_hash(json.dumps(data, sort_keys=True)) for name, data in deciding.items()}

@@ -116,19 +116,15 @@ def _put(data: dict[str, Any], key: str, put: Any) -> None:
         if isinstance(inner, str):
             inner = {"kind": inner}
         elif inner is None and isinstance(following, int):
-            raise _no_list(node, step, key)
+            hint = nearest(str(step), node) or f"Give `{step}` in the scenario, with all its entries"
+            got = f"of `{step}`, which it does not have"
+            raise BadInput(key, "name an entry of a list of the scenario", got, hint=hint)
         elif inner is None:
             inner = {}
         node[step] = inner
         node = inner
     _entry(node, path[-1], key)
     node[path[-1]] = put
-
-
-def _no_list(node: Any, step: str | int, key: str) -> BadInput:
-    """The error for a key path that names an entry of a list the scenario does not have."""
-    hint = nearest(str(step), node) or f"Give `{step}` in the scenario, with all its entries"
-    return BadInput(key, "name an entry of a list of the scenario", f"of `{step}`, which it does not have", hint=hint)
 
 
 def _entry(node: Any, step: str | int, key: str) -> Any:

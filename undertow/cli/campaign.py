@@ -93,12 +93,7 @@ def refuse_second(argument: Path) -> NoReturn:
 
 
 def status(folder: Path, options: Sequence[str]) -> int:
-    """Print the progress of the campaign in a folder.
-
-    Args:
-        folder: the folder of the campaign.
-        options: options given by mistake; `status` takes none.
-    """
+    """Print the progress of the campaign in a folder; `options` are those given by mistake: `status` takes none."""
     if options:
         raise BadInput(options[0], "be left out with `status`", "given", hint="Run: undertow campaign status DIR")
     try:

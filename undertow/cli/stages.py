@@ -31,9 +31,7 @@ def stage(console: Console, name: str) -> Iterator[None]:
 def shares(console: Console, remaining: bool = False) -> Iterator[Callable[[str, float], None]]:
     """A function that shows a message and the share done: as a bar on a terminal, as lines elsewhere.
 
-    Args:
-        console: where to show it.
-        remaining: whether to show the remaining time too; for work that proceeds evenly.
+    The remaining time can be shown too, for work that proceeds evenly.
     """
     left = (TextColumn("left"), TimeRemainingColumn()) if remaining else ()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), *left)

@@ -139,7 +139,8 @@ class Evaluation:
         height, width = len(numbers), self._training.number
         rows = [(numbers + numbers[:1] * AT_ONCE)[i : i + AT_ONCE] for i in range(0, height, AT_ONCE)]
         columns = [[min(i + j, trials.number - 1) for j in range(width)] for i in range(0, trials.number, width)]
-        batches = [(_stacked(row), trials.part(np.array(column))) for row in rows for column in columns]
+        stacked = [jax.tree.map(lambda *each: jnp.stack(each), *row) for row in rows]
+        batches = [(laws_of_row, trials.part(np.array(column))) for laws_of_row in stacked for column in columns]
         done = list(self._pool.map(lambda batch: self._batch(*batch), batches))
         lines = [done[i : i + len(columns)] for i in range(0, len(done), len(columns))]
         blocks = [jax.tree.map(lambda *pieces: np.concatenate(pieces, axis=1), *line) for line in lines]
@@ -200,7 +201,3 @@ class Evaluation:
             if name not in self._programs:
                 self._programs[name] = self._compilers.submit(compiled)
             return self._programs[name]
-
-
-def _stacked(trees: Sequence[Any]) -> Any:
-    return jax.tree.map(lambda *each: jnp.stack(each), *trees)
