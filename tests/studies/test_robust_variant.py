@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from undertow.report.figures.ablations import ablations_figure
-from undertow.report.figures.robust_fidelity import robust_fidelity_figure
+from undertow.report.figures.fidelity import robust_fidelity_figure
 from undertow.report.reproduction.report import write_report
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions

@@ -19,7 +19,7 @@ from undertow.scenario.reading import from_data
 from undertow.sensors import depth, dvl, imu
 from undertow.thrusters import t200
 from undertow.tuning.checkpoint import Checkpoint
-from undertow.tuning.evaluator import Evaluation, scaled
+from undertow.tuning.evaluator import Evaluation, Scaled
 from undertow.tuning.objective import Objective
 from undertow.tuning.problem import problem
 from undertow.tuning.search import descend, search
@@ -168,7 +168,7 @@ def test_one_ode_is_not_what_a_vehicle_runs():
 def test_disturbance_of_another_size():
     inner = Together((sinusoid(2.0, 1.0), wrench([1.0] * 6), current([0.3, 0.1, 0.0])))
     place, calm = Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)), Load(jnp.ones(6), jnp.zeros(6))
-    half = scaled(inner, 0.5)
+    half = Scaled(inner, 0.5)
     one, two = (each.at(each.realize(jax.random.PRNGKey(0)), 0.7, place, calm) for each in (inner, half))
     np.testing.assert_allclose(two.acceleration - 1, 0.5 * (one.acceleration - 1))
     np.testing.assert_allclose(two.wrench, 0.5 * one.wrench)

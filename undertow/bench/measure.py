@@ -25,14 +25,11 @@ _ON_GPU = 65_536
 # Control steps of the NumPy comparison, which is slow.
 _NUMPY_STEPS = 2_000
 
-Watch = Callable[[str, float], None]
+Watch = Callable[[str, float], None]  # called with the current stage and the share done
 
 
 def measure(watch: Watch) -> dict[str, Any]:
     """Nanoseconds per step, and per run where several execute at once; seconds of compiling; operations of one step.
-
-    Args:
-        watch: called with the current stage and the share done.
 
     Returns:
         Figures of W1 by their names, those of W2 under names that begin with `w2_`.
@@ -110,7 +107,8 @@ def _many(kind: str, threads: int) -> dict[str, Any]:
         one = workload.workload(W1 | {"precision": kind})
         found = _prefixed(f"batch_{kind}_", _batch(one, threads, _BATCH))
     if jax.default_backend() == "gpu":
-        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(_short(one, 200), _ON_GPU)}
+        short = one._replace(plan=one.plan._replace(steps=200))
+        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(short, _ON_GPU)}
     driver = simd_batch.gpu()
     if driver is not None:
         found |= _prefixed(f"gpu_{kind}_", on_gpu(one, driver, _ON_GPU))
@@ -144,10 +142,6 @@ def vmapped_ns(one: Workload, runs: int) -> float:
     program = VmapBatchRunner(one.run, one.plan, width=runs)
     numbers = jax.tree.map(jnp.asarray, workload.several(one.run, runs))
     return _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)
-
-
-def _short(one: Workload, steps: int) -> Workload:
-    return one._replace(plan=one.plan._replace(steps=steps))
 
 
 def _prefixed(prefix: str, figures: dict[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The closed loop as a user would write it in plain NumPy: no classes, Euler angles, matrices, RK4 at 1 ms.
 
-It is the reference for speed (workload W1) and an independent solution for the tests: it shares no code with undertow.
+It is the reference for speed (workload W1) and, in the tests, for numbers: it shares no code with undertow.
 Vehicle ODIN (Antonelli 2006), motor of the paper's Table 3, gains of Table 1, suite U1.
 """
 
@@ -24,7 +24,7 @@ M_INV, B_PINV = np.linalg.inv(M), np.linalg.pinv(B)
 LINEAR, QUADRATIC = np.array([0, 0, 0, 30.0, 30.0, 30.0]), np.array([48.0, 48.0, 48.0, 80.0, 80.0, 80.0])
 W, BUOYANCY, Z_G = 1226.0, 1224.2, 0.05
 R, L, KT, KE, KF, J_ROTOR, CT, CQ = 1.2, 0.01, 1.27, 0.01086, 0.06, 0.01, 0.0375, 0.00232
-K2, K3 = KE + R * KF / KT, R / KT
+K3 = R / KT
 ALPHA = CT / (K3 * CQ)
 GOAL = np.array([2, 3, 4, np.pi / 3, np.pi / 4, 2 * np.pi / 5])
 CENTRES, WIDTH = np.linspace(-1, 1, 5), 0.5
@@ -94,31 +94,6 @@ def rk4(rate, t, y, h):
     k3 = rate(t + h / 2, move(k2, h / 2))
     k4 = rate(t + h, move(k3, h))
     return tuple(p + h / 6 * (a + 2 * b + 2 * c + d) for p, a, b, c, d in zip(y, k1, k2, k3, k4, strict=True))
-
-
-def paper_example(fidelity, composite, duration=20.0, h=1e-3, every=10):
-    """Examples 1 (`ideal`) and 2 (`static`) as one ODE: e, d_hat - d and u_r at 10 ms from 10 s on."""
-
-    def thrust(voltage):
-        if fidelity == "ideal":
-            return ALPHA * voltage
-        speed = 2 * voltage / (K2 + np.sqrt(K2**2 + 4 * K3 * CQ * np.abs(voltage)))
-        return CT * speed * np.abs(speed)
-
-    def rate(t, y):
-        eta, eta_dot = y[:2]
-        voltage, v_hat_dot, theta_dot, (_, _, _, known) = law(y[0], y[1], y[2], y[3], composite)
-        unexplained = jacobian(eta) @ M_INV @ B @ (thrust(voltage) - ALPHA * voltage)
-        return eta_dot, known + unexplained + suite_u1(t), v_hat_dot, theta_dot
-
-    y, kept = (np.zeros(6), np.zeros(6), np.zeros(6), np.zeros((6, 5))), []
-    for k in range(round(duration / h) + 1):
-        if k % every == 0 and k * h >= 10 - 1e-9:
-            voltage, _, _, (e, d_hat, u_r, _) = law(y[0], y[1], y[2], y[3], composite)
-            d = jacobian(y[0]) @ M_INV @ B @ (thrust(voltage) - ALPHA * voltage) + suite_u1(k * h)
-            kept.append((e, d_hat - d, u_r))
-        y = rk4(rate, k * h, y, h)
-    return tuple(np.array(series) for series in zip(*kept, strict=True))
 
 
 def workload_w1(steps=20_000, h=1e-3, composite=20.0, bound=20.0):

@@ -128,7 +128,9 @@ class ProgramCache:
             with runtime.in_precision(kind.precision):
                 pieces.append(self._together(kind, group))
         names = dict.fromkeys(name for piece in pieces for name in piece.metrics)
-        pieces = [piece._replace(metrics={name: _defined(piece, name) for name in names}) for piece in pieces]
+        # A law or a plant may have no metric of that name.
+        defined = lambda piece, name: piece.metrics.get(name, np.full(len(piece.status), np.nan))
+        pieces = [piece._replace(metrics={name: defined(piece, name) for name in names}) for piece in pieces]
         back = np.argsort([i for group in groups.values() for i in group.members])
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
@@ -170,11 +172,6 @@ class ProgramCache:
             if self._shared is None:
                 self._shared = shared_numbers(self._probes())
             return self._shared
-
-
-def _defined(piece: BatchResult, name: str) -> np.ndarray:
-    """A metric of some trials; NaN where their law or plant has none of that name."""
-    return piece.metrics.get(name, np.full(len(piece.status), np.nan))
 
 
 def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:

@@ -82,12 +82,7 @@ _WORST = 5
 
 
 def summary(results: Results, several: Trials) -> dict[str, Any]:
-    """The contents of summary.json.
-
-    Args:
-        results: results of the campaign.
-        several: its trials, to find out why some were invalid.
-    """
+    """The contents of summary.json; the trials tell why some were invalid."""
     invalid = results.rows["trial"].values[~results.ran]
     return {
         "trials": results.total,

@@ -64,13 +64,7 @@ _DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "backend": "in
 
 
 def labels(several: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict[str, Label]:
-    """Labels of all columns, by name.
-
-    Args:
-        several: the trials.
-        built: one of them.
-        metrics: that any of them may have.
-    """
+    """Labels of all columns, by name; `built` is one of the trials, `metrics` are those that any of them may have."""
     found, along = trial_labels(several.campaign, metrics), (*several.campaign.axes, SAMPLES)
     loop = built.closed_loop
     for name in several.campaign.series.signals if several.campaign.series else ():
@@ -83,18 +77,16 @@ def labels(several: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict
 def trial_labels(campaign: Campaign, metrics: Mapping[str, Metric]) -> dict[str, Label]:
     """Labels of the columns that hold a number for each trial, by name."""
     of_metrics = {name: _said(metric.meaning, metric.unit) for name, metric in metrics.items()}
-    of_trials = {f"vary:{key}": _varied(key, entries) for key, entries in varied_keys(campaign)} | ALWAYS | of_metrics
-    along = (*campaign.axes, SAMPLES)
+    sampled: dict[str, dict[str, Any]] = {
+        f"vary:{key}": {"long_name": key} if entries is None else {"long_name": key, "choices": list(entries)}
+        for key, entries in varied_keys(campaign)
+    }
+    along, of_trials = (*campaign.axes, SAMPLES), sampled | ALWAYS | of_metrics
     return {name: Label(along, said, _DTYPES.get(name, "float64")) for name, said in of_trials.items()}
 
 
 def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
-    """Coordinates of the dimensions: values of `cross`, or their names; and those of recorded series.
-
-    Args:
-        several: the trials.
-        built: one of them.
-    """
+    """Coordinates of the dimensions: values of `cross`, or their names; and those of recorded series."""
     axes = several.campaign.axes
     found = {key: xr.Variable((key,), _swept(entries), {"long_name": key}) for key, entries in axes.items()}
     if several.campaign.series is None:
@@ -109,9 +101,3 @@ def _swept(entries: dict[str, Any]) -> np.ndarray:
     if not named and all(isinstance(value, bool) for value in values):
         return np.array(values)
     return np.array(values, dtype=float) if not named and all(map(is_number, values)) else np.array(list(entries))
-
-
-def _varied(key: str, entries: dict[str, Any] | None) -> dict[str, Any]:
-    """Attributes of a sampled key; for a choice, the list of its entries."""
-    said = {"long_name": key}
-    return said if entries is None else said | {"choices": list(entries)}

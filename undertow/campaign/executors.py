@@ -31,12 +31,7 @@ _TURN = 2e-4
 
 @contextlib.contextmanager
 def chosen(where: str | None, count: int) -> Iterator[Executor]:
-    """The executor for a cluster, or threads where none is named.
-
-    Args:
-        where: see `cluster`; None for threads.
-        count: of threads or workers.
-    """
+    """The executor for a cluster (see `cluster`), or threads where none is named."""
     if where is None:
         yield functools.partial(in_threads, threads=count)
         return

@@ -13,22 +13,13 @@ from undertow.scenario.reading import parse
 
 
 class Identity(NamedTuple):
-    """What a store records about its campaign.
+    """What a store records about its campaign."""
 
-    Attributes:
-        asked: the complete campaign file; requirements may change.
-        attributes: attributes that must be equal in a store that is resumed.
-    """
-
-    asked: str
-    attributes: dict[str, str]
+    asked: str  # the complete campaign file; requirements may change
+    attributes: dict[str, str]  # must be equal in a store that is resumed
 
     def check_same(self, found: Mapping[str, Any], folder: Path) -> None:
-        """Check that a store belongs to this campaign, or to this campaign with fewer samples.
-
-        Args:
-            found: attributes of the store.
-            folder: folder of the store, for the message.
+        """Check by its attributes that the store in a folder belongs to this campaign, or to one with fewer samples.
 
         Raises:
             BadInput: it belongs to another campaign.
@@ -55,11 +46,9 @@ class Identity(NamedTuple):
 
 
 def identity(asked: str, named: Sequence[Mapping[str, Any]]) -> Identity:
-    """Fingerprint of a campaign.
+    """Fingerprint of a campaign: of its complete file, and of scenarios with the contents of all files they name.
 
-    Args:
-        asked: the complete campaign file.
-        named: scenarios that include the contents of all files they name, because these may change too.
+    These files may change too.
     """
     deciding = {"campaign": _decisive(asked), "scenario": _as_floats(list(named))}
     hashes = {f"{name}_hash": text_hash(json.dumps(data, sort_keys=True)) for name, data in deciding.items()}

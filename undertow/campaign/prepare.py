@@ -34,9 +34,7 @@ class Prepared(NamedTuple):
 def prepare(path: Path, allow_code: bool = False) -> Prepared:
     """Read a campaign and build the first trials of every combination, so that errors appear before the first run.
 
-    Args:
-        path: the campaign file.
-        allow_code: whether the code that an earlier run.nc names may run, if the scenario is one.
+    `allow_code` lets the code run that an earlier run.nc names, if the scenario is one.
 
     Raises:
         BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.

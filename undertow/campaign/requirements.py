@@ -12,14 +12,9 @@ _CONFIDENCE = 0.95
 
 
 def verdict(rows: xr.Dataset, name: str, required: Requirement) -> dict[str, Any]:
-    """Share of the trials that keep a requirement, with the interval of Clopper and Pearson (1934).
+    """Share of the trials that ran that keep a requirement, with the interval of Clopper and Pearson (1934).
 
     The interval is exact for random samples. Failed trials do not keep the requirement.
-
-    Args:
-        rows: rows of the trials that ran.
-        name: name of the metric.
-        required: the requirement.
     """
     kept, count = int((rows[name].values < required.below).sum()), max(1, rows.sizes["trial"])
     interval = binomtest(kept, count).proportion_ci(_CONFIDENCE, method="exact")
@@ -43,8 +38,7 @@ def too_few(campaign: Campaign) -> tuple[str, ...]:
     """A sentence for each requirement that the number of trials cannot demonstrate."""
     return tuple(
         f"`requirements.{name}.share` is {required.share:g}, which takes at least {enough(required.share)} trials "
-        "without a "
-        f"failure to demonstrate; `trials` is {campaign.trials}"
+        f"without a failure to demonstrate; `trials` is {campaign.trials}"
         for name, required in campaign.requirements.items()
         if campaign.trials < enough(required.share)
     )

@@ -33,17 +33,11 @@ class Tally(NamedTuple):
         return Tally(self.trials, self.done + len(status), self.failed + failed, self.invalid + invalid)
 
 
-Watch = Callable[[Tally], None]
+Watch = Callable[[Tally], None]  # called after each task
 
 
 def run_campaign(prepared: Prepared, out: Path, executor: Executor, watch: Watch) -> None:
-    """Run the missing tasks of a campaign.
-
-    Args:
-        prepared: the campaign.
-        out: folder of the store.
-        executor: runs the tasks.
-        watch: called after each task.
+    """Run the missing tasks of a campaign, with its store in the folder `out`.
 
     Raises:
         BadInput: the folder holds another campaign.

@@ -28,9 +28,6 @@ class Samples:
     Blocks are computed on demand, so that a billion samples take no memory. Only a Latin hypercube is computed as a
     whole.
 
-    Args:
-        campaign: number of samples, design and seed.
-
     Raises:
         BadInput: too many samples for a Latin hypercube.
     """

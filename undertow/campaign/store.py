@@ -78,15 +78,12 @@ def check_array(array: Any, label: Label, chunks: tuple[int, ...], path: Path) -
     chunks = (*chunks, *array.shape[len(chunks) :])
     made = new_array(zarr.open_group(MemoryStore()), "made", array.shape, chunks, label)
     found, expected = array.metadata.to_dict(), made.metadata.to_dict()
-    other = [key for key in expected | found if _written(found.get(key)) != _written(expected.get(key))]
+    written = lambda value: json.dumps(value, sort_keys=True, default=str)
+    other = [key for key in expected | found if written(found.get(key)) != written(expected.get(key))]
     if other:
         got = f"{path / array.basename / 'zarr.json'} with another {', '.join(other)}"
         hint = f"Restore it, or remove {array.basename}/ and use --resume to compute it again"
         raise BadInput("--out", "hold a store as it was written", got, hint=hint)
-
-
-def _written(value: Any) -> str:
-    return json.dumps(value, sort_keys=True, default=str)
 
 
 def flags(array: Any, count: int) -> np.ndarray:
@@ -175,10 +172,8 @@ class Store:
             # In one write, so that no process is killed between two; and last, because growing may be interrupted.
             asked = {"campaign": identity.asked, "chunk": list(self.layout.chunk)}
             self._group.update_attributes({**attributes, **identity.attributes, **asked})
-        for (
-            name,
-            one,
-        ) in coordinates.items():  # always: an earlier process may have been killed before it wrote the values
+        # Always: an earlier process may have been killed before it wrote the values.
+        for name, one in coordinates.items():
             label = Label((name,), one.attrs, one.dtype.str)
             new_array(self._group, name, one.shape, one.shape, label)[:] = one.values
         if DONE not in self._arrays:
@@ -202,11 +197,7 @@ class Store:
         return [task for task in range(self.layout.tasks) if not (done[task] and self._whole(task))]
 
     def write(self, task: int, columns: Mapping[str, np.ndarray]) -> None:
-        """Write all rows of a task.
-
-        Args:
-            task: its number.
-            columns: by name, one entry per trial.
+        """Write all rows of a task: columns by name, with one entry per trial.
 
         Raises:
             OSError: for example, the disk is full; the task then counts as not done.

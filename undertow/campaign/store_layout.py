@@ -12,17 +12,11 @@ SAMPLES = "sample"
 
 
 class Layout(NamedTuple):
-    """Axes of the store, cut into blocks.
+    """Axes of the store, cut into blocks."""
 
-    Attributes:
-        swept: number of values of every key of `cross`.
-        samples: number of samples.
-        chunk: size of a block along every axis, that of the samples last.
-    """
-
-    swept: tuple[int, ...]
+    swept: tuple[int, ...]  # number of values of every key of `cross`
     samples: int
-    chunk: tuple[int, ...]
+    chunk: tuple[int, ...]  # size of a block along every axis, that of the samples last
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ from undertow.analysis.metrics import gathered_meanings
 from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.campaign_schema import read_text
 from undertow.campaign.store_layout import Layout
-from undertow.campaign.trials import Trials, trials
+from undertow.campaign.trials import Trials, trials, varied_keys
 from undertow.core import runtime
 from undertow.core.errors import BadInput, within
 from undertow.core.metric import Metric
@@ -46,12 +46,7 @@ class Site(NamedTuple):
 
 @functools.lru_cache(maxsize=2)
 def site(text: str, folder: str) -> Site:
-    """The campaign in this process.
-
-    Args:
-        text: of the campaign file.
-        folder: where relative paths in it start.
-    """
+    """The campaign of this text in this process; relative paths in it start at the folder."""
     several, part_cache = trials(*read_text(text, Path(folder))), PartCache()
     rows = several.probes()
     probes = functools.cache(lambda: {rows[place]: built for place, built in _built(several, part_cache, rows)})
@@ -65,13 +60,7 @@ def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np
 
 
 def run_trials(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndarray]:
-    """Run trials and return their columns: sampled values, status and metrics.
-
-    Args:
-        text: text of the campaign file.
-        folder: folder of relative paths in it.
-        rows: numbers of the trials.
-    """
+    """Run the trials of these numbers and return their columns: sampled values, status and metrics."""
     with runtime.on_processor():
         return _ran(site(text, folder), rows)
 
@@ -149,7 +138,7 @@ def _built(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Itera
 def _columns(several: Trials, rows: Sequence[int]) -> Iterable[tuple[str, np.ndarray]]:
     """Sampled values; the index of the choice where they are not numbers."""
     values = [several.values(row) for row in rows]
-    for key, entries in several.columns():
+    for key, entries in varied_keys(several.campaign):
         pick: Any = float if entries is None else list(entries.values()).index
         yield key, np.array([pick(one[key]) for one in values], dtype=float)
 

@@ -16,21 +16,13 @@ _PROBES = 4
 
 
 class Trials(NamedTuple):
-    """All trials by number: every combination of `cross` with the first sample, then with the next one, and so on.
-
-    Attributes:
-        campaign: the campaign.
-        text: text of the campaign file.
-        scenario: the scenario that it varies, and the folder of relative paths in it.
-        samples: points of the unit cube, for `vary`, and seeds.
-        combinations: values of `cross`, one tuple per combination.
-    """
+    """All trials by number: every combination of `cross` with the first sample, then with the next one, and so on."""
 
     campaign: Campaign
-    text: Text
-    scenario: Text
-    samples: Samples
-    combinations: tuple[tuple[Any, ...], ...]
+    text: Text  # of the campaign file
+    scenario: Text  # that it varies, and the folder of relative paths in it
+    samples: Samples  # points of the unit cube, for `vary`, and seeds
+    combinations: tuple[tuple[Any, ...], ...]  # values of `cross`, one tuple per combination
 
     @property
     def number(self) -> int:
@@ -66,7 +58,7 @@ class Trials(NamedTuple):
 
     def alternatives(self) -> Iterator[dict[str, Any]]:
         """The scenario of the first trial with each entry of every choice that is not numeric."""
-        for key, entries in self.columns():
+        for key, entries in varied_keys(self.campaign):
             for entry in (entries or {}).values():
                 data = self.data(0)
                 _put(data, key, copy.deepcopy(entry))
@@ -74,19 +66,14 @@ class Trials(NamedTuple):
 
     def location(self, name: str) -> str:
         """Line that sets a key of the scenario: of the campaign file, or of the scenario's own."""
-        for section, keys in (("vary", self.campaign.vary), ("cross", self.campaign.cross)):
+        campaign = self.campaign
+        sections = {("vary",): campaign.vary, ("cross",): campaign.cross}
+        sections |= {("variants", variant): keys for variant, keys in campaign.variants.items()}
+        for section, keys in sections.items():
             for key in keys:
                 if name == key or name.startswith((f"{key}.", f"{key}[")):
-                    return self.text.where((section, key))
-        for variant, keys in self.campaign.variants.items():
-            for key in keys:
-                if name == key or name.startswith((f"{key}.", f"{key}[")):
-                    return self.text.where(("variants", variant, key))
+                    return self.text.where((*section, key))
         return self.scenario.location(name)
-
-    def columns(self) -> Iterator[tuple[str, dict[str, Any] | None]]:
-        """See `varied_keys`."""
-        return varied_keys(self.campaign)
 
 
 def varied_keys(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None]]:
@@ -97,12 +84,7 @@ def varied_keys(campaign: Campaign) -> Iterator[tuple[str, dict[str, Any] | None
 
 
 def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
-    """The trials of a campaign.
-
-    Args:
-        campaign: the campaign.
-        text: text of its file.
-        allow_code: whether the code that an earlier run.nc names may run, if the scenario is one.
+    """The trials of a campaign; `allow_code` lets the code run that an earlier run.nc names, if the scenario is one.
 
     Raises:
         BadInput: the scenario cannot be read, or there are too many trials.
@@ -134,19 +116,15 @@ def _put(data: dict[str, Any], key: str, put: Any) -> None:
         if isinstance(inner, str):
             inner = {"kind": inner}
         elif inner is None and isinstance(following, int):
-            raise _no_list(node, step, key)
+            hint = nearest(str(step), node) or f"Give `{step}` in the scenario, with all its entries"
+            got = f"of `{step}`, which it does not have"
+            raise BadInput(key, "name an entry of a list of the scenario", got, hint=hint)
         elif inner is None:
             inner = {}
         node[step] = inner
         node = inner
     _entry(node, path[-1], key)
     node[path[-1]] = put
-
-
-def _no_list(node: Any, step: str | int, key: str) -> BadInput:
-    """The error for a key path that names an entry of a list the scenario does not have."""
-    hint = nearest(str(step), node) or f"Give `{step}` in the scenario, with all its entries"
-    return BadInput(key, "name an entry of a list of the scenario", f"of `{step}`, which it does not have", hint=hint)
 
 
 def _entry(node: Any, step: str | int, key: str) -> Any:

@@ -10,7 +10,7 @@ from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
-from undertow.cli.tables import wide_console
+from undertow.cli.tables import titled, wide_console
 from undertow.prediction.predict import predict, summary
 from undertow.prediction.warnings import advice
 from undertow.report.prediction_page import Rows, tables, write_prediction
@@ -47,14 +47,8 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool)
 
 
 def _table(rows: Rows) -> Table:
-    table = Table(
-        *rows.head,
-        title=rows.title,
-        title_justify="left",
-        title_style="bold",
-        caption=rows.sentence,
-        caption_justify="left",
-    )
+    table = titled(rows.title, *rows.head)
+    table.caption, table.caption_justify = rows.sentence, "left"
     for row in rows.rows:
         table.add_row(*map(Text, row))
     return table

@@ -10,7 +10,7 @@ from undertow.bench.measure import measure
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.stages import shares
-from undertow.cli.tables import wide_console
+from undertow.cli.tables import numbers, titled, wide_console
 
 _ROWS = {
     "single_ns": "one run, SIMD backend",
@@ -64,12 +64,9 @@ def bench(as_json: bool) -> int:
 def _table(words: str, found: dict[str, Any], prefix: str) -> Table:
     """One workload, with ratios to plain NumPy where that was measured."""
     steps = f"{found[f'{prefix}steps']} steps, SIMD width {found['simd_width']}, {found['threads']} threads"
-    table = Table(title=f"{words}: nanoseconds per step and run ({steps})", title_justify="left", title_style="bold")
-    table.add_column("execution")
-    table.add_column("ns", justify="right")
     compared = f"{prefix}numpy_ns" in found
-    if compared:
-        table.add_column("speed-up over NumPy", justify="right")
+    columns = map(numbers, ("ns", "speed-up over NumPy") if compared else ("ns",))
+    table = titled(f"{words}: nanoseconds per step and run ({steps})", "execution", *columns)
     for key, row in _ROWS.items():
         if (value := found.get(f"{prefix}{key}")) is not None:
             ratio = (f"{found[f'{prefix}numpy_ns'] / value:.3g}",) if compared else ()

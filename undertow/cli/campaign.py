@@ -23,8 +23,8 @@ from undertow.cli import results_folder
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder
-from undertow.cli.stages import Stages, shares
-from undertow.cli.tables import wide_console
+from undertow.cli.stages import shares, stage
+from undertow.cli.tables import titled, wide_console
 from undertow.core import checks
 from undertow.core.disk import alone
 from undertow.core.errors import BadInput
@@ -52,8 +52,7 @@ def campaign(
     with output_folder(out or (first if resume else None), first) as folder:
         check_folder(folder, resume, overwrite)
         console = wide_console()
-        stages = Stages(console)
-        with stages("building first trials"):
+        with stage(console, "building first trials"):
             prepared = interruptible(lambda: prepare(path, allow_code))
         for sentence in prepared.advice:
             typer.echo(f"Advice: {sentence}", err=True)
@@ -66,12 +65,12 @@ def campaign(
                 if (folder / STORE).is_dir():
                     typer.echo(f"Stopped. To resume: undertow campaign {path} --out {folder} --resume", err=True)
                 raise
-        return _conclude(console, stages, prepared, folder)
+        return _conclude(console, prepared, folder)
 
 
-def _conclude(console: Console, stages: Stages, prepared: Prepared, folder: Path) -> int:
+def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
     """Write page, summary and the scenarios of the worst trials; print the summary."""
-    with stages("summary and page"):
+    with stage(console, "summary and page"):
         results = load(folder)
         found = summary(results, prepared.trials)
         (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
@@ -94,12 +93,7 @@ def refuse_second(argument: Path) -> NoReturn:
 
 
 def status(folder: Path, options: Sequence[str]) -> int:
-    """Print the progress of the campaign in a folder.
-
-    Args:
-        folder: the folder of the campaign.
-        options: options given by mistake; `status` takes none.
-    """
+    """Print the progress of the campaign in a folder; `options` are those given by mistake: `status` takes none."""
     if options:
         raise BadInput(options[0], "be left out with `status`", "given", hint="Run: undertow campaign status DIR")
     try:
@@ -172,20 +166,15 @@ def clear_folder(folder: Path) -> None:
         return
     with alone(folder / STORE):
         for name in _WRITTEN:
-            target = folder / name
-            shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
+            results_folder.remove(folder / name)
 
 
 def table(results: Results, found: dict) -> Table:
     """One row per combination of the swept values."""
-    table = Table(title="Median [5 %, 95 %] of completed trials", title_justify="left", title_style="bold")
-    swept = list(results.campaign.axes)
+    swept, shown = list(results.campaign.axes), [*results.tracking, "input_rms"]
     counts = ("trials", "failed", "invalid") if found["invalid"] else ("trials", "failed")
-    for column in (*swept, *counts, "within"):
-        table.add_column(column)
-    shown = [*results.tracking, "input_rms"]
-    for name in shown:
-        table.add_column(f"{name.replace('_', ' ')}, {for_people(0.0, results.unit(name))[1]}")
+    metrics = (f"{name.replace('_', ' ')}, {for_people(0.0, results.unit(name))[1]}" for name in shown)
+    table = titled("Median [5 %, 95 %] of completed trials", *swept, *counts, "within", *metrics)
     for one in found["combinations"]:
         cells = [_spread(one["metrics"].get(name), results.unit(name)) for name in shown]
         table.add_row(

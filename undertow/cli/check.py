@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
-from rich.table import Table
 from rich.text import Text
 
 from undertow.checks import check as checks
 from undertow.cli.exit_codes import BAD_INPUT, DONE
-from undertow.cli.tables import wide_console
+from undertow.cli.tables import titled, wide_console
 from undertow.core.errors import BadInput
 from undertow.scenario.yaml_text import load
 
@@ -20,7 +19,7 @@ def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
     for sentence in report.sentences:
         print(sentence)
     for title, rows in report.tables:
-        table = Table("", "value", "unit", title=title, title_justify="left", title_style="bold")
+        table = titled(title, "", "value", "unit")
         for row in rows:
             table.add_row(*map(Text, row))
         console.print(table)

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
-from undertow.cli.tables import wide_console
+from undertow.cli.tables import titled, wide_console
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.signals import Signal
@@ -59,9 +59,7 @@ def _show_signals(console: Console, title: str, declared: Mapping[str, Signal]) 
 
 
 def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for column in columns:
-        table.add_column(column, overflow="fold")
+    table = titled(title, *(Column(name, overflow="fold") for name in columns))
     for row in rows:
         table.add_row(*map(Text, row))
     console.print(table)

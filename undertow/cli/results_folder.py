@@ -13,15 +13,10 @@ from undertow.core.errors import BadInput
 
 
 class Draft(NamedTuple):
-    """Results being written.
+    """Results being written."""
 
-    Attributes:
-        path: the staging folder.
-        publish: moves its contents to the results folder; it may be called again for later files.
-    """
-
-    path: Path
-    publish: Callable[[], None]
+    path: Path  # the staging folder
+    publish: Callable[[], None]  # moves its contents to the results folder; may be called again for later files
 
 
 @contextlib.contextmanager
@@ -162,10 +157,10 @@ def _publish(staging: Path, folder: Path, names: Sequence[str], marker: str) -> 
         new = sorted((path.name for path in staging.iterdir()), key=lambda name: name == marker)
         stale = [name for name in names if name not in new] if marker in new else []
         for name in stale:
-            _remove(folder / name)
+            remove(folder / name)
         for name in new:
             if (folder / name).is_dir():
-                _remove(folder / name)
+                remove(folder / name)
             os.replace(staging / name, folder / name)
     else:
         os.replace(staging, folder)
@@ -174,5 +169,6 @@ def _publish(staging: Path, folder: Path, names: Sequence[str], marker: str) -> 
     sync(folder.parent)
 
 
-def _remove(path: Path) -> None:
+def remove(path: Path) -> None:
+    """Remove a file, or a folder with all it holds, if there is one."""
     shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple, TypeVar
 import typer
 from rich.console import Console
 
-from undertow.analysis.linearization.response import Comparison, compare_metrics
+from undertow.analysis.linearization.response import compare_metrics
 from undertow.checks.vehicle_lint import vehicle_warnings
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.stages import Stages
+from undertow.cli.stages import stage
 from undertow.cli.tables import certificate_table, metrics_table, wide_console
 from undertow.core.status import Status
 from undertow.core.user_code import python_says
@@ -37,13 +37,12 @@ class PredictedMetrics(NamedTuple):
 def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool) -> int:
     """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
     console = wide_console()
-    stages = Stages(console)
     with (
         output_folder(out, Path("runs") / scenario.stem) as folder,
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
     ):
-        executed, predicted = _run(scenario, stages, prediction, allow_code)
-        with stages("files and figures"):
+        executed, predicted = _run(scenario, console, prediction, allow_code)
+        with stage(console, "files and figures"):
             _write(executed, predicted, draft.path)
             repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # before the figures, which may fail
@@ -65,14 +64,14 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
     return max(codes)
 
 
-def _run(path: Path, stages: Stages, prediction: bool, allow_code: bool) -> tuple[Executed, PredictedMetrics | None]:
-    with stages("reading"):
+def _run(path: Path, console: Console, prediction: bool, allow_code: bool) -> tuple[Executed, PredictedMetrics | None]:
+    with stage(console, "reading"):
         text = read(path, allow_code=allow_code)
-    with stages("building"):
+    with stage(console, "building"):
         built = build(text)
     for sentence in (*built.advice(), *vehicle_warnings(built)):
         typer.echo(f"Advice: {sentence}", err=True)
-    with stages("compiling, running and predicting" if prediction else "compiling and running"):
+    with stage(console, "compiling, running and predicting" if prediction else "compiling and running"):
         return interruptible(lambda: with_prediction(lambda: execute(built), built, prediction))
 
 
@@ -120,18 +119,15 @@ def with_prediction(work: Callable[[], Result], built: Built, enabled: bool) -> 
         return work(), predicting.result()
 
 
-def departures(predicted: PredictedMetrics, executed: Executed) -> list[Comparison]:
-    """Metrics that depart by more than a tenth from the predicted ones."""
-    return [one for one in _compared(predicted, executed) if one.name not in _PEAKS and one.departure > _DEPARTS]
-
-
 def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
     """One sentence that compares the run with its prediction."""
     if predicted.metrics is None:
         return f"No prediction: {predicted.why_not}"
     if executed.steady is None:
         return "The prediction is for the steady window, which the run did not reach"
-    departing = departures(predicted, executed)
+    zero = _NOTHING * max(predicted.metrics.values())
+    compared = [one for one in compare_metrics(predicted.metrics, executed.steady) if one.measured > zero]
+    departing = [one for one in compared if one.name not in _PEAKS and one.departure > _DEPARTS]
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"
     named = ", ".join(f"{one.name} by {one.departure:.0%}" for one in departing)
@@ -151,13 +147,6 @@ def _predict(built: Built) -> PredictedMetrics:
         return PredictedMetrics(*predicted(operating_point(built)))
     except Exception as error:  # a user's part may run and yet not be differentiable
         return PredictedMetrics(None, f"this loop cannot be linearised: {python_says(error)}")
-
-
-def _compared(predicted: PredictedMetrics, executed: Executed) -> list[Comparison]:
-    if predicted.metrics is None or executed.steady is None:
-        return []
-    largest = max(predicted.metrics.values())
-    return [one for one in compare_metrics(predicted.metrics, executed.steady) if one.measured > _NOTHING * largest]
 
 
 def _because(steady: dict[str, Any]) -> str:

@@ -16,30 +16,22 @@ from rich.progress import (
 )
 
 
-class Stages:
-    """Shows the stage in progress with its elapsed time, and leaves one line for each finished stage."""
-
-    def __init__(self, console: Console):
-        self.console = console
-
-    @contextlib.contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        """One stage. A stage that fails leaves no line."""
-        started = time.perf_counter()
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-        with Progress(*columns, console=self.console, transient=True, disable=not self.console.is_terminal) as live:
-            live.add_task(name)
-            yield
-        self.console.print(f"{name:<24}{time.perf_counter() - started:6.1f} s", highlight=False)
+@contextlib.contextmanager
+def stage(console: Console, name: str) -> Iterator[None]:
+    """Show a stage with its elapsed time, and leave one line when it is finished; none if it fails."""
+    started = time.perf_counter()
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
+        live.add_task(name)
+        yield
+    console.print(f"{name:<24}{time.perf_counter() - started:6.1f} s", highlight=False)
 
 
 @contextlib.contextmanager
 def shares(console: Console, remaining: bool = False) -> Iterator[Callable[[str, float], None]]:
     """A function that shows a message and the share done: as a bar on a terminal, as lines elsewhere.
 
-    Args:
-        console: where to show it.
-        remaining: whether to show the remaining time too; for work that proceeds evenly.
+    The remaining time can be shown too, for work that proceeds evenly.
     """
     left = (TextColumn("left"), TimeRemainingColumn()) if remaining else ()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), *left)

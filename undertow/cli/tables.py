@@ -4,10 +4,20 @@ from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from undertow.analysis.metrics import for_people
 from undertow.core.metric import Metric
+
+
+def titled(title: str, *columns: str | Column) -> Table:
+    """An empty table with its title at the left."""
+    return Table(*columns, title=title, title_justify="left", title_style="bold")
+
+
+def numbers(title: str) -> Column:
+    """A column of numbers, set to the right."""
+    return Column(title, justify="right")
 
 
 def metrics_table(
@@ -18,13 +28,9 @@ def metrics_table(
     predicted: dict[str, float] | None = None,
 ) -> Table:
     """Predicted and measured metrics of the steady window, and the metrics of the whole run."""
-    table = Table(title="Metrics", title_justify="left", title_style="bold")
-    table.add_column("metric")
-    if predicted:
-        table.add_column("predicted", justify="right")
-    table.add_column(f"{window[0]:g} to {window[1]:g} s", justify="right")
-    table.add_column("whole run", justify="right")
-    table.add_column("unit")
+    first = [numbers("predicted")] if predicted else []
+    late = numbers(f"{window[0]:g} to {window[1]:g} s")
+    table = titled("Metrics", "metric", *first, late, numbers("whole run"), "unit")
     for name, metric in known.items():
         if name in whole:
             said = lambda values, name=name, metric=metric: _number(for_people(values[name], metric.unit)[0])
@@ -36,11 +42,8 @@ def metrics_table(
 
 def certificate_table(certificate: dict[str, Any], window: tuple[float, float]) -> Table:
     """The share of the time for which each hypothesis of the stability proof held, and its first failure."""
-    table = Table(title="Certificate: hypotheses of the stability proof", title_justify="left", title_style="bold")
-    table.add_column("hypothesis")
-    table.add_column(f"{window[0]:g} to {window[1]:g} s", justify="right")
-    table.add_column("whole run", justify="right")
-    table.add_column("first fails at", justify="right")
+    columns = map(numbers, (f"{window[0]:g} to {window[1]:g} s", "whole run", "first fails at"))
+    table = titled("Certificate: hypotheses of the stability proof", "hypothesis", *columns)
     for one in certificate["hypotheses"]:
         if one["whole"] is None:
             table.add_row(one["sentence"], "-", "-", one["unknown"])

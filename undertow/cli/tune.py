@@ -13,7 +13,7 @@ from rich.table import Table
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.tables import wide_console
+from undertow.cli.tables import numbers, titled, wide_console
 from undertow.core import checks
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
@@ -105,9 +105,8 @@ def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], Non
 
 
 def _table(found: Tuned) -> Table:
-    table = Table(title="Cost, mean over runs", title_justify="left", title_style="bold")
-    for column in ("gains", "training", "held out", "tracking", "effort", "variation", "failure", "spectral radius"):
-        table.add_column(column, justify="left" if column == "gains" else "right")
+    columns = ("training", "held out", "tracking", "effort", "variation", "failure", "spectral radius")
+    table = titled("Cost, mean over runs", "gains", *map(numbers, columns))
     for one in found.evaluated:
         parts = [f"{float(part.mean()):.4g}" for part in one.held_out]
         table.add_row(

@@ -16,7 +16,6 @@ from undertow.core.contracts import AbstractController
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
 
-_HELD = "at fixed weights"
 _MAX_STEPS = 200_000  # largest number of predicted steps
 
 
@@ -56,15 +55,11 @@ def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
         return None, f"the loop has no equilibrium under the mean load: a state still changes by {rate}"
     if known.radius >= 1:
         pole = margins.poles(known.linear)[0]
-        moving = (
-            "; adapting weights may change that, which only a run shows"
-            if theory_of(known.built.closed_loop.controller).adapts
-            else ""
-        )
-        return (
-            None,
-            f"the loop linearised {_HELD} is unstable: rightmost pole {pole.real:+.3g} {_turning(pole)}1/s{moving}",
-        )
+        turning = f"+- {abs(pole.imag):.3g}j " if pole.imag else ""
+        why_not = f"the loop linearised at fixed weights is unstable: rightmost pole {pole.real:+.3g} {turning}1/s"
+        if theory_of(known.built.closed_loop.controller).adapts:
+            why_not += "; adapting weights may change that, which only a run shows"
+        return None, why_not
     start, stop = known.built.window()
     settings = known.built.scenario.loop
     every = max(1, round(settings.record / settings.dt))
@@ -93,7 +88,3 @@ def _start(known: OperatingPoint) -> list[np.ndarray]:
     outputs = loop.outputs_at_start(initial.position, initial.velocity)
     realization = loop.realize(key_of_seed(known.built.scenario.seed))
     return [np.asarray(ravel_pytree(state)[0]) for state in realization.start(*outputs)]
-
-
-def _turning(pole: complex) -> str:
-    return f"+- {abs(pole.imag):.3g}j " if pole.imag else ""

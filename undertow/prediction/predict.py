@@ -24,27 +24,17 @@ _HIGHEST = 1.0  # frequency times sampling time: a third of the Nyquist frequenc
 _NOISE = 0.01  # m/s and rad/s, for gains per unit of noise
 _DEVIATIONS = 3.0  # standard deviations of noise between the input at rest and its limit
 
-Progress = Callable[[str, float], None]
+Progress = Callable[[str, float], None]  # called with a message and the share done
 
 
 class Point(NamedTuple):
     """One operating point."""
 
     share: float  # quantile of the load
-    at: Equilibrium
+    at: Equilibrium  # with its load, m/s^2 or rad/s^2, and its input
     used: float  # largest |u| as a share of its limit; 0 without a limit
     poles: np.ndarray  # 1/s
     radius: float  # spectral radius over one control step; stable below 1
-
-    @property
-    def load(self) -> np.ndarray:
-        """m/s^2, rad/s^2."""
-        return self.at.at["load"]
-
-    @property
-    def u(self) -> np.ndarray:
-        """Input at the operating point."""
-        return self.at.at["u"]
 
     @property
     def found(self) -> bool:
@@ -83,12 +73,7 @@ class Prediction(NamedTuple):
 
 @in_its_precision
 def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
-    """Predict a scenario from its linearised closed loop.
-
-    Args:
-        built: the scenario.
-        progress: called with a message and the share done.
-    """
+    """Predict a scenario from its linearised closed loop."""
     progress("equilibrium", 0.0)
     known = operating_point(built)
     loop, settings = built.closed_loop, built.scenario.loop
@@ -185,8 +170,8 @@ def summary(prediction: Prediction) -> dict[str, Any]:
         "points": [
             {
                 "share": point.share,
-                "load": point.load.tolist(),
-                "input": point.u.tolist(),
+                "load": point.at.at["load"].tolist(),
+                "input": point.at.at["u"].tolist(),
                 "input_used": point.used,
                 "held": point.found,
                 "spectral_radius": point.radius,

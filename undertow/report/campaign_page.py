@@ -35,12 +35,6 @@ _INTERVALS = (
 def write_campaign(title: str, results: Results, found: Mapping[str, Any], folder: Path) -> tuple[Path, list[str]]:
     """Write `campaign.html`, and every figure as SVG and PNG into `figures/`; return a sentence for each failed figure.
 
-    Args:
-        title: title of the page.
-        results: the trials.
-        found: their summary.
-        folder: the results folder.
-
     Raises:
         OSError: the folder cannot be written.
     """
@@ -91,8 +85,9 @@ def _how(found: Mapping[str, Any]) -> Html:
 def _plots(results: Results, found: Mapping[str, Any]) -> Plots:
     """What makes each figure; nothing where there is nothing to sample."""
     values, units = _values(results, found), {metric: results.unit(metric) for metric in results.metrics}
+    ran = {named(one): one["trials"] - one["invalid"] for one in found["combinations"]}
     figures = {
-        "distributions": (lambda: distributions_figure(values, _ran(found), units)) if values else None,
+        "distributions": (lambda: distributions_figure(values, ran, units)) if values else None,
         "sensitivity": (lambda: sensitivity_figure(found["sensitivity"])) if found["sensitivity"] else None,
     }
     return {name: make for name, make in figures.items() if make is not None}
@@ -104,10 +99,6 @@ def _figures(saved: Saved) -> dict[str, Html]:
         name: figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
         for name, vector in saved.vectors.items()
     }
-
-
-def _ran(found: Mapping[str, Any]) -> dict[str, int]:
-    return {named(one): one["trials"] - one["invalid"] for one in found["combinations"]}
 
 
 def _values(results: Results, found: Mapping[str, Any]) -> dict[str, dict[str, np.ndarray]]:

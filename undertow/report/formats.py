@@ -2,13 +2,13 @@
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Any
 
 from undertow.report.mathml import with_symbols
-from undertow.report.page import Html, join, tag, text
+from undertow.report.page import Html, join, marked, tag, text
 
 _DIGITS = 3
-_KINDS = {"holds": "holds", "fails": "fails", "open": "open"}
 
 
 def number(value: Any, digits: int = _DIGITS) -> Html:
@@ -32,10 +32,11 @@ def percent(value: float | None) -> Html:
 
 def prose(content: Any) -> Html:
     """Plain text with formulas and symbols typeset, powers of units raised (m/s^2) and `code` set as code."""
-    parts = []
-    for number, part in enumerate(re.split(r"`([^`]+)`", content)) if not isinstance(content, Html) else ():
-        parts.append(tag("code", part) if number % 2 else _typeset(part))
-    return join(*parts) if parts else text(content)
+    return (
+        content
+        if isinstance(content, Html)
+        else marked(r"`([^`]+)`", content, lambda code: tag("code", code), _typeset)
+    )
 
 
 def _typeset(plain: str) -> Html:
@@ -50,13 +51,15 @@ def unit(value: str) -> Html:
 
 def kind(verdict: str) -> str:
     """Class of a verdict: holds, partly, fails or open."""
-    return _KINDS.get(verdict, "partly" if verdict.startswith("holds") else "open")
+    if verdict in ("holds", "fails"):
+        return verdict
+    return "partly" if verdict.startswith("holds") else "open"
 
 
 def chip(verdict: str) -> Html:
     """A verdict in one or two words, coloured."""
-    word = {"partly": "holds if", "holds": "holds", "fails": "fails", "open": "open"}[kind(verdict)]
-    return tag("span", word, class_=f"chip {kind(verdict)}")
+    word = kind(verdict)
+    return tag("span", "holds if" if word == "partly" else word, class_=f"chip {word}")
 
 
 def condition(verdict: str) -> str:
@@ -64,7 +67,7 @@ def condition(verdict: str) -> str:
     return verdict.removeprefix("holds if").strip() if kind(verdict) == "partly" else ""
 
 
-def ending(entry: dict[str, Any]) -> str:
+def ending(entry: Mapping[str, Any]) -> str:
     """Status of a run, with the time if it ended early."""
     word, when = str(entry.get("status", "completed")).replace("_", " "), entry.get("diverged_at")
     return word if when is None else f"{word} at {when:.3g} s"

@@ -3,15 +3,18 @@
 import html
 import re
 
-from undertow.report.page import Html, join, text
+from undertow.report.page import Html, marked
 
-_GREEK = {
+_IDENTIFIERS = {
     **{"alpha": "\u03b1", "gamma": "\u03b3", "delta": "\u03b4", "varepsilon": "\u03b5", "eta": "\u03b7"},
     **{"theta": "\u03b8", "mu": "\u03bc", "nu": "\u03bd", "xi": "\u03be", "sigma": "\u03c3", "tau": "\u03c4"},
     **{"phi": "\u03c6", "omega": "\u03c9", "Delta": "\u0394", "Omega": "\u03a9"},
+    **{word: word for word in ("exp", "sin", "cos", "tanh", "sign", "argmin", "sup")},
 }
-_SIGNS = {"cdot": "\u22c5", "le": "\u2264", "ge": "\u2265", "infty": "\u221e", "pm": "\u00b1", "times": "\u00d7"}
-_WORDS = ("exp", "sin", "cos", "tanh", "sign", "argmin", "sup")
+_SIGNS = {
+    **{"cdot": "\u22c5", "le": "\u2264", "ge": "\u2265", "infty": "\u221e", "pm": "\u00b1", "times": "\u00d7"},
+    "#": "#",
+}
 _ACCENTS = {"hat": "^", "bar": "\u00af", "tilde": "~", "dot": "\u02d9", "ddot": "\u00a8"}
 _TOKEN = re.compile(r"\\(?P<name>[A-Za-z]+|#)|(?P<number>\d+(?:\.\d+)?)|(?P<letter>[A-Za-z])|(?P<sign>[^\s])")
 
@@ -38,7 +41,8 @@ SYMBOLS = {
     "E^T P B": "E^T P B",
     "E^T Q E": "E^T Q E",
 }
-_SYMBOL = re.compile(rf"(?<![\w`^./|-])(?:{'|'.join(map(re.escape, SYMBOLS))})(?![\w`^.]*\w)|(?<!\w)G(?:#|\+)(?!\w)")
+_INVERSES = {"G#": r"G^{\#}", "G+": "G^+"}
+_SYMBOL = rf"((?<![\w`^./|-])(?:{'|'.join(map(re.escape, SYMBOLS))})(?![\w`^.]*\w)|(?<!\w)G(?:#|\+)(?!\w))"
 
 
 def mathml(tex: str) -> Html:
@@ -55,20 +59,8 @@ def mathml(tex: str) -> Html:
 
 def with_symbols(content: str) -> Html:
     """Plain text with the formulas between dollar signs, and the symbols of the paper, as MathML."""
-    parts = []
-    for number, part in enumerate(re.split(r"\$([^$]+)\$", content)):
-        parts += [mathml(part)] if number % 2 else _marked(part)
-    return join(*parts)
-
-
-def _marked(plain: str) -> list[Html]:
-    parts, end = [], 0
-    for found in _SYMBOL.finditer(plain):
-        word = found[0]
-        tex = {"G#": r"G^{\#}", "G+": "G^+"}.get(word) or SYMBOLS[word]
-        parts += [text(plain[end : found.start()]), mathml(tex)]
-        end = found.end()
-    return [*parts, text(plain[end:])]
+    with_letters = lambda plain: marked(_SYMBOL, plain, lambda word: mathml((SYMBOLS | _INVERSES)[word]))
+    return marked(r"\$([^$]+)\$", content, mathml, with_letters)
 
 
 def _tokens(tex: str) -> list[tuple[str, str]]:
@@ -122,10 +114,8 @@ def _command(name: str, rest: list[tuple[str, str]]) -> tuple[str, list[tuple[st
         above, rest = _item(rest)
         below, rest = _item(rest)
         return f"<mfrac>{above}{below}</mfrac>", rest
-    if name in _GREEK:
-        return f"<mi>{_GREEK[name]}</mi>", rest
-    if name in _WORDS:
-        return f"<mi>{name}</mi>", rest
-    if name in _SIGNS or name == "#":
-        return f"<mo>{_SIGNS.get(name, name)}</mo>", rest
+    if name in _IDENTIFIERS:
+        return f"<mi>{_IDENTIFIERS[name]}</mi>", rest
+    if name in _SIGNS:
+        return f"<mo>{_SIGNS[name]}</mo>", rest
     raise ValueError(f"unknown command in a formula: \\{name}")

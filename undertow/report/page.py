@@ -2,7 +2,8 @@
 
 import base64
 import html
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -21,6 +22,12 @@ def text(content: Any) -> Html:
 def join(*parts: Any) -> Html:
     """Parts one after the other."""
     return Html("".join(map(text, parts)))
+
+
+def marked(pattern: str, content: str, inside: Callable[[str], Html], outside: Callable[[str], Html] = text) -> Html:
+    """Plain text with what the group of a pattern captures as markup of one kind, and the rest as another."""
+    parts = enumerate(re.split(pattern, content))
+    return join(*(inside(part) if number % 2 else outside(part) for number, part in parts))
 
 
 def tag(name: str, *content: Any, **attributes: str) -> Html:

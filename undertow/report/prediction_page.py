@@ -66,10 +66,8 @@ LEFT_OUT = (
 
 def _section(number: int, rows: Rows):
     cells = [[prose(cell) for cell in row] for row in rows.rows]
-    head = [prose(cell) for cell in rows.head]
-    return section(
-        f"table-{number}", rows.title, tag("p", prose(rows.sentence)), table(head, cells, wide=len(rows.head) > 3)
-    )
+    whole = table([prose(cell) for cell in rows.head], cells, wide=len(rows.head) > 3)
+    return section(f"table-{number}", rows.title, tag("p", prose(rows.sentence)), whole)
 
 
 def tables(prediction: Prediction) -> list[Rows]:

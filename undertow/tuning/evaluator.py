@@ -54,11 +54,6 @@ class Scaled(AbstractDisturbance):
         return self.inner.jumps(duration)
 
 
-def scaled(inner: AbstractDisturbance, size) -> Scaled:
-    """A disturbance times a size, which may be traced."""
-    return Scaled(inner, jnp.asarray(size, dtype=float))
-
-
 # Compiling dominates a short tuning; a lower optimisation level halves its time at the same speed.
 _COMPILER = {"xla_backend_optimization_level": "1"}
 
@@ -68,28 +63,19 @@ _WORKERS = 2
 
 
 class TrainingLoop(NamedTuple):
-    """Everything that stays the same while the gains change.
+    """Everything that stays the same while the gains change."""
 
-    Attributes:
-        loop: reference, disturbance and navigation; plant and controller are replaced.
-        settings: settings of the loop.
-        duration: duration of every run, s.
-        start: outputs at t = 0, and their rates.
-        sums: accumulator of the cost.
-        weights: weights of the cost.
-    """
-
-    loop: ClosedLoop
+    loop: ClosedLoop  # reference, disturbance and navigation; plant and controller are replaced
     settings: Loop
-    duration: float
-    start: tuple[Any, Any]
+    duration: float  # of every run, s
+    start: tuple[Any, Any]  # outputs at t = 0, and their rates
     sums: CostSums
     weights: Weights
 
     def with_parts(self, plant: AbstractPlant, law: AbstractController, size: Any = 1.0) -> ClosedLoop:
         """The loop with a plant, a controller, and a scaled disturbance."""
         loop = self.loop
-        return ClosedLoop(plant, law, loop.reference, scaled(loop.disturbance, size), loop.navigation)
+        return ClosedLoop(plant, law, loop.reference, Scaled(loop.disturbance, size), loop.navigation)
 
     def run(
         self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""], smooth: bool = False
@@ -153,7 +139,8 @@ class Evaluation:
         height, width = len(numbers), self._training.number
         rows = [(numbers + numbers[:1] * AT_ONCE)[i : i + AT_ONCE] for i in range(0, height, AT_ONCE)]
         columns = [[min(i + j, trials.number - 1) for j in range(width)] for i in range(0, trials.number, width)]
-        batches = [(_stacked(row), trials.part(np.array(column))) for row in rows for column in columns]
+        stacked = [jax.tree.map(lambda *each: jnp.stack(each), *row) for row in rows]
+        batches = [(laws_of_row, trials.part(np.array(column))) for laws_of_row in stacked for column in columns]
         done = list(self._pool.map(lambda batch: self._batch(*batch), batches))
         lines = [done[i : i + len(columns)] for i in range(0, len(done), len(columns))]
         blocks = [jax.tree.map(lambda *pieces: np.concatenate(pieces, axis=1), *line) for line in lines]
@@ -214,7 +201,3 @@ class Evaluation:
             if name not in self._programs:
                 self._programs[name] = self._compilers.submit(compiled)
             return self._programs[name]
-
-
-def _stacked(trees: Sequence[Any]) -> Any:
-    return jax.tree.map(lambda *each: jnp.stack(each), *trees)

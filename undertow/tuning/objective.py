@@ -34,18 +34,11 @@ class Step(NamedTuple):
     radius: float  # spectral
 
 
-Watch = Callable[[Step, int], None]  # the best so far, evaluations so far
+Watch = Callable[[Step, int], None]  # called after every batch with the best so far, evaluations so far
 
 
 class Objective:
-    """Costs with a checkpoint. No point is accepted without a certificate.
-
-    Args:
-        computes: computes costs and gradients.
-        certify: point -> certificate.
-        checkpoint: the checkpoint.
-        watch: called after every batch.
-    """
+    """Costs with a checkpoint. No point is accepted without a certificate."""
 
     def __init__(
         self, computes: Computes, certify: Callable[[np.ndarray], Certificate], checkpoint: Checkpoint, watch: Watch

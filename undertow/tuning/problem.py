@@ -17,7 +17,7 @@ from undertow.tuning import tunable_parameters as tunable_parameters
 from undertow.tuning.cost import CostSums
 from undertow.tuning.evaluator import TrainingLoop
 from undertow.tuning.training_runs import Trials, training_and_held_out
-from undertow.tuning.tunable_parameters import SHARED, Law, TunableParameter, law_of, now
+from undertow.tuning.tunable_parameters import SHARED, Law, TunableParameter, law_of
 
 _LONGEST = 20.0  # s, default limit of the duration of a run
 _DIGITS = 5  # of a tuned gain
@@ -48,11 +48,8 @@ class Problem(NamedTuple):
 
     def scenario(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """The resolved scenario with these options of the controller."""
-        controller = self.built.resolved["controller"] | self._left_out(options) | dict(options)
-        return self.built.resolved | {"controller": controller}
-
-    def _left_out(self, options: Mapping[str, Any]) -> dict[str, None]:
-        return _left_out(_law_of(self.built), options)
+        left_out = _left_out(_law_of(self.built), options)
+        return self.built.resolved | {"controller": self.built.resolved["controller"] | left_out | dict(options)}
 
 
 def problem(text: Text) -> Problem:
@@ -115,9 +112,7 @@ def _parameters(
         if name.partition("[")[0] not in options:
             hint = did_you_mean(name, options)
             raise BadInput(f"tune.parameters.{name}", "be an option of the controller", "unknown", hint=hint)
-    chosen = tunable_parameters.parameters(ranges, _groups(tune.per, angles), SHARED)
-    tunable_parameters.whole(chosen)
-    return chosen
+    return tunable_parameters.parameters(ranges, _groups(tune.per, angles), SHARED)
 
 
 def _groups(per: str, angles: tuple[bool, ...]) -> list[tuple[int, ...]]:
@@ -138,7 +133,7 @@ def _left_out(known: Law, options: Mapping[str, Any]) -> dict[str, None]:
 def _mean(known: Law, law: AbstractController, given: Mapping[str, Any], parameter: TunableParameter) -> float:
     """Value of a parameter in a controller: geometric mean over its axes, or of its bounds where unknown."""
     name = parameter.option if parameter.entry is None else f"{parameter.option}[{parameter.entry}]"
-    value = now(known, law, name, given.get(parameter.option))
+    value = known.now[name](law) if name in known.now else given.get(parameter.option)
     if value is None:
         return float(np.sqrt(parameter.low * parameter.high))
     numbers = np.asarray(value, dtype=float)

@@ -26,8 +26,8 @@ def descend(objective: Objective, start: np.ndarray, cost: float, iterations: in
     Args:
         objective: gives costs and gradients.
         start: shape (k,).
-        cost: cost at the start.
-        iterations: largest number of iterations.
+        cost: at the start.
+        iterations: at most.
     """
     x, inverse, slope, idle, stuck, reach = start, None, objective.slope(start), 0, False, _FIRST
     chance = np.random.default_rng(0)

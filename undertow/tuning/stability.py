@@ -82,12 +82,7 @@ def _plant(trials: Trials, number: int) -> Any:
 
 
 def no_certificate(given: Certificate, tried: int) -> BadInput:
-    """The error where no gains are certified.
-
-    Args:
-        given: certificate of the gains of the scenario.
-        tried: number of evaluated points.
-    """
+    """The error where none of the tried points is certified; `given` is the certificate of the scenario's own gains."""
     plant = f" on the plant variant {given.worst_variant}" if given.worst_variant else ""
     sets = ", use another nominal model, or leave this variant out of tune.train.sets" if plant else ""
     hint = f"With the given gains the loop has a spectral radius of {given.worst:.4g}{plant}. Widen the ranges{sets}"

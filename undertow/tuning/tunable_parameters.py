@@ -55,7 +55,7 @@ def parameters(
         shared: options with one number for all axes.
 
     Raises:
-        BadInput: not two bounds, not positive, or the wrong way round.
+        BadInput: not two bounds, not positive, or the wrong way round; or not all numbers of an option.
     """
     found = []
     for name, bounds in ranges.items():
@@ -63,6 +63,13 @@ def parameters(
         low, high = _bounds(name, bounds)
         for axes in [()] if option in shared else groups:
             found.append(TunableParameter(option, entry, axes, low, high))
+    for option, width in _WIDTHS.items():
+        given = [parameter.entry for parameter in found if parameter.option == option]
+        missing = [f"{option}[{i}]" for i in range(width) if i not in given] if given else []
+        if missing:
+            raise BadInput(
+                "tune.parameters", f"include {', '.join(missing)}", f"given with {option}[{min(given)}] only"
+            )
     return found
 
 
@@ -85,19 +92,6 @@ def options(chosen: Sequence[TunableParameter], point: Point, axes: int) -> dict
         place = (np.array(parameter.axes),) if parameter.entry is None else (np.array(parameter.axes), parameter.entry)
         found[parameter.option] = held.at[place].set(value)
     return found
-
-
-def whole(chosen: Sequence[TunableParameter], key: str = "tune.parameters") -> None:
-    """Check that options with several numbers per axis are given completely.
-
-    Raises:
-        BadInput: some numbers are missing.
-    """
-    for option, width in _WIDTHS.items():
-        entries = {parameter.entry for parameter in chosen if parameter.option == option}
-        missing = [f"{option}[{i}]" for i in range(width) if i not in entries] if entries else []
-        if missing:
-            raise BadInput(key, f"include {', '.join(missing)}", f"given with {option}[{min(entries)}] only")  # pyright: ignore[reportArgumentType] - entries of one option are numbers
 
 
 def _parsed(name: str) -> tuple[str, int | None]:
@@ -202,8 +196,3 @@ def law_of(kind: str, preset: str | None, law: AbstractController) -> Law:
     declared = tuning_ranges(law)
     own = Law(lambda dt: declared, {name: attrgetter(name) for name in declared}, {})
     return _LAWS.get((kind, preset), own)
-
-
-def now(known: Law, law: AbstractController, option: str, given: Any) -> Any:
-    """Value of an option: from the controller, else the given one; None where neither is known."""
-    return known.now[option](law) if option in known.now else given

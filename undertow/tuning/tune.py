@@ -67,7 +67,6 @@ def tune(
     method: str = "gradient",
     budget: float = 240.0,
     resume: bool = False,
-    beside: Mapping[str, Mapping[str, Any]] | None = None,
     say: Callable[[str], None] = lambda stage: None,
     watch: Watch = lambda best, evaluations: None,
 ) -> Tuned:
@@ -79,7 +78,6 @@ def tune(
         method: `gradient`, gradient descent by forward differentiation, or `search`, differential evolution.
         budget: s, in total; the initial design is always evaluated, and a batch that has begun is completed.
         resume: whether to resume from the checkpoint.
-        beside: other choices of options, by name, to evaluate like the given and the tuned ones.
         say: called with the current stage.
         watch: called with the best so far after every batch.
 
@@ -91,9 +89,7 @@ def tune(
     task = problem(text)
     about = text_hash(dump({"method": method, "tune": task.built.scenario.tune.model_dump(), **task.built.resolved}))
     notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
-    make = lambda point: task.law(task.options(point))
-    first = make(task.start)
-    evaluation = Evaluation(task.training_loop, make, first, task.train)
+    first, evaluation = _programs(task)
     if method == "gradient" and not notes.is_over:
         evaluation.precompile_slope(task.start)
     certifier = Certifier(task.training_loop, task.train, first)
@@ -117,8 +113,7 @@ def tune(
         finished = False
     say("evaluating on held-out runs")
     best = objective.best or start
-    chosen: list[tuple[str, Mapping[str, Any] | None]] = [("given", None), *(beside or {}).items()]
-    chosen += [(name, task.rounded(np.array(step.point))) for name, step in (("start", start), ("tuned", best))]
+    chosen = {name: task.rounded(np.array(step.point)) for name, step in (("start", start), ("tuned", best))}
     evaluated = _evaluate(task, evaluation, certifier, chosen)
     if not evaluated[-1].certificate.holds:
         raise BadInput("tune", "find gains whose certificate holds after rounding", evaluated[-1].certificate.worst)
@@ -145,20 +140,23 @@ def compare_gains(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple
         BadInput: the scenario is invalid.
     """
     task = problem(text)
+    first, evaluation = _programs(task)
+    return _evaluate(task, evaluation, Certifier(task.training_loop, task.train, first), choices)
+
+
+def _programs(task: Problem) -> tuple[AbstractController, Evaluation]:
+    """The controller with the given gains, and what evaluates others of its kind."""
     make = lambda point: task.law(task.options(point))
     first = make(task.start)
-    evaluation = Evaluation(task.training_loop, make, first, task.train)
-    return _evaluate(
-        task, evaluation, Certifier(task.training_loop, task.train, first), [("given", None), *choices.items()]
-    )
+    return first, Evaluation(task.training_loop, make, first, task.train)
 
 
 def _evaluate(
-    task: Problem, evaluation: Evaluation, certifier: Certifier, chosen: list[tuple[str, Mapping[str, Any] | None]]
+    task: Problem, evaluation: Evaluation, certifier: Certifier, others: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Evaluated, ...]:
-    """Evaluate all choices on both sets of trials; the given gains without rounding."""
-    own = task.built.closed_loop.controller
-    laws: list[AbstractController] = [own if options is None else task.law(options) for _, options in chosen]
+    """Evaluate the given gains, without rounding, and other choices on both sets of trials."""
+    chosen = {"given": None, **others}
+    laws = [task.built.closed_loop.controller, *(task.law(options) for options in others.values())]
     train, held_out = (evaluation.shares(laws, trials) for trials in (task.train, task.held_out))
     costs = [evaluation.total(parts).mean(axis=1) for parts in (train, held_out)]
     row = lambda parts, i: Shares(*(np.asarray(part)[i] for part in parts))  # pyright: ignore[reportArgumentType] - NumPy's means
@@ -166,7 +164,7 @@ def _evaluate(
         Evaluated(
             name, options, row(train, i), row(held_out, i), float(costs[0][i]), float(costs[1][i]), certifier(laws[i])
         )
-        for i, (name, options) in enumerate(chosen)
+        for i, (name, options) in enumerate(chosen.items())
     )
 
 

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
 
 from undertow.report.figures import style
 
@@ -75,8 +74,7 @@ def _panel(panel: Axes, one: Ablation) -> None:
             panel.plot(0.97, row, "X", transform=panel.get_yaxis_transform(), color=_LOST, markersize=3.5)
     low, high = panel.get_xlim()
     panel.set_xlim(low / 1.5, high * 1.5)
-    panel.xaxis.set_major_locator(LogLocator(numticks=4))
-    panel.xaxis.set_minor_locator(NullLocator())
+    style.few_log_ticks(panel.xaxis, most=4)
     names = [variant["name"] for variant in one["variants"]]
     panel.set_yticks(range(len(names)), names, fontsize=style.TINY - 1)
     panel.set_ylim(len(names) - 0.5, -0.5)

@@ -84,9 +84,7 @@ def _head(figure: Figure, title: str, acting: Iterable[str]) -> None:
 def _plot(panel: Axes, time: np.ndarray, curves, key: bool = True) -> None:
     for name, values, look in curves:
         shown = np.where(np.isfinite(values), values, np.nan)
-        panel.plot(
-            time, shown, color=look.colour, linestyle=look.dashes, linewidth=look.width, zorder=look.order, label=name
-        )
+        panel.plot(time, shown, **look.line, label=name)
     if key:
         panel.legend(
             loc="lower right",

@@ -1,15 +1,16 @@
-"""Figure: one controller on four fidelity levels of the same thruster."""
+"""Figures over the fidelity levels of the thruster: the paper's controllers, and the robust variant beside them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import NullLocator
 
 from undertow.report.figures import recorded, style
+from undertow.report.formats import ending
 
 _SHOWN = {
     "tracking_rms": "tracking error rms, m and rad",
@@ -17,7 +18,6 @@ _SHOWN = {
     "input_variation": "voltage variation, V/s",
     "weights_peak": "largest weight, m/s$^2$ or rad/s$^2$",
 }
-_MARKS = {"rcafc": "o", "rafc": "s"}
 
 Runs = Mapping[str, Mapping[str, xr.Dataset]]  # fidelity, controller
 
@@ -35,7 +35,14 @@ def fidelity_figure(levels: Mapping[str, Mapping[str, Any]], datasets: Runs | No
     style.head(figure, "Fidelity levels: one controller, four thruster models", dict(style.CONTROLLERS.values()))
     for number, fidelity in enumerate(fidelity for fidelity in levels if fidelity in runs):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.58, 1.75, 1.25)
-        _errors(panel, fidelity, levels[fidelity], runs[fidelity])
+        panel.set_yscale("log", nonpositive="mask")
+        panel.yaxis.set_minor_locator(NullLocator())
+        for key, run in runs[fidelity].items():
+            name, look = style.CONTROLLERS[key]
+            _error(panel, run, look, f"{name}, {fidelity}")
+            if (entry := levels[fidelity][key])["status"] != "completed":
+                words = {"transform": panel.transAxes, "fontsize": style.TINY, "ha": "right", "va": "top"}
+                panel.text(0.98, 0.9, f"{name}: {ending(entry)}", **words)
         style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", fidelity)
     for number, (metric, text) in enumerate(_SHOWN.items()):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.68 + tall, 1.75, 1.35)
@@ -44,53 +51,29 @@ def fidelity_figure(levels: Mapping[str, Mapping[str, Any]], datasets: Runs | No
     return figure
 
 
-def _errors(panel: Axes, fidelity: str, entries: Mapping[str, Any], runs: Mapping[str, xr.Dataset]) -> None:
+def _error(panel: Axes, run: xr.Dataset, look: style.Look, name: str) -> None:
     """Root mean square over the axes of the tracking error; a cross where a run ended early."""
-    panel.set_yscale("log", nonpositive="mask")
-    panel.yaxis.set_minor_locator(NullLocator())
-    for key, run in runs.items():
-        name, look = style.CONTROLLERS[key]
-        error = recorded.curve(run, name, "error", look)
-        time, size = error.time, np.sqrt((error.values**2).mean(axis=1))
-        panel.plot(
-            time,
-            size,
-            color=look.colour,
-            linestyle=look.dashes,
-            linewidth=look.width,
-            zorder=look.order,
-            label=f"{name}, {fidelity}",
-        )
-        if entries[key]["status"] != "completed":
-            panel.plot(time[-1], size[-1], "X", color=look.colour, markersize=6, zorder=5)
-            _say(panel, f"{name}: {_ending(entries[key])}", (0.98, 0.9))
+    error = recorded.curve(run, name, "error", look)
+    size = np.sqrt((error.values**2).mean(axis=1))
+    panel.plot(error.time, size, **look.line, label=name)
+    if run.attrs["status"] != "completed":
+        panel.plot(error.time[-1], size[-1], "X", color=look.colour, markersize=6, zorder=6)
 
 
 def _metric(panel: Axes, levels: Mapping[str, Mapping[str, Any]], metric: str) -> None:
     fidelities = list(levels)
     panel.set_yscale("log")
-    panel.yaxis.set_major_locator(LogLocator(numticks=5))
-    panel.yaxis.set_minor_locator(NullLocator())
+    style.few_log_ticks(panel.yaxis)
     for key, (name, look) in style.CONTROLLERS.items():
         entries = [levels[fidelity].get(key) or {} for fidelity in fidelities]
         values = [(entry.get("steady") or {}).get(metric, np.nan) for entry in entries]
-        panel.plot(
-            range(len(fidelities)),
-            values,
-            color=look.colour,
-            linestyle=look.dashes,
-            linewidth=look.width,
-            marker=_MARKS[key],
-            markersize=4,
-            zorder=look.order,
-            label=name,
-        )
+        panel.plot(range(len(fidelities)), values, **look.line, marker=style.MARKS[key], markersize=4, label=name)
         for place, entry in enumerate(entries):
             if entry and not entry.get("steady"):
                 top = panel.get_xaxis_transform()
                 panel.plot(place, 0.93, "X", transform=top, color=look.colour, markersize=6)
                 words = {"transform": top, "fontsize": style.TINY, "ha": "right", "va": "center"}
-                panel.text(place - 0.15, 0.93, f"{name} {_ending(entry)}", **words)
+                panel.text(place - 0.15, 0.93, f"{name} {ending(entry)}", **words)
     panel.set_xticks(
         range(len(fidelities)), [fidelity.replace("electromechanical", "electro-\nmech.") for fidelity in fidelities]
     )
@@ -99,11 +82,74 @@ def _metric(panel: Axes, levels: Mapping[str, Mapping[str, Any]], metric: str) -
     panel.set_ylim(low, high * (high / low) ** 0.25)  # room for what failed
 
 
-def _ending(entry: Mapping[str, Any]) -> str:
-    when = entry.get("diverged_at")
-    word = str(entry["status"]).replace("_", " ")
-    return word if when is None else f"{word} at {when:.3g} s"
+# Names, looks and marks of the controllers beside the robust variant.
+_LAWS = {
+    "rcafc": ("RCAFC, Table 1", style.SOLID, "o"),
+    "table1": ("RCAFC, Table 1", style.SOLID, "o"),
+    "rafc": ("RAFC, Table 1", style.DASHED, "s"),
+    "hand_tuned": ("paper's controller, tuned by hand", style.Look("#7a5195", (0, (6, 1.5, 1, 1.5)), 1.1, 2), "D"),
+    "pid": ("PID", style.Look("#8a6d00", (0, (3, 1)), 1.1, 2), "v"),
+    "robust": ("robust", style.Look("#00785a", "-", 1.3, 4), "^"),
+    "measured": ("speeds measured", style.Look("#b0476f", (0, (1, 1)), 1.1, 5), "."),
+}
+# The cases that are shown against time, and their titles.
+_CASES = {
+    "electromechanical": "full motor model, no limit",
+    "24V_03": "24 V, U1 x 0.3",
+    "overload": "24 V, overload for 1.5 s",
+    "sea": "BlueROV2 Heavy, current and waves",
+}
+
+Rows = Sequence[Mapping[str, Any]]
 
 
-def _say(panel: Axes, text: str, place: tuple[float, float]) -> None:
-    panel.text(*place, text, transform=panel.transAxes, fontsize=style.TINY, ha="right", va="top")
+def robust_fidelity_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dataset]) -> Figure:
+    """Errors against time in up to four cases, and below them the steady tracking error in all cases.
+
+    Args:
+        rows: `place`, `words`, `law`, `status`, `diverged_at` and `steady` of each run.
+        datasets: runs by place and law; missing ones are not plotted.
+    """
+    places = list(dict.fromkeys(row["place"] for row in rows))
+    shown = [place for place in _CASES if any(place == where for where, _ in datasets)]
+    tall = 1.75 if shown else 0.0
+    figure = style.blank(9.6, 0.85 + tall + 0.27 * len(places) + 0.35)
+    style.head(figure, "The robust variant on every fidelity level", dict(_LAWS[row["law"]][:2] for row in rows))
+    for number, place in enumerate(shown):
+        panel = style.place(figure, 0.56 + 2.38 * number, 0.6, 1.75, 1.2)
+        panel.set_yscale("log", nonpositive="mask")
+        style.few_log_ticks(panel.yaxis)
+        for law in (law for where, law in datasets if where == place):
+            name, look, _ = _LAWS[law]
+            _error(panel, datasets[place, law], look, name)
+        style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", _CASES[place])
+    panel = style.place(figure, 3.3, 0.62 + tall, 6.0, 0.27 * len(places))
+    _dots(panel, places, rows)
+    style.label(panel, "tracking error rms over the second half, m and rad; cross: ended early")
+    return figure
+
+
+def _dots(panel: Axes, places: Sequence[str], rows: Rows) -> None:
+    panel.set_xscale("log")
+    style.few_log_ticks(panel.xaxis, most=8)
+    words = {row["place"]: row["words"] for row in rows}
+    for row in rows:
+        _, look, mark = _LAWS[row["law"]]
+        height = places.index(row["place"])
+        if row["steady"]:
+            marked = {"color": look.colour, "markerfacecolor": "white", "markersize": 5.5, "zorder": look.order}
+            panel.plot(row["steady"]["tracking_rms"], height, mark, **marked)
+        else:
+            panel.plot(0.985, height, "X", transform=panel.get_yaxis_transform(), color=look.colour, markersize=6)
+    panel.set_yticks(range(len(places)), [_wrapped(words[place]) for place in places], fontsize=style.SMALL)
+    panel.set_ylim(len(places) - 0.5, -0.5)
+    low, high = panel.get_xlim()
+    panel.set_xlim(low, high * 3)  # room for what ended early
+
+
+def _wrapped(words: str) -> str:
+    """Long text on two lines."""
+    if len(words) < 50:
+        return words
+    middle = words.rfind(" ", 0, 48)
+    return f"{words[:middle]}\n{words[middle + 1 :]}"

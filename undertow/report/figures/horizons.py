@@ -5,7 +5,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import NullLocator
 
 from undertow.report.figures import style
 from undertow.report.formats import round_time
@@ -54,14 +54,12 @@ def horizons_figure(rows: Rows, duration: float) -> Figure:
 def _growth(panel: Axes, rows: Rows) -> None:
     panel.set_xscale("log")
     panel.set_yscale("log")
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(LogLocator(numticks=5))
-        axis.set_minor_locator(NullLocator())
+    style.few_log_ticks(panel.xaxis, panel.yaxis)
     for row in sorted(rows, key=lambda row: not row["bounded"]):
         bounded = row["bounded"] and row["law"] != "robust"
         look = _BOUNDED if bounded else _LOOKS[row["law"]][1]
         time, peak = row["growth"]["time"], row["growth"]["weights_peak"]
-        panel.plot(time, peak, color=look.colour, linestyle=look.dashes, linewidth=look.width, zorder=look.order)
+        panel.plot(time, peak, **look.line)
         if not row["lasted"]:
             at = max(row["ended"], time[-1]), min(peak[-1], _TOP)
             panel.plot(*at, "X", color=look.colour, markersize=6, zorder=5, clip_on=False)

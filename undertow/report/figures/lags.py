@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
 
 from undertow.report.figures import style
 
@@ -15,7 +14,7 @@ _METRICS = {
     "input_variation": "voltage variation, V/s",
     "weights_peak": "largest weight, m/s$^2$, rad/s$^2$",
 }
-_KINDS = {"lag": ("first-order lag, ms", 1e3), "winding": ("inductance of the winding, mH", 1e3)}
+_KINDS = {"lag": "first-order lag, ms", "winding": "inductance of the winding, mH"}
 _LAWS = {"five": ("five sets", "#0072b2", "o"), "one": ("one rule, same loop gain", "#e07b00", "s")}
 _DASHES = ((0, (1, 1.2)), (0, (4, 1.6)), "-")  # the shorter the horizon, the shorter the dashes
 
@@ -38,7 +37,7 @@ def lags_figure(rows: Rows, windows: Sequence[Sequence[float]]) -> Figure:
     figure = style.blank(9.6, 0.5 + 2.05 * len(kinds))
     style.head(figure, "Table 1 behind a lag", keys)
     for number, kind in enumerate(kinds):
-        words, _ = _KINDS[kind]
+        words = _KINDS[kind]
         top = 0.6 + 2.05 * number
         for column, (metric, title) in enumerate(_METRICS.items()):
             panel = style.place(figure, 0.56 + 2.38 * column, top, 1.75, 1.3)
@@ -55,10 +54,9 @@ def _of(rows: Rows, **where: str) -> list[Mapping[str, Any]]:
 
 
 def _logarithmic(panel: Axes) -> None:
-    for axis, scale in ((panel.xaxis, panel.set_xscale), (panel.yaxis, panel.set_yscale)):
-        scale("log")
-        axis.set_major_locator(LogLocator(numticks=5))
-        axis.set_minor_locator(NullLocator())
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    style.few_log_ticks(panel.xaxis, panel.yaxis)
 
 
 def _metric(panel: Axes, rows: Rows, metric: str, dashes: Sequence[Any]) -> None:
@@ -119,6 +117,5 @@ def drifting_figure(shown: Mapping[str, Any]) -> Figure:
         style.label(panel, "time, s", "", title, style.TINY)
     for panel in panels[1:]:
         panel.set_yscale("log")
-        panel.yaxis.set_major_locator(LogLocator(numticks=5))
-        panel.yaxis.set_minor_locator(NullLocator())
+        style.few_log_ticks(panel.yaxis)
     return figure

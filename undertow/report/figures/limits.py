@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
+from matplotlib.ticker import FixedLocator
 
 from undertow.report.figures import style
 
@@ -26,7 +26,8 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
         if outside.size and outside.max() > 0:
             beyond.append(f"{name} to {values[outside.argmax()]:.3g}")
     if beyond:
-        _note(panel, f"first {start:.2g} s: {', '.join(beyond)}")
+        said = f"first {start:.2g} s: {', '.join(beyond)}"
+        style.note(panel, said, (1, 1), (0, 2), color=style.INK, ha="right", va="bottom")
 
 
 def fit_log(panel: Axes, series: Named, start: float) -> None:
@@ -36,8 +37,7 @@ def fit_log(panel: Axes, series: Named, start: float) -> None:
     sizes = sizes[sizes > 0]
     if sizes.size:  # nothing positive has no logarithm
         panel.set_yscale("log", nonpositive="mask")
-        panel.yaxis.set_major_locator(LogLocator(numticks=5))
-        panel.yaxis.set_minor_locator(NullLocator())
+        style.few_log_ticks(panel.yaxis)
         panel.set_ylim(float(np.quantile(sizes, 0.02)) / 2, 2 * float(sizes.max()))
 
 
@@ -61,18 +61,3 @@ def early_size(time: np.ndarray, values: np.ndarray) -> float:
 def _finite(parts: Sequence[np.ndarray]) -> np.ndarray:
     values = np.concatenate(parts) if parts else np.zeros(0)
     return values[np.isfinite(values)]
-
-
-def _note(panel: Axes, text: str) -> None:
-    """A line above the upper right corner."""
-    panel.annotate(
-        text,
-        (1, 1),
-        xycoords="axes fraction",
-        xytext=(0, 2),
-        textcoords="offset points",
-        fontsize=style.TINY,
-        color=style.INK,
-        ha="right",
-        va="bottom",
-    )

@@ -72,16 +72,7 @@ def _plot(panel: Axes, block: Block, column: int) -> None:
     shown = [_cut(curve, block.window) for curve in block.curves]
     for curve in shown:
         values = np.where(np.isfinite(curve.values[:, column]), curve.values[:, column], np.nan)
-        look = curve.look
-        panel.plot(
-            curve.time,
-            values,
-            color=look.colour,
-            linestyle=look.dashes,
-            linewidth=look.width,
-            zorder=look.order,
-            label=curve.name,
-        )
+        panel.plot(curve.time, values, **curve.look.line, label=curve.name)
     series = [(curve.name, curve.time, curve.values[:, column]) for curve in shown]
     {"linear": fit_linear, "log": fit_log, "symlog": fit_symmetric}[block.scale](panel, series, block.limits_from)
     ends = [curve.time[[0, -1]] for curve in shown if len(curve.time)]

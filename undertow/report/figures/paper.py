@@ -46,9 +46,7 @@ def thruster_laws(response: ThrusterResponse) -> Figure:
 
 
 def _loop(panel: Axes, x: np.ndarray, y: np.ndarray, name: str, look: style.Look) -> None:
-    panel.plot(
-        x, y, color=look.colour, linestyle=look.dashes, linewidth=look.width + 0.2, zorder=look.order, label=name
-    )
+    panel.plot(x, y, **look._replace(width=look.width + 0.2).line, label=name)
 
 
 def _errors(panel: Axes, laws: tuple[Law, ...]) -> None:

@@ -28,31 +28,15 @@ def _poles(prediction: Prediction) -> Figure:
     style.head(figure, "Controllable closed-loop poles over the operating range", {})
     panel = style.place(figure, 0.75, 0.55, 8.6, 3.1)
     for point, mark, colour in zip(prediction.points, _MARKS, _COLOURS, strict=False):
-        poles: Any = point.poles
-        panel.plot(
-            poles.real,
-            poles.imag,
-            mark,
-            color=colour,
-            markerfacecolor="none",
-            markersize=5.5,
-            label=f"{point.share:.0%} quantile of the load",
-        )
+        marked: Any = {"color": colour, "markerfacecolor": "none", "markersize": 5.5}
+        words = f"{point.share:.0%} quantile of the load"
+        panel.plot(np.real(point.poles), np.imag(point.poles), mark, **marked, label=words)
     panel.set_xscale("symlog", linthresh=1.0, linscale=0.5)
     panel.set_yscale("symlog", linthresh=1.0, linscale=0.5)
     right = max(1.0, *(float(np.real(point.poles).max(initial=0.0)) for point in prediction.points))
     panel.set_xlim(right=1.3 * right)
     panel.axvspan(0, 1.3 * right, color="#fbe3df", zorder=0)
-    panel.annotate(
-        "unstable",
-        (1.0, 1.0),
-        xycoords="axes fraction",
-        xytext=(-3, -3),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        fontsize=style.SMALL,
-    )
+    style.note(panel, "unstable", (1.0, 1.0), (-3, -3), ha="right", va="top", fontsize=style.SMALL)
     panel.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
     style.label(panel, "real part, 1/s", "imaginary part, rad/s")
     return figure

@@ -23,9 +23,9 @@ def per_axis(run: xr.Dataset, quantity: str, rate: str = "") -> list[str]:
     return [f"{quantity}, {power(unit + rate)}" for unit in units]
 
 
-def per_input(run: xr.Dataset, quantity: str, signal: str = "input") -> list[str]:
+def per_input(run: xr.Dataset, quantity: str) -> list[str]:
     """Label of a quantity on each input with its unit."""
-    return [f"{quantity}, {run[signal].attrs['units']}"] * run.sizes["actuator"]
+    return [f"{quantity}, {run['input'].attrs['units']}"] * run.sizes["actuator"]
 
 
 def curve(run: xr.Dataset, name: str, signal: str, look: Look) -> Curve:

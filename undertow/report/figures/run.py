@@ -26,7 +26,7 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
 
 def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a run, by name."""
-    outputs, columns = recorded.axis_names(run), _columns(run.sizes["axis"])
+    outputs = recorded.axis_names(run)
     inputs = [f"input {number}" for number in run["actuator"].values]
     desired = recorded.curve(run, "desired $x_d$", "reference", style.TRUTH)
     actual = recorded.curve(run, "actual $x$", "position", style.SOLID)
@@ -39,32 +39,24 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     applied = recorded.curve(run, "applied", "input", style.SOLID)
     places, errors = recorded.places(run), recorded.per_axis(run, "|error|")
     rates = recorded.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
-    levels = [f"input, {run['input'].attrs['units']}"] * run.sizes["actuator"]
-    figures: dict[str, Callable[[], Figure]] = {
-        "tracking": lambda: small_multiples(
-            _titled(run, "Tracking"), outputs, [_block(run, [desired, actual], places, 0.0)], columns
+    levels = recorded.per_input(run, "input")
+
+    def plot(what: str, names: list[str], blocks: Callable[[], list[Block]]) -> Callable[[], Figure]:
+        return lambda: small_multiples(_titled(run, what), names, blocks(), _columns(len(names)))
+
+    figures = {
+        "tracking": plot("Tracking", outputs, lambda: [_block(run, [desired, actual], places, 0.0)]),
+        "error": plot("Tracking error", outputs, lambda: [Block([error], errors, 1.4, scale="log", titled=True)]),
+        "estimate": plot(
+            "Lumped uncertainty and its estimate", outputs, lambda: [_block(run, curves, rates, settled(run))]
         ),
-        "error": lambda: small_multiples(
-            _titled(run, "Tracking error"), outputs, [Block([error], errors, 1.4, scale="log", titled=True)], columns
-        ),
-        "estimate": lambda: small_multiples(
-            _titled(run, "Lumped uncertainty and its estimate"),
-            outputs,
-            [_block(run, curves, rates, settled(run))],
-            columns,
-        ),
-        "effort": lambda: small_multiples(
-            _titled(run, "Inputs"),
-            inputs,
-            [_block(run, [commanded, applied], levels, settled(run))],
-            _columns(run.sizes["actuator"]),
-        ),
+        "effort": plot("Inputs", inputs, lambda: [_block(run, [commanded, applied], levels, settled(run))]),
     }
     if "lyapunov" in run:
         figures["certificate"] = lambda: certificate(run, _titled(run, "Certificate"))
     if (run["measured_position"] == run["position"]).all() and (run["measured_velocity"] == run["velocity"]).all():
         return figures
-    figures["measurement"] = lambda: small_multiples(_titled(run, "Measurement error"), outputs, _apart(run), columns)
+    figures["measurement"] = plot("Measurement error", outputs, lambda: _apart(run))
     return figures
 
 
@@ -96,6 +88,4 @@ def _titled(run: xr.Dataset, what: str) -> str:
 
 def _columns(count: int) -> int:
     """Three columns, or two where that fills the rows better."""
-    if count % 3 == 0:
-        return 3
-    return min(count, 2)
+    return 3 if count % 3 == 0 else min(count, 2)

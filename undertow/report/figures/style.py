@@ -3,12 +3,13 @@
 Only matplotlib's objects are used, never pyplot, and no setting of matplotlib is changed: two threads may plot at once.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from matplotlib.transforms import ScaledTranslation, Transform
 
 TEXT, SMALL, TINY = 8.0, 7.0, 6.2  # pt
@@ -24,11 +25,17 @@ class Look(NamedTuple):
     width: float
     order: int
 
+    @property
+    def line(self) -> dict[str, Any]:
+        """Arguments of `Axes.plot` for a line."""
+        return {"color": self.colour, "linestyle": self.dashes, "linewidth": self.width, "zorder": self.order}
+
 
 TRUTH = Look("#000000", (0, (1, 1.8)), 1.1, 4)  # dotted: desired or true
 SOLID = Look("#0072b2", "-", 1.1, 3)  # RCAFC, or what the run did
 DASHED = Look("#e07b00", (0, (4, 1.6)), 1.1, 2)  # RAFC, or the second of two
 CONTROLLERS = {"rcafc": ("RCAFC", SOLID), "rafc": ("RAFC", DASHED)}
+MARKS = {"rcafc": "o", "rafc": "s"}
 
 
 def blank(width: float, height: float) -> Figure:
@@ -51,6 +58,13 @@ def place(figure: Figure, left: float, top: float, width: float, height: float) 
         spine.set_visible(side in ("left", "bottom"))
         spine.set_linewidth(0.6)
     return panel
+
+
+def few_log_ticks(*axes: Axis, most: int = 5) -> None:
+    """At most so many labels and no minor ticks on logarithmic axes."""
+    for axis in axes:
+        axis.set_major_locator(LogLocator(numticks=most))
+        axis.set_minor_locator(NullLocator())
 
 
 def label(panel: Axes, x: str = "", y: str = "", title: str = "", size: float = TEXT) -> None:
@@ -96,6 +110,12 @@ def _legend(figure: Figure, keys: dict[str, Look], columns: int, **place) -> Non
         borderaxespad=0.2,
         **place,
     )
+
+
+def note(panel: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **looks: Any) -> None:
+    """A small text near a point, in shares of the panel, moved by points (pt)."""
+    settings = {"xycoords": "axes fraction", "textcoords": "offset points", "fontsize": TINY} | looks
+    panel.annotate(text, at, xytext=shift, **settings)
 
 
 def power(unit: str) -> str:

@@ -7,8 +7,6 @@ from matplotlib.figure import Figure
 
 from undertow.report.figures import style
 
-_MARKS = {"rcafc": "o", "rafc": "s"}
-
 
 def sweep_figure(sweep: Mapping[str, Mapping[str, Sequence[float]] | Any]) -> Figure:
     """Measured points against the theory's curve, one pair per controller.
@@ -26,19 +24,12 @@ def sweep_figure(sweep: Mapping[str, Mapping[str, Sequence[float]] | Any]) -> Fi
     for key, (name, look) in shown.items():
         points = sweep[key]
         if points.get("theory"):
-            panel.plot(
-                points["theory_frequency"],
-                points["theory"],
-                color=look.colour,
-                linestyle=look.dashes,
-                linewidth=look.width + 0.2,
-                zorder=look.order,
-                label=f"{name}, theory",
-            )
+            wider = look._replace(width=look.width + 0.2)
+            panel.plot(points["theory_frequency"], points["theory"], **wider.line, label=f"{name}, theory")
         panel.plot(
             points["frequency"],
             points["measured"],
-            _MARKS[key],
+            style.MARKS[key],
             color=look.colour,
             markerfacecolor="white",
             markersize=5,
@@ -46,15 +37,8 @@ def sweep_figure(sweep: Mapping[str, Mapping[str, Sequence[float]] | Any]) -> Fi
             label=f"{name}, measured",
         )
     panel.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
-    panel.annotate(
-        "above this line the estimate increases the error",
-        (0.01, 1.0),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 2),
-        textcoords="offset points",
-        fontsize=style.TINY,
-        va="bottom",
-    )
+    words = "above this line the estimate increases the error"
+    style.note(panel, words, (0.01, 1.0), (0, 2), xycoords=("axes fraction", "data"), va="bottom")
     panel.legend(fontsize=style.SMALL, frameon=False, loc="lower right", handlelength=3.2)
     style.label(panel, "frequency of d, rad/s", r"$|\hat{d} - d| \,/\, |d|$ (ratio)")
     return figure

@@ -6,8 +6,6 @@ from typing import Any
 from undertow.report.formats import number, prose, round_time
 from undertow.report.page import Html, join, table, tag
 
-FIGURES = ("horizons", "lags", "drifting")
-
 CAPTIONS = {
     "horizons": prose(
         "The upper panels show the largest weight against time; a cross marks a run that ended early. Thin grey lines "
@@ -38,13 +36,14 @@ def horizon_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> 
         figures: figures by name.
     """
     content = []
+    figure = lambda name: figures.get(name, Html(""))
     if results.get("horizons"):
-        content += [*_horizons(results["horizons"]), *_figure(figures, "horizons"), _table(results["horizons"])]
+        content += [*_horizons(results["horizons"]), figure("horizons"), _table(results["horizons"])]
     if results.get("lags"):
-        content += [tag("h3", "Effect of a lag and of the winding inductance"), *_figure(figures, "lags")]
+        content += [tag("h3", "Effect of a lag and of the winding inductance"), figure("lags")]
         content.append(_lags(results["lags"], results["horizons"]["windows"]))
     if results.get("drifting"):
-        content += [tag("h3", "Mechanism: drifting weights add damping"), *_figure(figures, "drifting")]
+        content += [tag("h3", "Mechanism: drifting weights add damping"), figure("drifting")]
     return content
 
 
@@ -101,7 +100,3 @@ def _wide(head: Sequence[str], windows: Sequence[Sequence[float]], rows: Sequenc
     names = ("tracking rms", "variation, V/s", "largest weight")
     titles = [join(name, tag("div", f"{a:g} to {b:g} s", class_="small")) for name in names for a, b in windows]
     return table((*head, *titles), rows, numeric=range(len(head), len(head) + len(titles)), wide=True)
-
-
-def _figure(figures: Mapping[str, Html], name: str) -> list[Html]:
-    return [figures[name]] if name in figures else []

@@ -6,24 +6,24 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from undertow.report.figures import fidelity_figure, paper_figures, sweep_figure
+from undertow.report.figures import paper_figures, sweep_figure
 from undertow.report.figures.ablations import ablations_figure
+from undertow.report.figures.fidelity import fidelity_figure, robust_fidelity_figure
 from undertow.report.figures.horizons import horizons_figure
 from undertow.report.figures.lags import drifting_figure, lags_figure
-from undertow.report.figures.robust_fidelity import robust_fidelity_figure
 from undertow.report.figures.writing import save
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
 from undertow.report.reproduction import horizon_section, tables
 from undertow.report.reproduction.background import ASSUMED, INTRODUCTION, LEFT_OPEN
 from undertow.report.reproduction.captions import captions
-from undertow.report.reproduction.robust_section import CAPTIONS, FIGURES, TITLE, robust_section
+from undertow.report.reproduction.robust_section import CAPTIONS, TITLE, robust_section
 from undertow.reproduction.reproduce import Reproduction
 
 _TITLE = "Reproduction of the paper and check of its claims"
 
 # Figures with a section of their own; all others are in the first section.
-_ELSEWHERE = ("fidelity", "sweep", *horizon_section.FIGURES, *FIGURES)
+_ELSEWHERE = ("fidelity", "sweep", *horizon_section.CAPTIONS, *CAPTIONS)
 
 
 def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path) -> Path:
@@ -110,7 +110,7 @@ def _fidelity(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[H
     )
     return [
         tag("p", prose(text)),
-        *(figures[name] for name in ("fidelity",) if name in figures),
+        figures.get("fidelity", Html("")),
         tables.fidelity_levels(results["fidelity"]),
         *horizon_section.horizon_section(results, figures),
     ]
@@ -123,15 +123,12 @@ def _audit(claims: list[dict[str, Any]], figures: Mapping[str, Html]) -> list[Ht
         "Each verdict names the run behind it, with the fidelity levels and the simulated time. It does not extend "
         "beyond these. Run the commands in the folder of this page."
     )
-    return [tag("p", prose(text)), tables.audit(claims), *(figures[name] for name in ("sweep",) if name in figures)]
+    return [tag("p", prose(text)), tables.audit(claims), figures.get("sweep", Html(""))]
 
 
 def _left_open() -> list[Html]:
-    return [
-        table(
-            ("location", "problem", "treatment here"), [[prose(cell) for cell in row] for row in LEFT_OPEN], wide=True
-        )
-    ]
+    rows = [[prose(cell) for cell in row] for row in LEFT_OPEN]
+    return [table(("location", "problem", "treatment here"), rows, wide=True)]
 
 
 def _provenance(results: Mapping[str, Any]) -> list[Html]:
@@ -164,14 +161,9 @@ def make_figures(found: Reproduction) -> dict[str, Figure]:
         "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),
         "drifting": drifting_figure(found.results["drifting"]),
     }
-    robust = found.results.get("robust_variant")
-    return figures | _of_last_chapter(found, robust) if robust else figures
-
-
-def _of_last_chapter(found: Reproduction, robust: dict[str, Any]) -> dict[str, Figure]:
-    rows = robust["fidelity"]
-    datasets = {(row["place"], row["law"]): found.runs[Path(row["scenario"]).stem].dataset for row in rows}
-    return {
-        "robust_fidelity": robust_fidelity_figure(rows, datasets),
-        "ablations": ablations_figure(robust["ablations"]),
-    }
+    if robust := found.results.get("robust_variant"):
+        rows = robust["fidelity"]
+        datasets = {(row["place"], row["law"]): found.runs[Path(row["scenario"]).stem].dataset for row in rows}
+        figures["robust_fidelity"] = robust_fidelity_figure(rows, datasets)
+        figures["ablations"] = ablations_figure(robust["ablations"])
+    return figures

@@ -8,8 +8,6 @@ from undertow.report.formats import ending, number, prose, unit
 from undertow.report.page import Html, bullets, join, table, tag
 from undertow.reproduction.all_outputs import unit_of
 
-FIGURES = ("robust_fidelity", "ablations")
-
 TITLE = "The robust variant"
 
 CAPTIONS = {
@@ -56,11 +54,12 @@ def robust_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> l
         "in the folder of this page: `undertow simulate` with the file named below each controller. Each ablation is a "
         "file of campaigns/ for `undertow campaign`."
     )
-    levels = [tag("h3", "Fidelity levels"), tag("p", prose(text)), *_figure(figures, "robust_fidelity")]
     return [
         tag("p", prose(conditions)),
         *lists,
-        *levels,
+        tag("h3", "Fidelity levels"),
+        tag("p", prose(text)),
+        figures.get("robust_fidelity", Html("")),
         fidelity_table(results["fidelity"]),
         *_ablations(results, figures),
     ]
@@ -78,7 +77,7 @@ def _ablations(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[
         tag("h3", "Ablations"),
         tag("p", prose(text)),
         answers_table(results["ablations"]),
-        *_figure(figures, "ablations"),
+        figures.get("ablations", Html("")),
         tag("details", tag("summary", "Every variant in numbers"), numbers_table(results["ablations"])),
     ]
 
@@ -92,13 +91,8 @@ def _sentences(conclusions: list[str]) -> Html:
     return bullets(items)
 
 
-def _figure(figures: Mapping[str, Html], name: str) -> list[Html]:
-    return [figures[name]] if name in figures else []
-
-
 _FIDELITY = ("tracking_rms", "estimation_rms", "input_rms", "input_variation", "saturated_fraction")
 _KINDS = {"yes": "holds", "partly": "partly", "no": "fails"}
-_OWN_UNITS = {"share": "", "lost_axes": ""}
 
 
 def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
@@ -108,15 +102,11 @@ def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
         steady = row["steady"] or {}
         place = tag("b", row["words"]) if row["words"] != last else ""
         last = row["words"]
-        ended = tag("span", ending(dict(row)), class_=f"chip {'holds' if row['status'] == 'completed' else 'fails'}")
+        ended = tag("span", ending(row), class_=f"chip {'holds' if row['status'] == 'completed' else 'fails'}")
         name = join(row["name"], tag("div", tag("code", row["scenario"]), class_="small"))
         shown.append((place, name, ended, *(number(steady.get(metric)) for metric in _FIDELITY)))
-    head = (
-        "case",
-        "controller",
-        "status",
-        *(join(metric.replace("_", " "), " ", _unit(metric)) for metric in _FIDELITY),
-    )
+    metrics = (join(metric.replace("_", " "), " ", unit(unit_of(metric))) for metric in _FIDELITY)
+    head = ("case", "controller", "status", *metrics)
     return table(head, shown, numeric=range(3, 3 + len(_FIDELITY)), wide=True)
 
 
@@ -158,7 +148,3 @@ def _metric(name: str, spread: Mapping[str, float]) -> Html:
 
 def _number(value: float) -> Html:
     return number(value) if math.isfinite(value) else Html("&infin;")
-
-
-def _unit(metric: str) -> Html:
-    return unit(_OWN_UNITS[metric] if metric in _OWN_UNITS else unit_of(metric))
