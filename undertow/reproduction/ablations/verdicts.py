@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-Found = Mapping[str, Any]  # variant -> its summary: `median(metric)`, `failures`, `seeds`, `metrics`
+Found = Mapping[str, Any]  # variant -> `study.Variant`
 
 
 class Verdict(NamedTuple):
@@ -23,7 +23,7 @@ class Ablation(NamedTuple):
         prediction: prediction of the theory.
         left_out: part of the question that is not examined.
         long: whether a quick reproduction omits it.
-        judge: verdict from the summaries of all variants.
+        judge: verdict from all variants.
     """
 
     id: str
@@ -292,8 +292,8 @@ def _thruster_loss(found: Found) -> Verdict:
     one = [found[f"{law}, one off"].metrics[_TRACKING] for law in _PRESETS]
     triple = all(not found[f"{law}, three off"].median(_TRACKING) < _LOST for law in _PRESETS)
     text = f"Median tracking rms: {_listed(_tracking(found), '.2g')}."
-    tolerated = all(each.median < _LOST for each in one)
-    return _verdict(tolerated and all(each.high < _LOST for each in one) and triple, text, partly=tolerated)
+    tolerated = all(each["median"] < _LOST for each in one)
+    return _verdict(tolerated and all(each["high"] < _LOST for each in one) and triple, text, partly=tolerated)
 
 
 @_ablation(
