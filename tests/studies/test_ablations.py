@@ -95,11 +95,7 @@ def test_conclusions_find_their_variants():
         {"id": one.id, "variants": [{"name": name, **each._asdict()} for name, each in pretended(one).items()]}
         for one in ABLATIONS
     ]
-    rows = [
-        {"place": place, "law": law, "status": "completed", "steady": None}
-        for place, compared in fidelity.places(False).items()
-        for law in compared.runs
-    ]
+    rows = [{"place": run.place, "law": run.law, "status": "completed", "steady": None} for run in fidelity.runs(False)]
     numbers = conclusions.Numbers(rows, results)
     asked = [sentence for sentences in conclusions._KINDS.values() for sentence in sentences]
     for sentence in asked:
