@@ -132,15 +132,7 @@ def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
 def table(executed: Mapping[str, Executed], quick: bool) -> list[dict[str, Any]]:
     """One row per setting and law: ending and steady metrics."""
     return [
-        {
-            "place": run.place,
-            "words": run.words,
-            "law": run.law,
-            "name": run.name,
-            "scenario": f"scenarios/{run.key}.yaml",
-            **_row(executed[run.key]),
-        }
-        for run in runs(quick)
+        {**run._asdict(), "scenario": f"scenarios/{run.key}.yaml", **_row(executed[run.key])} for run in runs(quick)
     ]
 
 
