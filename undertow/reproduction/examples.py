@@ -83,18 +83,13 @@ def _why(run: Executed, fidelity: str) -> str:
         )
     number = sum(value > 0 for value in growth)
     rate = f"{growth[worst]:+.1f} 1/s, {abs(modes[worst].imag):.0f} rad/s, {at}"
-    ended = run.status is not Status.OK
-    tail = (
-        "The oscillation grows until the run fails."
-        if ended
-        else f"The oscillation makes the weights drift apart, which adds damping (d_hat = z - c eps, c up to "
-        f"{_damping(run):.0f} 1/s at the end), until the oscillation stops growing: see below."
-    )
+    tail = "The oscillation grows until the run fails."
+    if run.status is Status.OK:
+        damping = gain_of(law, run.dataset["weights"].values[-1]).max()
+        tail = (
+            "The oscillation makes the weights drift apart, which adds damping (d_hat = z - c eps, c up to "
+            f"{damping:.0f} 1/s at the end), until the oscillation stops growing: see below."
+        )
     return (
         f"At fixed weights the linearised loop is unstable at {number} of {len(_SPEEDS)} speeds (worst {rate}). {tail}"
     )
-
-
-def _damping(run: Executed) -> float:
-    """Largest gain c of section 3.8 over the axes at the end of a run, 1/s."""
-    return float(gain_of(law_of(run), run.dataset["weights"].values[-1]).max())

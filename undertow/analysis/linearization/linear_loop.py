@@ -101,7 +101,7 @@ def close_continuous(at: Equilibrium, dt: float) -> LinearLoop:
 def _shown(slopes: Slopes, of_state: Callable[[str], np.ndarray]) -> tuple[dict[str, np.ndarray], Slopes]:
     """Signals of the state, and what enters them directly; the input is what the law commands."""
     u, u_noise = of_state("u"), slopes["u"]["noise"]
-    signals, direct = {"u": u}, {"u": {"noise": u_noise}}
+    signals, direct = {"u": u}, {"u": {"load": slopes["u"]["load"], "noise": u_noise}}
     for name in filter(slopes.__contains__, SIGNALS):
         applied = slopes[name]["u"]
         signals[name] = of_state(name) + applied @ u

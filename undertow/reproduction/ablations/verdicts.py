@@ -68,10 +68,6 @@ def _listed(values: Mapping[str, float], form: str = ".3f") -> str:
     return ", ".join(f"{name} {value:{form}}" for name, value in values.items())
 
 
-def _early(found: Found) -> str:
-    return "; ".join(name for name, one in found.items() if one.failures) or "none"
-
-
 def _lost_by_most(one: Any) -> bool:
     return one.failures > one.seeds / 2
 
@@ -277,7 +273,8 @@ def _model_errors(found: Found) -> Verdict:
         own = {name: error / exact for name, error in _tracking(found).items() if name.startswith(f"{law}, ")}
         name = max(own, key=own.__getitem__)
         worst.append(f"{own[name]:.3g} times ({name})")
-    text = f"Largest error over that of the exact model: {'; '.join(worst)}. Ended early: {_early(found)}."
+    early = "; ".join(name for name, one in found.items() if one.failures) or "none"
+    text = f"Largest error over that of the exact model: {'; '.join(worst)}. Ended early: {early}."
     ended = sum(one.failures > 0 for one in found.values())
     return _verdict(not ended, text, partly=ended <= 2)
 
