@@ -101,7 +101,7 @@ def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray
     return small.signals[signal] @ inner + loop.direct[signal]["load"]
 
 
-def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = "sampled") -> list[float]:
+def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any) -> list[float]:
     """Spectral radius of the closed loop at rest under each of some constant loads; below 1 each is stable.
 
     Loads that no input holds are left out; where none is held, the radius is infinite.
@@ -111,10 +111,9 @@ def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = 
         dt: sampling time, s.
         position: of the reference, m and rad.
         loads: accelerations of the outputs, m/s^2 and rad/s^2, one per row.
-        kind: sampled or continuous.
     """
     found = [at for load in np.atleast_2d(loads) if (at := equilibrium(loop, dt, position, load)).found]
-    return [spectral_radius(closed(at, dt, kind)) for at in found] or [float("inf")]
+    return [spectral_radius(closed(at, dt)) for at in found] or [float("inf")]
 
 
 def _largest(closed_at: Callable[[float], LinearLoop], least: float, most: float) -> float:

@@ -237,9 +237,7 @@ def _limits(found: Found) -> Verdict:
     lost = [name for name, error in _tracking(found).items() if not error < _LOST]
     text = f"Not back within 0.1 m (rad) after 10 s: {'; '.join(lost) or 'none'}."
     laws, limits = ("RCAFC", "RCAFC, command fed", "RAFC", "robust"), ("5 m/s^2", "3 m/s^2", "1.5 m/s^2")
-    on_axes = {
-        name for name in (f"{law}, {limit}" for law in laws for limit in limits) if name in found and name in lost
-    }
+    on_axes = set(lost) & {f"{law}, {limit}" for law in laws for limit in limits}
     expected = {f"RCAFC, command fed, {limit}" for limit in limits[1:]} | {f"RAFC, {limit}" for limit in limits}
     kept = [f"{law}, {limit}" for law in ("RCAFC", "robust") for limit in limits]
     return _verdict(on_axes == expected, text, partly=not any(found[name].median(_TRACKING) >= _LOST for name in kept))
