@@ -1,5 +1,6 @@
 """The closed loop as one linear discrete-time system, with optional delay, lag and gain between law and plant."""
 
+import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -70,17 +71,16 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
     matrix[z] = of_state("law") + slopes["law"]["u"] @ u
     entries["noise"][z] = slopes["law"]["noise"] + slopes["law"]["u"] @ u_noise
     slots = [slice(n + law + i * inputs, n + law + (i + 1) * inputs) for i in range(buffered)]  # newest first
-    for share, steps in ((late, buffered - 1), (early, buffered)) if buffered else ((late, 0), (early, 0)):
+    for share, steps in ((late, buffered - 1), (early, buffered)):
         if steps <= 0:
             matrix[x] += share @ u
             entries["noise"][x] += share @ u_noise
         else:
             matrix[x, slots[steps - 1]] += share
-    for older, slot in enumerate(slots):
-        if older == 0:
-            matrix[slot], entries["noise"][slot] = u, u_noise
-        else:
-            matrix[slot, slots[older - 1]] = np.eye(inputs)
+    if buffered:
+        matrix[slots[0]], entries["noise"][slots[0]] = u, u_noise
+    for newer, older in itertools.pairwise(slots):
+        matrix[older, newer] = np.eye(inputs)
     return LinearLoop(matrix, entries, *_shown(slopes, of_state), dt)
 
 

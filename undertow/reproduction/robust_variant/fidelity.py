@@ -88,7 +88,7 @@ _STATION_LAWS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-class Run(NamedTuple):
+class ComparedRun(NamedTuple):
     """One law in one setting."""
 
     place: str
@@ -103,7 +103,7 @@ class Run(NamedTuple):
         return f"robust_variant_{self.place}_{self.law}"
 
 
-def runs(quick: bool) -> list[Run]:
+def runs(quick: bool) -> list[ComparedRun]:
     """Every law in every setting, from the simplest to the most realistic; quick: the full motor model only."""
     found, laws = [], [law for law in LAWS if law != "measured" or not quick]
     for fidelity in (WHOLE,) if quick else FIDELITIES:
@@ -120,7 +120,7 @@ def runs(quick: bool) -> list[Run]:
     words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own sensors"
     for law, (name, controller) in _AT_SEA.items():
         described = {"description": f"{name}: BlueROV2 Heavy at sea, from its own sensors", "controller": controller}
-        found.append(Run("sea", words, law, name, W2 | described))
+        found.append(ComparedRun("sea", words, law, name, W2 | described))
     return found + [_of_station(place, law) for place in _STATION for law in _STATION_LAWS]
 
 
@@ -136,17 +136,19 @@ def table(executed: Mapping[str, Executed], quick: bool) -> list[dict[str, Any]]
     ]
 
 
-def _of_odin(place: str, words: str, law: str, load: Any, fidelity: str = WHOLE, supply: float | None = None) -> Run:
+def _of_odin(
+    place: str, words: str, law: str, load: Any, fidelity: str = WHOLE, supply: float | None = None
+) -> ComparedRun:
     name, controller = LAWS[law]
     sensor = {"speed_sensor": fidelity == "ideal" or law == "measured"}
     one = scenario(f"{name}: {words}", fidelity=fidelity, loop=_SAMPLED, disturbance=load, model=sensor)
     one["controller"] = controller
     if supply is not None:
         one["plant"]["thruster"]["supply"] = supply
-    return Run(place, words, law, name, one)
+    return ComparedRun(place, words, law, name, one)
 
 
-def _of_station(place: str, law: str) -> Run:
+def _of_station(place: str, law: str) -> ComparedRun:
     words, navigation, gains = _STATION[place]
     name, controller = _STATION_LAWS[law]
     per_axis = {key: [one[0]] * 3 + [one[1]] * 3 if isinstance(one, tuple) else one for key, one in gains[law].items()}
@@ -162,7 +164,7 @@ def _of_station(place: str, law: str) -> Run:
         "loop": {"kind": "sampled", "dt": 0.01, "duration": 60.0, "record": 0.05},
         "steady": {"start": 30.0},
     }
-    return Run(place, words, law, name, one)
+    return ComparedRun(place, words, law, name, one)
 
 
 def _row(run: Executed) -> dict[str, Any]:
