@@ -77,7 +77,7 @@ def largest_gain(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> float:
 
 
 def time_to_divergence(law: RCAF | RobustRCAF, dt: float, velocity: float) -> float:
-    """Time, s, in which white velocity noise drives c from zero to `largest_gain`; infinite where it cannot.
+    """Time, s, in which white velocity noise drives c of the first axis to `largest_gain`; infinite where it cannot.
 
     c_dot = gamma gamma_eps |xi'(0)|^2 mean(eps^2). Of the estimator alone, with n the noise of standard deviation
     `velocity` and q the shift by one step: eps = -(q - 1)^2 / ((q - 1)^2 + p (q - 1) + r) n.
