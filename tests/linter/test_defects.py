@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
+from undertow.checks.part_check import check_contract
+from undertow.checks.thruster_check import derived_of_thruster
 from undertow.checks.vehicle_lint import lint
 from undertow.scenario.vehicle_file import read_vehicle
 from undertow.thrusters import paper_table3, t200
@@ -100,7 +101,7 @@ def test_command_line_says_where(name, capsys):
 
 def test_motor_of_table_3():
     """k_t / k_e = 117: at 10 V the shaft would give 537 W from 78 W."""
-    (finding,) = lint_thruster(paper_table3())
+    (finding,) = check_contract(paper_table3())
     assert finding.level == "advice" and "torque constant / back-EMF constant is 117" in finding.says
     rows = {what: value for what, value, _ in derived_of_thruster(paper_table3())}
     assert rows["torque constant / back-EMF constant"] == "116.9"
@@ -108,6 +109,6 @@ def test_motor_of_table_3():
 
 
 def test_motor_with_equal_constants():
-    assert lint_thruster(t200()) == ()
+    assert check_contract(t200()) == ()
     rows = {what: value for what, value, _ in derived_of_thruster(t200())}
     assert all(0.3 < float(share) < 1 for share in rows["shaft power / electrical power"].split(","))

@@ -96,10 +96,11 @@ def test_every_run_of_the_fidelity_comparison_is_a_scenario(quick):
 
 
 def test_robust_meets_the_same_as_table_1():
-    for place in fidelity.places(False).values():
-        ours, theirs = (dict(place.runs[law][1]) for law in ("robust", next(iter(place.runs))))
+    runs = fidelity.runs(False)
+    ours = {run.place: run.scenario for run in runs if run.law == "robust"}
+    for run in runs:
         for key in ("plant", "disturbance", "reference", "loop"):
-            assert ours[key] == theirs[key]
+            assert ours[run.place][key] == run.scenario[key]
 
 
 def test_dots_stand_at_the_medians():

@@ -1,10 +1,11 @@
 """I25, section 3.8: weights drift under noise and ripple at a predicted rate, until the loop breaks; a box stops them."""
 
+import axis_forms
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from undertow.analysis import drift, noise, small_signal
+from undertow.analysis import drift, small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core.status import Status
 from undertow.disturbances.none import none
@@ -45,7 +46,7 @@ def test_rate_and_end_of_drift(velocity, spacing, printed_rate, printed_end):
     end, predicted_end = float(outcome.ended), drift.time_to_divergence(law, DT, velocity)
     fifth = time <= 0.2 * end
     rate = np.polyfit(time[fifth], gain[fifth], 1)[0]
-    predicted = drift.drift_rate(law, DT, drift.noise_square(law, DT, velocity))
+    predicted = axis_forms.drift_rate(law, DT, axis_forms.noise_square(law, DT, velocity))
     print(
         f"{velocity} m/s, sets {spacing}: c_dot {rate:.4g} ({predicted:.4g}), diverges {end:.4g} ({predicted_end:.4g})"
     )
@@ -80,7 +81,7 @@ def test_cures(choices):
     assert int(outcome.status) == int(Status.OK)
     bound = drift.gain_bound(law)
     assert gain.max() <= bound * (1 + 1e-12)
-    assert drift.is_certified(law, DT) and drift.time_to_divergence(law, DT, 1e-2) == np.inf
+    assert axis_forms.is_certified(law, DT) and drift.time_to_divergence(law, DT, 1e-2) == np.inf
     if "weights_bound" in choices:
         theta_max = choices["weights_bound"]
         assert np.abs(weights).max() <= theta_max
@@ -93,7 +94,7 @@ def test_certificate_separates_what_stays_calm_from_what_does_not():
     for share, calm in ((0.7, True), (1.3, False)):
         theta_max = share * 1860.0 * 0.1 / 0.848
         law, _, gain, _, outcome = noisy(15.0, 1e-2, 0.1, weights_bound=theta_max)
-        assert drift.is_certified(law, DT) == calm
+        assert axis_forms.is_certified(law, DT) == calm
         assert gain.max() <= drift.gain_bound(law) * (1 + 1e-12)
         late = float(np.sqrt((np.asarray(outcome.signals["modelling_error"])[-1000:] ** 2).mean()))
         print(f"box {theta_max:.4g}: rms of eps {late:.3g} m/s at the end")
@@ -117,7 +118,7 @@ def test_ripple_drives_weights_apart_too():
 
 def after_ripple(law, amplitude, frequency, duration):
     """c by its own equation, in which eps = -p d / (p^2 + (a1 + c) p + b2), p = i frequency."""
-    g, p, rate = small_signal.gains(law), 1j * frequency, drift.drift_rate(law, DT, 1.0)
+    g, p, rate = small_signal.gains(law), 1j * frequency, axis_forms.drift_rate(law, DT, 1.0)
     eps = lambda gain: abs(p / (p**2 + (g.pole + gain) * p + g.b2)) * amplitude
     return solve_ivp(lambda _, gain: rate * eps(gain) ** 2 / 2, (0.0, duration), [0.0], rtol=1e-8).y[0, -1]
 
@@ -137,6 +138,6 @@ def test_slope_of_the_basis():
 def test_closed_form_of_the_noise_is_the_lyapunov_equation(table1):
     """The estimator alone: what s adds at Table 1 is a thousandth."""
     for gain in (0.0, 50.0, 500.0):
-        whole = noise.deviations(table1(), DT, velocity=1.0, gain=gain).modelling_error ** 2
-        assert drift.noise_square(table1(), DT, 1.0, gain) == pytest.approx(whole, rel=3e-3)
+        whole = axis_forms.deviations(table1(), DT, velocity=1.0, gain=gain).modelling_error ** 2
+        assert axis_forms.noise_square(table1(), DT, 1.0, gain) == pytest.approx(whole, rel=3e-3)
     assert drift.largest_gain(table1(), DT) == pytest.approx(2 / DT + 21087 * DT / 2 - 150.2, rel=1e-4)

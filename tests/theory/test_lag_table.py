@@ -3,13 +3,14 @@
 Twenty pairs of gains and propeller speeds from a nudge off their equilibrium; then the table of 1-DOF runs.
 """
 
+import axis_forms
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from motor_rail import COUNT, MASS, InnerLoop, MotorRail, thrust_model
 
-from undertow.analysis import motor_loop, small_signal
+from undertow.analysis import motor_loop
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import Load, Target
 from undertow.core.status import Status
@@ -148,7 +149,7 @@ def row(fidelity="electromechanical", supply=np.inf, speed_sensor=False, inner=N
 def test_ideal_thrusters(rows):
     status, _, found, law = rows["ideal"]
     assert status == int(Status.OK)
-    assert found["e"] == pytest.approx(0.5 * abs(small_signal.tracking_response(law, 1.0)) / np.sqrt(2), rel=0.02)
+    assert found["e"] == pytest.approx(0.5 * abs(axis_forms.tracking_response(law, 1.0)) / np.sqrt(2), rel=0.02)
     assert found["e"] == pytest.approx(1.8e-5, rel=0.05)
     needed = MASS / COUNT * np.sqrt(0.25 + 0.125) / float(WHOLE.voltage_gain())
     assert found["V"] == pytest.approx(needed, rel=1e-3)

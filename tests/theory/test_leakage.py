@@ -1,5 +1,6 @@
 """Preset `robust`: fuzzy weights that noise drives apart come together again, so that they do not grow for as long as a run lasts."""
 
+import axis_forms
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -34,7 +35,7 @@ def test_drift_ends_where_leakage_takes_as_much_as_noise_brings():
     """c_dot = rate - kappa c, so c comes to rate / kappa and stays: after a week it is what it is after minutes."""
     gain, law = drift_gain(0.1)
     settled = gain[50:].mean()
-    rate = drift.drift_rate(law, DT, drift.noise_square(law, DT, NOISE, settled))
+    rate = axis_forms.drift_rate(law, DT, axis_forms.noise_square(law, DT, NOISE, settled))
     assert settled == pytest.approx(rate / 0.1, rel=0.1)
     assert gain[75:].mean() == pytest.approx(gain[50:75].mean(), rel=0.05)
     without, _ = drift_gain(0.0)

@@ -4,6 +4,7 @@ One run; every axis has a frequency of its own. Amplitudes come from a least-squ
 constant and the slow pole exp(-t).
 """
 
+import axis_forms
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -60,7 +61,7 @@ def test_estimation_error_within_one_percent(record):
 def test_tracking_error_within_one_percent(record):
     law, time, samples = record
     measured = amplitudes(time, samples["error"], *early())
-    np.testing.assert_allclose(measured, np.abs(small_signal.tracking_response(law, FREQUENCIES)), rtol=0.01)
+    np.testing.assert_allclose(measured, np.abs(axis_forms.tracking_response(law, FREQUENCIES)), rtol=0.01)
 
 
 def test_measured_uncertainty_is_the_disturbance(record):

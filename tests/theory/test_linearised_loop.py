@@ -1,10 +1,11 @@
 """The exact linearisation of whole loops against closed forms, against the small models, and against runs."""
 
+import axis_forms
 import jax
 import numpy as np
 import pytest
 
-from undertow.analysis import motor_loop, noise, small_signal
+from undertow.analysis import motor_loop, small_signal
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
@@ -59,12 +60,12 @@ def test_poles_and_responses_are_those_of_the_small_model(name):
     assert len(poles) == (6 if name == "rafc" else 8)
     assert unlike(small_signal.poles(law), poles) < 1e-6
     sampled = margins.closed(found, dt)
-    expected = np.log(np.linalg.eigvals(small_signal.sampled_matrix(law, dt)).astype(complex)) / dt
+    expected = np.log(np.linalg.eigvals(axis_forms.sampled_matrix(law, dt)).astype(complex)) / dt
     assert unlike(expected, margins.poles(sampled)) < 1e-6
     frequency = np.array([0.5, 5.0, 50.0])
     response = margins.response(one_ode, "error", frequency)
     np.testing.assert_allclose(
-        np.abs(response[:, 1, 1]), np.abs(small_signal.tracking_response(law, frequency)), rtol=2e-3
+        np.abs(response[:, 1, 1]), np.abs(axis_forms.tracking_response(law, frequency)), rtol=2e-3
     )
     assert np.abs(response[:, 0, 1]).max() < 1e-12  # axes do not touch each other
 
@@ -80,9 +81,9 @@ def test_sampling_time_and_lag_that_the_loop_tolerates():
     """Sections 3.6 and 3.9: 7.03 ms of sampling time, 7.2 ms of lag."""
     sampled = at_rest(on_axes(LAWS["rcafc"]), 1e-3)
     law = sampled.parts.loop.controller
-    longest = small_signal.largest_sampling_time(law)
+    longest = axis_forms.largest_sampling_time(law)
     assert margins.largest_sampling_time(sampled, 1e-3, 1.0) == pytest.approx(longest, rel=2e-3)
-    assert continuous(margins.largest_lag, "rcafc") == pytest.approx(motor_loop.critical_lag(law), rel=5e-3)
+    assert continuous(margins.largest_lag, "rcafc") == pytest.approx(axis_forms.critical_lag(law), rel=5e-3)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +109,7 @@ def test_noise_gains_are_those_of_one_axis(preset, options):
     """I24, the prediction: sections 3.7."""
     loop = on_axes(options, preset)
     sampled = margins.closed(at_rest(loop, 1e-3), 1e-3)
-    one = noise.deviations(loop.controller, 1e-3, position=1e-3, velocity=1e-2)
+    one = axis_forms.deviations(loop.controller, 1e-3, position=1e-3, velocity=1e-2)
     both = np.array([1e-3, 1e-3, 1e-2, 1e-2])
     for signal, expected in {"error": one.error, "estimate": one.estimate, "u": one.input}.items():
         np.testing.assert_allclose(margins.noise_gain(sampled, signal, both), expected, rtol=1e-6)

@@ -4,6 +4,7 @@ The linear model is checked against the Jacobian of the closed loop as it is sim
 thrusters, the four vertical ones turning at a given speed.
 """
 
+import axis_forms
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -55,7 +56,7 @@ def test_unstable_at_every_speed_with_or_without_inductance(table1):
 
 @pytest.mark.parametrize("speed", LAGS)
 def test_motor_as_a_lag(table1, speed):
-    gain, lag = motor_loop.motor_lag(MOTOR, speed)
+    gain, lag = axis_forms.motor_lag(MOTOR, speed)
     assert gain == pytest.approx(LAGS[speed][0], abs=0.006) and lag == pytest.approx(LAGS[speed][1], abs=6e-4)
     law = table1()
     as_lag = np.sort_complex(np.linalg.eigvals(motor_loop.lag_matrix(law, lag, gain)))
@@ -64,18 +65,18 @@ def test_motor_as_a_lag(table1, speed):
 
 
 def test_critical_unity_gain_lags(table1):
-    assert motor_loop.critical_lag(table1()) == pytest.approx(7.2e-3, rel=0.03)
-    assert motor_loop.critical_lag(table1(sets=1)) == pytest.approx(3.0e-3, rel=0.03)
+    assert axis_forms.critical_lag(table1()) == pytest.approx(7.2e-3, rel=0.03)
+    assert axis_forms.critical_lag(table1(sets=1)) == pytest.approx(3.0e-3, rel=0.03)
     third = (1 / 3) / float(table1().fuzzy.basis_norm_squared())
-    assert motor_loop.critical_lag(table1(adaptation=100 * third)) == pytest.approx(9.1e-3, rel=0.03)
-    assert motor_loop.critical_lag(table1(robust_gain=0.0)) == pytest.approx(45e-3, rel=0.03)
-    assert motor_loop.critical_lag(table1(sets=1, robust_gain=0.0)) == pytest.approx(5e-3, rel=0.03)
+    assert axis_forms.critical_lag(table1(adaptation=100 * third)) == pytest.approx(9.1e-3, rel=0.03)
+    assert axis_forms.critical_lag(table1(robust_gain=0.0)) == pytest.approx(45e-3, rel=0.03)
+    assert axis_forms.critical_lag(table1(sets=1, robust_gain=0.0)) == pytest.approx(5e-3, rel=0.03)
 
 
 def test_observer_alone_tolerates_any_lag_or_a_closed_form(table1):
-    assert motor_loop.critical_observer_lag(table1()) == np.inf
+    assert axis_forms.critical_observer_lag(table1()) == np.inf
     g = small_signal.gains(table1(sets=1))
-    critical = motor_loop.critical_observer_lag(table1(sets=1))
+    critical = axis_forms.critical_observer_lag(table1(sets=1))
     assert critical * (g.b2 - g.pole**2) == pytest.approx(g.pole)
     for factor, stable in ((0.99, True), (1.01, False)):
         lag = factor * critical

@@ -1,5 +1,6 @@
 """I23: the largest sampling time, by spectral radius and by the nonlinear loop; theory.md section 3.6."""
 
+import axis_forms
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,14 +17,14 @@ RULES = list(LIMITS)
 
 
 def radius(law, dt, rule):
-    return np.abs(np.linalg.eigvals(small_signal.sampled_matrix(law, dt, rule))).max()
+    return np.abs(np.linalg.eigvals(axis_forms.sampled_matrix(law, dt, rule))).max()
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_spectral_radius_on_both_sides(table1, rule):
     law = table1(**DISCRETISED[rule])
     assert radius(law, 0.95 * LIMITS[rule], rule) < 1 < radius(law, 1.05 * LIMITS[rule], rule)
-    assert small_signal.largest_sampling_time(law, rule) == pytest.approx(LIMITS[rule], rel=0.05)
+    assert axis_forms.largest_sampling_time(law, rule) == pytest.approx(LIMITS[rule], rel=0.05)
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -62,7 +63,7 @@ def test_jacobian_is_that_of_the_code(rails, rule):
         step = jnp.asarray(dt)
         columns = [(advance(flat + nudge, step) - advance(flat - nudge, step)) / 2e-6 for nudge in nudges]
         found = np.linalg.eigvals(np.stack(columns, 1))
-        predicted = np.linalg.eigvals(small_signal.sampled_matrix(loop.controller, dt, rule))
+        predicted = np.linalg.eigvals(axis_forms.sampled_matrix(loop.controller, dt, rule))
         marginal = np.ones(len(found) - 4)  # x_hat, and weights that cancel in d_hat
         for value in np.concatenate([predicted, marginal]):
             assert np.abs(found - value).min() < 2e-5, (dt, value, found)
@@ -72,9 +73,9 @@ def test_closed_forms_of_the_parts(table1):
     """Observer alone: a1 / b2. Boundary layer: (k2 + w_bar p22 / phi) Ts < 2. Identification pole: a1 Ts < 2."""
     alone = table1(weight=((1e-12, 0.0), (0.0, 1e-12)), robust_gain=0.0)
     g = small_signal.gains(alone)
-    assert small_signal.largest_sampling_time(alone) == pytest.approx(g.pole / g.b2, rel=1e-6)
+    assert axis_forms.largest_sampling_time(alone) == pytest.approx(g.pole / g.b2, rel=1e-6)
     assert g.pole / g.b2 == pytest.approx(7.12e-3, rel=1e-3)
     frozen = table1(adaptation=0.0)
-    assert small_signal.largest_sampling_time(frozen) == pytest.approx(2 / g.pole, rel=1e-6)
+    assert axis_forms.largest_sampling_time(frozen) == pytest.approx(2 / g.pole, rel=1e-6)
     slow_pole = table1(adaptation=0.0, pole=10.0)
-    assert small_signal.largest_sampling_time(slow_pole) == pytest.approx(19.6e-3, rel=0.02)
+    assert axis_forms.largest_sampling_time(slow_pole) == pytest.approx(19.6e-3, rel=0.02)

@@ -4,6 +4,7 @@ The law's own state may be stepped explicitly, semi-implicitly (weights first, t
 new estimate) or exactly; the input may reach the plant one step late, and the law is told when it does.
 """
 
+import axis_forms
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -84,9 +85,9 @@ def test_closed_forms(case):
 
 
 def test_without_delay_it_is_the_matrix_of_the_package(table1):
-    for rule in small_signal.RULES:
+    for rule in axis_forms.RULES:
         ours = tick_matrix(small_signal.gains(table1()), 2e-3, rule, False)
-        np.testing.assert_allclose(ours[:4, :4], small_signal.sampled_matrix(table1(), 2e-3, rule), atol=1e-12)
+        np.testing.assert_allclose(ours[:4, :4], axis_forms.sampled_matrix(table1(), 2e-3, rule), atol=1e-12)
 
 
 class Stepped(AbstractController):

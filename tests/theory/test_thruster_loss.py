@@ -6,13 +6,14 @@ how large a gain error the sampled law tolerated_status.
 
 import itertools
 
+import axis_forms
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.analysis import noise, small_signal
+from undertow.analysis import small_signal
 from undertow.controllers.rcaf import rcaf
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractPlant
@@ -138,7 +139,7 @@ LOAD = np.array([0.3, 0.3, 0.3, 0.1, 0.1, 0.1])  # m/s^2, rad/s^2
 
 def amplitudes(law, effect):
     """Amplitudes of e in the end, from the linearised step of all six axes coupled by what is left of G G+."""
-    one, unit = noise.steps(law, DT), np.eye(6)
+    one, unit = axis_forms.steps(law, DT), np.eye(6)
     q = np.exp(1j * FREQUENCY * DT)
     across = lambda row: np.kron(row, unit)  # over (e, e_dot, eps, z) of six axes each
     e, rate, eps, z = np.eye(4)

@@ -1,10 +1,10 @@
 """Section 3.5: in a long error transient d_hat is biased by -(a1 / gamma_eps) s = -0.30 s; RAFC has no such brake."""
 
+import axis_forms
 import jax
 import numpy as np
 import pytest
 
-from undertow.analysis import small_signal
 from undertow.loop import sampled
 
 STEP = 2.0  # m; s = 10 at the start, d = 0 all the while
@@ -21,7 +21,7 @@ def transient(rails, **choices):
 
 def test_bias_follows_s(rails):
     time, s, estimate, eps, law = transient(rails)
-    assert small_signal.transient_bias(law) == pytest.approx(-0.30, rel=5e-3)
+    assert axis_forms.transient_bias(law) == pytest.approx(-0.30, rel=5e-3)
     settled = (time > 0.04) & (np.abs(s) > 2.0)
     assert settled.sum() > 100
     assert (estimate / s)[settled].mean() == pytest.approx(-0.30, rel=0.10)
@@ -32,7 +32,7 @@ def test_peak_of_the_papers_step(rails):
     """-2.67 predicted at the time of the peak; with the overshoot of the observer, near -3.5 is reached."""
     _, s, estimate, _, law = transient(rails)
     peak = np.argmin(estimate)
-    assert small_signal.transient_bias(law) * s[peak] == pytest.approx(-2.67, rel=0.05)
+    assert axis_forms.transient_bias(law) * s[peak] == pytest.approx(-2.67, rel=0.05)
     assert estimate[peak] == pytest.approx(-3.5, rel=0.05)
 
 

@@ -49,7 +49,7 @@ def certify(
     time = lived["time"].values
     with np.errstate(all="ignore"):  # a run that diverged may have had any numbers
         function, hypotheses, numbers = parts(run, lived, steady, dt)
-        rate = _rate(function.value, run["time"].values)
+        rate = np.concatenate([[np.nan], np.diff(function.value) / np.diff(run["time"].values)])
         summary = {
             "function": function.meaning,
             "hypotheses": [_summed(one, time, steady) for one in hypotheses],
@@ -70,11 +70,6 @@ def _signals(function: Lyapunov, rate: np.ndarray) -> dict[str, xr.Variable]:
         for name, (meaning, values, units) in described.items()
         if values is not None
     }
-
-
-def _rate(value: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Differences of records over their distance; there is none at the first."""
-    return np.concatenate([[np.nan], np.diff(value) / np.diff(time)])
 
 
 def _summed(one: Hypothesis, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:

@@ -4,13 +4,40 @@ Weights that differ between sets give d_hat = z - c eps with c = -xi'(0)^T theta
 the square of eps and never decreases: it adds damping at first, and destabilises the sampled loop in the end.
 """
 
+import functools
+
 import numpy as np
 
-from undertow.analysis.noise import Steps, steps
+from undertow.analysis.small_signal import gains, of_axis
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput
 from undertow.estimation.fuzzy_system import FuzzySystem
+
+
+@functools.singledispatch
+def corrections(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> tuple[float, float]:
+    """Corrections per eps in one step of dt seconds: of x_hat_dot, and of d_hat in 1/s. Each class registers its own.
+
+    Raises:
+        BadInput: the paper's law with several steps per step, or with a `sign` switch; a law of another class.
+    """
+    raise BadInput("law", "be the paper's or the robust one", f"a {type(law).__name__}")
+
+
+@corrections.register
+def _paper(law: RCAF, dt: float, axis: int = 0) -> tuple[float, float]:
+    if (law.method, law.substeps) != ("euler", 1):
+        raise BadInput("method", "be euler with one step per step", f"{law.method} with {law.substeps}")
+    g = gains(law, axis)
+    return dt * g.pole, dt * g.b2
+
+
+@corrections.register
+def _robust(law: RobustRCAF, dt: float, axis: int = 0) -> tuple[float, float]:
+    of_rates, of_estimate = law.estimator.gains(as_array(dt))
+    return float(of_axis(law, of_rates, axis)), float(of_axis(law, of_estimate, axis))
 
 
 def basis_slope(fuzzy: FuzzySystem) -> np.ndarray:
@@ -36,9 +63,8 @@ def gain_of(law: RCAF | RobustRCAF, weights: np.ndarray) -> np.ndarray:
 
 def gain_bound(law: RCAF | RobustRCAF, axis: int = 0) -> float:
     """Largest c, 1/s, while |theta| <= theta_max: theta_max sum |xi'(0)|; zero for one set, infinite without a box."""
-    theta_max = np.broadcast_to(np.asarray(law.weights_bound, dtype=float), len(law.model.coordinates.angles))[axis]
     slope = np.abs(basis_slope(law.fuzzy)).sum()
-    return float(theta_max * slope) if slope > 0 else 0.0
+    return float(of_axis(law, law.weights_bound, axis) * slope) if slope > 0 else 0.0
 
 
 def largest_gain(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> float:
@@ -46,42 +72,23 @@ def largest_gain(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> float:
 
     For the paper's law 2 / dt + b2 dt / 2 - alpha - omega_bar / phi.
     """
-    one = steps(law, dt, axis)
-    return (2 - one.of_rates) / dt + one.of_estimate / 2
+    of_rates, of_estimate = corrections(law, dt, axis)
+    return (2 - of_rates) / dt + of_estimate / 2
 
 
-def is_certified(law: RCAF | RobustRCAF, dt: float, axis: int = 0) -> bool:
-    """Whether no drift can make the estimator unstable at this sampling time: `gain_bound` < `largest_gain`."""
-    return gain_bound(law, axis) < largest_gain(law, dt, axis)
+def time_to_divergence(law: RCAF | RobustRCAF, dt: float, velocity: float) -> float:
+    """Time, s, in which white velocity noise drives c of the first axis to `largest_gain`; infinite where it cannot.
 
-
-def drift_rate(law: RCAF | RobustRCAF, dt: float, mean_square: float, axis: int = 0) -> float:
-    """c_dot = gamma gamma_eps |xi'(0)|^2 mean(eps^2), 1/s^2, of a mean square in (m/s)^2."""
-    return _per_square(law, steps(law, dt, axis)) * mean_square
-
-
-def noise_square(law: RCAF | RobustRCAF, dt: float, velocity: float, gain: float = 0.0, axis: int = 0) -> float:
-    """Mean square of eps, (m/s)^2, under white noise of a standard deviation `velocity`, with a gain c in 1/s.
-
-    Of the estimator alone: eps = -(q - 1)^2 / ((q - 1)^2 + p (q - 1) + r) n, q the shift by one step.
+    c_dot = gamma gamma_eps |xi'(0)|^2 mean(eps^2). Of the estimator alone, with n the noise of standard deviation
+    `velocity` and q the shift by one step: eps = -(q - 1)^2 / ((q - 1)^2 + p (q - 1) + r) n.
     """
-    one = steps(law, dt, axis)
-    p, r = one.of_rates + dt * gain, one.of_estimate * dt
-    return velocity**2 * 2 * (2 * p - r) / ((p - r) * (4 - 2 * p + r))
-
-
-def time_to_divergence(law: RCAF | RobustRCAF, dt: float, velocity: float, axis: int = 0) -> float:
-    """Time, s, in which white velocity noise drives c from zero to `largest_gain`; infinite where it cannot."""
     from scipy.integrate import quad  # takes longer to import than all a run needs
 
-    one, end = steps(law, dt, axis), largest_gain(law, dt, axis)
-    rate = _per_square(law, one) * velocity**2
-    if rate == 0 or gain_bound(law, axis) < end:
+    (start, of_estimate), end = corrections(law, dt), largest_gain(law, dt)
+    squared_slope = float((basis_slope(law.fuzzy) ** 2).sum())
+    rate = of_estimate / dt / float(law.fuzzy.basis_norm_squared()) * squared_slope * velocity**2
+    if rate == 0 or gain_bound(law) < end:
         return float("inf")
-    start, r = one.of_rates, one.of_estimate * dt
-    slowness = lambda p: (p - r) * (4 - 2 * p + r) / (2 * (2 * p - r))  # 1 / `noise_square`
+    r = of_estimate * dt
+    slowness = lambda p: (p - r) * (4 - 2 * p + r) / (2 * (2 * p - r))  # 1 / mean(eps^2), p = start + c dt
     return float(quad(slowness, start, start + dt * end)[0] / dt / rate)
-
-
-def _per_square(law: RCAF | RobustRCAF, one: Steps) -> float:
-    return one.of_estimate / one.dt / one.basis_norm_squared * float((basis_slope(law.fuzzy) ** 2).sum())

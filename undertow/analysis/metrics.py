@@ -340,16 +340,13 @@ def meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, 
             if name in found:
                 raise BadInput("metrics", "have names of their own", f"a second `{name}`")
             found[name] = meaning
-    return {name: Metric(_resolved(metric.unit, plant), metric.meaning) for name, metric in found.items()}
+    unit = lambda metric: Signal((), metric.unit, "").unit_for(plant.output_units, plant.input_unit)
+    return {name: Metric(unit(metric), metric.meaning) for name, metric in found.items()}
 
 
 def gathered_meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
     """Those of `meanings` that are gathered along a run: what `results_of_batch` gives."""
     return {name: metric for name, metric in meanings(loop, own).items() if name not in _AFTERWARDS}
-
-
-def _resolved(unit: str, plant: AbstractPlant) -> str:
-    return Signal((), unit, "").unit_for(plant.output_units, plant.input_unit)
 
 
 def for_people(value: float, unit: str) -> tuple[float, str]:

@@ -12,19 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from undertow.analysis.small_signal import Gains, first_crossing, gains
+from undertow.analysis.small_signal import Gains, gains
 from undertow.controllers.composite_law import RCAF
 from undertow.thrusters.motor import DCMotor
-
-
-def motor_lag(motor: DCMotor, speed: float) -> tuple[float, float]:
-    """Gain kappa and lag tau (s) of a / a_c = kappa / (tau p + 1) about a propeller speed (rad/s), L = 0.
-
-    g0 = 2 k_3 c_q |speed|, kappa = g0 / (k_2 + g0), tau = k_1 / (k_2 + g0). Section 3.9.
-    """
-    slope = 2 * float(motor.k3 * motor.torque_coefficient) * abs(speed)
-    total = float(motor.k2) + slope
-    return slope / total, float(motor.k1) / total
 
 
 def lag_matrix(law: RCAF, lag: float, gain: float = 1.0, axis: int = 0, drifted: float = 0.0) -> np.ndarray:
@@ -32,7 +22,7 @@ def lag_matrix(law: RCAF, lag: float, gain: float = 1.0, axis: int = 0, drifted:
 
     `drifted` is c of section 3.8, 1/s; where it is zero, z = d_hat.
     """
-    return _lagged(gains(law, axis), lag, gain, drifted)
+    return _closed(gains(law, axis), np.array([[-1 / lag]]), np.array([gain / lag]), np.array([1.0]), drifted)
 
 
 def motor_matrix(
@@ -89,29 +79,6 @@ def stable_gains(matrix: Callable[[float], np.ndarray], largest: float) -> tuple
     values = np.arange(largest + 1)
     stable = values[np.linalg.eigvals(still + values[:, None, None] * slope).real.max(1) < 0]
     return (float(stable[0]), float(stable[-1])) if stable.size else None
-
-
-def critical_lag(law: RCAF, gain: float = 1.0, axis: int = 0) -> float:
-    """Actuator lag, s, beyond which the whole loop is unstable; infinite if none below 100 s is. Section 3.9."""
-    g = gains(law, axis)
-
-    def unstable(lag: float) -> bool:
-        return rightmost(_lagged(g, lag, gain)).real > 0
-
-    return first_crossing(unstable, np.geomspace(1e-6, 1e2, 1601))
-
-
-def critical_observer_lag(law: RCAF, axis: int = 0) -> float:
-    """Unity-gain lag, s, that the observer loop alone tolerates: a1 / (b2 - a1^2), or infinite. Section 3.9.
-
-    Routh's condition for lag p^3 + (1 + a1 lag) p^2 + a1 p + b2, without the feedback and the robust term.
-    """
-    g = gains(law, axis)
-    return g.pole / (g.b2 - g.pole**2) if g.b2 > g.pole**2 else float("inf")
-
-
-def _lagged(g: Gains, lag: float, gain: float, drifted: float = 0.0) -> np.ndarray:
-    return _closed(g, np.array([[-1 / lag]]), np.array([gain / lag]), np.array([1.0]), drifted)
 
 
 def _closed(g: Gains, own: np.ndarray, drive: np.ndarray, push: np.ndarray, drifted: float) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Whether control succeeded: the verdict of a stated criterion, beside whether the run reached its end."""
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -58,11 +59,7 @@ def judged(criterion: Mapping[str, float], steady: Mapping[str, Any] | None) -> 
     """Verdict on a run from the metrics of its steady window; None where it ended early, or without a criterion."""
     if not criterion:
         return None
-    exceeded = (
-        {} if steady is None else {n: steady.get(n) for n, most in criterion.items() if not _below(steady, n, most)}
-    )
-    return Success(dict(criterion), exceeded, steady is not None and not exceeded)
-
-
-def _below(steady: Mapping[str, Any], name: str, most: float) -> bool:
-    return name in steady and steady[name] < most
+    if steady is None:
+        return Success(dict(criterion), {}, False)
+    exceeded = {name: steady.get(name) for name, most in criterion.items() if not steady.get(name, math.inf) < most}
+    return Success(dict(criterion), exceeded, not exceeded)

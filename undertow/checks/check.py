@@ -10,7 +10,7 @@ from undertow.checks.controller_check import check_stability
 from undertow.checks.finding import Finding
 from undertow.checks.part_check import check_contract, of_plant
 from undertow.checks.plant_check import derived_of_plant
-from undertow.checks.thruster_lint import derived_of_thruster, lint_thruster
+from undertow.checks.thruster_check import derived_of_thruster
 from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint, vehicle_facts
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
@@ -128,7 +128,7 @@ def _place(part: Any, key: str) -> str:
 
 
 def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
-    findings = lint_thruster(thruster)
+    findings = check_contract(thruster)
     broken = any(finding.level == "error" for finding in findings)
     return _report(findings, partial(_place, thruster), title, () if broken else derived_of_thruster(thruster))
 

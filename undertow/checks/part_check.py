@@ -30,26 +30,26 @@ from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 _TIMES = (0.37, 1.93, 7.1)  # s; no round numbers, at which references may have corners
 
 
-class DisturbanceProfile(NamedTuple):
+class Surroundings(NamedTuple):
     """Plant around a part."""
 
     truth: Measurement
     pose: Pose | None
 
 
-_BODY = DisturbanceProfile(
+_BODY = Surroundings(
     truth=measurement_of_outputs(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
     pose=Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
 )
 
 
-def of_plant(plant: AbstractPlant) -> DisturbanceProfile:
-    """Profile of a plant in its initial state."""
+def of_plant(plant: AbstractPlant) -> Surroundings:
+    """Surroundings of a part: a plant in its initial state."""
     x = plant.initial_state()
-    return DisturbanceProfile(plant.output(jnp.zeros(()), x), plant.pose(x))
+    return Surroundings(plant.output(jnp.zeros(()), x), plant.pose(x))
 
 
-def check_contract(part: Any, around: DisturbanceProfile = _BODY) -> tuple[Finding, ...]:
+def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ...]:
     """Violations of the contract of a part; none for kinds that are data only.
 
     Args:
@@ -73,7 +73,7 @@ def _failed(part: Any, complaint: Exception) -> Finding:
     return error("contract", type(part).__name__, "be usable as its contract says", f"not: {says}", hint)
 
 
-def _disturbance(disturbance: AbstractDisturbance, around: DisturbanceProfile) -> Iterator[Finding]:
+def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iterator[Finding]:
     n, pose = len(around.truth.position), around.pose
     still = Load(jnp.zeros(n), jnp.zeros(n))
     busy = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
@@ -99,7 +99,7 @@ def _disturbance(disturbance: AbstractDisturbance, around: DisturbanceProfile) -
         yield error("contract", "jumps", "be a tuple of times between 0 and the duration", f"{jumps} for 10 s")
 
 
-def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> Iterator[Finding]:
+def _navigation(navigation: AbstractNavigation, around: Surroundings) -> Iterator[Finding]:
     realization = jax.eval_shape(navigation.realize, jax.random.PRNGKey(0))
     state = jax.eval_shape(navigation.init, realization, around.truth)
     answer = jax.eval_shape(navigation.measure, realization, state, jnp.zeros(()), around.truth)
@@ -112,7 +112,7 @@ def _navigation(navigation: AbstractNavigation, around: DisturbanceProfile) -> I
     yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
 
 
-def _sensor(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Finding]:
+def _sensor(sensor: AbstractSensor, around: Surroundings) -> Iterator[Finding]:
     """Check of a sensor on a body at rest, so that a delay has no effect."""
     report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
     truth = measurement_of_outputs(around.truth.position, jnp.zeros(6), report)
@@ -138,7 +138,7 @@ def _sensor(sensor: AbstractSensor, around: DisturbanceProfile) -> Iterator[Find
             yield error("contract", "correct", f"move the {name} towards the reading", got)
 
 
-def _reference(reference: AbstractReference, around: DisturbanceProfile) -> Iterator[Finding]:
+def _reference(reference: AbstractReference, around: Surroundings) -> Iterator[Finding]:
     for t in map(jnp.asarray, _TIMES):
         target, rate = jax.jvp(lambda t: tuple(reference.at(t)), (t,), (jnp.ones(()),))
         for value in target:
@@ -147,7 +147,7 @@ def _reference(reference: AbstractReference, around: DisturbanceProfile) -> Iter
         yield from agree("at", target[2], rate[1], f"the rate of the velocity at {t:g} s")
 
 
-_USES: dict[type, Callable[[Any, DisturbanceProfile], Iterator[Finding]]] = {
+_USES: dict[type, Callable[[Any, Surroundings], Iterator[Finding]]] = {
     AbstractPlant: lambda plant, around: check_plant(plant),
     AbstractController: lambda controller, around: check_controller(controller),
     AbstractDisturbance: _disturbance,

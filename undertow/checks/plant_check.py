@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,19 +23,20 @@ def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
         yield from wrong
         return
     found = jax.jit(partial(_numbers, plant))(_trial(plant))
-    yield from agree("output", found.velocity, found.position_rate, "the rate of its position")
-    yield from agree("acceleration", found.acceleration, found.velocity_rate, "the rate of the output")
+    yield from agree("output", found["velocity"], found["position_rate"], "the rate of its position")
+    yield from agree("acceleration", found["acceleration"], found["velocity_rate"], "the rate of the output")
     added = "the lumped acceleration of the load, which adds to it"
-    yield from agree("acceleration", found.gained, _extra(plant), added)
-    if not (found.held < 0).all():
-        i = int(np.argmax(found.held))
-        got = f"{found.held[i]:.4g} for a unit of it on {plant.outputs[i]}"
+    yield from agree("acceleration", found["gained"], _extra(plant), added)
+    held, gain, true_gain = found["held"], found["gain"], found["true_gain"]
+    if not (held < 0).all():
+        i = int(np.argmax(held))
+        got = f"{held[i]:.4g} for a unit of it on {plant.outputs[i]}"
         hint = "It stands on the left side of Eq. (2): subtract it from the forces"
         yield error("contract", "acceleration", "fall with the wrench of the load", got, hint)
-    yield from agree("invert", found.reached, found.reachable, "`gain`: G G# a = a")
-    if np.abs(found.true_gain).max() > _GRIP and float((found.true_gain * found.gain).sum()) < 0:
-        i, j = np.unravel_index(np.abs(found.gain).argmax(), found.gain.shape)
-        got = f"{found.gain[i, j]:.4g} where x_ddot changes by {found.true_gain[i, j]:.4g} per unit"
+    yield from agree("invert", found["reached"], found["reachable"], "`gain`: G G# a = a")
+    if np.abs(true_gain).max() > _GRIP and float((true_gain * gain).sum()) < 0:
+        i, j = np.unravel_index(np.abs(gain).argmax(), gain.shape)
+        got = f"{gain[i, j]:.4g} where x_ddot changes by {true_gain[i, j]:.4g} per unit"
         yield error("contract", "gain", "push where the plant does", got)
 
 
@@ -109,22 +109,8 @@ def _forms_of_model(plant: AbstractPlant) -> Iterator[Finding]:
         yield from shaped("invert", jax.eval_shape(model.dynamics.invert, y, jnp.zeros(n)), (m,))
 
 
-class _Numbers(NamedTuple):
+def _numbers(plant: AbstractPlant, x: PyTree) -> dict[str, Array]:
     """Results of the plant, each in two ways."""
-
-    velocity: Array
-    position_rate: Array
-    acceleration: Array
-    velocity_rate: Array
-    gained: Array  # from a lumped acceleration
-    held: Array  # from a unit of wrench on each axis
-    gain: Array
-    true_gain: Array
-    reachable: Array
-    reached: Array
-
-
-def _numbers(plant: AbstractPlant, x: PyTree) -> _Numbers:
     m, t, no_load = plant.inputs(), jnp.zeros(()), plant.no_load()
     u = plant.admissible(x, jnp.full(m, 0.1))
     y, rate = jax.jvp(lambda x: plant.output(t, x)[:2], (x,), (plant.dynamics(t, x, u, no_load),))
@@ -133,15 +119,16 @@ def _numbers(plant: AbstractPlant, x: PyTree) -> _Numbers:
     model, measured = plant.model(), plant.output(t, x)
     gain = model.dynamics.gain(measured)
     reachable = gain @ jnp.linspace(1.0, 2.0, m)
-    return _Numbers(
-        velocity=y[1],
-        position_rate=rate[0],
-        acceleration=at_rest,
-        velocity_rate=rate[1],
-        gained=moved(u, no_load._replace(acceleration=_extra(plant))) - at_rest,
-        held=jnp.diagonal(jax.jacfwd(lambda w: moved(u, no_load._replace(wrench=w)))(no_load.wrench)),
-        gain=gain,
-        true_gain=jax.jacfwd(lambda u: moved(u, no_load))(u),
-        reachable=reachable,
-        reached=gain @ model.dynamics.invert(measured, reachable),
-    )
+    held = jax.jacfwd(lambda w: moved(u, no_load._replace(wrench=w)))(no_load.wrench)
+    return {
+        "velocity": y[1],
+        "position_rate": rate[0],
+        "acceleration": at_rest,
+        "velocity_rate": rate[1],
+        "gained": moved(u, no_load._replace(acceleration=_extra(plant))) - at_rest,  # from a lumped acceleration
+        "held": jnp.diagonal(held),  # from a unit of wrench on each axis
+        "gain": gain,
+        "true_gain": jax.jacfwd(lambda u: moved(u, no_load))(u),
+        "reachable": reachable,
+        "reached": gain @ model.dynamics.invert(measured, reachable),
+    }

@@ -31,10 +31,18 @@ _BIN = 200  # samples of 1 ms over which chattering is computed
 
 def scenarios() -> dict[str, dict[str, Any]]:
     """Both runs, by name."""
-    return {
-        f"drifting_{name}": _scenario(words, bound)
-        for name, words, bound in (("free", "weights free", float("inf")), ("bounded", "weights within 20", BOUND))
-    }
+    found = {}
+    for name, words, bound in (("free", "weights free", float("inf")), ("bounded", "weights within 20", BOUND)):
+        one = scenario(
+            f"Table 1 with a lag of {1e3 * LAG:g} ms, {words}: one sinusoid per axis",
+            fidelity="electromechanical",
+            controller={"weights_bound": bound},
+            disturbance=STATIONARY,
+            loop={"kind": "sampled", "duration": _SECONDS, "record": 1e-3},
+        )
+        one["plant"]["thruster"] = lag_thruster(LAG)
+        found[f"drifting_{name}"] = one
+    return found
 
 
 def shown(folder: Path) -> dict[str, Any]:
@@ -69,15 +77,3 @@ def _curves(run: BatchResult) -> dict[str, Any]:
         if run.windows[0]
         else None,
     }
-
-
-def _scenario(words: str, bound: float) -> dict[str, Any]:
-    one = scenario(
-        f"Table 1 with a lag of {1e3 * LAG:g} ms, {words}: one sinusoid per axis",
-        fidelity="electromechanical",
-        controller={"weights_bound": bound},
-        disturbance=STATIONARY,
-        loop={"kind": "sampled", "duration": _SECONDS, "record": 1e-3},
-    )
-    one["plant"]["thruster"] = lag_thruster(LAG)
-    return one

@@ -16,47 +16,41 @@ _SPEEDS = (2.0, 10.0, 20.0, 40.0, 60.0)
 
 def scenarios() -> dict[str, dict[str, Any]]:
     """Every run of this part, by name."""
-    runs = {}
-    for fidelity in FIDELITIES:
-        for name, composite in CONTROLLERS.items():
-            runs[_with_fidelity(fidelity, name)] = scenario(
-                f"{name.upper()} at fidelity {fidelity}", fidelity=fidelity, composite=composite
-            )
-    for name, composite in CONTROLLERS.items():
-        runs[f"table2_{name}_state"] = scenario(
+    plain = {
+        f"{fidelity}_{name}": scenario(f"{name.upper()} at fidelity {fidelity}", fidelity=fidelity, composite=composite)
+        for fidelity in FIDELITIES
+        for name, composite in CONTROLLERS.items()
+    }
+    return plain | {
+        f"table2_{name}_state": scenario(
             f"{name.upper()} with the state as fuzzy input", composite=composite, controller={"fuzzy_input": "state"}
         )
-    return runs
+        for name, composite in CONTROLLERS.items()
+    }
 
 
 def example(runs: Mapping[str, Executed], number: int) -> dict[str, Any]:
     """Metrics of Example 1 (fidelity `ideal`) or 2 (fidelity `static`) for both controllers."""
     fidelity = FIDELITIES[number - 1]
-    return {name: _metrics(runs[_with_fidelity(fidelity, name)]) for name in CONTROLLERS}
+    return {name: _metrics(runs[f"{fidelity}_{name}"]) for name in CONTROLLERS}
 
 
 def table2(runs: Mapping[str, Executed]) -> dict[str, Any]:
     """Table 2 in numbers: both controllers with the modelling error or the state as fuzzy input."""
     table = {}
     for name in CONTROLLERS:
-        table[f"{name}_error"] = _metrics(runs[_with_fidelity("ideal", name)])
+        table[f"{name}_error"] = _metrics(runs[f"ideal_{name}"])
         table[f"{name}_state"] = _metrics(runs[f"table2_{name}_state"])
     return table
 
 
 def fidelity(runs: Mapping[str, Executed]) -> dict[str, Any]:
     """Both controllers at Table 1 gains at every fidelity level: how each run ended, when and why."""
-    return {
-        fidelity: {
-            name: _metrics(runs[_with_fidelity(fidelity, name)]) | {"why": _why(runs, fidelity, name)}
-            for name in CONTROLLERS
-        }
-        for fidelity in FIDELITIES
-    }
-
-
-def _with_fidelity(fidelity: str, controller: str) -> str:
-    return f"{fidelity}_{controller}"
+    found = {}
+    for level in FIDELITIES:
+        both = {name: runs[f"{level}_{name}"] for name in CONTROLLERS}
+        found[level] = {name: _metrics(run) | {"why": _why(run, level)} for name, run in both.items()}
+    return found
 
 
 def _metrics(run: Executed) -> dict[str, Any]:
@@ -70,8 +64,7 @@ def _metrics(run: Executed) -> dict[str, Any]:
     }
 
 
-def _why(runs: Mapping[str, Executed], fidelity: str, controller: str) -> str:
-    run = runs[_with_fidelity(fidelity, controller)]
+def _why(run: Executed, fidelity: str) -> str:
     if fidelity == "ideal":
         return "Thrust follows voltage without lag, as the theory assumes."
     if fidelity == "static":
@@ -90,18 +83,13 @@ def _why(runs: Mapping[str, Executed], fidelity: str, controller: str) -> str:
         )
     number = sum(value > 0 for value in growth)
     rate = f"{growth[worst]:+.1f} 1/s, {abs(modes[worst].imag):.0f} rad/s, {at}"
-    ended = run.status is not Status.OK
-    tail = (
-        "The oscillation grows until the run fails."
-        if ended
-        else f"The oscillation makes the weights drift apart, which adds damping (d_hat = z - c eps, c up to "
-        f"{_damping(run):.0f} 1/s at the end), until the oscillation stops growing: see below."
-    )
+    tail = "The oscillation grows until the run fails."
+    if run.status is Status.OK:
+        damping = gain_of(law, run.dataset["weights"].values[-1]).max()
+        tail = (
+            "The oscillation makes the weights drift apart, which adds damping (d_hat = z - c eps, c up to "
+            f"{damping:.0f} 1/s at the end), until the oscillation stops growing: see below."
+        )
     return (
         f"At fixed weights the linearised loop is unstable at {number} of {len(_SPEEDS)} speeds (worst {rate}). {tail}"
     )
-
-
-def _damping(run: Executed) -> float:
-    """Largest gain c of section 3.8 over the axes at the end of a run, 1/s."""
-    return float(gain_of(law_of(run), run.dataset["weights"].values[-1]).max())

@@ -28,24 +28,16 @@ _LARGEST = 6000.0  # c, 1/s
 
 def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
     """Every run of the map, by name."""
-    return {
-        _name(kind, value, law): _scenario(kind, value, law, quick)
-        for kind, values in _values(quick).items()
-        for value in values
-        for law in _laws(quick)
-    }
+    return {_name(*point): _scenario(*point, quick) for point in _points(quick)}
 
 
 def table(long: Long, quick: bool) -> list[dict[str, Any]]:
     """One row per run, with the gains c of section 3.8 between which the loop is stable in theory."""
     rows = []
-    for kind, values in _values(quick).items():
-        for value in values:
-            between = damping(kind, value, long)
-            for law, (words, _) in _laws(quick).items():
-                name = _name(kind, value, law)
-                facts = {"kind": kind, "value": value, "law": law, "words": words}
-                rows.append(described(name, facts, long[name]) | {"damping": between})
+    for kind, value, law in _points(quick):
+        name = _name(kind, value, law)
+        facts = {"kind": kind, "value": value, "law": law, "words": _LAWS[law][0]}
+        rows.append(described(name, facts, long[name]) | {"damping": damping(kind, value, long)})
     return rows
 
 
@@ -69,12 +61,10 @@ def lag_thruster(lag: float) -> dict[str, Any]:
     return {"kind": "first_order", "thrust_per_volt": _THRUST_PER_VOLT, "time_constant": lag}
 
 
-def _laws(quick: bool) -> dict[str, tuple[str, dict[str, Any]]]:
-    return {"five": _LAWS["five"]} if quick else _LAWS
-
-
-def _values(quick: bool) -> dict[str, tuple[float, ...]]:
-    return _QUICK if quick else {"lag": _LAGS, "winding": _WINDINGS}
+def _points(quick: bool) -> list[tuple[str, float, str]]:
+    """Kind, lag (s) or inductance (H), and law of every run; quick: fewer of them, and five sets only."""
+    values, laws = (_QUICK, ("five",)) if quick else ({"lag": _LAGS, "winding": _WINDINGS}, tuple(_LAWS))
+    return [(kind, value, law) for kind in values for value in values[kind] for law in laws]
 
 
 def _name(kind: str, value: float, law: str) -> str:

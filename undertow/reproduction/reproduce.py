@@ -1,7 +1,5 @@
 """`undertow reproduce`: every figure and table of the paper, and the audit of its claims."""
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,19 +7,14 @@ import xarray as xr
 
 from undertow.reproduction import claims, drifting, examples, horizons, lag_map
 from undertow.reproduction.robust_variant.chapter import chapter
-from undertow.reproduction.running import run_all, start, write_all
+from undertow.reproduction.running import Progress, run_all, start, two_at_once, write_all
 from undertow.reproduction.setup import CONTROLLERS
 from undertow.reproduction.thruster_response import ThrusterResponse, thruster_response
 from undertow.scenario.execute import Executed
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.provenance import versions
 
-Progress = Callable[[str, float], None]
-
 # Share of the work that the paper's runs take, with the long horizon, and with the last chapter; the rest is plotting.
-# Long runs run in parallel with the others: both release Python's lock most of the time.
-_AT_ONCE = 2
-
 _PAPER, _LONG, _RUNNING = 0.25, 0.35, 0.9
 
 
@@ -37,27 +30,22 @@ class Reproduction(NamedTuple):
         return {name: self.runs[f"{fidelity}_{name}"].dataset for name in CONTROLLERS}
 
 
-def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: bool = True) -> Reproduction:
+def reproduce(folder: Path, quick: bool, progress: Progress) -> Reproduction:
     """Run the paper and audit it; writes `runs/`, `scenarios/` and `results.json` into a folder.
 
     Args:
         folder: an existing, empty folder.
         quick: fewer points in the sweeps and a long horizon of 200 s, not 2,000 s; the same accuracy.
         progress: called with a message and the share done.
-        robust_variant: whether to run the last chapter, which compares the robust variant with the paper's law.
     """
     named = examples.scenarios() | claims.scenarios(quick)
     batched = horizons.scenarios(quick) | lag_map.scenarios(quick) | claims.batched(quick)
     write_all(batched, folder)
-    with ThreadPoolExecutor(_AT_ONCE) as pool:
-        try:
-            running_batches = start(batched, horizons.windows(quick), 1.0, ("weights_peak",), pool)
-            runs = run_all(named, folder, lambda message, share: progress(message, _PAPER * share))
-            progress(f"{horizons.duration(quick):g} s at every fidelity level", _PAPER)
-            long = running_batches()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with two_at_once() as pool:
+        running_batches = start(batched, horizons.windows(quick), 1.0, ("weights_peak",), pool)
+        runs = run_all(named, folder, lambda message, share: progress(message, _PAPER * share))
+        progress(f"{horizons.duration(quick):g} s at every fidelity level", _PAPER)
+        long = running_batches()
     progress("evaluating the claims", _LONG)
     results = {
         "provenance": {"quick": quick, "scenarios": sorted(named | batched), **versions()},
@@ -74,8 +62,7 @@ def reproduce(folder: Path, quick: bool, progress: Progress, robust_variant: boo
         "drifting": drifting.shown(folder),
         "claims": claims.audit(runs, long),
     }
-    if robust_variant:
-        last = chapter(folder, quick, lambda message, share: progress(message, _LONG + (_RUNNING - _LONG) * share))
-        results["robust_variant"], runs = last.results, runs | last.runs
+    report = lambda message, share: progress(message, _LONG + (_RUNNING - _LONG) * share)
+    results["robust_variant"], more = chapter(folder, quick, report)
     (folder / "results.json").write_text(to_json(results, indent=1) + "\n", encoding="utf-8")
-    return Reproduction(results, runs, thruster_response())
+    return Reproduction(results, runs | more, thruster_response())

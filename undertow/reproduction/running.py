@@ -1,7 +1,8 @@
 """Running named scenarios: one by one, each saved for repetition, or in batches of one program."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,9 +24,24 @@ from undertow.scenario.reading import dump
 
 Scenarios = Mapping[str, dict[str, Any]]
 Window = tuple[float, float]  # s
+Progress = Callable[[str, float], None]
 
 
-def run_all(scenarios: Scenarios, folder: Path, progress: Callable[[str, float], None]) -> dict[str, Executed]:
+@contextmanager
+def two_at_once() -> Iterator[Executor]:
+    """Two threads, which use two cores: compiling and running release Python's lock most of the time.
+
+    An error cancels what has not begun.
+    """
+    with ThreadPoolExecutor(2) as pool:
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def run_all(scenarios: Scenarios, folder: Path, progress: Progress) -> dict[str, Executed]:
     """Run named scenarios; writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
 
     Args:
@@ -67,7 +83,7 @@ class BatchResult(NamedTuple):
 
 
 def run_batches(
-    scenarios: Mapping[str, dict[str, Any]], windows: Sequence[Window], every: float, signals: Sequence[str]
+    scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str]
 ) -> dict[str, BatchResult]:
     """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `start`."""
     with ThreadPoolExecutor(1) as pool:
@@ -75,11 +91,7 @@ def run_batches(
 
 
 def start(
-    scenarios: Mapping[str, dict[str, Any]],
-    windows: Sequence[Window],
-    every: float,
-    signals: Sequence[str],
-    pool: Executor,
+    scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str], pool: Executor
 ) -> Callable[[], dict[str, BatchResult]]:
     """Start to run sampled scenarios, one task for each program.
 

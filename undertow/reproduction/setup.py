@@ -22,9 +22,6 @@ CONTROLLERS = {"rcafc": RCAFC, "rafc": RAFC}
 
 FIDELITIES = ("ideal", "static", "shaft", "electromechanical")
 
-# When the loop with the full motor model is unstable, propeller drag is too stiff for fixed steps of 1 ms.
-_METHODS = {"electromechanical": "adaptive"}
-
 
 def scenario(
     description: str,
@@ -43,6 +40,8 @@ def scenario(
         controller: further options of the law.
         changes: other keys of the scenario, replacing the paper's.
     """
+    # When the loop with the full motor model is unstable, propeller drag is too stiff for fixed steps of 1 ms.
+    method = "adaptive" if fidelity == "electromechanical" else "rk4"
     thruster = {"kind": "paper_table3", "fidelity": fidelity}
     plant = {"kind": "hybrid_vehicle", "vehicle": "odin", "thruster": thruster, "ledger": False}  # these runs are timed
     return {
@@ -52,7 +51,7 @@ def scenario(
         "controller": {"kind": "rcaf", "composite": composite, **(controller or {})},
         "reference": {"kind": "setpoint", "position": GOAL},
         "disturbance": {"kind": "u1"},
-        "loop": {"kind": "continuous", "duration": 20.0, "method": _METHODS.get(fidelity, "rk4")},
+        "loop": {"kind": "continuous", "duration": 20.0, "method": method},
     } | changes
 
 

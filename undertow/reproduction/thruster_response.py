@@ -52,13 +52,12 @@ class ThrusterResponse(NamedTuple):
 
 
 @functools.cache  # used by a figure and a claim
-def thruster_response(fidelity: str = "electromechanical") -> ThrusterResponse:
-    """Drive the motor of Table 3 with the two voltages of Fig. 2 and fit the static laws. Eqs. (8)-(11).
+def thruster_response() -> ThrusterResponse:
+    """Drive the motor of Table 3, unmodelled Delta_o left out, with the two voltages of Fig. 2; fit the static laws.
 
-    Args:
-        fidelity: electromechanical (default, unmodelled Delta_o left out) or shaft (Delta_L left out, so L = 0 too).
+    Eqs. (8)-(11).
     """
-    thruster = paper_table3(fidelity)
+    thruster = paper_table3("electromechanical")
     long, short = (_steady_period(thruster, frequency) for frequency in (LONG, SHORT))
     laws = (
         _law("T = c_0 V", "N/V", lambda p: (p.voltage, p.thrust), long, short),

@@ -1,6 +1,7 @@
-"""The Lyapunov function of a controller from recorded signals: Eq. (46), and section X4 of the theory.
+"""The Lyapunov function of a controller from recorded signals: Eqs. (45)-(60), and section X4 of the theory.
 
-theta* = d(t) 1: the basis sums to one, so these weights are exact at every instant (U6 of the theory). While d moves
+Eqs. (38), (41) and (45) define the best weights theta* and what they leave over; the basis sums to one, so both are
+known in closed form. With theta* = d(t) 1 these weights are exact at every instant (U6 of the theory). While d moves
 they move, and the function may rise.
 """
 
@@ -32,6 +33,30 @@ def of_paper(law: RCAF, run: xr.Dataset) -> Lyapunov:
     own = np.asarray(law.composite) * run["modelling_error"].values ** 2 + per_weight * _departure(run)
     estimation = own.sum(-1) / 2
     return Lyapunov("V_f of Eq. (46)", run["lyapunov_tracking"].values + estimation, estimation)
+
+
+def of_set_point(law: RCAF, run: xr.Dataset) -> np.ndarray:
+    """V_f of Eq. (46), one column per axis, along a run towards a set-point, with `minimax_weight`: (time, axis)."""
+    error = np.stack([run["error"].values, -run["velocity"].values], axis=-1)
+    p, eps = np.asarray(law.lyapunov()), run["modelling_error"].values
+    departure = run["weights"].values - minimax_weight(run)[..., None]
+    tracking = 0.5 * np.einsum("...i,...ij,...j", error, p, error)
+    composite, adaptation = np.asarray(law.composite), np.asarray(law.adaptation)
+    return tracking + 0.5 * composite * eps**2 + (departure**2).sum(-1) / (2 * adaptation)
+
+
+def minimax_weight(run: xr.Dataset) -> np.ndarray:
+    """theta* of Eq. (40) for a measured d: half-way between its extremes, for every axis; d itself where constant.
+
+    The basis sums to one, so no weights do better than the constant nearest to all values of d.
+    """
+    d = run["uncertainty"].values
+    return (d.max(axis=0) + d.min(axis=0)) / 2
+
+
+def share_increasing(values: np.ndarray) -> float:
+    """Share of steps, over all axes, at which V_f grows by more than 1e-10 of its first value. Eq. (58)."""
+    return float((np.diff(values, axis=0) > 1e-10 * values[0]).mean())
 
 
 def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 import xarray as xr
 
-from undertow.analysis.certificate.set_point import minimax_weight
+from undertow.analysis.certificate.function import minimax_weight
 from undertow.controllers.composite_law import RCAF
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core.arrays import as_array

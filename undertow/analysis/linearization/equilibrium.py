@@ -112,9 +112,11 @@ def equilibrium(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Equili
         load: acceleration of the outputs, m/s^2 and rad/s^2.
     """
     parts, start = take_apart(loop, position)
-    load, model, y = np.asarray(load, dtype=float), parts.loop.controller.model.in_body_axes(), _output(parts, start)
+    load, model = np.asarray(load, dtype=float), parts.loop.controller.model.in_body_axes()
+    y = parts.loop.plant.output(jnp.zeros(()), parts.plant_state(jnp.asarray(start["plant"])))
     balance = Balance(parts, dt, _acting(parts.differentiate(start, dt)), _steered(model, y))
-    from_afar = lambda load: _from_afar(balance, start | {"load": load, "u": _holding_input(model, y, load)})
+    holding = lambda load: np.asarray(_settled_input(model, y, jnp.asarray(load)))
+    from_afar = lambda load: _from_afar(balance, start | {"load": load, "u": holding(load)})
     found = from_afar(load)
     # Where that fails, the load is put on little by little, from a share that can be held.
     share, step = 0.0, _FIRST_SHARE
@@ -150,10 +152,6 @@ def _together(balance: Balance, at: dict) -> Equilibrium:
     return Equilibrium(balance.parts, at, local, float(np.abs(remaining).max(initial=0.0)), balance.acting)
 
 
-def _output(parts: Parts, start: dict) -> Measurement:
-    return parts.loop.plant.output(jnp.zeros(()), parts.plant_state(jnp.asarray(start["plant"])))
-
-
 def _steered(model: Model, y: Measurement) -> np.ndarray:
     """Projection of the outputs on what some input accelerates; one where that is everything."""
     into_axes, effect = _reach(model, y)
@@ -166,10 +164,6 @@ def _reach(model: Model, y: Measurement):
     """From accelerations of the outputs to the axes of the law; and what the forces give there."""
     into_axes = jax.jacfwd(lambda a: model.coordinates.acceleration(y, a))(jnp.zeros_like(y.position))
     return into_axes, model.dynamics.gain(y)
-
-
-def _holding_input(model: Model, y: Measurement, load: np.ndarray) -> np.ndarray:
-    return np.asarray(_settled_input(model, y, jnp.asarray(load)))
 
 
 @jax.jit

@@ -23,12 +23,14 @@ from undertow.loop.closed_loop import ClosedLoop
 INPUTS = ("plant", "law", "u", "load", "noise")
 SIGNALS = ("error", "uncertainty", "estimate", "modelling_error", "robust_term")
 
+Slopes = dict[str, dict[str, np.ndarray]]  # of what -> with respect to what
+
 
 class Local(NamedTuple):
     """Values and derivatives of everything at one instant, by name."""
 
     values: dict[str, np.ndarray]
-    slopes: dict[str, dict[str, np.ndarray]]  # of what -> with respect to what
+    slopes: Slopes
 
 
 class Parts(NamedTuple):

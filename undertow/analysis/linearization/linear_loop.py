@@ -1,12 +1,14 @@
 """The closed loop as one linear discrete-time system, with optional delay, lag and gain between law and plant."""
 
+import itertools
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
-from undertow.analysis.linearization.jacobians import SIGNALS
+from undertow.analysis.linearization.jacobians import SIGNALS, Slopes
 
 # Where something enters: a load (m/s^2, rad/s^2), errors of position and velocity, and an error of the input.
 ENTRIES = ("load", "noise", "input")
@@ -26,7 +28,7 @@ class LinearLoop(NamedTuple):
     matrix: np.ndarray
     entries: dict[str, np.ndarray]
     signals: dict[str, np.ndarray]
-    direct: dict[str, dict[str, np.ndarray]]
+    direct: Slopes
     dt: float
 
 
@@ -43,7 +45,6 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
     slopes, acting = at.local.slopes, at.acting
     own = slopes["plant"]["plant"][np.ix_(acting, acting)]
     push, load = gain * slopes["plant"]["u"][acting], slopes["plant"]["load"][acting]
-    from_plant = lambda name: slopes[name]["plant"][:, acting]
     inputs, count = push.shape[1], len(own)
     if lag:
         own = np.block([[own, push], [np.zeros((inputs, count)), -np.eye(inputs) / lag]])
@@ -52,13 +53,13 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
     whole, rest = divmod(delay / dt, 1.0)
     buffered = int(whole) + 1 if delay else 0
     step, early, late, loaded = _held(own, push, load, dt, rest * dt)
-    n, states, law = count + (inputs if lag else 0), None, len(slopes["law"]["law"])
+    n, law = len(own), len(slopes["law"]["law"])
     states = n + law + buffered * inputs
     x, z = slice(0, n), slice(n, n + law)
 
     def of_state(name: str) -> np.ndarray:
         row = np.zeros((len(slopes[name]["law"]), states))
-        row[:, :count], row[:, z] = from_plant(name), slopes[name]["law"]
+        row[:, :count], row[:, z] = slopes[name]["plant"][:, acting], slopes[name]["law"]
         return row
 
     u, u_noise = of_state("u"), slopes["u"]["noise"]
@@ -70,47 +71,42 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
     matrix[z] = of_state("law") + slopes["law"]["u"] @ u
     entries["noise"][z] = slopes["law"]["noise"] + slopes["law"]["u"] @ u_noise
     slots = [slice(n + law + i * inputs, n + law + (i + 1) * inputs) for i in range(buffered)]  # newest first
-    for share, steps in ((late, buffered - 1), (early, buffered)) if buffered else ((late, 0), (early, 0)):
+    for share, steps in ((late, buffered - 1), (early, buffered)):
         if steps <= 0:
             matrix[x] += share @ u
             entries["noise"][x] += share @ u_noise
         else:
             matrix[x, slots[steps - 1]] += share
-    for older, slot in enumerate(slots):
-        if older == 0:
-            matrix[slot], entries["noise"][slot] = u, u_noise
-        else:
-            matrix[slot, slots[older - 1]] = np.eye(inputs)
-    signals, direct = {"u": u}, {"u": {"noise": u_noise}}
-    for name in filter(slopes.__contains__, SIGNALS):
-        applied = slopes[name]["u"]
-        signals[name] = of_state(name) + applied @ u
-        direct[name] = {"load": slopes[name]["load"], "noise": slopes[name]["noise"] + applied @ u_noise}
-    return LinearLoop(matrix, entries, signals, direct, dt)
+    if buffered:
+        matrix[slots[0]], entries["noise"][slots[0]] = u, u_noise
+    for newer, older in itertools.pairwise(slots):
+        matrix[older, newer] = np.eye(inputs)
+    return LinearLoop(matrix, entries, *_shown(slopes, of_state), dt)
 
 
 def close_continuous(at: Equilibrium, dt: float) -> LinearLoop:
     """The loop as one differential equation, followed exactly over dt (s); law and input change all the time."""
     slopes, acting = at.local.slopes, at.acting
-    from_plant = lambda name: slopes[name]["plant"][:, acting]
-    u, u_noise = np.hstack([from_plant("u"), slopes["u"]["law"]]), slopes["u"]["noise"]
+    of_state = lambda name: np.hstack([slopes[name]["plant"][:, acting], slopes[name]["law"]])
+    u, u_noise = of_state("u"), slopes["u"]["noise"]
     push = np.vstack([slopes["plant"]["u"][acting], slopes["flow"]["u"]])
-    own = np.vstack(
-        [
-            np.hstack([slopes["plant"]["plant"][np.ix_(acting, acting)], slopes["plant"]["law"][acting]]),
-            np.hstack([from_plant("flow"), slopes["flow"]["law"]]),
-        ]
-    )
+    own = np.vstack([of_state("plant")[acting], of_state("flow")])
     load = np.vstack([slopes["plant"]["load"][acting], slopes["flow"]["load"]])
     noise = np.vstack([slopes["plant"]["noise"][acting], slopes["flow"]["noise"]]) + push @ u_noise
     to_plant = np.vstack([slopes["plant"]["u"][acting], 0 * slopes["flow"]["u"]])
     step, *entered = _followed(own + push @ u, (load, noise, to_plant), dt)
-    signals, direct = {"u": u}, {"u": {"noise": u_noise}}
+    return LinearLoop(step, dict(zip(ENTRIES, entered, strict=True)), *_shown(slopes, of_state), dt)
+
+
+def _shown(slopes: Slopes, of_state: Callable[[str], np.ndarray]) -> tuple[dict[str, np.ndarray], Slopes]:
+    """Signals of the state, and what enters them directly; the input is what the law commands."""
+    u, u_noise = of_state("u"), slopes["u"]["noise"]
+    signals, direct = {"u": u}, {"u": {"load": slopes["u"]["load"], "noise": u_noise}}
     for name in filter(slopes.__contains__, SIGNALS):
         applied = slopes[name]["u"]
-        signals[name] = np.hstack([from_plant(name), slopes[name]["law"]]) + applied @ u
+        signals[name] = of_state(name) + applied @ u
         direct[name] = {"load": slopes[name]["load"], "noise": slopes[name]["noise"] + applied @ u_noise}
-    return LinearLoop(step, dict(zip(ENTRIES, entered, strict=True)), signals, direct, dt)
+    return signals, direct
 
 
 def _held(own, push, load, dt: float, wait: float):

@@ -85,12 +85,12 @@ def noise_gain(loop: LinearLoop, signal: str, deviations: np.ndarray) -> np.ndar
     """
     small = visible(loop, ("noise",), (signal,))
     entry = small.entries["noise"] * deviations
-    direct = loop.direct[signal].get("noise", 0.0) * deviations
+    direct = loop.direct[signal]["noise"] * deviations
     if np.abs(multipliers(loop, ("noise",), (signal,))).max(initial=0.0) >= 1:
         return np.full(len(loop.signals[signal]), np.inf)
     covariance = solve_discrete_lyapunov(_FADING * small.matrix, entry @ entry.T)
     shown = small.signals[signal]
-    return np.sqrt(np.einsum("ij,jk,ik->i", shown, covariance, shown) + (np.atleast_2d(direct) ** 2).sum(axis=1))
+    return np.sqrt(np.einsum("ij,jk,ik->i", shown, covariance, shown) + (direct**2).sum(axis=1))
 
 
 def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray:
@@ -98,10 +98,10 @@ def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray
     small = visible(loop, ("load",), (signal,))
     turning = np.exp(1j * np.asarray(frequency, dtype=float) * loop.dt)[:, None, None]
     inner = np.linalg.solve(turning * np.eye(len(small.matrix)) - small.matrix, small.entries["load"] + 0j)
-    return small.signals[signal] @ inner + loop.direct[signal].get("load", 0.0)
+    return small.signals[signal] @ inner + loop.direct[signal]["load"]
 
 
-def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = "sampled") -> list[float]:
+def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any) -> list[float]:
     """Spectral radius of the closed loop at rest under each of some constant loads; below 1 each is stable.
 
     Loads that no input holds are left out; where none is held, the radius is infinite.
@@ -111,10 +111,9 @@ def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any, kind: str = 
         dt: sampling time, s.
         position: of the reference, m and rad.
         loads: accelerations of the outputs, m/s^2 and rad/s^2, one per row.
-        kind: sampled or continuous.
     """
     found = [at for load in np.atleast_2d(loads) if (at := equilibrium(loop, dt, position, load)).found]
-    return [spectral_radius(closed(at, dt, kind)) for at in found] or [float("inf")]
+    return [spectral_radius(closed(at, dt)) for at in found] or [float("inf")]
 
 
 def _largest(closed_at: Callable[[float], LinearLoop], least: float, most: float) -> float:

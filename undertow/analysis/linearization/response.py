@@ -51,7 +51,7 @@ def signals_within(
     inside = recorded & (around.time >= window[0] - hair) & (around.time <= window[1] + hair)
     signals = {}
     for name in loop.signals:
-        direct = np.hstack([_direct(loop, name, way) for way in _ENTRIES])
+        direct = np.hstack([loop.direct[name][way] for way in _ENTRIES])
         departure = states @ small.signals[name].T + driven @ direct.T
         signals[name] = (at.local.values[name] + departure)[inside]
     return signals
@@ -84,10 +84,6 @@ def from_start(loop: LinearLoop, at: Equilibrium, plant: np.ndarray, law: np.nda
 def compare_metrics(predicted: dict[str, float], measured: dict) -> list[Comparison]:
     """Predicted metrics beside the measured ones of the same names."""
     return [Comparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
-
-
-def _direct(loop: LinearLoop, signal: str, entry: str) -> np.ndarray:
-    return loop.direct[signal].get(entry, np.zeros((len(loop.signals[signal]), loop.entries[entry].shape[1])))
 
 
 @jax.jit

@@ -1,13 +1,12 @@
 """Theory of the robust variant: poles of its estimator and tracking, drift, and the certificate of section X4."""
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
 from undertow.analysis import drift
 from undertow.analysis.certificate import hypotheses
 from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty, of_robust
+from undertow.analysis.small_signal import of_axis
 from undertow.analysis.theory.contract import RunCertificate, SteadyWindow, Theory, register
 from undertow.controllers.robust.robust_law import RobustRCAF
 
@@ -15,10 +14,8 @@ from undertow.controllers.robust.robust_law import RobustRCAF
 @register(RobustRCAF)
 def theory(law: RobustRCAF) -> Theory:
     """Closed forms of the law on axes whose actuators follow the command at once."""
-    estimator = lambda axis: (
-        float(_at(law, law.estimator.bandwidth, axis)),
-        float(_at(law, law.estimator.damping, axis)),
-    )
+    at = lambda value, axis: float(of_axis(law, value, axis))
+    estimator = lambda axis: (at(law.estimator.bandwidth, axis), at(law.estimator.damping, axis))
     return Theory(
         poles=lambda axis: _poles(law, axis, *estimator(axis)),
         estimator=estimator,
@@ -29,13 +26,9 @@ def theory(law: RobustRCAF) -> Theory:
     )
 
 
-def _at(law: RobustRCAF, value: Any, axis: int, *shape: int) -> np.ndarray:
-    return np.broadcast_to(np.asarray(value, dtype=float), (len(law.model.coordinates.angles), *shape))[axis]
-
-
 def _poles(law: RobustRCAF, axis: int, frequency: float, damping: float) -> list[tuple[str, complex]]:
-    k, p = _at(law, law.feedback, axis, 2), _at(law, law.lyapunov(), axis, 2, 2)
-    slope = _at(law, law.robust_gain, axis) / _at(law, law.layer, axis)
+    k, p = of_axis(law, law.feedback, axis, 2), of_axis(law, law.lyapunov(), axis, 2, 2)
+    slope = of_axis(law, law.robust_gain, axis) / of_axis(law, law.layer, axis)
     tracking = np.roots([1.0, k[1] + slope * p[1, 1], k[0] + slope * p[0, 1]])
     observer = np.roots([1.0, 2 * damping * frequency, frequency**2])
     return [("estimator", complex(pole)) for pole in observer] + [("tracking", complex(pole)) for pole in tracking]

@@ -88,7 +88,7 @@ def _sphere(facts: Facts) -> Iterator[Finding]:
         hint = f"In fresh water that is a sphere of radius {radius:.3g} m"
         yield advice("sphere", "added_mass", "be half the displaced mass, if this is a sphere", got, hint)
     if facts.size is not None and np.ptp(facts.size) > 0.2 * facts.size.max():
-        got = f"{_metres(facts.size)} m, with the added mass of a sphere"
+        got = f"{' x '.join(f'{side:.3g}' for side in facts.size)} m, with the added mass of a sphere"
         yield advice("sphere", "size", "fit the added mass", got, "Is `added_mass` that of another vehicle?")
 
 
@@ -100,10 +100,6 @@ def _shown(values: np.ndarray, which: np.ndarray) -> str:
 
 def _names(which: np.ndarray) -> str:
     return ", ".join(DOF_NAMES[i] for i in np.flatnonzero(which))
-
-
-def _metres(size: np.ndarray) -> str:
-    return " x ".join(f"{side:.3g}" for side in size)
 
 
 RULES = (added_mass, damping_sign, dissipation, undamped)

@@ -6,7 +6,7 @@ import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
 from undertow.plants.reachability import open_loop_advice
-from undertow.vehicles.facts import DOF_NAMES, Facts
+from undertow.vehicles.facts import DOF_NAMES, FRESH_WATER, Facts
 
 _ROUNDING = 5e-3
 _WORST_CONDITION = 10.0
@@ -24,7 +24,7 @@ def unit_directions(facts: Facts) -> Iterator[Finding]:
 def arms(facts: Facts) -> Iterator[Finding]:
     """Thrusters are on the vehicle."""
     if facts.size is None:
-        side = np.cbrt(facts.displaced_mass / (facts.water_density or 1000.0))
+        side = np.cbrt(facts.displaced_mass / (facts.water_density or FRESH_WATER))
         share = facts.lever / side
         got = f"{facts.lever:.4g} m from the centre of gravity, {share:.3g} times the side of a cube of the volume"
         if share > 100:

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,14 +35,9 @@ class Propellers:
         if not isinstance(thruster, ShaftThruster | StaticThruster):
             hint = "Others are not written a second time; take fidelity: shaft"
             raise BadInput("thruster", "be on fidelity `shaft` or `static`", type(thruster).__name__, hint=hint)
-        motor = thruster.motor
-        self._resistance = np.asarray(motor.resistance)
-        self._torque_constant = np.asarray(motor.torque_constant)
-        self._back_emf = np.asarray(motor.back_emf_constant)
-        self._friction = np.asarray(motor.friction)
-        self._inertia = np.asarray(motor.rotor_inertia)
-        self._thrust_coefficients = np.asarray(motor.thrust_coefficient), np.asarray(motor.reverse_thrust_coefficient)
-        self._torque_coefficients = np.asarray(motor.torque_coefficient), np.asarray(motor.reverse_torque_coefficient)
+        self._motor = motor = jax.tree.map(np.asarray, thruster.motor)  # its numbers; its equations are written anew
+        self._thrust_coefficients = motor.thrust_coefficient, motor.reverse_thrust_coefficient
+        self._torque_coefficients = motor.torque_coefficient, motor.reverse_torque_coefficient
         self._supply, self._dead_zone = float(thruster.supply), float(thruster.dead_zone)
         self._lost = self._dead_zone if thruster.dead_zone_kind == "subtract" else 0.0
         self._turns_at_once = isinstance(thruster, StaticThruster)
@@ -74,9 +70,10 @@ class Propellers:
 
     def _speed_rate(self, voltage: NDArray, speed: NDArray) -> NDArray:
         """J speed_dot = k_t I - k_f speed - Q with R I = V - k_e speed."""
-        current = (voltage - self._back_emf * speed) / self._resistance
+        motor = self._motor
+        current = (voltage - motor.back_emf_constant * speed) / motor.resistance
         load = _either(speed, self._torque_coefficients) * speed * np.abs(speed)
-        return (self._torque_constant * current - self._friction * speed - load) / self._inertia
+        return (motor.torque_constant * current - motor.friction * speed - load) / motor.rotor_inertia
 
     def _stepped(self, voltage: NDArray, h: float) -> NDArray:
         """Speed one classical Runge-Kutta step later."""
@@ -88,9 +85,9 @@ class Propellers:
 
     def _steady(self, voltage: NDArray) -> NDArray:
         """Speed at which torque and load balance: positive root of q x^2 + l x = k_t |V| / R, with the sign of V."""
-        quadratic = _either(voltage, self._torque_coefficients)
-        linear = self._friction + self._torque_constant * self._back_emf / self._resistance
-        drive = self._torque_constant * np.abs(voltage) / self._resistance
+        motor, quadratic = self._motor, _either(voltage, self._torque_coefficients)
+        linear = motor.friction + motor.torque_constant * motor.back_emf_constant / motor.resistance
+        drive = motor.torque_constant * np.abs(voltage) / motor.resistance
         return np.sign(voltage) * (np.sqrt(linear**2 + 4 * quadratic * drive) - linear) / (2 * quadratic)
 
 

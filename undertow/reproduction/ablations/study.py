@@ -22,26 +22,17 @@ QUICK_SEEDS = 8
 _FOLDER = Path(__file__).parent
 
 
-class Spread(NamedTuple):
-    """One metric over the seeds; a run that ended early counts as infinite."""
+class Variant(NamedTuple):
+    """One variant over the seeds, as in results.json."""
 
-    median: float
-    low: float  # 5 % of the seeds are below
-    high: float  # 5 % are above
-    median_low: float  # 95 % confidence interval of the median
-    median_high: float
-
-
-class Summary(NamedTuple):
-    """One variant over the seeds."""
-
+    settings: str  # how it differs from the scenario
     seeds: int
     failures: int  # runs that ended early
-    metrics: Mapping[str, Spread]
+    metrics: Mapping[str, dict[str, float]]  # see `spread`
 
     def median(self, metric: str) -> float:
         """Median of a metric."""
-        return self.metrics[metric].median
+        return self.metrics[metric]["median"]
 
 
 def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str, Any]:
@@ -55,10 +46,10 @@ def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str
     Raises:
         KeyError: the verdict needs a variant that the campaign does not have.
     """
-    found: dict[str, tuple[str, Summary]] = {}
+    found: dict[str, Variant] = {}
     for name in ablation.campaigns:
-        found |= dict(summaries(_FOLDER / f"{name}.yaml", ablation.metrics, quick, folder))
-    verdict = ablation.judge({name: one for name, (_, one) in found.items()})
+        found |= dict(variants(_FOLDER / f"{name}.yaml", ablation.metrics, quick, folder))
+    verdict = ablation.judge(found)
     return {
         "id": ablation.id,
         "question": read_campaign(_FOLDER / f"{ablation.campaigns[0]}.yaml")[0].description,
@@ -66,23 +57,14 @@ def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str
         "agrees": verdict.agrees,
         "answer": verdict.text,
         "left_out": ablation.left_out,
-        "variants": [
-            {
-                "name": name,
-                "settings": settings,
-                "seeds": one.seeds,
-                "failures": one.failures,
-                "metrics": {metric: spread._asdict() for metric, spread in one.metrics.items()},
-            }
-            for name, (settings, one) in found.items()
-        ],
+        "variants": [{"name": name, **one._asdict()} for name, one in found.items()],
     }
 
 
-def summaries(
+def variants(
     path: Path, metrics: tuple[str, ...], quick: bool, folder: Path | None = None
-) -> Iterator[tuple[str, tuple[str, Summary]]]:
-    """Every combination of a campaign by its name: how it differs from the scenario, and its metrics over the seeds."""
+) -> Iterator[tuple[str, Variant]]:
+    """Every combination of a campaign, by its name."""
     campaign, text = read_campaign(path)
     if quick:
         campaign = campaign.model_copy(update={"trials": QUICK_SEEDS})
@@ -103,10 +85,14 @@ def summaries(
         defined = [metric for metric in metrics if not np.isnan(own[metric][lasted]).all() or not lasted.any()]
         kept = {metric: spread(np.where(lasted, own[metric], np.inf)) for metric in defined}
         settings = ", ".join(f"{key}: {words(value)}" for key, value in several.values(i).items())
-        yield ", ".join(name), (settings or "Table 1", Summary(lasted.size, int((~lasted).sum()), kept))
+        yield ", ".join(name), Variant(settings or "Table 1", lasted.size, int((~lasted).sum()), kept)
 
 
-def spread(values: np.ndarray) -> Spread:
-    """Quantiles of a metric over the seeds."""
+def spread(values: np.ndarray) -> dict[str, float]:
+    """Median of a metric over the seeds with its 95 % confidence interval, and the 5 % and 95 % quantiles.
+
+    A run that ended early counts as infinite.
+    """
     low, median, high = quantiles(values).values()
-    return Spread(median, low, high, *median_interval(values))
+    median_low, median_high = median_interval(values)
+    return {"median": median, "low": low, "high": high, "median_low": median_low, "median_high": median_high}

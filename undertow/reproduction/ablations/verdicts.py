@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-Found = Mapping[str, Any]  # variant -> its summary: `median(metric)`, `failures`, `seeds`, `metrics`
+Found = Mapping[str, Any]  # variant -> `study.Variant`
 
 
 class Verdict(NamedTuple):
@@ -23,7 +23,7 @@ class Ablation(NamedTuple):
         prediction: prediction of the theory.
         left_out: part of the question that is not examined.
         long: whether a quick reproduction omits it.
-        judge: verdict from the summaries of all variants.
+        judge: verdict from all variants.
     """
 
     id: str
@@ -66,10 +66,6 @@ def _tracking(found: Found, names: Sequence[str] | None = None) -> dict[str, flo
 
 def _listed(values: Mapping[str, float], form: str = ".3f") -> str:
     return ", ".join(f"{name} {value:{form}}" for name, value in values.items())
-
-
-def _early(found: Found) -> str:
-    return "; ".join(name for name, one in found.items() if one.failures) or "none"
 
 
 def _lost_by_most(one: Any) -> bool:
@@ -241,9 +237,7 @@ def _limits(found: Found) -> Verdict:
     lost = [name for name, error in _tracking(found).items() if not error < _LOST]
     text = f"Not back within 0.1 m (rad) after 10 s: {'; '.join(lost) or 'none'}."
     laws, limits = ("RCAFC", "RCAFC, command fed", "RAFC", "robust"), ("5 m/s^2", "3 m/s^2", "1.5 m/s^2")
-    on_axes = {
-        name for name in (f"{law}, {limit}" for law in laws for limit in limits) if name in found and name in lost
-    }
+    on_axes = set(lost) & {f"{law}, {limit}" for law in laws for limit in limits}
     expected = {f"RCAFC, command fed, {limit}" for limit in limits[1:]} | {f"RAFC, {limit}" for limit in limits}
     kept = [f"{law}, {limit}" for law in ("RCAFC", "robust") for limit in limits]
     return _verdict(on_axes == expected, text, partly=not any(found[name].median(_TRACKING) >= _LOST for name in kept))
@@ -277,7 +271,8 @@ def _model_errors(found: Found) -> Verdict:
         own = {name: error / exact for name, error in _tracking(found).items() if name.startswith(f"{law}, ")}
         name = max(own, key=own.__getitem__)
         worst.append(f"{own[name]:.3g} times ({name})")
-    text = f"Largest error over that of the exact model: {'; '.join(worst)}. Ended early: {_early(found)}."
+    early = "; ".join(name for name, one in found.items() if one.failures) or "none"
+    text = f"Largest error over that of the exact model: {'; '.join(worst)}. Ended early: {early}."
     ended = sum(one.failures > 0 for one in found.values())
     return _verdict(not ended, text, partly=ended <= 2)
 
@@ -292,8 +287,8 @@ def _thruster_loss(found: Found) -> Verdict:
     one = [found[f"{law}, one off"].metrics[_TRACKING] for law in _PRESETS]
     triple = all(not found[f"{law}, three off"].median(_TRACKING) < _LOST for law in _PRESETS)
     text = f"Median tracking rms: {_listed(_tracking(found), '.2g')}."
-    tolerated = all(each.median < _LOST for each in one)
-    return _verdict(tolerated and all(each.high < _LOST for each in one) and triple, text, partly=tolerated)
+    tolerated = all(each["median"] < _LOST for each in one)
+    return _verdict(tolerated and all(each["high"] < _LOST for each in one) and triple, text, partly=tolerated)
 
 
 @_ablation(

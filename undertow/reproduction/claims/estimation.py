@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from undertow.reproduction.all_outputs import with_all_outputs
-from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1, claim
+from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1, claim, steady
 from undertow.reproduction.horizons import BOUND, Long, sampled
 from undertow.reproduction.running import BatchResult
 from undertow.reproduction.setup import RAFC, RCAFC, equal_gain, scenario
@@ -110,8 +109,8 @@ def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Findi
     """Verdict on `RCAFC has a smaller <metric> than RAFC`."""
     text, numbers = at_table_1(runs, metric, what, unit)
     rcafc, rafc, fair = numbers.values()
-    tracking = steady_tracking(runs)
-    text += f" Its tracking error is {100 * (1 - tracking[1] / tracking[0]):.1f} % smaller than that of RCAFC."
+    own, other = (steady(runs[name])["tracking_rms"] for name in (EQUAL_GAIN, "ideal_rcafc"))
+    text += f" Its tracking error is {100 * (1 - own / other):.1f} % smaller than that of RCAFC."
     more, found = sentences(long, metric, unit)
     numbers, text = numbers | found, f"{text} {more}"
     simulated = "level ideal, U1, 20 s"
@@ -126,12 +125,6 @@ def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Findi
         where.append("velocities are noisy (1 cm/s)")
     else_where = f"; at equal loop gain only where {' or '.join(where)}" if where else "; not at equal loop gain"
     return Finding(f"holds if both use the gamma of Table 1{else_where}", text, EQUAL_GAIN, simulated, numbers)
-
-
-def steady_tracking(runs: Runs) -> tuple[float, float]:
-    """Tracking rms of RCAFC, and of RAFC at equal loop gain."""
-    of = lambda name: with_all_outputs(runs[name].steady)["tracking_rms"]
-    return of("ideal_rcafc"), of(EQUAL_GAIN)
 
 
 @claim("C3", "RCAFC needs a smaller robust control signal than RAFC.")

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from undertow.core.status import Status
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import equal_gain_ratio
 from undertow.scenario.execute import Executed
@@ -52,12 +53,6 @@ def claim(
 EQUAL_GAIN = "rafc_equal_gain"
 
 
-def pair(runs: Runs, metric: str) -> tuple[float, float, float]:
-    """A steady metric of RCAFC and RAFC at Table 1, and of RAFC at equal loop gain (Example 1)."""
-    names = ("ideal_rcafc", "ideal_rafc", EQUAL_GAIN)
-    return tuple(steady(runs[name])[metric] for name in names)
-
-
 def steady(run: Executed) -> dict[str, Any]:
     """Steady metrics of a run that reached its end.
 
@@ -69,9 +64,14 @@ def steady(run: Executed) -> dict[str, Any]:
     return with_all_outputs(run.steady)
 
 
+def tracking_error(run: Executed) -> float | None:
+    """Steady tracking rms, m and rad; None for a run that ended early."""
+    return steady(run)["tracking_rms"] if run.status is Status.OK else None
+
+
 def at_table_1(runs: Runs, metric: str, what: str, unit: str) -> tuple[str, dict[str, float]]:
-    """A metric of RCAFC and RAFC as a sentence, at the paper's gains and at equal tuning, and as numbers."""
-    rcafc, rafc, fair = pair(runs, metric)
+    """A steady metric of RCAFC and RAFC (Example 1), at the paper's gains and at equal tuning: sentence and numbers."""
+    rcafc, rafc, fair = (steady(runs[name])[metric] for name in ("ideal_rcafc", "ideal_rafc", EQUAL_GAIN))
     text = (
         f"{what} of RCAFC {rcafc:.3g} {unit}, RAFC {rafc:.3g} {unit} ({rafc / rcafc:.1f} times) at Table 1; "
         f"RAFC with gamma raised {equal_gain_ratio():.0f} times, to the same loop gain: {fair:.3g} {unit} "

@@ -1,7 +1,6 @@
 """C9: square and non-square gain matrices."""
 
-from undertow.core.status import Status
-from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
+from undertow.reproduction.claims.finding import Finding, Runs, claim, steady, tracking_error
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import plant_of, scenario
 
@@ -52,9 +51,7 @@ def gain_matrices(runs: Runs, long: Long) -> Finding:
         run = runs[_name(key)]
         plant = plant_of(run)
         count, rank = plant.inputs(), plant.rank()
-        lost = run.status is not Status.OK
-        error = None if lost else steady(run)["tracking_rms"]
-        numbers[key] = error
+        numbers[key] = error = tracking_error(run)
         shown = f"ends at {float(run.outcome.ended):.1f} s ({run.status.word})" if error is None else f"{error:.2g}"
         parts.append(f"{count} thrusters, rank {rank}: {shown}")
         if error is None or error > 10 * everything:

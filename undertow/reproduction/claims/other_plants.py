@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from undertow.core.status import Status
 from undertow.plants.magnetic_levitation import MagneticLevitation
-from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
+from undertow.reproduction.claims.finding import Finding, Runs, claim, tracking_error
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import scenario
 from undertow.scenario.execute import Executed
@@ -47,8 +47,10 @@ def other_plants(runs: Runs, long: Long) -> Finding:
     """Tracking on both plants, and the lag of the coil at which it fails."""
     coils = sorted((_lag(runs[_at(gap)]), gap) for gap in _GAPS if _at(gap) in runs)
     numbers = {
-        "pendulum": _error(runs[_PENDULUM]),
-        "levitation": [{"gap": gap / 1e3, "lag": lag, "tracking_rms": _error(runs[_at(gap)])} for lag, gap in coils],
+        "pendulum": tracking_error(runs[_PENDULUM]),
+        "levitation": [
+            {"gap": gap / 1e3, "lag": lag, "tracking_rms": tracking_error(runs[_at(gap)])} for lag, gap in coils
+        ],
     }
     text = (
         f"Table 1 unchanged. Pendulum with nominal mass and length up to 50 % too small, load of 1 rad/s^2: "
@@ -56,7 +58,7 @@ def other_plants(runs: Runs, long: Long) -> Finding:
     )
     text += "; ".join(f"{gap} mm ({1e3 * lag:.1f} ms) {_shown(runs[_at(gap)], 'm')}" for lag, gap in coils) + "."
     if _IDEAL in runs:
-        numbers["levitation_ideal"] = _error(runs[_IDEAL])
+        numbers["levitation_ideal"] = tracking_error(runs[_IDEAL])
         text += f" With coils without lag, {min(_GAPS)} mm: {_shown(runs[_IDEAL], 'm')}."
     lost = [lag for lag, gap in coils if runs[_at(gap)].status is not Status.OK]
     kept = [lag for lag, _ in coils if not lost or lag < lost[0]]
@@ -91,10 +93,6 @@ def _lag(run: Executed) -> float:
     return float(rig.lag(jnp.asarray(start))[0])
 
 
-def _error(run: Executed) -> float | None:
-    return steady(run)["tracking_rms"] if run.status is Status.OK else None
-
-
 def _shown(run: Executed, unit: str) -> str:
-    error = _error(run)
+    error = tracking_error(run)
     return f"ends at {float(run.outcome.ended):.2f} s ({run.status.word})" if error is None else f"{error:.2g} {unit}"

@@ -24,7 +24,7 @@ def _robustness_scenarios(quick: bool) -> dict:
     """Every gain halved and doubled, and random starts."""
     gains = {
         f"c10_{name}_{'half' if factor < 1 else 'double'}": scenario(
-            f"RCAFC with {name} times {factor:g}", **_with(name, factor * value)
+            f"RCAFC with {name} times {factor:g}", controller={name: factor * value}
         )
         for name, value in _TABLE1.items()
         for factor in (0.5, 2.0)
@@ -97,7 +97,3 @@ def robustness(runs: Runs, long: Long) -> Finding:
     )
     verdict = "holds if there is neither noise nor sampling, for 20 s"
     return Finding(verdict, text, f"{_NOISE}_0", simulated, numbers)
-
-
-def _with(name: str, value: float) -> dict:
-    return {"composite": value} if name == "composite" else {"controller": {name: value}}

@@ -19,7 +19,7 @@ class Numbers:
     """Medians of the ablations, and rows of the fidelity comparison; a missing one is a KeyError."""
 
     def __init__(self, compared: Rows, ablations: Rows):
-        everything = {(place, law): None for place, one in fidelity.places(False).items() for law in one.runs}
+        everything = {(run.place, run.law): None for run in fidelity.runs(False)}
         self._compared = everything | {(row["place"], row["law"]): row for row in compared}
         self._ablations = {one.id: None for one in ABLATIONS} | {
             one["id"]: {each["name"]: each for each in one["variants"]} for one in ablations

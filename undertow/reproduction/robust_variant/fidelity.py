@@ -9,7 +9,6 @@ import xarray as xr
 from undertow.bench.workload import W2
 from undertow.core.status import Status
 from undertow.reproduction.all_outputs import with_all_outputs
-from undertow.reproduction.robust_variant import station_keeping
 from undertow.reproduction.setup import FIDELITIES, HAND_TUNED, RAFC, RCAFC, scenario
 from undertow.scenario.execute import Executed
 
@@ -52,84 +51,120 @@ _AT_SEA: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-class Place(NamedTuple):
-    """Setting of a comparison."""
+# Station keeping at sea: words, navigation, gains; pairs are for translation and rotation. Both laws were tuned with
+# the same budget; `benchmarks/station_keeping.py` finds their gains and simulates 500 runs of each, with every
+# published parameter set as the true plant in turn.
+_STATION: dict[str, tuple[str, str, dict[str, dict[str, Any]]]] = {
+    "station": (
+        "BlueROV2 Heavy keeps station, position fixes of 5 cm",
+        "navigation",
+        {
+            "pid": {"frequency": (7.073, 10.07), "damping": (1.292, 4.0), "integral_share": (0.1532, 0.0227)},
+            "robust": {
+                "bandwidth": (27.33, 40.77),
+                "damping": (0.947, 0.977),
+                "tracking": (3.085, 8.575),
+                "actuator_rate": 22.07,
+            },
+        },
+    ),
+    "station_known": (
+        "the same, exact position and velocity",
+        "perfect",
+        {
+            "pid": {"frequency": (9.015, 10.8), "damping": (1.74, 3.628), "integral_share": (0.1445, 0.0289)},
+            "robust": {
+                "bandwidth": (39.91, 42.2),
+                "damping": (0.983, 0.991),
+                "tracking": (11.97, 15.08),
+                "actuator_rate": 46.9,
+            },
+        },
+    ),
+}
+_STATION_LAWS: dict[str, tuple[str, dict[str, Any]]] = {
+    "pid": ("PID, tuned", {"kind": "pid"}),
+    "robust": ("robust, tuned", {"kind": "rcaf", "preset": "robust"}),
+}
 
-    words: str
-    runs: dict[str, tuple[str, dict[str, Any]]]  # law -> its name, and the scenario
+
+class ComparedRun(NamedTuple):
+    """One law in one setting."""
+
+    place: str
+    words: str  # for the setting
+    law: str
+    name: str  # of the law
+    scenario: dict[str, Any]
+
+    @property
+    def key(self) -> str:
+        """Name of its files."""
+        return f"robust_variant_{self.place}_{self.law}"
 
 
-def places(quick: bool) -> dict[str, Place]:
-    """Every setting, from the simplest to the most realistic; quick: the full motor model only."""
-    found = {}
+def runs(quick: bool) -> list[ComparedRun]:
+    """Every law in every setting, from the simplest to the most realistic; quick: the full motor model only."""
+    found, laws = [], [law for law in LAWS if law != "measured" or not quick]
     for fidelity in (WHOLE,) if quick else FIDELITIES:
         words = "full motor model, no limit" if fidelity == WHOLE else fidelity
-        found[fidelity] = Place(words, _laws(words, fidelity, {"kind": "u1"}, quick=quick))
-    for name, (words, volts, scale) in _SUPPLIES.items():
-        found[name] = Place(words, _laws(words, WHOLE, {"kind": "u1", "scale": scale}, volts, quick))
-    if not quick:
-        words = "full motor model, 24 V, U1 x 0.3, overload of 1.5 s"
-        two = {key: one for key, one in _laws(words, WHOLE, _OVERLOAD, 24.0).items() if key in ("rcafc", "robust")}
-        two = {key: (name, one | {"steady": {"start": _JUDGED}}) for key, (name, one) in two.items()}
-        found["overload"] = Place(words, two)
-        words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own sensors"
-        found["sea"] = Place(
-            words,
-            {
-                key: (name, at_sea(f"{name}: BlueROV2 Heavy at sea, from its own sensors", law))
-                for key, (name, law) in _AT_SEA.items()
-            },
-        )
-        found |= {place: Place(*each) for place, each in station_keeping.places().items()}
-    return found
+        shown = [law for law in laws if law != "measured" or fidelity == WHOLE]
+        found += [_of_odin(fidelity, words, law, {"kind": "u1"}, fidelity) for law in shown]
+    for place, (words, volts, scale) in _SUPPLIES.items():
+        found += [_of_odin(place, words, law, {"kind": "u1", "scale": scale}, supply=volts) for law in laws]
+    if quick:
+        return found
+    words = "full motor model, 24 V, U1 x 0.3, overload of 1.5 s"
+    overload = [_of_odin("overload", words, law, _OVERLOAD, supply=24.0) for law in ("rcafc", "robust")]
+    found += [one._replace(scenario=one.scenario | {"steady": {"start": _JUDGED}}) for one in overload]
+    words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own sensors"
+    for law, (name, controller) in _AT_SEA.items():
+        described = {"description": f"{name}: BlueROV2 Heavy at sea, from its own sensors", "controller": controller}
+        found.append(ComparedRun("sea", words, law, name, W2 | described))
+    return found + [_of_station(place, law) for place in _STATION for law in _STATION_LAWS]
 
 
 def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
     """Every run, by name."""
-    return {
-        _name(place, law): one for place, compared in places(quick).items() for law, (_, one) in compared.runs.items()
-    }
+    return {run.key: run.scenario for run in runs(quick)}
 
 
-def table(runs: Mapping[str, Executed], quick: bool) -> list[dict[str, Any]]:
+def table(executed: Mapping[str, Executed], quick: bool) -> list[dict[str, Any]]:
     """One row per setting and law: ending and steady metrics."""
     return [
-        {
-            "place": place,
-            "words": compared.words,
-            "law": law,
-            "name": name,
-            "scenario": f"scenarios/{_name(place, law)}.yaml",
-            **_row(runs[_name(place, law)]),
-        }
-        for place, compared in places(quick).items()
-        for law, (name, _) in compared.runs.items()
+        {**run._asdict(), "scenario": f"scenarios/{run.key}.yaml", **_row(executed[run.key])} for run in runs(quick)
     ]
 
 
-def _name(place: str, law: str) -> str:
-    return f"robust_variant_{place}_{law}"
+def _of_odin(
+    place: str, words: str, law: str, load: Any, fidelity: str = WHOLE, supply: float | None = None
+) -> ComparedRun:
+    name, controller = LAWS[law]
+    sensor = {"speed_sensor": fidelity == "ideal" or law == "measured"}
+    one = scenario(f"{name}: {words}", fidelity=fidelity, loop=_SAMPLED, disturbance=load, model=sensor)
+    one["controller"] = controller
+    if supply is not None:
+        one["plant"]["thruster"]["supply"] = supply
+    return ComparedRun(place, words, law, name, one)
 
 
-def _laws(
-    words: str, fidelity: str, load: Any, supply: float | None = None, quick: bool = False
-) -> dict[str, tuple[str, dict]]:
-    found = {}
-    for key, (name, law) in LAWS.items():
-        if key == "measured" and (quick or fidelity != WHOLE):
-            continue
-        sensor = {"speed_sensor": fidelity == "ideal" or key == "measured"}
-        one = scenario(f"{name}: {words}", fidelity=fidelity, loop=_SAMPLED, disturbance=load, model=sensor)
-        one["controller"] = law
-        if supply is not None:
-            one["plant"]["thruster"]["supply"] = supply
-        found[key] = (name, one)
-    return found
-
-
-def at_sea(description: str, law: dict[str, Any]) -> dict[str, Any]:
-    """The scenario of examples/bluerov2_heavy.yaml with another law."""
-    return W2 | {"description": description, "controller": law}
+def _of_station(place: str, law: str) -> ComparedRun:
+    words, navigation, gains = _STATION[place]
+    name, controller = _STATION_LAWS[law]
+    per_axis = {key: [one[0]] * 3 + [one[1]] * 3 if isinstance(one, tuple) else one for key, one in gains[law].items()}
+    vehicle = lambda parameters: {"kind": "bluerov2_heavy", "parameters": parameters}
+    one = {
+        "description": f"{name}: {words}",
+        "plant": {"vehicle": vehicle("ng2024"), "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
+        "model": {"vehicle": vehicle("vonbenzon2022"), "rate_term": True},
+        "controller": controller | per_axis,
+        "reference": {"kind": "setpoint", "position": [0] * 6},
+        "disturbance": [{"kind": "current", "velocity": [0.4, 0.3, 0]}, {"kind": "waves", "height": 0.5, "depth": 3}],
+        "navigation": navigation,
+        "loop": {"kind": "sampled", "dt": 0.01, "duration": 60.0, "record": 0.05},
+        "steady": {"start": 30.0},
+    }
+    return ComparedRun(place, words, law, name, one)
 
 
 def _row(run: Executed) -> dict[str, Any]:
