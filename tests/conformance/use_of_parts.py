@@ -3,10 +3,10 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from textbook import rotation_from_euler
 
 from undertow.core.contracts import Load, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
-from undertow.numerics.rotations import rotation_from_euler
 from undertow.power import ESC
 from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.thrusters.thruster import PropellerReport

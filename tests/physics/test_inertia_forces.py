@@ -4,10 +4,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import coriolis_matrix, jacobian, shift_matrix
 
-from undertow.numerics.rotations import jacobian
 from undertow.vehicles import odin
-from undertow.vehicles.body import coriolis_matrix, shift_matrix
 
 RNG = np.random.default_rng(1)
 COUNT = 300

@@ -84,19 +84,6 @@ def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> 
     return jnp.block([[mass * jnp.eye(3), -lever], [lever, inertia]])
 
 
-def shift_matrix(r: Vector3) -> Matrix6:
-    """H(r): the velocity at a point at r is H nu; M_b = H^T M H. Fossen (2021), Eq. (C.5)."""
-    return jnp.block([[jnp.eye(3), skew(r).T], [jnp.zeros((3, 3)), jnp.eye(3)]])
-
-
-def coriolis_matrix(mass_matrix: Matrix6, nu: Vector6) -> Matrix6:
-    """C(nu) from M, skew-symmetric. Fossen (2021), theorem 3.2."""
-    symmetric = 0.5 * (mass_matrix + mass_matrix.T)
-    momentum = matvec(symmetric, nu)
-    linear, angular = skew(momentum[:3]), skew(momentum[3:])
-    return -jnp.block([[jnp.zeros((3, 3)), linear], [linear, angular]])
-
-
 class SeenFromWater(NamedTuple):
     """Arguments of the equation of motion relative to the water, body axes."""
 
