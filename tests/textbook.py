@@ -1,4 +1,4 @@
-"""Matrices as the paper and Fossen (2021) print them, against which the package is tested: it never forms them."""
+"""Formulas of textbooks and the paper that the package does not need: it is tested against them."""
 
 import jax.numpy as jnp
 
@@ -40,3 +40,21 @@ def coriolis_matrix(mass_matrix, nu):
     momentum = 0.5 * (mass_matrix + mass_matrix.T) @ nu
     linear, angular = skew(jnp.asarray(momentum[:3])), skew(jnp.asarray(momentum[3:]))
     return -jnp.block([[jnp.zeros((3, 3)), linear], [linear, angular]])
+
+
+def kinetic_energy(body, nu):
+    """1/2 nu . M nu of a vehicle, J."""
+    return 0.5 * nu @ body.mass_matrix @ nu
+
+
+def potential_energy(body, position, down):
+    """Energy of weight and buoyancy, J; zero with the body upright at the world origin and r_g = r_b = 0."""
+    lever = body.weight * body.r_g - body.buoyancy * body.r_b
+    return -(body.weight - body.buoyancy) * position[2] - lever @ down
+
+
+def energy_of_arm(links, q, rate):
+    """Kinetic and potential energy of a two-link arm, J."""
+    outer = links.outer_mass * links.outer_centre * jnp.sin(q[0] + q[1] - links.outer_offset)
+    inner = (links.inner_mass * links.inner_centre + links.outer_mass * links.inner_length) * jnp.sin(q[0])
+    return rate @ links.mass_matrix(q) @ rate / 2 + links.gravity * (inner + outer)

@@ -17,7 +17,7 @@ NUMBERS = 64
 def vehicles(vehicle, v):
     body = vehicle.body()
     own = body.free_acceleration(v[:6], v[6:9] / jnp.linalg.norm(v[6:9]))
-    return own, vehicle.thruster_matrix() @ v[: vehicle.thrusters], body.kinetic_energy(v[:6])
+    return own, vehicle.thruster_matrix() @ v[: vehicle.thrusters]
 
 
 def thrusters(thruster, v):

@@ -18,7 +18,7 @@ _BOOK = "Slotine and Li 1991, Example 9.1"
 
 
 class Links(AbstractDynamics):
-    """Rigid links: mass matrix, Coriolis matrix, weight and energy. Slotine and Li 1991, section 9.1.
+    """Rigid links: mass matrix, Coriolis matrix and weight. Slotine and Li 1991, section 9.1.
 
     The outer link carries a load: its centre of mass need not lie on the line through its joint.
 
@@ -69,12 +69,6 @@ class Links(AbstractDynamics):
         outer = self.outer_mass * self.outer_centre * jnp.cos(q[0] + q[1] - self.outer_offset)
         inner = (self.inner_mass * self.inner_centre + self.outer_mass * self.inner_length) * jnp.cos(q[0])
         return self.gravity * jnp.stack([inner + outer, outer])
-
-    def energy(self, q: Float[Array, "2"], rate: Float[Array, "2"]) -> Float[Array, ""]:
-        """Kinetic and potential energy, J."""
-        outer = self.outer_mass * self.outer_centre * jnp.sin(q[0] + q[1] - self.outer_offset)
-        inner = (self.inner_mass * self.inner_centre + self.outer_mass * self.inner_length) * jnp.sin(q[0])
-        return rate @ matvec(self.mass_matrix(q), rate) / 2 + self.gravity * (inner + outer)
 
     def drift(self, y: Measurement) -> Float[Array, "2"]:
         """-M^-1 (C q_dot + g), rad/s^2."""

@@ -61,15 +61,6 @@ class Body(eqx.Module):
         """M^-1 wrench, m/s^2 and rad/s^2."""
         return matvec(self.inverse_mass_matrix, wrench)
 
-    def kinetic_energy(self, nu: Vector6) -> Float[Array, ""]:
-        """1/2 nu . M nu, J."""
-        return 0.5 * (nu * matvec(self.mass_matrix, nu)).sum()
-
-    def potential_energy(self, position: Vector3, down: Vector3) -> Float[Array, ""]:
-        """Energy of weight and buoyancy, J; zero with the body upright at the world origin and r_g = r_b = 0."""
-        lever = self.weight * self.r_g - self.buoyancy * self.r_b
-        return -(self.weight - self.buoyancy) * position[2] - (lever * down).sum()
-
 
 @jax.jit
 def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> Matrix6:
