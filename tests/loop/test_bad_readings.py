@@ -10,8 +10,7 @@ import pytest
 
 from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
-from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractController, AbstractNavigation, Model
+from undertow.core.contracts import AbstractContinuousController, AbstractController, AbstractNavigation, Model
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
 from undertow.disturbances.none import none

@@ -11,7 +11,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
-from undertow.core.continuous import AbstractContinuousController
+from undertow.core.contracts import AbstractContinuousController
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Realization
