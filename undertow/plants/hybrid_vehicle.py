@@ -50,12 +50,7 @@ class HybridVehicle(AbstractPlant):
     At the fidelities `ideal` and `static` a prescribed acceleration load is all of d, J_dot nu included (Remark 2); at
     the others J_dot nu is part of the dynamics, and the load is added to x_ddot.
 
-    Args:
-        vehicle: hull and thruster layout.
-        thruster: model of every thruster.
-        battery: power supply of the thrusters; None for the thruster's own supply.
-        esc: electronic speed controllers; None for none.
-        ledger: whether to integrate the energies of the thrusters; None for yes where there is a motor.
+    Arguments are those of `hybrid_vehicle`, which can leave thrusters out.
     """
 
     vehicle: Vehicle
