@@ -11,8 +11,9 @@ from ruamel.yaml import YAML
 
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
+from undertow.scenario.factory import make
 from undertow.scenario.reading import read
-from undertow.scenario.vehicle_file import make_vehicle, read_vehicle
+from undertow.scenario.vehicle_file import read_vehicle
 from undertow.vehicles import bluerov2_heavy
 
 ROV = (Path(__file__).parents[2] / "examples" / "my_rov.yaml").read_text()
@@ -81,10 +82,10 @@ def test_elevation_is_upward(rov):
 
 
 def test_description_needs_no_file(rov, tmp_path):
-    vehicle, description = make_vehicle("my_rov.yaml", {"mass": 14}, rov().parent)
+    vehicle, description = make("vehicles", {"kind": "my_rov.yaml", "mass": 14}, rov().parent)
     (tmp_path / "my_rov.yaml").unlink()
     assert description["kind"] == "my_rov.yaml"
-    again, same = make_vehicle(description["kind"], {"contents": description["contents"]}, tmp_path)
+    again, same = make("vehicles", description, tmp_path)
     assert same == description
     for a, b in zip(jax.tree.leaves(vehicle), jax.tree.leaves(again), strict=True):
         assert np.array_equal(a, b)

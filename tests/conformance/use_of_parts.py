@@ -3,10 +3,10 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from textbook import rotation_from_euler
 
 from undertow.core.contracts import Load, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
-from undertow.numerics.rotations import rotation_from_euler
 from undertow.power import ESC
 from undertow.sensors.estimate import estimate_of, motion_of
 from undertow.thrusters.thruster import PropellerReport
@@ -17,7 +17,7 @@ NUMBERS = 64
 def vehicles(vehicle, v):
     body = vehicle.body()
     own = body.free_acceleration(v[:6], v[6:9] / jnp.linalg.norm(v[6:9]))
-    return own, vehicle.thruster_matrix() @ v[: vehicle.thrusters], body.kinetic_energy(v[:6])
+    return own, vehicle.thruster_matrix() @ v[: vehicle.thrusters]
 
 
 def thrusters(thruster, v):

@@ -10,8 +10,7 @@ import pytest
 
 from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
-from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import AbstractController, AbstractNavigation, Model
+from undertow.core.contracts import AbstractContinuousController, AbstractController, AbstractNavigation, Model
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
 from undertow.disturbances.none import none
@@ -143,8 +142,8 @@ def test_a_vehicle_in_its_own_axes(law, within):
     plan = simd_batch.Plan(300, DT, 1, ("position", "bad_readings"), "euler", 1)
     found = simd_batch.BatchRunner(run, plan, same).run(numbers)
     np.testing.assert_array_equal(found.status, int(Status.OK))
-    np.testing.assert_array_equal(found.series["bad_readings"][:, -1], [0, 50])
-    sound, hit = found.series["position"]
+    np.testing.assert_array_equal(found.signals["bad_readings"][:, -1], [0, 50])
+    sound, hit = found.signals["position"]
     assert np.abs(sound[150, 3:] - sound[100, 3:]).max() > 0.1, "it turns meanwhile"
     assert 0 < np.abs(hit - sound).max() < within
 

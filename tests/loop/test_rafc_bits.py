@@ -4,8 +4,7 @@ import jax
 import numpy as np
 
 from undertow.controllers.rcaf import rcaf
-from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import Model
+from undertow.core.contracts import AbstractContinuousController, Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop

@@ -5,12 +5,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import wrap_angle
 
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.navigation.observer import observer
-from undertow.numerics.rotations import wrap_angle
 from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
 from undertow.sensors.sampling import Sampling
 from undertow.thrusters.thruster import PropellerReport

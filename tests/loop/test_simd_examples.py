@@ -102,8 +102,8 @@ def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     for i in range(11):
         single = alone.run(jax.tree.map(lambda leaf, i=i: leaf[i : i + 1], many))
         same = lambda a, b, i=i: np.testing.assert_array_equal(a[0], b[i])
-        jax.tree.map(same, (single.accumulated, single.series), (found.accumulated, found.series))
-    pair = lambda one: (one.accumulated, one.series)
+        jax.tree.map(same, (single.accumulated, single.signals), (found.accumulated, found.signals))
+    pair = lambda one: (one.accumulated, one.signals)
     jax.tree.map(lambda a, b: np.testing.assert_array_equal(a[::-1], b), pair(backwards), pair(found))
     jax.tree.map(np.testing.assert_array_equal, pair(general), pair(found))
 

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import jacobian
 
 from undertow.numerics.linear_algebra import (
     partial_inverse,
@@ -14,7 +15,6 @@ from undertow.numerics.linear_algebra import (
     regularised_inverse,
     regularised_sharp,
 )
-from undertow.numerics.rotations import jacobian
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2, odin

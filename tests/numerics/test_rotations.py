@@ -4,19 +4,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import euler_rate_matrix, jacobian, rotation_from_euler, wrap_angle
 
 from undertow.numerics.rotations import (
     Kinematics,
     cross,
     euler_from_rotation,
-    euler_rate_matrix,
-    jacobian,
     quaternion_from_euler,
     quaternion_rate,
-    rotation_from_euler,
     rotation_from_quaternion,
     skew,
-    wrap_angle,
 )
 
 RNG = np.random.default_rng(7)

@@ -9,9 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import rotation_from_euler
 
 from undertow.core.contracts import Load
-from undertow.numerics.rotations import rotation_from_euler
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import paper_table3
 from undertow.vehicles import Vehicle, bluerov2_heavy, odin, rexrov

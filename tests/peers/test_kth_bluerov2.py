@@ -14,9 +14,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import jacobian, rotation_from_euler
 
 from undertow.numerics.integrators import rk4
-from undertow.numerics.rotations import jacobian, rotation_from_euler
 from undertow.vehicles import bluerov2_heavy
 
 PEER = json.loads((Path(__file__).parent / "data" / "kth_bluerov2_heavy.json").read_text())

@@ -8,11 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 from mujoco_states import poses, undertow_acceleration
+from textbook import rotation_from_euler
 
 from undertow.core.errors import BadInput
 from undertow.interop.mujoco_engine import Submerged, Water, mjcf
 from undertow.interop.mujoco_engine.mjcf import as_rigid_body
-from undertow.numerics.rotations import Kinematics, rotation_from_euler
+from undertow.numerics.rotations import Kinematics
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import paper_table3
 from undertow.vehicles import bluerov2, bluerov2_heavy, lauv, npsauv2, odin, remus100, rexrov

@@ -6,11 +6,11 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hull import SEAWATER, cross_flow_coefficient, cross_flow_drag, lift_and_drag
+from textbook import coriolis_matrix, euler_rate_matrix, jacobian, rotation_from_euler, shift_matrix
 
-from undertow.numerics.rotations import euler_rate_matrix, jacobian, rotation_from_euler
 from undertow.vehicles import Body
-from undertow.vehicles.body import coriolis_matrix, rigid_body_mass, shift_matrix
-from undertow.vehicles.hull import SEAWATER, cross_flow_coefficient, cross_flow_drag, lift_and_drag
+from undertow.vehicles.body import rigid_body_mass
 
 PEER = json.loads((Path(__file__).parent / "data" / "pvs_gnc.json").read_text())
 NU, R = np.array(PEER["nu"]), np.array(PEER["r"])

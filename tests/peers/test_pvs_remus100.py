@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 
 import numpy as np
+from hull import cross_flow_coefficient
 
 from undertow.vehicles import remus100
-from undertow.vehicles.hull import cross_flow_coefficient
 
 PEER = json.loads((Path(__file__).parent / "data" / "pvs_remus100.json").read_text())
 VEHICLE = remus100("fossen_python")

@@ -4,13 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import coriolis_matrix, jacobian
 
 from undertow.core.contracts import Load
-from undertow.numerics.rotations import jacobian
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import paper_table3
 from undertow.vehicles import Vehicle, odin
-from undertow.vehicles.body import coriolis_matrix
 
 RNG = np.random.default_rng(2)
 COUNT = 300

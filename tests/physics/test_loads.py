@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import rotation_from_euler
 
 from undertow.core.contracts import Pose
 from undertow.core.errors import BadInput
@@ -13,7 +14,6 @@ from undertow.disturbances.adding import Together
 from undertow.disturbances.parameter_error import parameter_error
 from undertow.disturbances.payload import payload
 from undertow.disturbances.tether import tether
-from undertow.numerics.rotations import rotation_from_euler
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin

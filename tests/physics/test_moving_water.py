@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import rotation_from_euler
 
 from undertow.core.contracts import Pose, Water
 from undertow.core.errors import BadInput
@@ -14,7 +15,6 @@ from undertow.disturbances.gauss_markov_current import gauss_markov_current
 from undertow.disturbances.sheared_current import sheared_current
 from undertow.disturbances.waves import spectrum, waves
 from undertow.numerics.integrators import rk4
-from undertow.numerics.rotations import rotation_from_euler
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin

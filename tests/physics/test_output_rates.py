@@ -4,10 +4,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import jacobian
 
 from undertow.core.contracts import Load
 from undertow.numerics.integrators import rk4
-from undertow.numerics.rotations import euler_from_rotation, jacobian, rotation_from_quaternion
+from undertow.numerics.rotations import euler_from_rotation, rotation_from_quaternion
 from undertow.plants import double_integrator, hybrid_vehicle
 from undertow.thrusters import paper_table3
 from undertow.vehicles import odin

@@ -11,8 +11,7 @@ from jaxtyping import Array, Float
 from scipy.integrate import quad
 
 import undertow as ut
-from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import Model
+from undertow.core.contracts import AbstractContinuousController, Model
 from undertow.core.errors import BadInput
 from undertow.disturbances.none import none
 from undertow.loop import continuous, sampled

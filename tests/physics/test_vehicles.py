@@ -6,13 +6,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import coriolis_matrix, rotation_from_euler
 
 from undertow import vehicles
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.core.param import parameters
-from undertow.numerics.rotations import rotation_from_euler
-from undertow.vehicles.body import coriolis_matrix
 
 # Mass (kg), smallest and largest eigenvalue of M, (B - W) / W (%), righting moment (N m/rad), smallest eigenvalue of
 # the symmetric part of D at unit speed; to the digits given. From the printed numbers, by other code than undertow's.

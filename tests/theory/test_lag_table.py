@@ -20,7 +20,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.numerics.integrators import rk4
 from undertow.references.setpoint import setpoint
-from undertow.thrusters.electromechanical import ElectromechanicalState
+from undertow.thrusters.fidelity import ElectromechanicalState
 from undertow.thrusters.paper_table3 import paper_table3
 
 WHOLE = paper_table3()

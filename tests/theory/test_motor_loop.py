@@ -18,7 +18,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.references.setpoint import setpoint
-from undertow.thrusters.electromechanical import ElectromechanicalState
+from undertow.thrusters.fidelity import ElectromechanicalState
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from textbook import rotation_from_euler, wrap_angle
 
 from undertow.controllers import rcaf
 from undertow.core.contracts import AbstractReference, Target
@@ -13,7 +14,6 @@ from undertow.disturbances import none, sinusoid, table, u1
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.numerics.rotations import rotation_from_euler, wrap_angle
 from undertow.plants import double_integrator, hybrid_vehicle, magnetic_levitation
 from undertow.references import setpoint, sine
 from undertow.thrusters import paper_table3, t200

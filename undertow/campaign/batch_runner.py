@@ -150,7 +150,7 @@ class ProgramCache:
         backend = np.full(
             count, SIMD if isinstance(self._programs[kind], simd_batch.BatchRunner) else XLA, dtype=np.int8
         )
-        return BatchResult(metrics, result.status.astype(np.int8), result.ended, backend, result.series)
+        return BatchResult(metrics, result.status.astype(np.int8), result.ended, backend, result.signals)
 
     def _common(self, kind: _Kind, count: int) -> list[np.ndarray | None]:
         """Constants of the program of a kind, in the order of the leaves of its runs; None for the other leaves."""

@@ -13,8 +13,7 @@ from undertow.controllers.law_signals import ADAPTIVE_LAW, lyapunov_signals, sha
 from undertow.controllers.robust_modification import RobustModification
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
-from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import Measurement, Model, Target
+from undertow.core.contracts import AbstractContinuousController, Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal

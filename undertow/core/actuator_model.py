@@ -54,7 +54,29 @@ class AbstractActuatorModel(eqx.Module):
         """The same actuators without their dynamics: the force follows the input at once."""
 
 
-class DirectActuator(AbstractActuatorModel):
+class AbstractMemorylessActuator(AbstractActuatorModel):
+    """Actuators whose force follows the input at once; there is no state."""
+
+    def max_bandwidth(self, sampled):
+        return sampled
+
+    def init(self) -> tuple[()]:
+        return ()
+
+    def update_from_report(self, state, report) -> tuple[()]:
+        return ()
+
+    def target_of(self, state, u, rate):
+        return self.force(state, u)
+
+    def advance(self, state, u, dt) -> tuple[()]:
+        return ()
+
+    def quasi_static(self):
+        return self
+
+
+class DirectActuator(AbstractMemorylessActuator):
     """The force is proportional to the input, within limits of the input."""
 
     gain: Forces = eqx.field(converter=jnp.asarray, default=1.0)
@@ -62,17 +84,8 @@ class DirectActuator(AbstractActuatorModel):
     high: Forces = eqx.field(converter=jnp.asarray, default=jnp.inf)
     at_once: bool = eqx.field(static=True, default=True)  # whether the force is known to follow the input at once
 
-    def max_bandwidth(self, sampled):
-        return sampled
-
     def time_constant(self):
         return jnp.zeros(()) if self.at_once else None
-
-    def init(self) -> tuple[()]:
-        return ()
-
-    def update_from_report(self, state, report) -> tuple[()]:
-        return ()
 
     def range(self, state, rate):
         return self.gain * self.low, self.gain * self.high
@@ -82,15 +95,6 @@ class DirectActuator(AbstractActuatorModel):
 
     def command(self, state, force, rate):
         return force / self.gain
-
-    def target_of(self, state, u, rate):
-        return self.gain * u
-
-    def advance(self, state, u, dt) -> tuple[()]:
-        return ()
-
-    def quasi_static(self) -> "DirectActuator":
-        return self
 
 
 class LaggedActuator(AbstractActuatorModel):

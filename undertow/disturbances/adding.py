@@ -1,4 +1,4 @@
-"""Sum of loads."""
+"""Sums of loads, and the base class of disturbances that are neither random nor jump."""
 
 from typing import Any
 
@@ -12,6 +12,16 @@ from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross
 
 Vector3 = Float[Array, "3"]
+
+
+class AbstractSmoothDisturbance(AbstractDisturbance):
+    """A load that is not random and does not jump."""
+
+    def realize(self, key) -> tuple[()]:
+        return ()
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return ()
 
 
 class Together(AbstractDisturbance):

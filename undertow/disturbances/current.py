@@ -4,12 +4,12 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.contracts import Load
 from undertow.core.param import Param, param
-from undertow.disturbances.adding import with_water
+from undertow.disturbances.adding import AbstractSmoothDisturbance, with_water
 
 
-class Current(AbstractDisturbance):
+class Current(AbstractSmoothDisturbance):
     """Water of constant, uniform velocity."""
 
     velocity: Float[Param, "3"] = param("m/s", "velocity of the water: north, east, down", symbol="v_c")
@@ -18,14 +18,8 @@ class Current(AbstractDisturbance):
         checks.length("velocity", self.velocity, 3, "north, east, down")
         checks.finite("velocity", self.velocity, "m/s")
 
-    def realize(self, key) -> tuple[()]:
-        return ()
-
     def at(self, realization, t, pose, load: Load) -> Load:
         return with_water(load, pose, self.velocity, jnp.zeros(3))
-
-    def jumps(self, duration: float) -> tuple[float, ...]:
-        return ()
 
 
 def current(velocity=(0.5, 0.0, 0.0)) -> Current:

@@ -1,19 +1,14 @@
 """No disturbance."""
 
-from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.contracts import Load
+from undertow.disturbances.adding import AbstractSmoothDisturbance
 
 
-class NoDisturbance(AbstractDisturbance):
+class NoDisturbance(AbstractSmoothDisturbance):
     """Still water and no load."""
-
-    def realize(self, key) -> tuple[()]:
-        return ()
 
     def at(self, realization, t, pose, load: Load) -> Load:
         return load
-
-    def jumps(self, duration: float) -> tuple[float, ...]:
-        return ()
 
 
 def none() -> NoDisturbance:

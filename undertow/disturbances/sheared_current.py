@@ -7,13 +7,13 @@ from jax.core import Tracer
 from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.disturbances.adding import body_of, with_water
+from undertow.disturbances.adding import AbstractSmoothDisturbance, body_of, with_water
 
 
-class ShearedCurrent(AbstractDisturbance):
+class ShearedCurrent(AbstractSmoothDisturbance):
     """Horizontal velocities at given depths, linear in between, constant above and below.
 
     The water is assumed uniform over the vehicle, with the velocity at its origin.
@@ -37,16 +37,10 @@ class ShearedCurrent(AbstractDisturbance):
         if not isinstance(self.depths, Tracer) and not (np.diff(np.asarray(self.depths)) > 0).all():
             raise BadInput("depths", "increase", np.asarray(self.depths).tolist())
 
-    def realize(self, key) -> tuple[()]:
-        return ()
-
     def at(self, realization, t, pose, load: Load) -> Load:
         down = body_of(pose).position[2]
         north, east = jax.vmap(jnp.interp, in_axes=(None, None, 1))(down, self.depths, self.velocities)
         return with_water(load, pose, jnp.stack([north, east, jnp.zeros_like(north)]), jnp.zeros(3))
-
-    def jumps(self, duration: float) -> tuple[float, ...]:
-        return ()
 
 
 def sheared_current(depths=(0.0, 20.0), velocities=((0.8, 0.0), (0.1, 0.0))) -> ShearedCurrent:

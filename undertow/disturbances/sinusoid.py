@@ -3,11 +3,12 @@
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.contracts import Load
 from undertow.core.param import Param, param
+from undertow.disturbances.adding import AbstractSmoothDisturbance
 
 
-class Sinusoid(AbstractDisturbance):
+class Sinusoid(AbstractSmoothDisturbance):
     """offset + amplitude sin(frequency t + phase), the same arguments for all axes or one per axis."""
 
     amplitude: Float[Param, "..."] = param("m/s^2, rad/s^2", "amplitude")
@@ -15,15 +16,9 @@ class Sinusoid(AbstractDisturbance):
     offset: Float[Param, "..."] = param("m/s^2, rad/s^2", "constant part")
     phase: Float[Param, "..."] = param("rad", "phase at t = 0")
 
-    def realize(self, key) -> tuple[()]:
-        return ()
-
     def at(self, realization, t, pose, load: Load) -> Load:
         signal = self.offset + self.amplitude * jnp.sin(self.frequency * t + self.phase)
         return load._replace(acceleration=load.acceleration + signal)
-
-    def jumps(self, duration: float) -> tuple[float, ...]:
-        return ()
 
 
 def sinusoid(amplitude=1.0, frequency=1.0, offset=0.0, phase=0.0) -> Sinusoid:

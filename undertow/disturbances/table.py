@@ -7,12 +7,13 @@ from jax.core import Tracer
 from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
+from undertow.disturbances.adding import AbstractSmoothDisturbance
 
 
-class Table(AbstractDisturbance):
+class Table(AbstractSmoothDisturbance):
     """Samples of the lumped acceleration, linear in between, constant before the first and after the last.
 
     Raises:
@@ -31,9 +32,6 @@ class Table(AbstractDisturbance):
             if not (steps > 0).all():
                 raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
 
-    def realize(self, key) -> tuple[()]:
-        return ()
-
     def at(self, realization, t, pose, load: Load) -> Load:
         axes = load.acceleration.shape[0]
         if self.samples.shape[1] != 1 + axes:
@@ -41,9 +39,6 @@ class Table(AbstractDisturbance):
         times, values = self.samples[:, 0], self.samples[:, 1:]
         signal = jax.vmap(jnp.interp, in_axes=(None, None, 1))(t, times, values)
         return load._replace(acceleration=load.acceleration + signal)
-
-    def jumps(self, duration: float) -> tuple[float, ...]:
-        return ()
 
 
 def table(samples) -> Table:

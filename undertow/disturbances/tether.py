@@ -4,15 +4,15 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.contracts import Load
 from undertow.core.param import Param, param
-from undertow.disturbances.adding import body_of, with_force
+from undertow.disturbances.adding import AbstractSmoothDisturbance, body_of, with_force
 from undertow.numerics.linear_algebra import matvec
 
 _TINY = 1e-9  # m
 
 
-class Tether(AbstractDisturbance):
+class Tether(AbstractSmoothDisturbance):
     """Straight elastic cable from a fixed point to the vehicle, with the drag of half its length on the vehicle.
 
     Its inertia, weight and catenary are neglected; its drag assumes water at rest.
@@ -35,9 +35,6 @@ class Tether(AbstractDisturbance):
         checks.positive("stiffness", self.stiffness, "N/m")
         checks.not_negative("drag", self.drag, "N s^2/m^3")
 
-    def realize(self, key) -> tuple[()]:
-        return ()
-
     def at(self, realization, t, pose, load: Load) -> Load:
         body = body_of(pose)
         span = self.anchor - body.position - matvec(body.rotation, self.point)
@@ -47,9 +44,6 @@ class Tether(AbstractDisturbance):
         hanging = jnp.minimum(distance, self.length)
         force = tension * span / distance - 0.5 * self.drag * hanging * speed * body.velocity
         return with_force(load, pose, force, self.point)
-
-    def jumps(self, duration: float) -> tuple[float, ...]:
-        return ()
 
 
 def tether(anchor=(0.0, 0.0, -5.0), point=(0.0, 0.0, 0.0), length=20.0, stiffness=200.0, drag=4.0) -> Tether:

@@ -4,12 +4,13 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
+from undertow.disturbances.adding import AbstractSmoothDisturbance
 
 
-class ConstantWrench(AbstractDisturbance):
+class ConstantWrench(AbstractSmoothDisturbance):
     """w_d is on the left side of Eq. (2), so a positive surge force opposes forward motion."""
 
     value: Float[Param, " n"] = param("N, N m", "force and moment", symbol="w_d")
@@ -17,16 +18,10 @@ class ConstantWrench(AbstractDisturbance):
     def __check_init__(self):
         checks.finite("value", self.value)
 
-    def realize(self, key) -> tuple[()]:
-        return ()
-
     def at(self, realization, t, pose, load: Load) -> Load:
         if np.shape(self.value) != load.wrench.shape:
             raise BadInput("value", f"have {load.wrench.shape[0]} entries", f"of shape {np.shape(self.value)}")
         return load._replace(wrench=load.wrench + self.value)
-
-    def jumps(self, duration: float) -> tuple[float, ...]:
-        return ()
 
 
 def wrench(value=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> ConstantWrench:

@@ -11,7 +11,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
-from undertow.core.continuous import AbstractContinuousController
+from undertow.core.contracts import AbstractContinuousController
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Realization
@@ -88,8 +88,6 @@ def simulate(
     key = jax.random.PRNGKey(0) if key is None else key
     start = loop.outputs_at_start(position, velocity)
     if tolerances is not None:
-        from undertow.loop.continuous import solve
-
         times = jnp.asarray(np.arange(records + 1) * record_step, dtype=float)
         until = jnp.maximum(times[-1], duration)
         jumps = jnp.asarray([0.0, *loop.disturbance.jumps(duration)])

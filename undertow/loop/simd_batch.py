@@ -95,18 +95,6 @@ class Plan(NamedTuple):
         return np.arange(0, self.steps + 1, self.every) * self.dt
 
 
-class Ended(NamedTuple):
-    """Runs at their end, one entry each: as in `Outcome`."""
-
-    accumulated: Any
-    final: Any
-    status: np.ndarray
-    ended: np.ndarray
-    input: np.ndarray
-    time: np.ndarray
-    series: dict[str, Any]
-
-
 class BatchRunner:
     """Runs of one kind, compiled once.
 
@@ -156,18 +144,18 @@ class BatchRunner:
         """Arithmetic operations of one step of one run: law, integration of the plant, accumulators."""
         return self._program.operations
 
-    def run(self, numbers: Any, steps: int | None = None) -> Ended:
-        """Run a batch.
+    def run(self, numbers: Any, steps: int | None = None) -> Outcome:
+        """Run a batch; the outcome has NumPy arrays with a leading axis over runs.
 
         Args:
             numbers: arrays of the runs, as in `run`, with a leading axis over runs.
             steps: how many; as planned unless given.
         """
         steps, every = self._plan.steps if steps is None else steps, self._plan.every
-        carry, (time, series) = self._program.run(numbers, steps, every)
+        carry, (time, signals) = self._program.run(numbers, steps, every)
         states, accumulated, (status, ended, wrong) = carry
-        ended = np.where(status == int(Status.OK), steps * self._plan.dt, ended)
-        return Ended(accumulated, states[:2], status, ended, wrong, time, series)
+        until: Any = np.where(status == int(Status.OK), steps * self._plan.dt, ended)
+        return Outcome(time, signals, accumulated, states[:2], status, until, wrong)
 
 
 def simulate(
@@ -195,6 +183,5 @@ def simulate(
     constant = [True] * len(jax.tree.leaves(arrays))
     plan = Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps)
     batch = BatchRunner(run, plan, constant, width=1)
-    ended = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
-    one = jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, ended)
-    return Outcome(one.time, one.series, one.accumulated, one.final, one.status, one.ended, one.input)
+    outcome = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
+    return jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, outcome)

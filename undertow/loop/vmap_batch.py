@@ -9,7 +9,8 @@ import jax
 import numpy as np
 
 from undertow.loop import sampled
-from undertow.loop.simd_batch import Ended, Plan, Run
+from undertow.loop.outcome import Outcome
+from undertow.loop.simd_batch import Plan, Run
 
 # The last bits of a result depend on the width of the program, but not on the other runs in it: every program has
 # this width, however few runs there are, so that no result depends on how they are divided into tasks.
@@ -27,7 +28,7 @@ class BatchRunner:
 
     def __init__(self, run: Run, plan: Plan, width: int = 0):
         numbers, rest = eqx.partition(run, eqx.is_array)
-        self.run: Callable[[Any], Ended] = _batched(partial(_one, rest, plan), numbers, width or _WIDTH)
+        self.run: Callable[[Any], Outcome] = _batched(partial(_one, rest, plan), numbers, width or _WIDTH)
 
 
 def _batched(function: Callable[[Any], Any], numbers: Any, width: int) -> Callable[[Any], Any]:
@@ -46,7 +47,7 @@ def _batched(function: Callable[[Any], Any], numbers: Any, width: int) -> Callab
     return run
 
 
-def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
+def _one(rest: Any, plan: Plan, numbers: Any) -> Outcome:
     loop, accumulators, (position, velocity), key = eqx.combine(numbers, rest)
     outcome = sampled.simulate(
         loop,
@@ -60,6 +61,4 @@ def _one(rest: Any, plan: Plan, numbers: Any) -> Ended:
         method=plan.method,
         substeps=plan.substeps,
     )
-    series = {name: outcome.signals[name] for name in plan.signals}
-    ending = outcome.status, outcome.ended, outcome.input
-    return Ended(outcome.accumulated, outcome.final, *ending, outcome.time, series)  # pyright: ignore[reportArgumentType] - the caller converts the leaves
+    return outcome._replace(signals={name: outcome.signals[name] for name in plan.signals})

@@ -38,25 +38,6 @@ def skew(a: Vector3) -> Matrix3:
     return jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
 
 
-def wrap_angle(angle: Float[Array, "..."]) -> Float[Array, "..."]:
-    """Same angle in [-pi, pi), rad."""
-    return angle - 2 * jnp.pi * jnp.floor((angle + jnp.pi) / (2 * jnp.pi))
-
-
-def rotation_from_euler(angles: Vector3) -> Matrix3:
-    """Rotation body -> world, R(roll, pitch, yaw). Fossen (2.31); upper block of J in Eq. (1)."""
-    return _rotation_from_quaternion_parts(*quaternion_from_euler(angles))
-
-
-def euler_rate_matrix(angles: Vector3) -> Matrix3:
-    """T with Euler rates = T (p, q, r); singular at pitch = +-90 deg. Fossen (2.41); lower block of J in Eq. (1)."""
-    (sr, sp, _), (cr, cp, _) = jnp.sin(angles), jnp.cos(angles)
-    zero, one = jnp.zeros_like(sr), jnp.ones_like(sr)
-    return jnp.stack(
-        [jnp.stack([one, sr * sp / cp, cr * sp / cp]), jnp.stack([zero, cr, -sr]), jnp.stack([zero, sr / cp, cr / cp])]
-    )
-
-
 def quaternion_from_euler(angles: Vector3) -> Quaternion:
     """Unit quaternion of (roll, pitch, yaw)."""
     return _quaternion_from_halves(jnp.sin(angles / 2), jnp.cos(angles / 2))
@@ -80,7 +61,14 @@ def turning_from_euler(angles: Vector3, rates: Vector3, accelerations: Vector3) 
 
 def rotation_from_quaternion(q: Quaternion) -> Matrix3:
     """Rotation body -> world. Exact for a unit quaternion; no trigonometry."""
-    return _rotation_from_quaternion_parts(*q)
+    w, x, y, z = q
+    return jnp.stack(
+        [
+            jnp.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]),
+            jnp.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]),
+            jnp.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]),
+        ]
+    )
 
 
 def euler_from_rotation(rotation: Matrix3) -> Vector3:
@@ -180,27 +168,6 @@ class Kinematics:
                 ),
             ]
         )
-
-
-def kinematics_from_euler(angles: Vector3) -> Kinematics:
-    """J of Eq. (1) at (roll, pitch, yaw)."""
-    return Kinematics(rotation_from_euler(angles))
-
-
-def jacobian(angles: Vector3) -> Float[Array, "6 6"]:
-    """J of Eq. (1) as a matrix, from (roll, pitch, yaw)."""
-    zero = jnp.zeros((3, 3))
-    return jnp.block([[rotation_from_euler(angles), zero], [zero, euler_rate_matrix(angles)]])
-
-
-def _rotation_from_quaternion_parts(w: Array, x: Array, y: Array, z: Array) -> Matrix3:
-    return jnp.stack(
-        [
-            jnp.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]),
-            jnp.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]),
-            jnp.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]),
-        ]
-    )
 
 
 def _quaternion_from_halves(sines: Vector3, cosines: Vector3) -> Quaternion:

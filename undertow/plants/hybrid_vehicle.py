@@ -20,6 +20,7 @@ from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import Kinematics, quaternion_from_euler, quaternion_rate, rotation_from_quaternion
 from undertow.plants.hybrid_model import EulerCoordinates, HybridDynamics
 from undertow.plants.hybrid_power import HybridPower, PowerState, has_motor
+from undertow.plants.mechanism import given_or_zero
 from undertow.plants.reachability import open_loop_advice
 from undertow.power import ESC, Battery
 from undertow.thrusters.thruster import AbstractThruster
@@ -39,28 +40,6 @@ class VehicleState(NamedTuple):
     thrusters: Any
     power: PowerState = PowerState()  # battery and ledger
 
-    def pose(self) -> Pose:
-        """Pose and velocity of the body."""
-        rotation = rotation_from_quaternion(self.attitude)
-        return Pose(self.position, rotation, matvec(rotation, self.nu[:3]))
-
-    def status(self) -> Array:
-        """Status code: OK if Euler angles are defined and all values are within the plausible range."""
-        third_row = rotation_from_quaternion(self.attitude)[2]
-        near_vertical = third_row[1] ** 2 + third_row[2] ** 2 < 1e-6
-        far = (jnp.abs(self.position) > _ENVELOPE).any() | (jnp.abs(self.nu) > _ENVELOPE).any()
-        code = jnp.where(near_vertical, int(Status.PITCH_SINGULAR), int(Status.OK))
-        return jnp.where(far, int(Status.DIVERGED), code)
-
-
-def state_at(position: Any, velocity: Any, thrusters: Any, power: PowerState) -> VehicleState:
-    """State with given outputs and rates of outputs, in Euler angles; zero where None."""
-    position = jnp.zeros(6) if position is None else position
-    velocity = jnp.zeros(6) if velocity is None else velocity
-    attitude = quaternion_from_euler(position[3:])
-    nu = Kinematics(rotation_from_quaternion(attitude)).to_body(velocity)
-    return VehicleState(position[:3], attitude, nu, thrusters, power)
-
 
 _DOF_NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
@@ -71,12 +50,7 @@ class HybridVehicle(AbstractPlant):
     At the fidelities `ideal` and `static` a prescribed acceleration load is all of d, J_dot nu included (Remark 2); at
     the others J_dot nu is part of the dynamics, and the load is added to x_ddot.
 
-    Args:
-        vehicle: hull and thruster layout.
-        thruster: model of every thruster.
-        battery: power supply of the thrusters; None for the thruster's own supply.
-        esc: electronic speed controllers; None for none.
-        ledger: whether to integrate the energies of the thrusters; None for yes where there is a motor.
+    Arguments are those of `hybrid_vehicle`, which can leave thrusters out.
     """
 
     vehicle: Vehicle
@@ -106,8 +80,11 @@ class HybridVehicle(AbstractPlant):
         self.input_unit = thruster.input_unit
 
     def initial_state(self, position=None, velocity=None) -> VehicleState:
-        thrusters = self.thruster.initial_state(self.inputs())
-        return state_at(position, velocity, thrusters, self.power.initial_state(self.inputs()))
+        outputs = given_or_zero(position, 6)
+        attitude = quaternion_from_euler(outputs[3:])
+        nu = Kinematics(rotation_from_quaternion(attitude)).to_body(given_or_zero(velocity, 6))
+        thrusters, power = self.thruster.initial_state(self.inputs()), self.power.initial_state(self.inputs())
+        return VehicleState(outputs[:3], attitude, nu, thrusters, power)
 
     def dynamics(self, t, x: VehicleState, u, d: Load) -> VehicleState:
         kinematics = Kinematics(rotation_from_quaternion(x.attitude))
@@ -145,7 +122,8 @@ class HybridVehicle(AbstractPlant):
         return own + body.accelerate(wrench) + kinematics.to_body(prescribed)
 
     def pose(self, x: VehicleState) -> Pose:
-        return x.pose()
+        rotation = rotation_from_quaternion(x.attitude)
+        return Pose(x.position, rotation, matvec(rotation, x.nu[:3]))
 
     def admissible(self, x: VehicleState, u):
         return self.power.admissible(self.thruster, x.thrusters, x.power, u)
@@ -164,7 +142,12 @@ class HybridVehicle(AbstractPlant):
         return self.vehicle.thrusters
 
     def status(self, x: VehicleState) -> Array:
-        return x.status()
+        """OK if Euler angles are defined and all values are within the plausible range."""
+        third_row = rotation_from_quaternion(x.attitude)[2]
+        near_vertical = third_row[1] ** 2 + third_row[2] ** 2 < 1e-6
+        far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.nu) > _ENVELOPE).any()
+        code = jnp.where(near_vertical, int(Status.PITCH_SINGULAR), int(Status.OK))
+        return jnp.where(far, int(Status.DIVERGED), code)
 
     def advice(self) -> tuple[str, ...]:
         return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _DOF_NAMES)

@@ -1,7 +1,5 @@
 """x_ddot = F x + H x_dot + G u with any matrix G: square, redundant, under-actuated or of deficient rank."""
 
-from typing import NamedTuple
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -13,11 +11,8 @@ from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec, pseudo_inverse
-from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
-
-_ENVELOPE = 1e6
+from undertow.plants.mechanism import AbstractOutputMechanism, Motion, both_ways, nominal
 
 
 class LinearSystem(eqx.Module):
@@ -46,13 +41,6 @@ class LinearSystem(eqx.Module):
         return matvec(self.position_term, position) + matvec(self.velocity_term, velocity)
 
 
-class LinearState(NamedTuple):
-    """Positions (m) and velocities (m/s)."""
-
-    position: Float[Array, " n"]
-    velocity: Float[Array, " n"]
-
-
 class LinearDynamics(AbstractDynamics):
     """Dynamics with nominal matrices; G# is the Moore-Penrose inverse for any rank."""
 
@@ -69,7 +57,7 @@ class LinearDynamics(AbstractDynamics):
         return matvec(self.allocation, acceleration)
 
 
-class LinearPlant(AbstractMechanism):
+class LinearPlant(AbstractOutputMechanism):
     """Coupled axes with inputs without unit; directions outside the range of G stay in open loop."""
 
     system: LinearSystem
@@ -81,30 +69,16 @@ class LinearPlant(AbstractMechanism):
     def __check_init__(self):
         checks.not_negative("limit", self.limit, finite=False)
 
-    def initial_state(self, position=None, velocity=None) -> LinearState:
-        n = len(self.outputs)
-        return LinearState(given_or_zero(position, n), given_or_zero(velocity, n))
-
-    def dynamics(self, t, x: LinearState, u, d: Load) -> LinearState:
-        return LinearState(x.velocity, self.acceleration(t, x, u, d))
-
-    def output(self, t, x: LinearState) -> Measurement:
-        return Measurement(x.position, x.velocity)
-
-    def acceleration(self, t, x: LinearState, u, d: Load):
+    def acceleration(self, t, x: Motion, u, d: Load):
         own = self.system.drift(x.position, x.velocity) + matvec(self.system.gain, u)
         return own + d.acceleration - d.wrench
 
     def limits(self):
         return both_ways(self.limit, self.system.gain.shape[1])
 
-    def power(self, x: LinearState, u):
+    def power(self, x: Motion, u):
         """Power given to unit masses: u_j times the velocity along column j of G."""
         return u * matvec(self.system.gain.T, x.velocity)
-
-    def status(self, x: LinearState) -> Array:
-        far = (jnp.abs(x.position) > _ENVELOPE).any() | (jnp.abs(x.velocity) > _ENVELOPE).any()
-        return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
     def model(self, *, gain=None, position_term=None, velocity_term=None) -> Model:
         """Nominal model for the controller; parameters that are not given have their true values.

@@ -2,14 +2,15 @@
 
 import abc
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
-from undertow.core.contracts import AbstractPlant, Effort, Inputs, Outputs
+from undertow.core.contracts import AbstractPlant, Effort, Inputs, Load, Measurement, Outputs
 from undertow.core.signals import Signal
+from undertow.core.status import Status
 from undertow.plants.reachability import open_loop_advice
 
 Part = TypeVar("Part", bound=eqx.Module)
@@ -56,6 +57,33 @@ class AbstractMechanism(AbstractPlant):
 
     def signals(self) -> dict[str, Signal]:
         return {}
+
+
+class Motion(NamedTuple):
+    """Outputs (m, rad) and their rates (m/s, rad/s)."""
+
+    position: Outputs
+    velocity: Outputs
+
+
+class AbstractOutputMechanism(AbstractMechanism):
+    """A mechanism whose outputs and their rates are its whole state."""
+
+    envelope: ClassVar[float] = 1e6  # m, rad, m/s, rad/s; far above plausible values
+
+    def initial_state(self, position: Outputs | None = None, velocity: Outputs | None = None) -> Motion:
+        n = len(self.outputs)
+        return Motion(given_or_zero(position, n), given_or_zero(velocity, n))
+
+    def dynamics(self, t, x: Motion, u: Inputs, d: Load) -> Motion:
+        return Motion(x.velocity, self.acceleration(t, x, u, d))
+
+    def output(self, t, x: Motion) -> Measurement:
+        return Measurement(x.position, x.velocity)
+
+    def status(self, x: Motion) -> Array:
+        far = (jnp.abs(x.position) > self.envelope).any() | (jnp.abs(x.velocity) > self.envelope).any()
+        return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 
 
 def both_ways(limit: Float[Array, "..."], inputs: int) -> tuple[Inputs, Inputs]:

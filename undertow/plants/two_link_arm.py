@@ -1,7 +1,6 @@
 """Planar arm with two revolute joints: M(q) q_ddot + C q_dot + g = torque, n = m = 2."""
 
 import math
-from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,15 +11,14 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import Param, param
-from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec
-from undertow.plants.mechanism import AbstractMechanism, both_ways, given_or_zero, nominal
+from undertow.plants.mechanism import AbstractOutputMechanism, Motion, both_ways, nominal
 
 _BOOK = "Slotine and Li 1991, Example 9.1"
 
 
 class Links(AbstractDynamics):
-    """Rigid links: mass matrix, Coriolis matrix, weight and energy. Slotine and Li 1991, section 9.1.
+    """Rigid links: mass matrix, Coriolis matrix and weight. Slotine and Li 1991, section 9.1.
 
     The outer link carries a load: its centre of mass need not lie on the line through its joint.
 
@@ -72,12 +70,6 @@ class Links(AbstractDynamics):
         inner = (self.inner_mass * self.inner_centre + self.outer_mass * self.inner_length) * jnp.cos(q[0])
         return self.gravity * jnp.stack([inner + outer, outer])
 
-    def energy(self, q: Float[Array, "2"], rate: Float[Array, "2"]) -> Float[Array, ""]:
-        """Kinetic and potential energy, J."""
-        outer = self.outer_mass * self.outer_centre * jnp.sin(q[0] + q[1] - self.outer_offset)
-        inner = (self.inner_mass * self.inner_centre + self.outer_mass * self.inner_length) * jnp.sin(q[0])
-        return rate @ matvec(self.mass_matrix(q), rate) / 2 + self.gravity * (inner + outer)
-
     def drift(self, y: Measurement) -> Float[Array, "2"]:
         """-M^-1 (C q_dot + g), rad/s^2."""
         own = matvec(self.coriolis_matrix(y.position, y.velocity), y.velocity) + self.weight(y.position)
@@ -90,17 +82,7 @@ class Links(AbstractDynamics):
         return matvec(self.mass_matrix(y.position), acceleration)
 
 
-_ENVELOPE = 1e3  # rad, rad/s
-
-
-class ArmState(NamedTuple):
-    """Joint angles (rad) and their rates (rad/s)."""
-
-    angle: Float[Array, "2"]
-    rate: Float[Array, "2"]
-
-
-class TwoLinkArm(AbstractMechanism):
+class TwoLinkArm(AbstractOutputMechanism):
     """Shoulder and elbow driven by torques; the elbow angle is relative to the inner link."""
 
     links: Links
@@ -108,29 +90,17 @@ class TwoLinkArm(AbstractMechanism):
     outputs: tuple[str, ...] = eqx.field(static=True, default=("shoulder", "elbow"))
     output_units: tuple[str, ...] = eqx.field(static=True, default=("rad", "rad"))
     input_unit: str = eqx.field(static=True, default="N m")
+    envelope = 1e3  # rad, rad/s
 
-    def initial_state(self, position=None, velocity=None) -> ArmState:
-        return ArmState(given_or_zero(position, 2), given_or_zero(velocity, 2))
-
-    def dynamics(self, t, x: ArmState, u, d: Load) -> ArmState:
-        return ArmState(x.rate, self.acceleration(t, x, u, d))
-
-    def output(self, t, x: ArmState) -> Measurement:
-        return Measurement(x.angle, x.rate)
-
-    def acceleration(self, t, x: ArmState, u, d: Load):
-        turned = matvec(self.links.inverse_mass_matrix(x.angle), u - d.wrench)
+    def acceleration(self, t, x: Motion, u, d: Load):
+        turned = matvec(self.links.inverse_mass_matrix(x.position), u - d.wrench)
         return self.links.drift(self.output(t, x)) + turned + d.acceleration
 
     def limits(self):
         return both_ways(self.limit, 2)
 
-    def power(self, x: ArmState, u):
-        return u * x.rate
-
-    def status(self, x: ArmState) -> Array:
-        far = (jnp.abs(x.angle) > _ENVELOPE).any() | (jnp.abs(x.rate) > _ENVELOPE).any()
-        return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
+    def power(self, x: Motion, u):
+        return u * x.velocity
 
     def model(
         self, *, outer_mass: float | None = None, outer_centre: float | None = None, outer_offset: float | None = None

@@ -15,7 +15,8 @@ from undertow.campaign.batch_runner import leaves, planned, run_of
 from undertow.campaign.campaign_schema import Series
 from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
-from undertow.loop.simd_batch import BatchRunner, Ended, Plan, Run, simd_width
+from undertow.loop.outcome import Outcome
+from undertow.loop.simd_batch import BatchRunner, Plan, Run, simd_width
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import Built, build
 from undertow.scenario.execute import Executed, execute, save
@@ -126,7 +127,7 @@ def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
 
 
 @double_outside_runs
-def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ended]:
+def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Outcome]:
     """Runs of one program, by name with their numbers of steps; those of one length in one batch."""
     first = next(iter(runs.values()))[0]
     numbers = {name: leaves(run) for name, (run, _) in runs.items()}
@@ -146,11 +147,11 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Ende
     return found
 
 
-def _ran(built: Built, ended: Ended, windows: Sequence[Window]) -> BatchResult:
-    status, end = Status(int(ended.status)), float(ended.ended)
-    each = zip(_gathered(built, windows), ended.accumulated, windows, strict=True)
+def _ran(built: Built, outcome: Outcome, windows: Sequence[Window]) -> BatchResult:
+    status, end = Status(int(outcome.status)), float(outcome.ended)
+    each = zip(_gathered(built, windows), outcome.accumulated, windows, strict=True)
     metrics = [with_all_outputs(results((one,), (state,))) if end >= stop else None for one, state, (_, stop) in each]
-    time = np.asarray(ended.time)
+    time = np.asarray(outcome.time)
     kept = time <= end
-    series = {name: np.asarray(values)[kept] for name, values in ended.series.items()}
+    series = {name: np.asarray(values)[kept] for name, values in outcome.signals.items()}
     return BatchResult(built, status, end, metrics, series, time[kept])

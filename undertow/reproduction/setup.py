@@ -11,7 +11,7 @@ from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.reproduction.running import BatchResult
 from undertow.scenario.execute import Executed
-from undertow.thrusters.electromechanical import ElectromechanicalThruster
+from undertow.thrusters.fidelity import ElectromechanicalThruster
 from undertow.thrusters.motor import DCMotor
 
 GOAL = [2.0, 3.0, 4.0, math.pi / 3, math.pi / 4, 2 * math.pi / 5]  # m, rad; Section 5

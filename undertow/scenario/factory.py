@@ -17,7 +17,7 @@ from undertow.core.user_code import fault_of
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
 from undertow.scenario.values import checked
-from undertow.scenario.vehicle_file import is_vehicle_file, make_vehicle
+from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
@@ -74,7 +74,8 @@ def make(
     if not isinstance(name, str):
         raise BadInput("kind", f"name one of the {kind}", name)
     if kind == "vehicles" and is_vehicle_file(name):
-        return make_vehicle(name, options, folder)
+        found = read_vehicle(folder / name, options)
+        return found.vehicle(), {"kind": Path(name).name, "contents": found.contents}  # independent of the file
     function, preset = _preset(catalogue.find(kind, name, folder, "kind"), options)
     own = inspect.signature(function).parameters
     options = {key: value for key, value in (context or {}).items() if key in own} | options

@@ -60,21 +60,6 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
         return VehicleFile(parse(contents), contents, text, changed)
 
 
-def make_vehicle(name: str, options: Mapping[str, Any], folder: Path) -> tuple[Vehicle, dict[str, Any]]:
-    """The vehicle of a file, and a description of it that does not need the file any more.
-
-    Args:
-        name: of the file, relative to `folder`.
-        options: see `changes` of `read_vehicle`.
-        folder: where the name starts.
-
-    Raises:
-        BadInput: see `read_vehicle`.
-    """
-    found = read_vehicle(folder / name, options)
-    return found.vehicle(), {"kind": Path(name).name, "contents": found.contents}
-
-
 def _location(text: Text, changed: frozenset[str]) -> Callable[[str], str]:
     """Location of a key in the file; none where the key has been changed."""
     return lambda name: "" if set(key_path(name)[:1]) & changed else text.location(name)

@@ -1,4 +1,4 @@
-"""Thrusters: volts in, thrust out. One file per thruster, and one per fidelity level of a DC motor."""
+"""Thrusters: volts in, thrust out. One file per thruster; `fidelity.py` has the levels of a DC motor."""
 
 from undertow.core.catalogue import publish
 from undertow.thrusters.motor import DCMotor as DCMotor

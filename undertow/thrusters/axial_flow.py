@@ -2,15 +2,13 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, Sources, param, sources_field
-from undertow.thrusters.memoryless import AbstractMotorlessThruster
-from undertow.thrusters.thruster import PerThruster
+from undertow.thrusters.thruster import AbstractMotorlessThruster, PerThruster
 
 
 class AxialFlowState(NamedTuple):
@@ -55,14 +53,13 @@ class AxialFlowThruster(AbstractMotorlessThruster):
     supply: Float[Param, ""] = param("V", "largest drive voltage")
     dead_zone: Float[Param, ""] = param("V", "largest command that the drive ignores", default=0.0)
     sources: Sources = sources_field()
-    has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
         lenient = ("loss", "decay", "dead_zone", "current_per_torque")
         for name in self.__dataclass_fields__:
             if name == "supply":
                 checks.positive(name, self.supply, "V", finite=False)
-            elif name not in ("sources", "has_prescribed_acceleration"):
+            elif name != "sources":
                 (checks.not_negative if name.endswith(lenient) else checks.positive)(name, getattr(self, name))
 
     def initial_state(self, count) -> AxialFlowState:

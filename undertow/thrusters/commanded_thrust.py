@@ -2,7 +2,6 @@
 
 import math
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -11,8 +10,7 @@ from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 from undertow.thrusters.first_order import LaggedThrust
-from undertow.thrusters.memoryless import AbstractMotorlessThruster
-from undertow.thrusters.thruster import PerThruster
+from undertow.thrusters.thruster import AbstractMotorlessThruster, PerThruster
 
 
 class CommandedThrust(AbstractMotorlessThruster):
@@ -27,7 +25,6 @@ class CommandedThrust(AbstractMotorlessThruster):
     time_constant: Float[Param, ""] = param("s", "time to 63 % of a step of thrust", symbol="tau")
     thrust_rate_max: Float[Param, ""] = param("N/s", "fastest change of thrust", default=jnp.inf)
     power_per_thrust: Float[Param, ""] = param("W/N", "electrical power per commanded thrust", default=0.0)
-    has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
     input_unit = "N"
 
     def __check_init__(self):

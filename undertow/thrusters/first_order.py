@@ -11,9 +11,9 @@ from undertow.core import checks
 from undertow.core.actuator_model import LaggedActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.thrusters.memoryless import AbstractMotorlessThruster, MemorylessThruster
-from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
-from undertow.thrusters.thruster import PerThruster
+from undertow.thrusters.memoryless import MemorylessThruster
+from undertow.thrusters.quasi_static import QuasiStaticActuator
+from undertow.thrusters.thruster import AbstractMotorlessThruster, PerThruster
 
 _OF_STEADY_STATE = (
     "thrust_per_volt",
@@ -49,7 +49,6 @@ class FirstOrderThruster(AbstractMotorlessThruster):
     supply: Float[Param, ""] = param("V", "supply voltage", default=jnp.inf)
     dead_zone: Float[Param, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
-    has_prescribed_acceleration: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
         checks.positive("time_constant", self.time_constant, "s")

@@ -7,32 +7,13 @@ from jaxtyping import Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
-from undertow.thrusters.thruster import AbstractThruster, PerThruster
-
-
-class AbstractMotorlessThruster(AbstractThruster):
-    """A thruster without a motor model: no energy balance, no speed to report, and a given nominal gain."""
-
-    linear_gain: eqx.AbstractVar[Float[Param, ""]]  # N/V
-
-    def powers(self, state, voltage) -> None:
-        return None
-
-    def stored(self, state) -> PerThruster:
-        return jnp.zeros(())
-
-    def report(self, state) -> None:
-        return None
-
-    def voltage_gain(self):
-        return self.linear_gain
-
+from undertow.thrusters.quasi_static import AbstractQuasiStaticThruster
+from undertow.thrusters.thruster import PerThruster
 
 _LEAST = 1e-30  # stands for 0, where a power has no slope
 
 
-class MemorylessThruster(AbstractMotorlessThruster):
+class MemorylessThruster(AbstractQuasiStaticThruster):
     """Thrust c |V|^(p-1) V, multiplied by `reverse_share` in reverse; current proportional to thrust.
 
     Raises:
@@ -47,18 +28,11 @@ class MemorylessThruster(AbstractMotorlessThruster):
     dead_zone: Float[Param, ""] = param("V", "voltage below which the thrust is zero", default=0.0)
     dead_zone_kind: str = eqx.field(static=True, default="pass")
     reverse_share: Float[Param, ""] = param("", "thrust in reverse as a share of forward thrust", default=1.0)
-    has_prescribed_acceleration: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
         for name in ("thrust_per_volt", "power", "current_per_thrust", "linear_gain", "reverse_share"):
             checks.positive(name, getattr(self, name))
         checks.positive("supply", self.supply, "V", finite=False)
-
-    def initial_state(self, count):
-        return jnp.zeros(0)
-
-    def dynamics(self, state, voltage):
-        return jnp.zeros(0)
 
     def thrust(self, state, voltage) -> PerThruster:
         volts = self.terminal(voltage)
@@ -67,15 +41,17 @@ class MemorylessThruster(AbstractMotorlessThruster):
     def current(self, state, voltage) -> PerThruster:
         return self.current_per_thrust * self.thrust(state, voltage)
 
+    def powers(self, state, voltage) -> None:
+        return None
+
+    def voltage_gain(self):
+        return self.linear_gain
+
     def speed_term(self, report):
         raise BadInput("speed_sensor", "be false", "true", hint="This thruster has no propeller speed")
 
     def voltage_for(self, thrust: PerThruster) -> PerThruster:
-        """V, V, that gives a thrust in N."""
         return self.commanded(_signed_power(thrust / self._coefficient(thrust), 1 / self.power))
-
-    def actuator_model(self, count: int, measured: bool) -> QuasiStaticActuator:
-        return QuasiStaticActuator(self)
 
     def advice(self):
         return ()

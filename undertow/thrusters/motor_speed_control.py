@@ -1,17 +1,14 @@
 """Speed control of motors by computed voltage, so that a thruster follows a commanded thrust."""
 
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Float
 
 from undertow.core.actuator_model import AbstractActuatorModel
-from undertow.core.param import Param
 from undertow.numerics.integrators import rk4
-from undertow.thrusters.motor import DCMotor
-from undertow.thrusters.quasi_static_actuator import QuasiStaticActuator
-from undertow.thrusters.static import StaticThruster
+from undertow.thrusters.motor_thruster import AbstractMotorThruster, StaticThruster
+from undertow.thrusters.quasi_static import QuasiStaticActuator
 from undertow.thrusters.thruster import PerThruster
 
 # Bandwidth of the current loop relative to that of the speed loop.
@@ -28,24 +25,6 @@ class MotorState(NamedTuple):
     current: PerThruster  # A
 
 
-@runtime_checkable
-class WithMotor(Protocol):
-    """A thruster with a motor model."""
-
-    motor: DCMotor
-    supply: Float[Param, "..."]
-    dead_zone: Float[Param, "..."]
-    dead_zone_kind: str
-
-    def terminal(self, voltage: PerThruster) -> PerThruster:
-        """Voltage that turns the motor."""
-        ...
-
-    def commanded(self, terminal: PerThruster) -> PerThruster:
-        """Inverse of `terminal`."""
-        ...
-
-
 class SpeedControlledMotor(AbstractActuatorModel):
     """Current for a required torque, Eq. (8), and voltage for that current, Eq. (9). Section X9 of the theory.
 
@@ -53,7 +32,7 @@ class SpeedControlledMotor(AbstractActuatorModel):
     currents are predicted.
     """
 
-    thruster: WithMotor
+    thruster: AbstractMotorThruster
     count: int = eqx.field(static=True)
     measured: bool = eqx.field(static=True)
 

@@ -41,8 +41,8 @@ class AbstractThruster(eqx.Module):
     dead_zone: eqx.AbstractVar[Float[Param, "..."]]  # V; smaller voltages have no effect
     dead_zone_kind = "pass"  # one of DEAD_ZONES; a field where a thruster offers both
     input_unit = "V"  # unit of the command; where this is not V, every voltage below has that unit
-    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, `ideal` and `static`.
-    has_prescribed_acceleration: eqx.AbstractVar[bool]
+    # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, for thrust without dynamics.
+    has_prescribed_acceleration = False
 
     def __check_init__(self):
         checks.not_negative("dead_zone", self.dead_zone, self.input_unit)
@@ -125,3 +125,21 @@ class AbstractThruster(eqx.Module):
         if self.dead_zone_kind == "subtract":
             return terminal + jnp.sign(terminal) * self.dead_zone
         return terminal
+
+
+class AbstractMotorlessThruster(AbstractThruster):
+    """A lagging thruster without a motor model: no energy balance, no speed to report, and a given nominal gain."""
+
+    linear_gain: eqx.AbstractVar[Float[Param, ""]]  # N/V
+
+    def powers(self, state, voltage) -> None:
+        return None
+
+    def stored(self, state) -> PerThruster:
+        return jnp.zeros(())
+
+    def report(self, state) -> None:
+        return None
+
+    def voltage_gain(self):
+        return self.linear_gain

@@ -61,15 +61,6 @@ class Body(eqx.Module):
         """M^-1 wrench, m/s^2 and rad/s^2."""
         return matvec(self.inverse_mass_matrix, wrench)
 
-    def kinetic_energy(self, nu: Vector6) -> Float[Array, ""]:
-        """1/2 nu . M nu, J."""
-        return 0.5 * (nu * matvec(self.mass_matrix, nu)).sum()
-
-    def potential_energy(self, position: Vector3, down: Vector3) -> Float[Array, ""]:
-        """Energy of weight and buoyancy, J; zero with the body upright at the world origin and r_g = r_b = 0."""
-        lever = self.weight * self.r_g - self.buoyancy * self.r_b
-        return -(self.weight - self.buoyancy) * position[2] - (lever * down).sum()
-
 
 @jax.jit
 def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> Matrix6:
@@ -82,19 +73,6 @@ def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> 
     """
     lever = mass * skew(r_g)
     return jnp.block([[mass * jnp.eye(3), -lever], [lever, inertia]])
-
-
-def shift_matrix(r: Vector3) -> Matrix6:
-    """H(r): the velocity at a point at r is H nu; M_b = H^T M H. Fossen (2021), Eq. (C.5)."""
-    return jnp.block([[jnp.eye(3), skew(r).T], [jnp.zeros((3, 3)), jnp.eye(3)]])
-
-
-def coriolis_matrix(mass_matrix: Matrix6, nu: Vector6) -> Matrix6:
-    """C(nu) from M, skew-symmetric. Fossen (2021), theorem 3.2."""
-    symmetric = 0.5 * (mass_matrix + mass_matrix.T)
-    momentum = matvec(symmetric, nu)
-    linear, angular = skew(momentum[:3]), skew(momentum[3:])
-    return -jnp.block([[jnp.zeros((3, 3)), linear], [linear, angular]])
 
 
 class SeenFromWater(NamedTuple):

@@ -14,8 +14,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PyTree
 
-from undertow.core.continuous import AbstractContinuousController
-from undertow.core.contracts import Target, known_acceleration
+from undertow.core.contracts import AbstractContinuousController, Target, known_acceleration
 from undertow.core.measurement import with_outputs
 from undertow.loop.closed_loop import ClosedLoop
 

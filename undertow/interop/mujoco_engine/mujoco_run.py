@@ -15,8 +15,8 @@ from undertow.core.measurement import measurement_of_outputs
 from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.interop.mujoco_engine.submerged import Submerged
-from undertow.thrusters.shaft import ShaftThruster
-from undertow.thrusters.static import StaticThruster
+from undertow.thrusters.fidelity import ShaftThruster
+from undertow.thrusters.motor_thruster import StaticThruster
 from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 
 
