@@ -219,7 +219,8 @@ def motor_lag(motor: DCMotor, speed: float) -> tuple[float, float]:
 
 def critical_lag(law: RCAF) -> float:
     """Actuator lag, s, beyond which the whole loop is unstable; infinite if none below 100 s is. Section 3.9."""
-    unstable = lambda lag: motor_loop.rightmost(motor_loop.lag_matrix(law, lag)).real > 0
+    matrix = motor_loop.lag_matrix(law, 1.0)  # of which a lag divides the actuator's row, the last one
+    unstable = lambda lag: motor_loop.rightmost(np.vstack([matrix[:-1], matrix[-1:] / lag])).real > 0
     return first_crossing(unstable, np.geomspace(1e-6, 1e2, 1601))
 
 

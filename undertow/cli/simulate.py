@@ -20,9 +20,9 @@ from undertow.core.user_code import python_says
 from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.figures import run_plots, save_all
 from undertow.scenario.build import Built, build, in_its_precision
-from undertow.scenario.execute import Executed, execute, save
-from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of, metrics_text
-from undertow.scenario.reading import dump, read
+from undertow.scenario.execute import Executed, execute, write
+from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of
+from undertow.scenario.reading import read
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
 
@@ -42,8 +42,9 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
     ):
         executed, predicted = _run(scenario, console, prediction, allow_code)
+        known, certificate = metrics_of(executed.dataset), certificate_of(executed.dataset)
         with stage(console, "files and figures"):
-            _write(executed, predicted, draft.path)
+            write(executed, draft.path, in_results(predicted))
             repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # before the figures, which may fail
             warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures").failures)
@@ -51,11 +52,9 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
         why = executed.dataset.attrs["left_to_xla"]
         typer.echo(f"Advice: the run used backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
     expected = predicted.metrics if predicted else None
-    known = metrics_of(executed.dataset)
     console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
     if predicted:
         console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)
-    certificate = certificate_of(executed.dataset)
     if certificate is not None:
         console.print(certificate_table(certificate, executed.built.window()))
     verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
@@ -73,12 +72,6 @@ def _run(path: Path, console: Console, prediction: bool, allow_code: bool) -> tu
         typer.echo(f"Advice: {sentence}", err=True)
     with stage(console, "compiling, running and predicting" if prediction else "compiling and running"):
         return interruptible(lambda: with_prediction(lambda: execute(built), built, prediction))
-
-
-def _write(executed: Executed, predicted: PredictedMetrics | None, folder: Path) -> None:
-    save(executed.dataset, folder / "run.nc")
-    (folder / "metrics.json").write_text(metrics_text(executed.dataset, in_results(predicted)), encoding="utf-8")
-    (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
 
 
 def _ending_code(executed: Executed) -> int:

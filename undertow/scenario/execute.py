@@ -19,7 +19,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
-from undertow.scenario.finished_run import Measuring, label
+from undertow.scenario.finished_run import Measuring, label, metrics_text
 from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
@@ -108,6 +108,17 @@ def run_loop(
         except simd_batch.Unsupported as error:
             lacking = {"left_to_xla": str(error)}
     return jax.device_get(sampled.simulate(loop, **common)), lacking
+
+
+def write(executed: Executed, folder: Path, further: Mapping[str, Any]) -> None:
+    """Write run.nc, metrics.json with further entries, and scenario.yaml to a folder.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    save(executed.dataset, folder / "run.nc")
+    (folder / "metrics.json").write_text(metrics_text(executed.dataset, further), encoding="utf-8")
+    (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

@@ -95,10 +95,10 @@ def rules(loop: ClosedLoop) -> int | None:
     return None if fuzzy is None else fuzzy.rules
 
 
-def metrics_text(dataset: xr.Dataset, further: dict[str, Any] | None = None) -> str:
+def metrics_text(dataset: xr.Dataset, further: Mapping[str, Any]) -> str:
     """Contents of metrics.json for a run, with further entries."""
     ending = {"status": dataset.attrs["status"], "ended": dataset.attrs["ended"]}
-    metrics = json.loads(dataset.attrs["metrics"]) | (further or {})
+    metrics = json.loads(dataset.attrs["metrics"]) | further
     success = json.loads(dataset.attrs.get("success", "null"))
     found = ending | {"success": success} | metrics | {"certificate": certificate_of(dataset)}
     return to_json(found, indent=2) + "\n"
