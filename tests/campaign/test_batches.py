@@ -54,6 +54,7 @@ def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, backend):
             np.testing.assert_array_equal(np.concatenate([piece[name] for piece in pieces]), expected, err_msg=name)
 
 
+@pytest.mark.slow
 def test_a_gpu_changes_no_bit(campaign, monkeypatch):
     """Trials of two laws in tasks of 50, by a GPU that this processor stands in for."""
     two = campaign(cross={"controller": [{"kind": "pid", "frequency": 2.0}, {"kind": "rcaf", "preset": "robust"}]})

@@ -50,7 +50,7 @@ ENDINGS = {
 }
 
 
-@pytest.fixture(scope="module", params=RUNS)
+@pytest.fixture(scope="module", params=["sampled", pytest.param("continuous", marks=pytest.mark.slow)])
 def batch(request):
     """The endings side by side in one batch, and the sound one alone."""
     run = RUNS[request.param]
