@@ -43,7 +43,7 @@ def pytest_runtest_setup(item):
     """Before the fixtures of the test are made."""
     strict = item.path.parent.name in STRICT
     jaxtyping.config.update("jaxtyping_disable", not strict)
-    jax.config.update("jax_numpy_rank_promotion", "raise" if strict else "allow")
+    jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
 def pytest_configure(config):

@@ -8,7 +8,7 @@ import numpy as np
 from undertow.checks.vehicle_lint import derived, lint
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import read
-from undertow.scenario.vehicle_data import parse
+from undertow.scenario.vehicle_schema import parse
 
 SOUND = read(Path(__file__).parents[2] / "examples" / "my_rov.yaml").data
 ODD = [

@@ -101,7 +101,7 @@ def test_linear_model_is_the_jacobian_of_the_code(skew):
     drawn = loop.realize(jax.random.PRNGKey(0))
     _, z = drawn.start()
     estimate = -(law.model.dynamics.drift(y) + law.model.dynamics.gain(y) @ volts)
-    z = z._replace(weights=estimate[:, None] + skew * jnp.array([1.0, 0.0, -1.0]))
+    z = z._replace(weights=estimate[:, None] + skew * jnp.array([[1.0, 0.0, -1.0]]))
     drifted = drift.gain_of(law, np.asarray(z.weights))[0]
     assert drifted == pytest.approx(skew * 0.848, rel=1e-3)
     flat, restore = ravel_pytree((x, z))

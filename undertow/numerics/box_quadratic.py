@@ -1,6 +1,6 @@
 """Strictly convex quadratic programme with bounds, by an exact active-set method.
 
-Small enough for a control loop (about ten variables): every step solves one symmetric system by elimination
+The thruster allocation poses one (controllers/thruster_allocation.py). Small enough for a control loop (about ten variables): every step solves one symmetric system by elimination
 without pivots, written as rank-one updates, so that nothing leaves the compiled loop.
 """
 

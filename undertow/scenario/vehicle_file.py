@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from undertow.core.errors import BadInput, within
 from undertow.core.runtime import double_outside_runs
 from undertow.scenario.reading import Text, from_data, key_path, read
-from undertow.scenario.vehicle_data import INSTEAD, VehicleData, parse
+from undertow.scenario.vehicle_schema import INSTEAD, VehicleData, parse
 from undertow.vehicles.vehicle import Vehicle
 
 

@@ -57,7 +57,7 @@ _AT_SEA: dict[str, tuple[str, dict[str, Any]]] = {
 _STATION: dict[str, tuple[str, str, dict[str, dict[str, Any]]]] = {
     "station": (
         "BlueROV2 Heavy keeps station, position fixes of 5 cm",
-        "navigation",
+        "observer",
         {
             "pid": {"frequency": (7.073, 10.07), "damping": (1.292, 4.0), "integral_share": (0.1532, 0.0227)},
             "robust": {

@@ -104,9 +104,8 @@ def printed_matrix(contents: Mapping[str, Any], thrusters: int) -> NDArray | Non
     return array
 
 
-_KEYS = ("position", "direction", "azimuth", "elevation")
-_FARTHEST = 1e9
-_AXES = "forward, starboard, down"
+_THRUSTER_KEYS = ("position", "direction", "azimuth", "elevation")
+_FARTHEST = 1e9  # m
 
 
 def poses(entries: Any) -> tuple[NDArray, NDArray]:
@@ -131,8 +130,8 @@ def _pose(name: str, entry: Any) -> tuple[NDArray, NDArray]:
     if not isinstance(entry, Mapping):
         raise BadInput(name, "be a mapping of `position` and `direction`", entry)
     for key in entry:
-        if key not in _KEYS:
-            raise BadInput(f"{name}.{key}", "be a key of a thruster", "unknown", hint=did_you_mean(key, _KEYS))
+        if key not in _THRUSTER_KEYS:
+            raise BadInput(f"{name}.{key}", "be a key of a thruster", "unknown", hint=did_you_mean(key, _THRUSTER_KEYS))
     angles = [key for key in ("azimuth", "elevation") if key in entry]
     if "direction" in entry and angles:
         raise BadInput(f"{name}.{angles[0]}", "be left out when there is a `direction`", entry[angles[0]])
