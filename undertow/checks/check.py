@@ -22,8 +22,8 @@ from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.reading import Text, read
 from undertow.scenario.schema import Scenario
-from undertow.scenario.vehicle_schema import KEYS
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
+from undertow.scenario.vehicle_schema import KEYS
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 

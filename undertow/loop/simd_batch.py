@@ -3,8 +3,8 @@
 Results equal those of `sampled.simulate` to rounding; their bits depend neither on the machine nor on the other runs.
 
 This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
-`unavailable` says why. What is unsupported runs by XLA: scenario/execute.py falls back for a run, campaign/batch_runner.py
-for a campaign.
+`unavailable` says why. What is unsupported runs by XLA: scenario/execute.py falls back for a run,
+campaign/batch_runner.py for a campaign.
 """
 
 from typing import TYPE_CHECKING, Any, NamedTuple

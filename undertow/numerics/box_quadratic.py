@@ -1,7 +1,8 @@
 """Strictly convex quadratic programme with bounds, by an exact active-set method.
 
-The thruster allocation poses one (controllers/thruster_allocation.py). Small enough for a control loop (about ten variables): every step solves one symmetric system by elimination
-without pivots, written as rank-one updates, so that nothing leaves the compiled loop.
+The thruster allocation poses one (controllers/thruster_allocation.py). Small enough for a control loop (about ten
+variables): every step solves one symmetric system by elimination without pivots, written as rank-one updates, so that
+nothing leaves the compiled loop.
 """
 
 from typing import NamedTuple
