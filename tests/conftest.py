@@ -1,4 +1,4 @@
-"""Strict arithmetic for every test: double precision outside of runs, no silent promotion of types."""
+"""Strict arithmetic for every test: double precision outside of runs, no silent promotion of types or ranks."""
 
 from undertow.process_setup import prepare  # isort: skip  (before JAX is imported
 
@@ -12,6 +12,7 @@ import pytest
 from jaxtyping import install_import_hook
 
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+jax.config.update("jax_numpy_rank_promotion", "raise")
 
 # Annotations of arrays are checked at every call of the rooms that compute. `process` comes before JAX; the models of
 # `scenario` and the commands of `cli` are checked by pydantic and typer.
@@ -31,8 +32,8 @@ CHECKED = (
     "loop",
     "analysis",
 )
-# Folders of tests where they are, and where arrays of different rank are an error: together they trace every part and
-# both loops. Elsewhere the same code runs again, and checking it once more would cost time and find nothing.
+# Folders of tests where they are: together they trace every part and both loops. Elsewhere the same code runs again, and
+# checking it once more would cost time and find nothing. Arrays of different rank are an error everywhere.
 STRICT = ("numerics", "physics", "conformance")
 install_import_hook([f"undertow.{room}" for room in CHECKED], "beartype.beartype")
 jaxtyping.config.update("jaxtyping_disable", True)
@@ -41,9 +42,7 @@ jaxtyping.config.update("jaxtyping_disable", True)
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
     """Before the fixtures of the test are made."""
-    strict = item.path.parent.name in STRICT
-    jaxtyping.config.update("jaxtyping_disable", not strict)
-    jax.config.update("jax_numpy_rank_promotion", "raise")
+    jaxtyping.config.update("jaxtyping_disable", item.path.parent.name not in STRICT)
 
 
 def pytest_configure(config):
