@@ -4,12 +4,12 @@ import os
 import subprocess
 import sys
 import time
-from types import SimpleNamespace
 
 import pytest
 from good_scenario import SCENARIO, SMALL
 
 from undertow.cli import simulate
+from undertow.scenario import execute
 
 
 def write(tmp_path, text=SCENARIO):
@@ -84,8 +84,7 @@ def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
 
 
 def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
-    monkeypatch.setattr(simulate, "execute", lambda built: SimpleNamespace(dataset=None))
-    monkeypatch.setattr(simulate, "save", raising(OSError(28, "No space left on device", "run.nc")))
+    monkeypatch.setattr(execute, "save", raising(OSError(28, "No space left on device", "run.nc")))
     write(tmp_path)
     said = undertow("simulate", "s.yaml", "--out", "out")
     line = "Error: files could not be read or written: No space left on device (run.nc)"
