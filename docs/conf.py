@@ -39,8 +39,10 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_theme_options = {"source_directory": "docs/"}
 html_copy_source = False
+html_show_copyright = False
 html_show_sourcelink = False
 
+default_role = "literal"  # `name` in docstrings
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_typehints = "signature"

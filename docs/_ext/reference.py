@@ -3,16 +3,17 @@
 from typing import Any
 
 import typer
+from blocks import paragraph, paragraphs, section, table
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
 
-from blocks import paragraph, paragraphs, section, table
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
 from undertow.cli.exit_codes import MEANINGS as EXIT_CODES
 from undertow.cli.main import app as command_line
 from undertow.core import catalogue
+from undertow.core.runtime import in_precision
 from undertow.core.status import Status
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
@@ -29,7 +30,10 @@ class Parts(Directive):
 
     def run(self) -> list[nodes.Node]:
         (kind,) = self.arguments
-        return [_part(one) for name in sorted(catalogue.names(kind)) for one in describing.describe(f"{kind}/{name}")]
+        with in_precision("float64"):
+            return [
+                _part(one) for name in sorted(catalogue.names(kind)) for one in describing.describe(f"{kind}/{name}")
+            ]
 
 
 def _part(part: Description) -> nodes.section:
@@ -112,7 +116,9 @@ class Commands(Directive):
 def _command(name: str, command: Any) -> nodes.section:
     usage = " ".join([name, *command.collect_usage_pieces(command.make_context(name, [], resilient_parsing=True))])
     found = section(f"`{name}`", name, nodes.literal_block(usage, usage), *paragraphs(command.help))
-    given = [(one.metavar or one.name.upper(), one.help or "") for one in command.params if one.param_type_name == "argument"]
+    given = [
+        (one.metavar or one.name.upper(), one.help or "") for one in command.params if one.param_type_name == "argument"
+    ]
     if given:
         found += table(("argument", "meaning"), given, ("argument",))
     options = [
