@@ -46,7 +46,7 @@ default_role = "literal"  # `name` in docstrings
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_typehints = "signature"
-python_maximum_signature_line_length = 88
+python_maximum_signature_line_length = 110
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 

@@ -32,11 +32,14 @@ class Parts(Directive):
         (kind,) = self.arguments
         with in_precision("float64"):
             return [
-                _part(one) for name in sorted(catalogue.names(kind)) for one in describing.describe(f"{kind}/{name}")
+                described(one)
+                for name in sorted(catalogue.names(kind))
+                for one in describing.describe(f"{kind}/{name}")
             ]
 
 
-def _part(part: Description) -> nodes.section:
+def described(part: Description) -> nodes.section:
+    """The section of one part, or of one preset of it."""
     preset = [option.default for option in part.options if option.name == "preset"]
     title = f"`{part.name}`, preset `{preset[0]}`" if preset else f"`{part.name}`"
     found = section(title, title, *paragraphs(part.summary))
@@ -60,8 +63,8 @@ class Keys(Directive):
     def run(self) -> list[nodes.Node]:
         if self.arguments == ["scenario"]:
             return [_keys(Scenario)]
-        entries = {"vary": Distribution, "requirements": Requirement, "series": Series}
-        each = [section(f"Keys of `{name}`", f"keys-of-{name}", _keys(model)) for name, model in entries.items()]
+        entries = {"each distribution in `vary`": Distribution, "each requirement": Requirement, "`series`": Series}
+        each = [section(f"Keys of {name}", f"keys of {name}", _keys(model)) for name, model in entries.items()]
         return [_keys(Campaign), *each]
 
 
