@@ -23,6 +23,7 @@ class Exports(SphinxDirective):
     """The public names of `undertow`; stands in reStructuredText, where the directives of autodoc are."""
 
     def run(self) -> list[nodes.Node]:
+        self.env.note_reread()
         entries = [_entry(name) for name in dir(undertow) if name not in (*catalogue.KINDS, "__version__")]
         return self.parse_text_to_nodes("\n\n".join(entries))
 

@@ -34,10 +34,7 @@ class Layers(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         rows = "".join(f'<div class="layer">{"".join(map(_box, layer))}</div>' for layer in layers())
-        for layer in layers():
-            for name in layer:
-                self.env.note_dependency(str(ROOT / "undertow" / name / "__init__.py"))
-        self.env.note_dependency(str(ROOT / "pyproject.toml"))
+        self.env.note_reread()
         return [nodes.raw("", f'<div class="layers">{rows}</div>', format="html")]
 
 

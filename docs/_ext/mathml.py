@@ -32,6 +32,9 @@ def mathml(tex: str, block: bool = False) -> str:
     root = ET.fromstring(found.replace("&ApplyFunction;", "\u2061"))
     for element in root.findall(".//{*}munderover"):
         _index_beside_accent(element)
+    for sign in root.iterfind(".//{*}mo"):
+        if sign.text == "|":  # of an absolute value, not of a division
+            sign.attrib |= {"lspace": "0", "rspace": "0"}
     return ET.tostring(root, "unicode", short_empty_elements=False)
 
 

@@ -5,8 +5,8 @@ from typing import Any
 import typer
 from blocks import paragraph, paragraphs, section, table
 from docutils import nodes
-from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
@@ -23,12 +23,24 @@ from undertow.scenario.schema import Scenario, keys
 _PARAMETERS = ("parameter", "value", "unit", "symbol", "meaning", "source")
 
 
-class Parts(Directive):
+class FromCode(SphinxDirective):
+    """What is made from the code; its page is read again in every build."""
+
+    def run(self) -> list[nodes.Node]:
+        self.env.note_reread()
+        return self.contents()
+
+    def contents(self) -> list[nodes.Node]:
+        """The nodes that stand in the place of the directive."""
+        raise NotImplementedError
+
+
+class Parts(FromCode):
     """Every part of a kind, as `undertow describe` has it: options, parameters with units and sources, signals."""
 
     required_arguments = 1
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         (kind,) = self.arguments
         with in_precision("float64"):
             return [
@@ -55,12 +67,12 @@ def described(part: Description) -> nodes.section:
     return found
 
 
-class Keys(Directive):
+class Keys(FromCode):
     """Every key of a scenario or a campaign file."""
 
     required_arguments = 1
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         if self.arguments == ["scenario"]:
             return [_keys(Scenario)]
         entries = {"each distribution in `vary`": Distribution, "each requirement": Requirement, "`series`": Series}
@@ -73,19 +85,19 @@ def _keys(model: Any) -> nodes.table:
     return table(("key", "type", "default", "meaning"), rows, ("key", "default"))
 
 
-class Metrics(Directive):
+class Metrics(FromCode):
     """Metrics of a run."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         unit = lambda metric: metric.unit.replace("[axis]", "[output]")
         rows = [(name, unit(one), PER_AXIS.get(name, ""), one.meaning) for name, one in MEANINGS.items()]
         return [table(("metric", "unit", "of each output", "meaning"), rows, ("metric", "of each output"))]
 
 
-class Signals(Directive):
+class Signals(FromCode):
     """Signals of every run."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         return [_signals(RECORDED)]
 
 
@@ -94,24 +106,24 @@ def _signals(declared: Any) -> nodes.table:
     return table(("signal", "dimensions", "unit", "meaning"), rows, ("signal",))
 
 
-class Statuses(Directive):
+class Statuses(FromCode):
     """How a run can end."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         return [table(("status", "meaning"), [(one.word, one.sentence) for one in Status], ("status",))]
 
 
-class ExitCodes(Directive):
+class ExitCodes(FromCode):
     """Exit codes of every command."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         return [table(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()], ("code",))]
 
 
-class Commands(Directive):
+class Commands(FromCode):
     """Arguments and options of every command."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         main: Any = typer.main.get_command(command_line)
         return [_command(f"undertow {name}", command) for name, command in main.commands.items()]
 
