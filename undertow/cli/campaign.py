@@ -4,7 +4,7 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -50,15 +50,15 @@ def campaign(
         check_cluster(where)
     first = Path("runs") / path.stem
     with output_folder(out or (first if resume else None), first) as folder:
-        check_folder(folder, resume, overwrite)
+        check_folder(folder, _WRITTEN, resume, overwrite)
         console = wide_console()
         with stage(console, "building first trials"):
             prepared = interruptible(lambda: prepare(path, allow_code))
         for sentence in prepared.advice:
             typer.echo(f"Advice: {sentence}", err=True)
         if not resume:
-            clear_folder(folder)
-        with chosen(where, count) as executor, _live(console) as watch:
+            clear_folder(folder, _WRITTEN)
+        with chosen(where, count) as executor, live(console) as watch:
             try:
                 interruptible(lambda: run_campaign(prepared, folder, executor, watch))
             except (KeyboardInterrupt, OSError):
@@ -109,7 +109,7 @@ def status(folder: Path, options: Sequence[str]) -> int:
 
 
 @contextlib.contextmanager
-def _live(console: Console) -> Iterator[Watch]:
+def live(console: Console) -> Iterator[Watch]:
     """Show the number of finished trials, their rate and the remaining time."""
     begun, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
@@ -127,21 +127,34 @@ def _live(console: Console) -> Iterator[Watch]:
 
 
 def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
+    write_trials(
+        prepared, {trial: (f"trial-{trial:07d}", f"Trial {trial} of the campaign.") for trial in trials}, folder
+    )
+
+
+def write_trials(prepared: Prepared, trials: Mapping[int, tuple[str, str]], folder: Path) -> None:
+    """Write the scenarios of some trials into a folder, in place of what it held.
+
+    Args:
+        prepared: the campaign.
+        trials: number of a trial -> name of its file, without ending, and a sentence at its top.
+        folder: created if missing.
+    """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     part_cache = PartCache()
-    for trial in trials:
+    tune = {key: value for key, value in prepared.trials.scenario.data.items() if key == "tune"}
+    for trial, (name, sentence) in trials.items():
         data = build_trial(prepared.trials, part_cache, trial).resolved  # includes the contents of named files
-        data = data | {"steady": data["steady"] | {"every_step": True}}
-        text = f"# Trial {trial} of the campaign.\n{dump(data)}"
-        (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
+        data = data | {"steady": data["steady"] | {"every_step": True}} | tune
+        (folder / f"{name}.yaml").write_text(f"# {sentence}\n{dump(data)}", encoding="utf-8")
 
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
 
-def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
-    """Check that a campaign may be written to a folder.
+def check_folder(folder: Path, names: Sequence[str], resume: bool, overwrite: bool) -> None:
+    """Check that a campaign may be written to a folder; `names` are the files and folders that it writes.
 
     Raises:
         BadInput: the folder cannot be used.
@@ -151,13 +164,13 @@ def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
         raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
     if not resume:
         hint = "Add --resume to continue it, or --overwrite to replace it"
-        results_folder.check_folder(folder, _WRITTEN, STORE, overwrite, hint)
+        results_folder.check_folder(folder, names, STORE, overwrite, hint)
     elif not (folder / STORE).exists():
         raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
 
 
-def clear_folder(folder: Path) -> None:
-    """Remove all files of a campaign that is replaced.
+def clear_folder(folder: Path, names: Sequence[str]) -> None:
+    """Remove all files of a campaign that is replaced, by their names.
 
     Raises:
         BadInput: another process is running it.
@@ -165,7 +178,7 @@ def clear_folder(folder: Path) -> None:
     if not folder.exists():
         return
     with alone(folder / STORE):
-        for name in _WRITTEN:
+        for name in names:
             results_folder.remove(folder / name)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.metrics import MEANINGS
+from undertow.campaign.columns import DONE
 from undertow.campaign.executors import chosen
 from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.campaign.store_results import load
@@ -78,7 +79,7 @@ def read_comparison(folder: Path, ready: Contest) -> Comparison:
     """
     results = load(folder)  # checks the store, and knows which metrics are defined
     with xr.open_zarr(folder / STORE, consolidated=False) as opened:
-        dataset = opened.load()
+        dataset = opened.drop_vars(DONE).load()
     (axis,) = results.campaign.axes
     named = {ready.dimension: np.array(ready.names)}
     dataset = dataset.rename({axis: ready.dimension} if axis != ready.dimension else {}).assign_coords(named)

@@ -178,16 +178,15 @@ def _firsts(prepared: Prepared) -> tuple[Built, ...]:
     """The first valid trial of each contestant."""
     several, probes = prepared.trials, tasks.site(prepared.text, str(prepared.folder)).probes()
     return tuple(
-        next(probes[row] for row in several.first(number) if row in probes) for number in range(len(several.combinations))
+        next(probes[row] for row in several.first(number) if row in probes)
+        for number in range(len(several.combinations))
     )
 
 
 @in_its_precision
 def _random(built: Built) -> bool:
     """Whether a run depends on its seed: whether its random parts differ for two seeds."""
-    first, second = (
-        jax.tree.leaves(built.closed_loop.realize(key_of_seed(seed))[1:]) for seed in (1, 2)
-    )
+    first, second = (jax.tree.leaves(built.closed_loop.realize(key_of_seed(seed))[1:]) for seed in (1, 2))
     return any(not np.array_equal(one, other) for one, other in zip(first, second, strict=True))
 
 
@@ -197,4 +196,4 @@ def _fair(names: Sequence[str], notes: Sequence[TuningNote]) -> tuple[str, ...]:
     if not rivals:
         return ()
     said = f"{', '.join(rivals)} {'is' if len(rivals) == 1 else 'are'} not tuned for this scenario"
-    return (f"{said}, and an untuned rival is no fair one. To tune it, see the folder `scenarios` of the results",)
+    return (f"{said}, and an untuned rival is no fair one (docs/compare.md)",)

@@ -69,20 +69,20 @@ def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Conte
         if "scenario" in text.data:
             hint = "A campaign file is compared alone: its own `cross` or `variants`, or with --controllers"
             raise BadInput("SCENARIO", "be a scenario where several are given", f"{path}, a campaign", hint=hint)
-    whole = [_flat(build(text).resolved) for text in texts]
-    keys = [key for key in dict.fromkeys(key for each in whole for key in each)]
+    resolved = [build(text).resolved for text in texts]
+    whole = [_flat(each) for each in resolved]
+    keys = dict.fromkeys(key for each in whole for key in each)
     different = [key for key in keys if any(each.get(key) != whole[0].get(key) for each in whole)]
     alike = [path.stem for path in paths]
     names = [f"{path.parent.name}/{path.stem}" if alike.count(path.stem) > 1 else path.stem for path in paths]
     found = [
-        Contestant(name, {key: each[key] for key in different if key in each}, path)
+        Contestant(name, {key: each.get(key, []) for key in different}, path)  # `metrics` alone may be missing
         for name, each, path in zip(names, whole, paths, strict=True)
     ]
-    first = from_data(build(texts[0]).resolved)._replace(name=texts[0].name, folder=texts[0].folder)
-    return first, _unique(found), differing(texts)
+    return from_data(resolved[0])._replace(folder=texts[0].folder), _unique(found), _differing(texts)
 
 
-def differing(texts: Sequence[Text]) -> dict[str, list[str]]:
+def _differing(texts: Sequence[Text]) -> dict[str, list[str]]:
     """Key -> its value in each scenario as the user wrote it, for the keys that differ."""
     written = [_flat(validate(text).model_dump()) for text in texts]
     keys = dict.fromkeys(key for each in written for key in each)
@@ -117,7 +117,7 @@ def _controller(name: str, entry: Any, scenario: Text, path: Path | None) -> Con
         raise BadInput("--controllers", "name controllers, separated by commas", repr(entry))
     if entry == OWN:
         part = part_of(validate(scenario).controller, scenario.folder)
-        return Contestant(name or OWN, {"controller": part}, path)
+        return Contestant(name or f"{label(part)} (scenario)", {"controller": part}, path)
     if entry.endswith(_FILES):
         return _of_file(name, Path(entry))
     part = _named(entry)

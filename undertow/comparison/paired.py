@@ -27,9 +27,11 @@ class Difference(NamedTuple):
         left_out: the other trials.
         median: of the differences, in the unit of the metric; NaN without pairs.
         low, high: 95 % bootstrap interval of the median (percentiles); NaN with fewer than six pairs.
-        relative: median of the differences as shares of the baseline's values; NaN where one of these is zero.
+        relative: median of the differences as shares of the baseline's values; NaN unless all of these are
+            positive.
         smaller, larger: pairs in which the contestant's value is smaller, or larger, than the baseline's.
-        p: of the Wilcoxon signed-rank test, two-sided; NaN where all differences are zero.
+        p: of the Wilcoxon signed-rank test, two-sided; NaN where all differences are zero, or with fewer
+            than six pairs, which can establish nothing.
         p_holm: the same with Holm's correction for all tests of the comparison.
     """
 
@@ -60,10 +62,11 @@ def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[Differen
         values: metric -> contestant -> value of each sample, the same samples in the same order; NaN where the trial
             failed or has no such metric.
     """
+    names = dict.fromkeys(name for each in values.values() for name in each)
     found = [
         _difference(metric, contestant, baseline, by_name[contestant], by_name[baseline])
+        for baseline, contestant in itertools.combinations(names, 2)
         for metric, by_name in values.items()
-        for baseline, contestant in itertools.combinations(by_name, 2)
     ]
     corrected = holm([one.p for one in found])
     return [one._replace(p_holm=p) for one, p in zip(found, corrected, strict=True)]
@@ -83,7 +86,7 @@ def _difference(metric: str, contestant: str, baseline: str, first: np.ndarray, 
         median=float(np.median(apart)) if apart.size else math.nan,
         low=low,
         high=high,
-        relative=float(np.median(apart / second)) if apart.size and second.all() else math.nan,
+        relative=float(np.median(apart / second)) if apart.size and (second > 0).all() else math.nan,
         smaller=int((apart < 0).sum()),
         larger=int((apart > 0).sum()),
         p=rank_test(apart),
@@ -108,9 +111,10 @@ def median_interval(values: np.ndarray) -> tuple[float, float]:
 
 
 def rank_test(apart: np.ndarray) -> float:
-    """Two-sided p of the Wilcoxon signed-rank test, zeros left out (Wilcoxon 1945); NaN where nothing is left."""
-    apart = apart[apart != 0]
-    return float(wilcoxon(apart).pvalue) if apart.size else math.nan  # pyright: ignore[reportAttributeAccessIssue]
+    """Two-sided p of the Wilcoxon signed-rank test (1945); NaN where all are zero, and for fewer than six values."""
+    if apart.size < FEWEST or not apart.any():
+        return math.nan
+    return float(wilcoxon(apart).pvalue)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def holm(several: Sequence[float]) -> list[float]:

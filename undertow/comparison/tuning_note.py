@@ -56,7 +56,9 @@ def tuning_note(
     return TuningNote(f"default gains of `{short}`, not tuned", False)
 
 
-def _given(part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path) -> tuple[str, str | None, dict[str, Any]]:
+def _given(
+    part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path
+) -> tuple[str, str | None, dict[str, Any]]:
     """Kind, preset and the gains that do not have their default value."""
     kind = part["kind"]
     function = catalogue.find("controllers", kind, folder)
