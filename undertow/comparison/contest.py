@@ -107,8 +107,11 @@ def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: 
         text, found, differing = scenarios(given, allow_code)
         dimension = "scenario"
     else:
-        path = None if isinstance(given, Mapping) else given[0]
-        text = from_data(given) if path is None else read(path, allow_code=allow_code)
+        if isinstance(given, Mapping):
+            text = from_data(given)
+        else:
+            path = given[0]
+            text = read(path, allow_code=allow_code)
         if "scenario" in text.data and entries is None:
             return _of_file(text)
         if entries is None:
@@ -196,4 +199,4 @@ def _fair(names: Sequence[str], notes: Sequence[TuningNote]) -> tuple[str, ...]:
     if not rivals:
         return ()
     said = f"{', '.join(rivals)} {'is' if len(rivals) == 1 else 'are'} not tuned for this scenario"
-    return (f"{said}, and an untuned rival is no fair one (docs/compare.md)",)
+    return (f"{said}; with untuned gains a comparison says little about the laws themselves (docs/compare.md)",)

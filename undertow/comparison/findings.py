@@ -11,7 +11,7 @@ import xarray as xr
 from undertow.campaign.campaign_summary import median_interval
 from undertow.campaign.columns import ENDINGS, JUDGEMENTS
 from undertow.campaign.store_layout import SAMPLES
-from undertow.comparison.paired import FEWEST, Difference, differences
+from undertow.comparison.paired import FEWEST, Completion, Difference, completions, differences
 from undertow.core.status import Status
 
 COMPLETED = Status.OK.word
@@ -43,6 +43,7 @@ class Findings(NamedTuple):
         units: metric -> unit, empty for a dimensionless number, in the order of tables.
         medians: metric -> contestant -> median.
         differences: every two contestants in every metric.
+        completions: every two contestants, by the trials that only one of them completed.
         endings: contestant -> how its trials ended -> how many.
         failed_at: contestant -> median time at which its failed trials ended, s; NaN without any.
         successes: contestant -> trials within the scenario's criterion of success, and trials that were judged.
@@ -57,6 +58,7 @@ class Findings(NamedTuple):
     units: dict[str, str]
     medians: dict[str, dict[str, Median]]
     differences: tuple[Difference, ...]
+    completions: tuple[Completion, ...]
     endings: dict[str, dict[str, int]]
     failed_at: dict[str, float]
     successes: dict[str, tuple[int, int]]
@@ -82,6 +84,7 @@ class Findings(NamedTuple):
             metric: {name: one._asdict() for name, one in each.items()} for metric, each in self.medians.items()
         }
         plain["differences"] = [one._asdict() | {"established": one.established} for one in self.differences]
+        plain["completions"] = [one._asdict() for one in self.completions]
         return plain
 
 
@@ -96,7 +99,8 @@ def find(
         metric: {name: np.where(lasted[name], one[metric].values, np.nan) for name, one in rows.items()}
         for metric in metrics
     }
-    all_equal = all(_constant(one) for each in values.values() for one in each.values())
+    alike = all(_constant(one) for each in values.values() for one in each.values())
+    all_equal = alike and (bool(values) or dataset.sizes[SAMPLES] == 1)
     if all_equal:  # many copies of one trial prove no more than that trial
         values = {metric: {name: one[:1] for name, one in each.items()} for metric, each in values.items()}
     ended = {name: one["ended"].values[~lasted[name]] for name, one in rows.items()}
@@ -108,6 +112,7 @@ def find(
         units={metric: dataset[metric].attrs["units"].removesuffix("1") for metric in metrics},
         medians={metric: {name: _median(one) for name, one in each.items()} for metric, each in values.items()},
         differences=tuple(differences(values)),
+        completions=tuple(completions(lasted)) if not all_equal else (),
         endings={name: _counts(one["status"].values, ENDINGS) for name, one in rows.items()},
         failed_at={name: float(np.median(each)) if each.size else math.nan for name, each in ended.items()},
         successes={name: _successes(one["success"].values) for name, one in rows.items()},

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import bootstrap, wilcoxon
+from scipy.stats import binomtest, bootstrap, wilcoxon
 
 LEVEL = 0.05  # of significance; the intervals hold 95 %
 
@@ -53,6 +53,35 @@ class Difference(NamedTuple):
     def established(self) -> bool:
         """Whether the test is below 5 % after correction and the interval excludes zero."""
         return self.p_holm < LEVEL and (self.low > 0 or self.high < 0)
+
+
+class Completion(NamedTuple):
+    """Which of two contestants completed trials that the other did not.
+
+    Attributes:
+        contestant, baseline: the two.
+        only_contestant, only_baseline: trials that one of them alone completed.
+        p: of McNemar's exact test, two-sided; NaN where there are none.
+        p_holm: the same with Holm's correction for every two contestants.
+    """
+
+    contestant: str
+    baseline: str
+    only_contestant: int
+    only_baseline: int
+    p: float
+    p_holm: float
+
+
+def completions(completed: Mapping[str, np.ndarray]) -> list[Completion]:
+    """How the completed trials of every two contestants differ; one entry per sample, in the same order."""
+    found = []
+    for baseline, contestant in itertools.combinations(completed, 2):
+        alone = int((completed[contestant] & ~completed[baseline]).sum())
+        other = int((completed[baseline] & ~completed[contestant]).sum())
+        p = float(binomtest(alone, alone + other).pvalue) if alone + other else math.nan
+        found.append(Completion(contestant, baseline, alone, other, p, math.nan))
+    return [one._replace(p_holm=p) for one, p in zip(found, holm([one.p for one in found]), strict=True)]
 
 
 def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[Difference]:

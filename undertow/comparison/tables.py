@@ -10,7 +10,7 @@ from typing import NamedTuple
 from undertow.analysis.metrics import for_people
 from undertow.comparison.findings import Findings, Median
 from undertow.comparison.paired import Difference
-from undertow.comparison.sentences import metric_name, relative
+from undertow.comparison.sentences import digits, metric_name, relative
 
 NOTE = (
     "Median over completed trials [95 % interval of the median]; metrics of the steady window. "
@@ -53,7 +53,7 @@ def paired(found: Findings) -> Rows:
                 median(Median(one.median, one.low, one.high, one.pairs), unit),
                 _NOTHING if math.isnan(one.relative) else relative(one, unit),
                 of(one.smaller),
-                _NOTHING if math.isnan(one.p_holm) else f"{one.p_holm:.2g}",
+                _NOTHING if math.isnan(one.p_holm) else digits(one.p_holm),
                 "yes" if one.established else "no",
             )
         )
@@ -65,7 +65,7 @@ def median(one: Median, unit: str) -> str:
     """A median with its interval, in the unit of tables for people."""
     if math.isnan(one.value):
         return _NOTHING
-    value, low, high = (f"{for_people(number, unit)[0]:.3g}" for number in one[:3])
+    value, low, high = (digits(for_people(number, unit)[0]) for number in one[:3])
     return value if math.isnan(one.low) else f"{value} [{low}, {high}]"
 
 
@@ -109,7 +109,7 @@ def _tabular(rows: Rows) -> list[str]:
 
 _LATEX = re.compile(
     r"(?<![\w.])(?P<sign>-?)(?P<mantissa>\d+(?:\.\d+)?)e(?P<power>[+-]\d+)|(?P<minus>(?<![\w.])-(?=[\d. ]))"
-    r"|\^(?P<exponent>-?\d+)|(?P<special>[\\~^*&%$#_{}])"
+    r"|\^(?P<exponent>-?\d+)|(?P<infinite>\binf\b)|(?P<special>[\\~^*&%$#_{}])"
 )
 _SPECIAL = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "*": r"$^{*}$"}
 
@@ -122,6 +122,8 @@ def _escaped(cell: str) -> str:
             return rf"${found['sign']}{found['mantissa']} \times 10^{{{int(found['power'])}}}$"
         if found["minus"]:
             return "$-$"
+        if found["infinite"]:
+            return r"$\infty$"
         if found["exponent"]:
             return f"$^{{{found['exponent']}}}$"
         return _SPECIAL.get(found["special"], f"\\{found['special']}")

@@ -1,5 +1,6 @@
 """The page of a comparison: the findings, how each contestant was tuned, figures, differences and configuration."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,8 +12,8 @@ from undertow.comparison.tables import NOTE, Rows, medians, paired
 from undertow.report.campaign_page import asked
 from undertow.report.figures.comparison import comparison_plots
 from undertow.report.figures.writing import save_all
-from undertow.report.formats import prose
-from undertow.report.page import Html, bullets, document, figure, section, table, tag
+from undertow.report.formats import number, prose
+from undertow.report.page import Html, bullets, document, figure, marked, section, table, tag
 
 _CAPTIONS = {
     "differences": "Each point is one trial: the metric of the contestant less that of the first one, with the same "
@@ -73,8 +74,14 @@ def _lead(found: Findings) -> str:
 
 
 def _rows(rows: Rows, wide: bool = False) -> Html:
-    cells = [tuple(map(prose, row)) for row in rows.rows]
+    cells = [tuple(map(_cell, row)) for row in rows.rows]
     return table(rows.head, cells, numeric=range(1, len(rows.head)), wide=wide)
+
+
+def _cell(content: str) -> Html:
+    """A cell with its numbers typeset."""
+    content = re.sub(r"(?<![\w.])-(?=[\d.])", "\u2212", re.sub(r"\binf\b", "\u221e", content))
+    return marked(r"(\u2212?\d\.\d+e[+-]\d+)", content, lambda one: number(float(one.replace("\u2212", "-"))), prose)
 
 
 def _differing(found: Findings) -> Html:

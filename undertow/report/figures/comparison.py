@@ -24,7 +24,7 @@ _PLANE = ("north", "east")
 def comparison_plots(dataset: xr.Dataset, found: Findings) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a comparison, by name; those for which there is something to show."""
     plots: dict[str, Callable[[], Figure]] = {}
-    if any(one.pairs for one in found.differences):
+    if any(one.pairs and one.baseline == found.names[0] for one in found.differences):
         plots["differences"] = lambda: differences_figure(dataset, found)
     if "series:error" in dataset:
         plots["histories"] = lambda: histories_figure(dataset, found)
@@ -38,7 +38,8 @@ def comparison_plots(dataset: xr.Dataset, found: Findings) -> dict[str, Callable
 def differences_figure(dataset: xr.Dataset, found: Findings) -> Figure:
     """Difference of each contestant from the first one: a point per pair, and the median with its 95 % interval."""
     first, *others = found.names
-    shown = [metric for metric in found.units if any(one.pairs and one.metric == metric for one in found.differences)]
+    from_first = [one for one in found.differences if one.baseline == first and one.pairs]
+    shown = [metric for metric in found.units if any(one.metric == metric for one in from_first)]
     rows, tall = -(-len(shown) // _COLUMNS), 0.35 + 0.3 * len(others)
     left = min(2.4, 0.3 + 0.068 * max(map(len, others)))
     figure = style.blank(9.6, 0.45 + rows * (tall + 0.75))
