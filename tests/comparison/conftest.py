@@ -5,10 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from undertow.report.figures import writing
+from undertow.report import comparison_page
 from undertow.scenario.reading import dump
-
-BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
 
 AXIS = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 1e30},
@@ -33,11 +31,10 @@ def scenario(tmp_path, monkeypatch):
 
 
 @pytest.fixture(autouse=True)
-def blank_figures(monkeypatch, request):
-    """Figures are made, but blank ones are written unless a test has the fixture `whole_figures`."""
+def no_figures(monkeypatch, request):
+    """None are made unless a test has the fixture `whole_figures`."""
     if "whole_figures" not in request.fixturenames:
-        monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
-        monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+        monkeypatch.setattr(comparison_page, "comparison_plots", lambda dataset, found: {})
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from test_blocks import FILE, ROOT, blocks
 
 import undertow as ut
 from undertow.cli.main import run
+from undertow.comparison.contest import contest
 from undertow.scenario.reading import dump
 
 WILD = {"kind": "pid", "frequency": 500.0}
@@ -55,16 +56,24 @@ def test_command(scenario, own_law, capsys):
     table = list(csv.DictReader((out / "comparison.csv").read_text().splitlines()))
     assert {row["contestant"] for row in table} == set(names[1:])
     assert "\\toprule" in (out / "comparison.tex").read_text() and "| smc |" in (out / "comparison.md").read_text()
-    assert {one.stem for one in (out / "figures").glob("*.svg")} == {"differences", "histories", "distributions"}
     page = re.sub(r"<[^>]+>", " ", (out / "comparison.html").read_text())
     for words in ("Comparison: pid (scenario), again", "default gains of", "axis.yaml", "Holm", "diverged"):
         assert words in page
-    assert run(["simulate", "out/scenarios/smc.yaml", "--no-prediction", "--out", "one"]) == 0
+
+
+@pytest.mark.slow
+def test_figures_repetition_and_further_trials(scenario, own_law, whole_figures, capsys):
+    path, out = scenario(), Path("out")
+    given = ["compare", path, "--controllers", "scenario,./mine.py:smc", "--out", "out"]
+    assert run([*given, "--trials", "8"]) == 0
+    assert {one.stem for one in (out / "figures").glob("*.svg")} == {"differences", "histories", "distributions"}
+    errors = xr.open_zarr(out / "trials.zarr", consolidated=False).load()["position_rms"].values
+    assert run(["simulate", "out/scenarios/2-smc.yaml", "--no-prediction", "--out", "one"]) == 0
     metrics = json.loads(Path("one/metrics.json").read_text())["steady"]
-    assert metrics["position_rms"] == errors[3, 0]  # bit for bit
-    assert run(["compare", path, "--controllers", given, "--trials", "8", "--out", "out"]) == 2
+    assert metrics["position_rms"] == errors[1, 0]  # bit for bit
+    assert run([*given, "--trials", "9"]) == 2
     assert "Add --resume to continue it, or --overwrite to replace it" in capsys.readouterr().err
-    assert run(["compare", path, "--controllers", given, "--trials", "9", "--out", "out", "--resume"]) == 1
+    assert run([*given, "--trials", "9", "--resume"]) == 0
     assert json.loads((out / "comparison.json").read_text())["trials"] == 9
 
 
@@ -124,11 +133,13 @@ def test_campaign_file(scenario, capsys):
     Path("swept.yaml").write_text(dump(swept))
     Path("slow.yaml").write_text(Path("axis.yaml").read_text().replace("frequency: 2.0", "frequency: 1.0"))
     assert run(["compare", "varied.yaml", "--controllers", "slow.yaml,scenario", "--out", "one"]) == 0
-    assert run(["compare", "swept.yaml", "--out", "two"]) == 0
-    one, two = (json.loads(Path(name, "comparison.json").read_text()) for name in ("one", "two"))
-    assert [each["median"] for each in one["differences"]] == [each["median"] for each in two["differences"]]
-    assert (one["dimension"], two["dimension"]) == ("controller", "controller.frequency")
-    assert one["differences"][0]["smaller"] == 6
+    found = json.loads(Path("one/comparison.json").read_text())
+    assert found["names"] == ["pid (slow)", "pid (scenario)"] and found["differences"][0]["smaller"] == 6
+    rows = xr.open_zarr("one/trials.zarr", consolidated=False).load()["vary:disturbance.amplitude"].values
+    assert (rows[0] == rows[1]).all() and np.ptp(rows[0]) > 0.1
+    ready = contest([Path("swept.yaml")])
+    assert (ready.dimension, ready.names, ready.campaign.trials) == ("controller.frequency", ("1.0", "2.0"), 6)
+    assert "axis.yaml" not in ready.notes[0].sentence and "frequency 1.0" in ready.notes[0].sentence
     capsys.readouterr()
     assert run(["compare", "swept.yaml", "--controllers", "pid,adrc", "--out", "three"]) == 2
     assert "Leave out --controllers to compare controller.frequency of the file" in capsys.readouterr().err

@@ -4,7 +4,7 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -29,6 +29,7 @@ from undertow.core import checks
 from undertow.core.disk import alone
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import by_xla, write_campaign
+from undertow.scenario.build import Built
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
@@ -127,27 +128,18 @@ def live(console: Console) -> Iterator[Watch]:
 
 
 def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
-    write_trials(
-        prepared, {trial: (f"trial-{trial:07d}", f"Trial {trial} of the campaign.") for trial in trials}, folder
-    )
-
-
-def write_trials(prepared: Prepared, trials: Mapping[int, tuple[str, str]], folder: Path) -> None:
-    """Write the scenarios of some trials into a folder, in place of what it held.
-
-    Args:
-        prepared: the campaign.
-        trials: number of a trial -> name of its file, without ending, and a sentence at its top.
-        folder: created if missing.
-    """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     part_cache = PartCache()
-    tune = {key: value for key, value in prepared.trials.scenario.data.items() if key == "tune"}
-    for trial, (name, sentence) in trials.items():
-        data = build_trial(prepared.trials, part_cache, trial).resolved  # includes the contents of named files
-        data = data | {"steady": data["steady"] | {"every_step": True}} | tune
-        (folder / f"{name}.yaml").write_text(f"# {sentence}\n{dump(data)}", encoding="utf-8")
+    for trial in trials:
+        text = trial_text(build_trial(prepared.trials, part_cache, trial), f"Trial {trial} of the campaign.")
+        (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
+
+
+def trial_text(built: Built, sentence: str) -> str:
+    """The scenario of a trial, which `undertow simulate` repeats, with a sentence above it."""
+    data = built.resolved | {"steady": built.resolved["steady"] | {"every_step": True}}  # with contents of named files
+    return f"# {sentence}\n{dump(data)}"
 
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")

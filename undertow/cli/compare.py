@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,8 +12,9 @@ from rich.console import Console
 
 from undertow.campaign.executors import chosen
 from undertow.campaign.run_campaign import STORE, run_campaign
-from undertow.campaign.task import INVALID
-from undertow.cli.campaign import check_folder, clear_folder, live, write_trials
+from undertow.campaign.store_results import load
+from undertow.campaign.task import build_trial
+from undertow.cli.campaign import check_folder, clear_folder, live, trial_text
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder
@@ -26,6 +28,7 @@ from undertow.core import checks
 from undertow.core.status import Status
 from undertow.report.comparison_page import write_comparison
 from undertow.scenario.finished_run import to_json
+from undertow.scenario.part_cache import PartCache
 
 # File of each style of table.
 _TABLES = {"markdown": "comparison.md", "latex": "comparison.tex", "csv": "comparison.csv"}
@@ -73,13 +76,14 @@ def compare(
 def _conclude(console: Console, ready: Contest, folder: Path) -> int:
     """Write page, tables and scenarios; print the findings."""
     with stage(console, "statistics and page"):
-        comparison = read_comparison(folder, ready)
+        results = load(folder)
+        comparison = read_comparison(folder, results, ready)
         found = comparison.findings
         files = _write_scenarios(ready, comparison, folder / "scenarios")
         for style, name in _TABLES.items():
             (folder / name).write_text(comparison.table(style), encoding="utf-8")
         (folder / "comparison.json").write_text(to_json(found.data(), indent=1) + "\n", encoding="utf-8")
-        page, failures = write_comparison(comparison, folder)
+        page, failures = write_comparison(comparison, results, folder)
     warn_of(failures)
     rows = medians(found)
     table = titled(f"Median of {found.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))
@@ -103,18 +107,19 @@ def _write_scenarios(ready: Contest, comparison: Comparison, folder: Path) -> di
 
     `undertow simulate` repeats such a trial; `undertow tune` tunes its controller.
     """
-    trials, files = {}, {}
-    for i, name in enumerate(ready.names):
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    files, part_cache = {}, PartCache()
+    for i, (name, first) in enumerate(zip(ready.names, ready.built, strict=True)):
+        file = folder / f"{i + 1}-{re.sub(r'[^a-zA-Z0-9_-]+', '-', name).strip('-')}.yaml"
+        files[name] = file
+        file.write_text(
+            trial_text(first, f"{name}, in one trial: {comparison.findings.tuning[name]}."), encoding="utf-8"
+        )
         rows = comparison.dataset.isel({ready.dimension: i})
-        numbers_of, codes = rows["trial"].values, rows["status"].values
-        file = re.sub(r"[^\w.-]+", "-", name).strip("-") or f"contestant-{i + 1}"
-        valid, failed = numbers_of[codes != INVALID], numbers_of[codes > int(Status.OK)]
-        for trial in valid[:1]:
-            files[name] = folder / f"{file}.yaml"
-            trials[int(trial)] = (file, f"Trial {trial} of the comparison, {name}: {comparison.findings.tuning[name]}.")
-        for trial in failed[:1]:
-            if int(trial) in trials:
-                continue
-            trials[int(trial)] = (f"{file}-failed", f"Trial {trial} of the comparison, {name}, which failed.")
-    write_trials(ready.prepared, trials, folder)
+        for trial in rows["trial"].values[rows["status"].values > int(Status.OK)][:1].tolist():
+            text = trial_text(
+                build_trial(ready.prepared.trials, part_cache, trial), f"{name}, trial {trial}: it failed."
+            )
+            file.with_stem(f"{file.stem}-failed").write_text(text, encoding="utf-8")
     return files

@@ -15,7 +15,7 @@ from undertow.analysis.metrics import MEANINGS
 from undertow.campaign.columns import DONE
 from undertow.campaign.executors import chosen
 from undertow.campaign.run_campaign import STORE, run_campaign
-from undertow.campaign.store_results import load
+from undertow.campaign.store_results import Results, load
 from undertow.comparison.contest import Contest, contest
 from undertow.comparison.findings import Findings, find
 from undertow.comparison.paired import Difference
@@ -71,13 +71,8 @@ class Comparison:
         return "\n".join([f"Comparison of {names}, {self.findings.trials} trials each.", *sentences(self.findings)])
 
 
-def read_comparison(folder: Path, ready: Contest) -> Comparison:
-    """The result of a comparison whose campaign has run in a folder.
-
-    Raises:
-        OSError: its store is damaged.
-    """
-    results = load(folder)  # checks the store, and knows which metrics are defined
+def read_comparison(folder: Path, results: Results, ready: Contest) -> Comparison:
+    """The result of a comparison whose campaign has run in a folder and was read from there."""
     with xr.open_zarr(folder / STORE, consolidated=False) as opened:
         dataset = opened.drop_vars(DONE).load()
     (axis,) = results.campaign.axes
@@ -122,4 +117,4 @@ def compare(
         warnings.warn(sentence, stacklevel=2)
     with tempfile.TemporaryDirectory() as folder, chosen(None, workers or os.cpu_count() or 1) as executor:
         run_campaign(ready.prepared, Path(folder), executor, lambda tally: None)
-        return read_comparison(Path(folder), ready)
+        return read_comparison(Path(folder), load(Path(folder)), ready)

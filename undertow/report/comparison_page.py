@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from undertow.campaign.store_results import load
+from undertow.campaign.store_results import Results
 from undertow.comparison.comparison import Comparison
 from undertow.comparison.findings import Findings
 from undertow.comparison.sentences import HOW, sentences
@@ -32,7 +32,7 @@ _FAIR = (
 )
 
 
-def write_comparison(comparison: Comparison, folder: Path) -> tuple[Path, list[str]]:
+def write_comparison(comparison: Comparison, results: Results, folder: Path) -> tuple[Path, list[str]]:
     """Write `comparison.html`, and every figure into `figures/`; return a sentence for each figure that failed.
 
     Raises:
@@ -58,7 +58,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> tuple[Path, list[s
         section("figures", "Figures", *figures),
         section("endings", "Status of the trials", _endings(found)),
         section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), wide=True)),
-        section("configuration", "Configuration", *asked(load(folder))),
+        section("configuration", "Configuration", *asked(results)),
     )
     path = folder / "comparison.html"
     path.write_text(page, encoding="utf-8")
