@@ -5,7 +5,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 README, SIMD, LIMITS = (
-    (ROOT / name).read_text("utf-8") for name in ("README.md", "docs/simd.md", "docs/known-limits.md")
+    (ROOT / name).read_text("utf-8")
+    for name in ("README.md", "docs/explanation/simd.md", "docs/explanation/known-limits.md")
 )
 
 
@@ -15,7 +16,7 @@ def plain(text):
 
 
 def test_speed():
-    """Nanoseconds per step and the factor over NumPy of README are those of the table in docs/simd.md."""
+    """Nanoseconds per step and the factor over NumPy of README are those of the table in docs/explanation/simd.md."""
     said = re.search(r"about (\d+) ns per step .*?, (\d+) times faster than plain NumPy", plain(README))
     assert said is not None
     ns, times = said.groups()

@@ -50,7 +50,8 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
             warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures").failures)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
-        typer.echo(f"Advice: the run used backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
+        slower = "the run used backend xla, which is slower than simd (docs/explanation/simd.md)"
+        typer.echo(f"Advice: {slower}: {why}.", err=True)
     expected = predicted.metrics if predicted else None
     console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
     if predicted:
