@@ -57,7 +57,7 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
     advice: dict[str, str] = {}
     for row, built in firsts:
         _check(campaign, built, metrics)
-        for sentence in (*built.advice(), *vehicle_warnings(built)):
+        for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
     by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
     why = unavailable() if by_simd else ""

@@ -1,4 +1,4 @@
-"""A vehicle from a YAML file. See docs/your-own-vehicle.md."""
+"""A vehicle from a YAML file. See docs/how-to/your-own-vehicle.md."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
