@@ -7,7 +7,11 @@ from typing import Any
 from sphinx.application import Sphinx
 
 # File of the repository -> page of the site that includes it.
-_PAGES = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md", "simdjit/README.md": "explanation/simdjit.md"}
+_PAGES = {
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+    "simdjit/README.md": "explanation/simdjit.md",
+}
 _LINK = re.compile(rf"\]\((?:\.\./)+({'|'.join(map(re.escape, _PAGES))})")
 
 

@@ -112,7 +112,9 @@ class Commands(Directive):
 def _command(name: str, command: Any) -> nodes.section:
     usage = " ".join([name, *command.collect_usage_pieces(command.make_context(name, [], resilient_parsing=True))])
     found = section(f"`{name}`", name, nodes.literal_block(usage, usage), *paragraphs(command.help))
-    given = [(one.metavar or one.name.upper(), one.help or "") for one in command.params if one.param_type_name == "argument"]
+    given = [
+        (one.metavar or one.name.upper(), one.help or "") for one in command.params if one.param_type_name == "argument"
+    ]
     if given:
         found += table(("argument", "meaning"), given, ("argument",))
     options = [

@@ -27,7 +27,8 @@ MEANINGS = {
     INTERNAL_ERROR: "Internal error: please report it, with the output of `undertow --traceback ...`.",
     FILES_FAILED: "Files could not be read or written.",
     INTERRUPTED: "Interrupted by Ctrl-C.",
-    _BY_SIGNAL + signal.SIGTERM: "Ended by SIGTERM, for example by `kill` or the end of a SLURM job; otherwise like Ctrl-C.",
+    _BY_SIGNAL
+    + signal.SIGTERM: "Ended by SIGTERM, for example by `kill` or the end of a SLURM job; otherwise like Ctrl-C.",
 }
 
 

@@ -27,7 +27,7 @@ _SIGNALS = ("error", "position", "reference")
 _RECORDS = 400
 
 NOT_RANDOM = "nothing in the scenario is random, so that all trials are equal: one is run, and no interval can be given"
-VARY = "To compare over a range of conditions, give a campaign file with `vary` (docs/compare.md)"
+VARY = "To compare over a range of conditions, give a campaign file with `vary` (docs/how-to/compare.md)"
 
 
 class Contest(NamedTuple):
@@ -199,4 +199,4 @@ def _fair(names: Sequence[str], notes: Sequence[TuningNote]) -> tuple[str, ...]:
     if not rivals:
         return ()
     said = f"{', '.join(rivals)} {'is' if len(rivals) == 1 else 'are'} not tuned for this scenario"
-    return (f"{said}; with untuned gains a comparison says little about the laws themselves (docs/compare.md)",)
+    return (f"{said}; with untuned gains a comparison says little about the laws themselves (docs/how-to/compare.md)",)
