@@ -26,7 +26,7 @@ def code(text: str) -> nodes.paragraph:
     """A cell of code; each of its lines stands on its own."""
     found = nodes.paragraph()
     for number, line in enumerate(text.splitlines()):
-        found += [nodes.Text(" ")] * (number > 0) + [nodes.literal(line, line)]
+        found += [nodes.Text(" ")] * (number > 0) + [nodes.literal(line, line, classes=["value"])]
     return found
 
 

@@ -1,7 +1,8 @@
-"""Directive that shows the folders as layers, from the import contract in pyproject.toml and the folders' docstrings."""
+"""Directive that shows the folders as layers: from the import contract in pyproject.toml and their docstrings."""
 
 import ast
 import html
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,8 @@ class Layers(SphinxDirective):
 
 
 def _box(name: str) -> str:
-    return f"<div><b>{name}</b><span>{html.escape(purpose(name))}</span></div>"
+    said = re.sub(r"`(.*?)`", r"<code>\1</code>", html.escape(purpose(name)))
+    return f"<div><b>{name}</b><span>{said}</span></div>"
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

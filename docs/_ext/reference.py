@@ -3,16 +3,17 @@
 from typing import Any
 
 import typer
+from blocks import paragraph, paragraphs, section, table
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
 
-from blocks import paragraph, paragraphs, section, table
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
 from undertow.cli.exit_codes import MEANINGS as EXIT_CODES
 from undertow.cli.main import app as command_line
 from undertow.core import catalogue
+from undertow.core.runtime import in_precision
 from undertow.core.status import Status
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
@@ -29,10 +30,16 @@ class Parts(Directive):
 
     def run(self) -> list[nodes.Node]:
         (kind,) = self.arguments
-        return [_part(one) for name in sorted(catalogue.names(kind)) for one in describing.describe(f"{kind}/{name}")]
+        with in_precision("float64"):
+            return [
+                described(one)
+                for name in sorted(catalogue.names(kind))
+                for one in describing.describe(f"{kind}/{name}")
+            ]
 
 
-def _part(part: Description) -> nodes.section:
+def described(part: Description) -> nodes.section:
+    """The section of one part, or of one preset of it."""
     preset = [option.default for option in part.options if option.name == "preset"]
     title = f"`{part.name}`, preset `{preset[0]}`" if preset else f"`{part.name}`"
     found = section(title, title, *paragraphs(part.summary))
@@ -56,8 +63,8 @@ class Keys(Directive):
     def run(self) -> list[nodes.Node]:
         if self.arguments == ["scenario"]:
             return [_keys(Scenario)]
-        entries = {"vary": Distribution, "requirements": Requirement, "series": Series}
-        each = [section(f"Keys of `{name}`", f"keys-of-{name}", _keys(model)) for name, model in entries.items()]
+        entries = {"each distribution in `vary`": Distribution, "each requirement": Requirement, "`series`": Series}
+        each = [section(f"Keys of {name}", f"keys of {name}", _keys(model)) for name, model in entries.items()]
         return [_keys(Campaign), *each]
 
 
