@@ -17,6 +17,7 @@ import pytest
 
 from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
+from undertow.comparison.contest import contest
 from undertow.report.figures import writing
 
 ROOT = Path(__file__).parents[2]
@@ -64,9 +65,19 @@ def quicker(arguments: list[str], page: str) -> list[str]:
     return [*arguments, "--no-prediction"] if page in SIMULATED else ["check", arguments[1]]
 
 
+def compared(arguments: list[str]) -> None:
+    """Build the controllers of a comparison, without the preset `robust`, and run nothing."""
+    entries = arguments[arguments.index("--controllers") + 1].split(",")
+    assert contest([Path(arguments[1])], [one for one in entries if one != "robust"]).campaign.number > 1
+
+
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built
 # but not run.
-WHOLE, SIMULATED, BUILT = {"your-own-plant"}, {"README", "your-own-controller", "your-own-vehicle"}, {"campaign"}
+WHOLE, SIMULATED, BUILT = (
+    {"your-own-plant"},
+    {"README", "your-own-controller", "your-own-vehicle"},
+    {"campaign", "compare"},
+)
 
 
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
@@ -91,12 +102,17 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch):
             (tmp_path / file["name"]).write_text(code, encoding="utf-8")
         elif not whole and page.stem in BUILT:
             for arguments in commands(block.code):
-                if arguments[1].endswith(".yaml"):
+                if arguments[0] == "compare":
+                    compared(arguments)
+                elif arguments[1].endswith(".yaml"):
                     assert prepare(tmp_path / arguments[1]).trials.number > 0
         elif block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
         elif block.language == "bash":
             for arguments in commands(block.code):
+                if not whole and arguments[0] == "compare":
+                    compared(arguments)
+                    continue
                 arguments = arguments if whole else quicker(arguments, page.stem)
                 assert run(arguments) in (0, 1), f"{page.name}, line {block.line}: undertow {shlex.join(arguments)}"
 

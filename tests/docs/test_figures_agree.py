@@ -30,7 +30,7 @@ def plain_rows(text):
 
 def test_times_of_divergence():
     """Seconds after which the paper's laws end, in the section of failures, are those of the page of limits."""
-    section = plain(README).split("## Where the paper's claims fail")[1].split("## Beyond the paper")[0]
+    section = plain(README).split("## Where the paper's claims fail")[1].split("## What there is")[0]
     ends = re.findall(r"(?:after|lasts|with none) (\d+(?:\.\d+)?) s\b", section)
     assert {"60", "1829", "135", "547", "122"} <= set(ends)
     for end in ("60", "1829", "135", "547", "122"):

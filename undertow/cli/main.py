@@ -207,6 +207,47 @@ def campaign(
     return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code)
 
 
+@app.command()
+def compare(
+    scenarios: Annotated[
+        list[Path], typer.Argument(metavar="SCENARIO...", help="A .yaml file, several of them, or one campaign file.")
+    ],
+    controllers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="What to compare on one scenario, separated by commas: presets (robust, paper), controllers (pid), "
+            "./file.py:function, scenario files whose controller is taken (tuned.yaml), and the word `scenario` for "
+            "the scenario's own controller. NAME=ENTRY gives a name.",
+        ),
+    ] = None,
+    trials: Annotated[
+        int | None, typer.Option(metavar="N", help="Trials of each. Default: 20, or the number of the campaign file.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Folder for the results. Default: runs/NAME-comparison, or the next free one."
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue an interrupted comparison, or add trials.")
+    ] = False,
+    workers: Annotated[int | None, typer.Option(metavar="N", help="Number of threads. Default: all cores.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier comparison in DIR.")] = False,
+    allow_code: AllowCode = False,
+) -> int:
+    """Compare controllers on one scenario, or several scenarios, on the same seeds.
+
+    The command runs the same samples and seeds for each, and writes the medians, the paired differences with confidence
+    intervals and a rank test, and the failures: comparison.html, .json, .csv, .tex and .md, figures/, trials.zarr, and
+    the scenario of each contestant.
+    """
+    from undertow.cli.compare import compare
+
+    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code)
+
+
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,

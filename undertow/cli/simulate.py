@@ -69,7 +69,7 @@ def _run(path: Path, console: Console, prediction: bool, allow_code: bool) -> tu
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
         built = build(text)
-    for sentence in (*built.advice(), *vehicle_warnings(built)):
+    for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
         typer.echo(f"Advice: {sentence}", err=True)
     with stage(console, "compiling, running and predicting" if prediction else "compiling and running"):
         return interruptible(lambda: with_prediction(lambda: execute(built), built, prediction))

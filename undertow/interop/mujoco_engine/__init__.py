@@ -9,7 +9,8 @@ agrees.
 import importlib.util
 
 if importlib.util.find_spec("mujoco") is None:
-    raise ModuleNotFoundError("MuJoCo is not installed: pip install 'undertow[mujoco]'", name="mujoco")
+    remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[mujoco]'"
+    raise ModuleNotFoundError(f"MuJoCo is not installed. {remedy}", name="mujoco")
 
 from undertow.interop.mujoco_engine.hydrodynamics import Water as Water
 from undertow.interop.mujoco_engine.mjcf import mjcf as mjcf
