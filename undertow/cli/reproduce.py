@@ -10,7 +10,7 @@ from undertow.cli.tables import wide_console
 from undertow.report.reproduction.report import write
 from undertow.reproduction import reproduce as study
 
-_WRITTEN = ("report.html", "results.json", "figures", "runs", "scenarios", "campaigns")
+_WRITTEN = ("report.html", "ablations.html", "results.json", "figures", "runs", "scenarios", "campaigns")
 
 
 def reproduce(out: Path, quick: bool) -> None:

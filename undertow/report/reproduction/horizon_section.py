@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from undertow.report.formats import number, prose, round_time
+from undertow.report.formats import CRITERION, number, outcome, prose, round_time
 from undertow.report.page import Html, join, table, tag
 
 CAPTIONS = {
@@ -54,7 +54,8 @@ def _horizons(found: Mapping[str, Any]) -> list[Html]:
         "weights and with weights bounded by 20 m/s^2 or rad/s^2. Metrics are computed over three windows, chattering "
         "from every sample."
     )
-    return [tag("h3", f"Long runs: {found['duration']:,.0f} s"), tag("p", prose(text))]
+    colours = f"{CRITERION} The window is the last one that the run reached."
+    return [tag("h3", f"Long runs: {found['duration']:,.0f} s"), tag("p", prose(text)), tag("p", prose(colours))]
 
 
 def _table(found: Mapping[str, Any]) -> Html:
@@ -88,7 +89,7 @@ def _between(gains: Sequence[float]) -> str:
 def _ended(row: Mapping[str, Any]) -> Html:
     word = str(row["status"]).replace("_", " ")
     text = f"lasts {row['ended']:g} s" if row["lasted"] else f"{word} at {round_time(row['ended'])} s"
-    return tag("span", text, class_=f"chip {'holds' if row['lasted'] else 'fails'}")
+    return outcome(text, row["lasted"], row["within"])
 
 
 def _by_window(row: Mapping[str, Any], windows: Sequence[Sequence[float]]) -> list[Html]:

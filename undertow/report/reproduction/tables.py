@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from undertow.report.formats import chip, condition, ending, number, percent, prose, unit
+from undertow.report.formats import chip, condition, ending, number, outcome, percent, prose, unit, within
 from undertow.report.page import Html, join, table, tag
 from undertow.reproduction.all_outputs import unit_of
 
@@ -80,10 +80,11 @@ def fidelity_levels(results: dict[str, Any]) -> Html:
             figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "input_variation")]
             lasted = entry["status"] == "completed"
             words = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
-            ended = tag("span", words, class_=f"chip {'holds' if lasted else 'fails'}")
+            ended = outcome(words, lasted, within(entry["steady"]))
             place = join(tag("b", fidelity), tag("span", _LEVELS.get(fidelity, ""), class_="said"))
             rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
-    head = ("fidelity", "controller", "status", "tracking rms", "estimation rms", "voltage variation, V/s", "reason")
+    metrics = map(_named, ("tracking_rms", "estimation_rms", "input_variation"))
+    head = ("fidelity", "controller", "status", *metrics, "reason")
     return table(head, rows, numeric=(3, 4, 5), wide=True)
 
 

@@ -57,6 +57,7 @@ def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str
         "agrees": verdict.agrees,
         "answer": verdict.text,
         "left_out": ablation.left_out,
+        "campaigns": list(ablation.campaigns),
         "variants": [{"name": name, **one._asdict()} for name, one in found.items()],
     }
 
