@@ -36,13 +36,17 @@ _INTERVALS = (
 )
 
 
-def write_campaign(title: str, results: Results, found: Mapping[str, Any], folder: Path) -> tuple[Path, list[str]]:
-    """Write `campaign.html`, and every figure as SVG and PNG into `figures/`; return a sentence for each failed figure.
+def write_campaign(
+    title: str, results: Results, found: Mapping[str, Any], folder: Path, pdf: str | None = None
+) -> tuple[Path, list[str]]:
+    """Write `campaign.html`, and every figure into `figures/`; return a sentence for each failed figure.
+
+    `pdf` is the width of PDF files; None for none.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    saved = save_all(lambda: _plots(results, found), folder / "figures")
+    saved = save_all(lambda: _plots(results, found), folder / "figures", pdf)
     plotted = _figures(saved)
     page = document(
         title,

@@ -20,6 +20,11 @@ _SMALL, _LARGE = 1e-3, 1e5  # outside of these a number is written with a power 
 _POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?!\w)")
 _NEGATIVE = re.compile(r"(?<![\w.)\]}>])-(?=\d)")
 _EITHER = re.compile(r"\+-(?=\s?\d)")
+_TINY = re.compile(r"(?<![\w.])0\.000(0*)(\d+)(?!\w)")
+_SIGNS = {"&lt;=": "&le;", "&gt;=": "&ge;"}
+
+# Between a number and its unit no line ends.
+_UNITS = re.compile(r"(?<=\d) (?=(?:[mk]?[msVNW]|[kM]?Hz|rad|deg|mH|cm|mm|mrad|1/s|%)(?![\w]))")
 
 
 def number(value: Any, digits: int = _DIGITS) -> Html:
@@ -31,7 +36,13 @@ def number(value: Any, digits: int = _DIGITS) -> Html:
     if value and not _SMALL <= abs(value) < _LARGE:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return _with_power(_minus(mantissa), str(int(exponent)))
-    return text(_minus(f"{value:.{digits}g}" if abs(value) < 1000 else f"{value:.0f}"))
+    return text(plain(value, digits))
+
+
+def plain(value: float, digits: int = _DIGITS) -> str:
+    """A number as text for figures; whole numbers have no zeros after the point."""
+    whole = float(value).is_integer() or abs(value) >= 10 ** (digits - 0.5)
+    return _minus(f"{value:.0f}" if whole else f"{value:#.{digits}g}".rstrip("."))
 
 
 def quantity(value: float | None, of: str, digits: int = _DIGITS) -> Html:
@@ -58,11 +69,20 @@ def prose(content: Any) -> Html:
     )
 
 
-def _typeset(plain: str) -> Html:
-    marked = _POWER.sub(lambda found: _with_power(found[1], f"{found[2]}{found[3]}".lstrip("+")), with_symbols(plain))
+def _typeset(words: str) -> Html:
+    marked = _TINY.sub(lambda found: _scientific(len(found[1]), found[2]), with_symbols(words))
+    marked = _POWER.sub(lambda found: _with_power(found[1], f"{found[2]}{found[3]}".lstrip("+")), marked)
     marked = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", marked))
+    for sign, entity in _SIGNS.items():
+        marked = marked.replace(sign, entity)
+    marked = _UNITS.sub("&nbsp;", marked)
     marked = re.sub(r"\^(-?\d)", lambda found: f"<sup>{_minus(found[1])}</sup>", marked)
     return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked))
+
+
+def _scientific(zeros: int, digits: str) -> Html:
+    """0.000ddd with some more zeros, as d.dd times a power of ten."""
+    return _with_power(digits[0] + (f".{digits[1:]}" if digits[1:] else ""), str(-4 - zeros))
 
 
 def _with_power(mantissa: str, exponent: str) -> Html:

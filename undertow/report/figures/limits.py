@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator
 
 from undertow.report.figures import style
+from undertow.report.formats import plain
 
 Named = Sequence[tuple[str, np.ndarray, np.ndarray]]  # name, time, values
 
@@ -24,7 +25,7 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
     for name, _, values in series:
         outside = np.where(np.isfinite(values), np.maximum(values - high, low - values), -np.inf)
         if outside.size and outside.max() > 0:
-            beyond.append(f"{name} to {values[outside.argmax()]:.3g}")
+            beyond.append(f"{name} to {plain(values[outside.argmax()])}")
     if beyond:
         said = f"first {start:.2g} s: {', '.join(beyond)}"
         style.note(panel, said, (1, 1), (0, 2), color=style.INK, ha="right", va="bottom")

@@ -3,6 +3,7 @@
 Only matplotlib's objects are used, never pyplot, and no setting of matplotlib is changed: two threads may plot at once.
 """
 
+import re
 from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
@@ -119,6 +120,5 @@ def note(panel: Axes, text: str, at: tuple[float, float], shift: tuple[float, fl
 
 
 def power(unit: str) -> str:
-    """A unit as matplotlib typesets it: m/s^2 with a raised 2."""
-    base, _, exponent = unit.partition("^")
-    return f"{base}$^{exponent}$" if exponent else unit
+    """A unit, or several, as matplotlib typesets it: m/s^2 with a raised 2."""
+    return re.sub(r"\^(\d)", r"$^\1$", unit)

@@ -5,7 +5,7 @@ import re
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -27,7 +27,7 @@ _PATH = re.compile(r'( d=")([^"]+)(")')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
 
 
-Pdf = Literal["wide", "one-column"]  # as on the page, or rearranged for a column of a journal
+PDF_WIDTHS = ("wide", "one-column")  # as on the page, or rearranged for a column of a journal
 
 Plots = Mapping[str, Callable[[], Figure]]  # functions that make the figures, by name
 
@@ -68,10 +68,10 @@ def pdf(figure: Figure) -> bytes:
     return data.getvalue()
 
 
-def save(figure: Figure, folder: Path, name: str, width: Pdf | None = None) -> tuple[Path, Path]:
-    """Write `name.svg` and `name.png` into a folder, which is made if need be, and `name.pdf` where a width is given.
+def save(figure: Figure, folder: Path, name: str, width: str | None = None) -> tuple[Path, Path]:
+    """Write `name.svg` and `name.png` into a folder, which is made if need be; and `name.pdf` where a width is given.
 
-    A PDF of one column rearranges the figure, which is written last.
+    A PDF of one column rearranges the figure itself.
 
     Raises:
         OSError: the folder cannot be written.
@@ -85,7 +85,7 @@ def save(figure: Figure, folder: Path, name: str, width: Pdf | None = None) -> t
     return vector, raster
 
 
-def save_all(plots: Callable[[], Plots], folder: Path, width: Pdf | None = None) -> Saved:
+def save_all(plots: Callable[[], Plots], folder: Path, width: str | None = None) -> Saved:
     """Make and write figures. A failed figure affects neither the others nor the results.
 
     Args:

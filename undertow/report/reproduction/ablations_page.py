@@ -6,7 +6,7 @@ from typing import Any
 
 from undertow.report.formats import number, prose, unit
 from undertow.report.page import Html, document, join, section, table, tag
-from undertow.reproduction.all_outputs import unit_of
+from undertow.reproduction.ablations.study import unit_of
 
 NAME = "ablations.html"
 TITLE = "Ablations of the paper's controller"
@@ -98,16 +98,12 @@ def numbers_table(one: Ablation) -> Html:
         name = join(variant["name"], tag("span", variant["settings"], class_="said"))
         failed = f"{variant['failures']} of {variant['seeds']}" if variant["failures"] else "0"
         rows.append((name, failed, *(_spread(variant["metrics"].get(metric)) for metric in metrics)))
-    heads = (join(metric.replace("_", " "), " ", unit(_unit(metric))) for metric in metrics)
+    heads = (join(metric.replace("_", " "), " ", unit(unit_of(metric))) for metric in metrics)
     sentence = "Median [95 % interval of the median], and below it the 5 % to 95 % range of the seeds."
     whole = table(
         ("variant and its settings", "ended early", *heads), rows, numeric=range(2, 2 + len(metrics)), wide=True
     )
     return join(tag("p", sentence, class_="small"), whole)
-
-
-def _unit(metric: str) -> str:
-    return "" if metric == "share" else unit_of(metric)
 
 
 def _spread(spread: Mapping[str, float] | None) -> Html:

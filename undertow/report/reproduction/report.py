@@ -26,13 +26,16 @@ _TITLE = "Reproduction of the paper and check of its claims"
 _ELSEWHERE = ("fidelity", "sweep", *horizon_section.CAPTIONS, *CAPTIONS)
 
 
-def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path) -> Path:
+def write_report(
+    results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path, pdf: str | None = None
+) -> Path:
     """Write `report.html`, `ablations.html` if they were run, and every figure into `figures/`.
 
     Args:
         results: contents of results.json; missing parts are left out of the page.
         figures: by name: fig02, fig06, ..., fig13, fidelity, sweep; others are shown after the paper's.
         folder: where to write, created if missing.
+        pdf: width of PDF files; None for none.
 
     Returns:
         The first page.
@@ -45,8 +48,9 @@ def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], fold
     texts |= {"ablations": ablations_page.CAPTION}
     shown = {}
     for name, one in figures.items():
-        vector, _ = save(one, folder / "figures", name)
-        shown[name] = figure(vector.read_text(encoding="utf-8"), name, _alternative(one, name), texts.get(name, name))
+        alternative = _alternative(one, name)
+        vector, _ = save(one, folder / "figures", name, pdf)
+        shown[name] = figure(vector.read_text(encoding="utf-8"), name, alternative, texts.get(name, name))
     page, overview = folder / "report.html", shown.pop("ablations", Html(""))
     page.write_text(document(_TITLE, *_content(results, shown)), encoding="utf-8")
     if robust := results.get("robust_variant"):
@@ -127,10 +131,9 @@ def _audit(claims: list[dict[str, Any]], figures: Mapping[str, Html]) -> list[Ht
         return []
     text = (
         "Each verdict names the run behind it, with the fidelity levels and the simulated time. It does not extend "
-        "beyond these. Run the commands in the folder of this page. Green: the claim holds in these runs. Amber: it "
-        "holds under the stated condition only. Red: it fails. Grey: it could not be decided."
+        "beyond these. Run the commands in the folder of this page."
     )
-    return [tag("p", prose(text)), tables.audit(claims), figures.get("sweep", Html(""))]
+    return [tag("p", prose(text)), tag("p", tables.COLOURS), tables.audit(claims), figures.get("sweep", Html(""))]
 
 
 def _left_open() -> list[Html]:
@@ -148,13 +151,13 @@ def _alternative(one: Figure, name: str) -> str:
     return one.texts[0].get_text() if one.texts else name
 
 
-def write(found: Reproduction, folder: Path) -> Path:
+def write(found: Reproduction, folder: Path, pdf: str | None = None) -> Path:
     """Write the pages and `figures/`; returns the first page.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    return write_report(found.results, make_figures(found), folder)
+    return write_report(found.results, make_figures(found), folder, pdf)
 
 
 def make_figures(found: Reproduction) -> dict[str, Figure]:

@@ -12,6 +12,11 @@ REFERENCE = {
     "rafc": {"tracking_rms": 7.22e-3, "estimation_rms": 1.607, "uncertainty_rms": 3.224, "robust_rms": 1.579},
 }
 
+COLOURS = (
+    "Green: the claim holds in the runs named with it. Amber: it holds under the stated condition only. Red: it fails. "
+    "Grey: these runs do not decide it."
+)
+
 NAMES = {"rcafc": "RCAFC", "rafc": "RAFC"}
 
 _COLUMNS = {
@@ -109,7 +114,7 @@ def glance(claims: list[dict[str, Any]]) -> Html:
         simulated = tag("span", prose(f"Simulated: {claim['simulated']}."), class_="said")
         words = join(prose(claim["claim"]), _condition(claim["verdict"]), simulated)
         items.append(tag("li", link, tag("span", chip(claim["verdict"])), tag("span", words)))
-    return tag("ul", *items, class_="verdicts")
+    return join(tag("p", COLOURS, class_="small"), tag("ul", *items, class_="verdicts"))
 
 
 def provenance(results: dict[str, Any]) -> Html:
