@@ -21,6 +21,7 @@ _POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?!\w)")
 _NEGATIVE = re.compile(r"(?<![\w.)\]}>])-(?=\d)")
 _EITHER = re.compile(r"\+-(?=\s?\d)")
 _TINY = re.compile(r"(?<![\w.])0\.000(0*)(\d+)(?!\w)")
+_RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 _SIGNS = {"&lt;=": "&le;", "&gt;=": "&ge;"}
 
 # Between a number and its unit no line ends.
@@ -40,7 +41,10 @@ def number(value: Any, digits: int = _DIGITS) -> Html:
 
 
 def plain(value: float, digits: int = _DIGITS) -> str:
-    """A number as text for figures; whole numbers have no zeros after the point."""
+    """A number as text, for figures; whole numbers have no zeros after the point."""
+    if value and not _SMALL <= abs(value) < _LARGE:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{_minus(mantissa)} \u00d7 10{str(int(exponent)).translate(_RAISED)}"
     whole = float(value).is_integer() or abs(value) >= 10 ** (digits - 0.5)
     return _minus(f"{value:.0f}" if whole else f"{value:#.{digits}g}".rstrip("."))
 

@@ -3,7 +3,9 @@
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import ScaledTranslation
 
 from undertow.report.figures import style
 
@@ -11,6 +13,7 @@ WIDTH = 3.5  # in
 _TALLEST = 9.0  # in, of a page without margins
 _LOWEST, _NARROWEST = 0.5, 1.0  # in, of a panel
 _GAP = 0.06  # in
+_LINE = 0.15  # in, height of a title
 _FEW = 8  # panels; more of them stand in two columns
 
 
@@ -25,6 +28,8 @@ def one_column(figure: Figure) -> Figure:
         title.remove()
     panels, across = figure.axes, 2 if len(figure.axes) > _FEW else 1
     _label_last(panels, across)
+    for panel in panels:
+        _raise_notes(panel)
     around = [_around(panel, canvas) for panel in panels]
     left, right = (max(sides) for sides in zip(*((one[0], one[1]) for one in around), strict=True))
     own = [panel.get_position().width * figure.get_size_inches()[0] if panel.images else 0.0 for panel in panels]
@@ -55,12 +60,25 @@ def _label_last(panels: list[Axes], across: int) -> None:
         seen.add((i % across, panel.get_xlabel()))
 
 
+def _raise_notes(panel: Axes) -> None:
+    """Lift what stands above a panel beside its title above the title, for which the panel is too narrow."""
+    if not panel.get_title(loc="left"):
+        return
+    for note in panel.texts:
+        if isinstance(note, Annotation) and note.xycoords == "axes fraction" and note.xy[1] == 1 and note.xyann[1] > 0:
+            note.xyann = (note.xyann[0], note.xyann[1] + 72 * _LINE)
+    key = panel.get_legend()
+    if key is not None and key.get_window_extent().y0 >= panel.get_window_extent().y1 - 1:
+        lifted = panel.transAxes + ScaledTranslation(0, _LINE, panel.figure.dpi_scale_trans)
+        key.set_bbox_to_anchor((1.0, 1.0), transform=lifted)
+
+
 def _around(panel: Axes, canvas: FigureCanvasAgg) -> tuple[float, float, float, float]:
     """Space that labels take at the left, at the right, above and below, in."""
     whole, inner = panel.get_tightbbox(canvas.get_renderer()), panel.get_window_extent()
     if whole is None:
         return 0.0, 0.0, 0.0, 0.0
-    sides = inner.x0 - whole.x0, whole.x1 - inner.x1, whole.y1 - inner.y1, inner.y0 - whole.y0
+    sides = inner.x0 - whole.x0 + 2, whole.x1 - inner.x1, whole.y1 - inner.y1, inner.y0 - whole.y0
     return tuple(max(side, 0.0) / panel.figure.dpi for side in sides)  # pyright: ignore[reportReturnType]
 
 
