@@ -23,6 +23,15 @@ AllowCode = Annotated[
     ),
 ]
 
+Pdf = Annotated[
+    str | None,
+    typer.Option(
+        "--pdf",
+        metavar="WIDTH",
+        help="Also write every figure as PDF: wide (as on the page), or one-column (3.5 in, without its title).",
+    ),
+]
+
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
@@ -53,15 +62,16 @@ def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="Skip the parameter sweeps. The other results stay the same.")
     ] = False,
+    pdf: Pdf = None,
 ) -> None:
     """Reproduce the paper.
 
-    The command computes every figure and table of the paper, checks its claims, and writes one HTML page,
-    DIR/report.html.
+    The command computes every figure and table of the paper, checks its claims, and writes two HTML pages,
+    DIR/report.html and DIR/ablations.html.
     """
     from undertow.cli.reproduce import reproduce
 
-    reproduce(out, quick)
+    reproduce(out, quick, pdf)
 
 
 @app.command()
@@ -86,6 +96,7 @@ def simulate(
         ),
     ] = True,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
 ) -> int:
     """Simulate one scenario.
 
@@ -95,7 +106,7 @@ def simulate(
     """
     from undertow.cli.simulate import simulate
 
-    return simulate(scenario, out, overwrite, prediction, allow_code)
+    return simulate(scenario, out, overwrite, prediction, allow_code, pdf)
 
 
 @app.command()
@@ -130,6 +141,7 @@ def tune(
     resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted tuning.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")] = False,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
 ) -> int:
     """Tune the gains of a controller.
 
@@ -140,7 +152,7 @@ def tune(
     """
     from undertow.cli.tune import tune_scenario
 
-    return tune_scenario(scenario, out, method, budget, resume, overwrite, allow_code)
+    return tune_scenario(scenario, out, method, budget, resume, overwrite, allow_code, pdf)
 
 
 @app.command()
@@ -152,6 +164,7 @@ def analyze(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier prediction in DIR.")] = False,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
 ) -> int:
     """Predict closed-loop performance and stability margins without simulating.
 
@@ -161,7 +174,7 @@ def analyze(
     """
     from undertow.cli.analyze import analyze
 
-    return analyze(scenario, out, overwrite, allow_code)
+    return analyze(scenario, out, overwrite, allow_code, pdf)
 
 
 @app.command()
@@ -190,6 +203,7 @@ def campaign(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier campaign in DIR.")] = False,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
 ) -> int:
     """Run a Monte Carlo study or a parameter sweep of one scenario.
 
@@ -200,11 +214,11 @@ def campaign(
 
     if str(campaign) == "status":
         given = {"--out": out, "--resume": resume, "--workers": workers, "--cluster": cluster, "--overwrite": overwrite}
-        given["--allow-code"] = allow_code
+        given |= {"--allow-code": allow_code, "--pdf": pdf}
         return command.status(folder or Path(), [name for name, value in given.items() if value])
     if folder is not None:
         command.refuse_second(folder)
-    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code)
+    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code, pdf)
 
 
 @app.command()

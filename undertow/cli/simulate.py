@@ -12,6 +12,7 @@ from undertow.analysis.linearization.response import compare_metrics
 from undertow.checks.vehicle_lint import vehicle_warnings
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import stage
 from undertow.cli.tables import certificate_table, metrics_table, wide_console
@@ -34,8 +35,11 @@ class PredictedMetrics(NamedTuple):
     why_not: str
 
 
-def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool) -> int:
+def simulate(
+    scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool, pdf: str | None
+) -> int:
     """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
     console = wide_console()
     with (
         output_folder(out, Path("runs") / scenario.stem) as folder,
@@ -47,7 +51,7 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
             write(executed, draft.path, in_results(predicted))
             repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # before the figures, which may fail
-            warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures").failures)
+            warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures", pdf).failures)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
         slower = "the run used backend xla, which is slower than simd (docs/explanation/simd.md)"

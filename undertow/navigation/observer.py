@@ -25,7 +25,7 @@ class NavigationState(NamedTuple):
 
     time: Float[Array, ""]  # of the last step, s
     velocity: Float[Array, "3"]  # true velocity then, m/s; accelerometers measure its change
-    states: tuple[SensorState, ...]  # one per sensor
+    sensors: tuple[SensorState, ...]  # state of each
     estimate: Estimate
     ignored: Int[Array, ""]  # readings so far that were not finite
 
@@ -87,7 +87,7 @@ class Navigation(AbstractInformedNavigation):
         deliveries = [
             sensor.sampling.deliver(states, t, reading, chance)
             for sensor, states, reading, chance in zip(
-                self.sensors, state.states, readings, _chances(realization, numbers, readings), strict=True
+                self.sensors, state.sensors, readings, _chances(realization, numbers, readings), strict=True
             )
         ]
         arrivals = [arrival for arrival, _ in deliveries]

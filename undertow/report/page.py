@@ -58,16 +58,15 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
         first = tag("th", row[0], scope="row", **style(0))
         body.append(tag("tr", first, *(tag("td", cell, **style(i)) for i, cell in enumerate(row[1:], 1))))
     whole = tag("table", *head_rows, tag("tbody", *body), class_="wide" if wide else "fit")
-    return tag("div", whole, class_="scroll", tabindex="0")
+    return tag("div", whole, class_="scroll wide" if wide else "scroll", tabindex="0")
 
 
 def figure(svg: str, name: str, alternative: str, caption: Any) -> Html:
-    """A figure with its caption, embedded in the page."""
+    """A figure with its caption, embedded in the page; it scrolls inside its own box where the screen is narrow."""
     data = base64.b64encode(svg.encode()).decode()
     image = Html(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(alternative)}">')
-    return tag(
-        "figure", tag("div", image, class_="scroll", tabindex="0"), tag("figcaption", caption), id=f"figure-{name}"
-    )
+    box = tag("div", image, class_="scroll wide", tabindex="0")
+    return tag("figure", box, tag("figcaption", caption), id=f"figure-{name}")
 
 
 def section(identity: str, title: str, *content: Any) -> Html:

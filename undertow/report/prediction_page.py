@@ -31,13 +31,15 @@ _CAPTIONS = {
 }
 
 
-def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path) -> list[str]:
-    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`; return sentences on failures.
+def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path, pdf: str | None = None) -> list[str]:
+    """Write `prediction.html`, and every figure into `figures/`; return sentences on failures.
+
+    `pdf` is the width of PDF files; None for none.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    saved = save_all(lambda: prediction_plots(prediction), folder / "figures")
+    saved = save_all(lambda: prediction_plots(prediction), folder / "figures", pdf)
     figures = [tag("p", prose(sentence)) for sentence in saved.failures]
     for name, vector in saved.vectors.items():
         caption = _CAPTIONS[name]

@@ -3,6 +3,7 @@
 Only matplotlib's objects are used, never pyplot, and no setting of matplotlib is changed: two threads may plot at once.
 """
 
+import re
 from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
@@ -14,7 +15,7 @@ from matplotlib.transforms import ScaledTranslation, Transform
 
 TEXT, SMALL, TINY = 8.0, 7.0, 6.2  # pt
 INK, FAINT = "#222222", "#d9d9d9"
-_STEPS = (1, 2, 2.5, 5, 10)  # between ticks
+STEPS = (1, 2, 2.5, 5, 10)  # between ticks
 
 
 class Look(NamedTuple):
@@ -52,8 +53,8 @@ def place(figure: Figure, left: float, top: float, width: float, height: float) 
     panel.tick_params(which="both", left=False, bottom=False, labelsize=SMALL, labelcolor=INK, pad=3)
     panel.grid(True, color=FAINT, linewidth=0.5)
     panel.set_axisbelow(True)
-    panel.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 0.4)), steps=_STEPS))
-    panel.yaxis.set_major_locator(MaxNLocator(4, steps=_STEPS))
+    panel.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 0.4)), steps=STEPS))
+    panel.yaxis.set_major_locator(MaxNLocator(4, steps=STEPS))
     for side, spine in panel.spines.items():
         spine.set_visible(side in ("left", "bottom"))
         spine.set_linewidth(0.6)
@@ -119,6 +120,5 @@ def note(panel: Axes, text: str, at: tuple[float, float], shift: tuple[float, fl
 
 
 def power(unit: str) -> str:
-    """A unit as matplotlib typesets it: m/s^2 with a raised 2."""
-    base, _, exponent = unit.partition("^")
-    return f"{base}$^{exponent}$" if exponent else unit
+    """A unit, or several, as matplotlib typesets it: m/s^2 with a raised 2."""
+    return re.sub(r"\^(\d)", r"$^\1$", unit)
