@@ -30,6 +30,7 @@ app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, 
 def undertow(
     context: typer.Context,
     traceback: Annotated[bool, typer.Option("--traceback", help="Show the traceback of an error.")] = False,
+    short_version: Annotated[bool, typer.Option("--version", help="Show the version of undertow.")] = False,
 ) -> None:
     """Simulate, analyse and tune robust adaptive control of underwater vehicles with voltage-driven thrusters.
 
@@ -38,6 +39,9 @@ def undertow(
     """
     if traceback:
         os.environ["UNDERTOW_TRACEBACK"] = "1"
+    if short_version:
+        typer.echo(f"undertow {importlib.metadata.version('undertow')}")
+        raise typer.Exit
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 

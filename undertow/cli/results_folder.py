@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import os
 import shutil
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -89,10 +90,19 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
     """
     check_folder(folder, names, marker, overwrite)
     staging = _stage(folder)
-    publish = lambda: _publish(staging, folder, names, marker)
+    published = []
+
+    def publish() -> None:
+        _publish(staging, folder, names, marker)
+        published.append(folder)
+
     try:
         yield Draft(staging, publish)
         publish()
+    except KeyboardInterrupt:
+        left = f"The results are in {folder}, without figures" if published else f"No results were written to {folder}"
+        print(f"{left}.", file=sys.stderr)
+        raise
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
