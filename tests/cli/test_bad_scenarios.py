@@ -87,7 +87,7 @@ MISTAKES = {
     "wrong vector length": (
         "position: [2, 3, 4, 0, 0, 1]",
         "position: [2, 3, 4]",
-        "`reference.position` must have 6 entries, one per output of the plant, but is of shape (3,) (s.yaml, line 7)",
+        "`reference.position` must have 6 entries (north, east, down, roll, pitch, yaw), but is 3 long (s.yaml, line 7)",
     ),
     "short centre of gravity": (
         "mass: 125",
@@ -176,12 +176,12 @@ MISTAKES = {
     "record not a multiple of dt": (
         "record: 1e-2",
         "record: 1.5e-3",
-        "`loop.record` must be a whole number of steps (0.001 s), but is 0.0015 s (s.yaml, line 9)",
+        "`loop.record` must be a whole number of steps of `loop.dt` (0.001 s), but is 0.0015 s (s.yaml, line 9). Take 0.001 or 0.002 s",
     ),
     "record shorter than dt": (
         "record: 1e-2",
         "record: 1e-4",
-        "`loop.record` must be a whole number of steps (0.001 s), but is 0.0001 s (s.yaml, line 9)",
+        "`loop.record` must be a whole number of steps of `loop.dt` (0.001 s), but is 0.0001 s (s.yaml, line 9). Take 0.001 s",
     ),
     "unknown loop": (
         "dt: 1e-3",
@@ -197,7 +197,7 @@ MISTAKES = {
     "short initial state": (
         "position: [0, 0, 0, 0, 0, 0]",
         "position: [0, 0]",
-        "`initial.position` must have 6 entries (one per output of the plant), but is 2 long (s.yaml, line 10)",
+        "`initial.position` must have 6 entries (north, east, down, roll, pitch, yaw), but is 2 long (s.yaml, line 10)",
     ),
     "word in the initial state": (
         "position: [0, 0, 0, 0, 0, 0]",

@@ -56,12 +56,12 @@ ERRORS = {
     "missing file": (("simulate", "my_rv.yaml"), "", "", "", ["my_rv.yaml", "`my_rov.yaml`"]),
     "ending left out": (("simulate", "my_rov"), "", "", "", ["my_rov", "`my_rov.yaml`"]),
     "missing folder": (("simulate", "there/s.yaml"), "", "", "", ["there/s.yaml", "no folder there"]),
-    "empty file": (("simulate", "empty.yaml"), "", "", "", ["empty.yaml", "empty", "undertow init"]),
+    "empty file": (("simulate", "empty.yaml"), "", "", "", ["empty.yaml", "empty", "`undertow describe scenario`"]),
     "binary file": (("simulate", "binary.yaml"), "", "", "", ["binary.yaml", "UTF-8"]),
     "misspelt command": (("simulte", "s.yaml"), "", "", "", ["simulte", "Did you mean 'simulate'?"]),
     "misspelt option": (("simulate", "s.yaml", "--overwite"), "", "", "", ["--overwite", "--overwrite"]),
     "misspelt key": (SIMULATE, "s.yaml", "controller:", "contoller:", ["`contoller`", "s.yaml, line 4", "`controller`"]),
-    "key in no section": (SIMULATE, "s.yaml", "  dt: 0.01", "dt: 0.01", ["`dt`", "s.yaml, line 10", "`loop: {dt: ...}`"]),
+    "key in no section": (SIMULATE, "s.yaml", "  record: 0.05", "record: 0.05", ["`record`", "s.yaml, line 11", "`loop: {record: ...}`"]),
     "vehicle in no section": (SIMULATE, "s.yaml", CONTROLLER, "vehicle: odin", ["`vehicle`", "s.yaml, line 4", "`plant`"]),
     "capital letters": (SIMULATE, "s.yaml", "kind: t200", "kind: T200", ["`plant.thruster.kind`", "s.yaml, line 3", "`t200`"]),
     "capital letters of a vehicle": (SIMULATE, "s.yaml", "my_rov.yaml", "BlueROV2", ["s.yaml, line 2", "`bluerov2`"]),
@@ -73,9 +73,9 @@ ERRORS = {
     "fraction of pi": (SIMULATE, "s.yaml", "0, 0.5]", "0, pi/2]", ["`reference.position`", "s.yaml, line 5", "1.5708"]),
     "negative mass": (CHECK, "my_rov.yaml", "mass: 13.5", "mass: -13.5", ["`mass`", "positive", "-13.5 kg", "my_rov.yaml, line 7"]),
     "six outputs": (SIMULATE, "s.yaml", "[2, 0, 1, 0, 0, 0.5]", "[2, 0, 1, 0.5]", ["`reference.position`", "s.yaml, line 5", "north, east, down, roll, pitch, yaw"]),
-    "three forces for six": (SIMULATE, "s.yaml", "{kind: current, velocity: [0.3, 0, 0]}", "{kind: wrench, value: [1, 0, 0]}", ["`disturbance", "s.yaml, line 7", "north, east, down, roll, pitch, yaw"]),
-    "record no multiple": (SIMULATE, "s.yaml", "record: 0.05", "record: 0.025", ["`loop.record`", "s.yaml, line 11", "0.02", "0.03"]),
-    "controller for another plant": (SIMULATE, "s.yaml", CONTROLLER, "controller: ./mine.py:my_law", ["`controller", "s.yaml, line 4", "my_law", "mine.py, line 5"]),
+    "three forces for six": (SIMULATE, "s.yaml", "{kind: current, velocity: [0.3, 0, 0]}", "{kind: wrench, value: [1, 0, 0]}", ["`disturbance[0].value`", "s.yaml, line 7", "surge, sway, heave, roll, pitch, yaw"]),
+    "record no multiple": (SIMULATE, "s.yaml", "record: 0.05", "record: 0.025", ["`loop.record`", "s.yaml, line 11", "0.02 or 0.03 s"]),
+    "controller for another plant": (SIMULATE, "s.yaml", CONTROLLER, "controller: {kind: pid, frequency: [1, 2]}", ["`controller.frequency`", "s.yaml, line 4", "6"]),
     "file without its function": (SIMULATE, "s.yaml", CONTROLLER, "controller: ./mine.py", ["s.yaml, line 4", "./mine.py:my_law"]),
     "function of another name": (SIMULATE, "s.yaml", CONTROLLER, "controller: ./mine.py:my_lw", ["s.yaml, line 4", "`my_law`"]),
     "syntax error": (("check", "./mine.py:my_law"), "mine.py", "(model)", "(model", ["mine.py", "line 4", "SyntaxError"]),
@@ -83,9 +83,9 @@ ERRORS = {
     "sensor without the observer": (SIMULATE, "s.yaml", "loop:", "navigation: dvl\nloop:", ["`navigation.kind`", "s.yaml, line 8", "`navigation.sensors`"]),
     "sensors at the top": (SIMULATE, "s.yaml", "loop:", "sensors: [imu, dvl]\nloop:", ["`sensors`", "s.yaml, line 8", "`navigation"]),
     "observer without an IMU": (SIMULATE, "s.yaml", "loop:", "navigation: {kind: observer, sensors: [dvl]}\nloop:", ["`navigation.sensors`", "s.yaml, line 8", "Add `imu`"]),
-    "file for --out": (("simulate", "s.yaml", "--out", "notes.txt"), "", "", "", ["`--out`", "notes.txt is a file"]),
+    "file for --out": (("simulate", "s.yaml", "--out", "notes.txt"), "", "", "", ["`--out`", "notes.txt, a file", "another name"]),
     "results that exist": (("simulate", "s.yaml", "--out", "old"), "", "", "", ["`--out`", "old, which has run.nc", "--overwrite"]),
-    "nowhere to write": (("simulate", "s.yaml", "--out", "/proc/out"), "", "", "", ["`--out`", "/proc/out"]),
+    "nowhere to write": (("simulate", "s.yaml", "--out", "/proc/out"), "", "", "", ["`--out`", "/proc/out", "Choose"]),
 }  # fmt: skip
 
 
@@ -97,10 +97,10 @@ def prepare(folder, file, old, new):
     (folder / "binary.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\xff")
     (folder / "old").mkdir()
     (folder / "old" / "run.nc").touch()
-    if file:
-        text = (folder / file).read_text()
-        assert old in text
-        (folder / file).write_text(text.replace(old, new, 1))
+    for one, other in zip([old] if isinstance(old, str) else old, [new] if isinstance(new, str) else new, strict=True):
+        text = (folder / (file or "s.yaml")).read_text()
+        assert one in text
+        (folder / (file or "s.yaml")).write_text(text.replace(one, other, 1))
 
 
 @pytest.mark.parametrize("mistake", ERRORS)
@@ -110,3 +110,43 @@ def test_mistake_names_place_and_remedy(refused, tmp_path, mistake):
     said = refused(*arguments)
     print(f"\n{mistake}: {said}") if os.environ.get("SHOW") else None
     assert [one for one in named if one not in said] == [], said
+
+
+WAYPOINTS = "{kind: waypoints, points: [[0, 0, 0], [20, 0, 0], [20, 20, 0]], speed: 0.5}"
+SETPOINT = "{kind: setpoint, position: [2, 0, 1, 0, 0, 0.5]}"
+OBSERVER = "navigation: {kind: observer, sensors: [%s]}\nloop:"
+
+# The mistake in s.yaml (or the vehicle file), and what the advice must have: the two numbers, and the remedy.
+ADVICE = {
+    "heading in degrees": ("s.yaml", "0, 0.5]", "0, 45]", ["`reference`", "yaw at 45 rad", "7.16 turns", "0.7854 rad"]),
+    "start in degrees": ("s.yaml", "loop:", "initial: {position: [0, 0, 0, 0, 0, 90]}\nloop:", ["`initial.position`", "90 rad", "1.571 rad"]),
+    "pitch in degrees": ("s.yaml", "0, 0.5]", "5, 0]", ["pitch", "5 rad (286.5 degrees)", "in radians"]),
+    "height for depth": ("s.yaml", "[2, 0, 1,", "[2, 0, -5,", ["down = -5 m", "5 m above the start", "positive downward"]),
+    "above the surface": ("s.yaml", "[0.3, 0, 0]}", "[0.3, 0, 0]}\n  - {kind: waves, depth: 0.5}\ninitial: {position: [0, 0, -2, 0, 0, 0]}", ["down = -2 m", "down = -0.5 m", "positive downward"]),
+    "current": ("s.yaml", "[0.3, 0, 0]", "[4, 3, 0]", ["current is 5 m/s", "at most 1.32", "drifts away"]),
+    "too far": ("s.yaml", "[2, 0, 1,", "[300, 0, 1,", ["300 m from the start", "at most 1.32", "`loop.duration` more than 20 s"]),
+    "step": ("s.yaml", "[2, 0, 1,", "[25, 0, 1,", ["25.02 m from the vehicle", "at most 1.32", "`settling`"]),
+    "too fast": ("s.yaml", SETPOINT, "{kind: circle, radius: 20, period: 20}", ["6.28 m/s", "at most 1.32"]),
+    "waypoints in time": ("s.yaml", SETPOINT, WAYPOINTS, ["ends at 20 s", "at 80 s", "`loop.duration`"]),
+    "no compass, no position": ("s.yaml", "loop:", OBSERVER % "imu, dvl, depth", ["0.013 m (north and east) and 0.051 degrees (yaw) in 20 s", "`position_fix` and `compass`"]),
+    "long steps": ("s.yaml", "static", "electromechanical", ["0.437 ms", "10 ms", "loop.substeps: 9"]),
+    "radians of a thruster": ("my_rov.yaml", (": -45}", ": 45}", ": -135}", ": 135}"), (": -0.785}", ": 0.785}", ": -2.356}", ": 2.356}"), ["`thrusters[0].azimuth`", "-0.785", "-45 degrees in radians", "Write -45"]),
+}  # fmt: skip
+
+
+class _Stop(BadInput):
+    """Ends a command where it would compile and run."""
+
+
+@pytest.mark.parametrize("mistake", ADVICE)
+def test_advice_names_its_numbers_and_the_remedy(undertow, tmp_path, monkeypatch, mistake):
+    def stop(*arguments):
+        raise _Stop("", "", "stopped")
+
+    monkeypatch.setattr(simulate, "with_prediction", stop)
+    file, old, new, named = ADVICE[mistake]
+    prepare(tmp_path, file, old, new)
+    *advice, last = undertow(*SIMULATE).err.splitlines()
+    assert last == "Error: Stopped" and len(advice) == 1 and advice[0].startswith("Advice: "), advice
+    print(f"\n{mistake}: {advice[0]}") if os.environ.get("SHOW") else None
+    assert [one for one in named if one not in advice[0]] == [], advice

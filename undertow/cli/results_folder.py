@@ -132,11 +132,13 @@ def check_folder(
 def _check_place(folder: Path) -> None:
     for part in (folder, *folder.parents):
         if part.exists() and not part.is_dir():
-            raise BadInput("--out", "be a folder", f"{folder}, and {part} is a file")
+            got = f"{folder}, a file" if part == folder else f"{folder}, and {part} is a file"
+            raise BadInput("--out", "be a folder", got, hint="Choose another name")
 
 
 def _unwritable(folder: Path, error: OSError) -> BadInput:
-    return BadInput("--out", "be a folder that can be written", f"{folder}: {error.strerror}")
+    hint = "Choose a folder of yours"
+    return BadInput("--out", "be a folder that can be written", f"{folder}: {error.strerror}", hint=hint)
 
 
 def _staging_name(folder: Path) -> str:

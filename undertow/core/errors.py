@@ -57,7 +57,7 @@ class BadInput(ValueError):
         for place in reversed(_PLACES.get()):
             where = where or place.location(name)
             where = ", ".join(filter(None, (where, place.note)))
-            name = ".".join(filter(None, (place.key, name)))
+            name = ".".join(filter(None, (place.key, name))).replace(".[", "[")
         self.name, self.must, self.got, self.hint, self.where = name, must, got, hint, where
         super().__init__(name, must, got)
 

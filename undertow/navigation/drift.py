@@ -26,15 +26,19 @@ class _Error(NamedTuple):
 
 
 def drift_advice(sensors: Sequence[AbstractSensor], duration: float) -> tuple[str, ...]:
-    """One sentence for each output that drifts by more than nothing in `duration` (s)."""
-    said = []
-    for what, drift in drifts(sensors, duration).items():
-        shown = f"{np.degrees(drift):.2g} degrees" if what == "yaw" else f"{drift:.2g} m"
-        said.append(
-            f"no sensor measures {what}: the estimate drifts by about {shown} (one standard deviation) in "
-            f"{duration:g} s. Add `{_REMEDIES[what]}` to `navigation.sensors`"
-        )
-    return tuple(said)
+    """A sentence where an output drifts in `duration` (s), with the sensors that prevent it."""
+    found = drifts(sensors, duration)
+    if not found:
+        return ()
+    sizes = {
+        what: f"{np.degrees(size):.2g} degrees" if what == "yaw" else f"{size:.2g} m" for what, size in found.items()
+    }
+    far = " and ".join(f"{size} ({what})" for what, size in sizes.items())
+    remedies = " and ".join(f"`{_REMEDIES[what]}`" for what in found)
+    return (
+        f"no sensor measures {', '.join(found)}: the estimate drifts by about {far} in {duration:g} s, one standard "
+        f"deviation. Add {remedies} to `navigation.sensors`",
+    )
 
 
 def drifts(sensors: Sequence[AbstractSensor], duration: float) -> dict[str, float]:

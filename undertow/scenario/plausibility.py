@@ -105,7 +105,7 @@ def _unfinished(reference: AbstractReference, desired: Motion):
     """A reference that comes to rest after the end of the run."""
     duration = float(desired.time[-1])
     late = _sampled(reference, np.geomspace(duration, _LONG, _SAMPLES), desired.start)
-    goal, size = late.position[-1], 1e-3 * np.ptp(late.position, axis=0).max()
+    goal, size = late.position[-1], 1e-9 * np.ptp(late.position, axis=0).max()
     there = np.abs(late.position - goal).max(axis=1) <= size
     if there.all() or not there[-2:].all() or late.velocity[-2:].any() or size == 0:
         return

@@ -16,7 +16,7 @@ from undertow.scenario.provenance import checksum
 Path_ = tuple[str | int, ...]
 
 _YAML, _RESULT = (".yaml", ".yml"), ".nc"
-_LISTED = 4  # files of a folder that a message names
+_LISTED = 6  # files of a folder that a message names
 
 
 class Text(NamedTuple):
@@ -145,7 +145,8 @@ def parse(text: str, name: str, folder: Path, what: str) -> Text:
     data, lines = load(text, name, what)
     if not isinstance(data, dict):
         got = "empty" if data is None else "a list" if isinstance(data, list) else f"a single {type(data).__name__}"
-        raise BadInput(what, "be a mapping of keys to values", got, where=name)
+        hint = "Write `key: value` lines; `undertow describe scenario` shows the keys"
+        raise BadInput(what, "be a mapping of keys to values", got, where=name, hint=hint)
     return Text(data, name, folder, lines)
 
 

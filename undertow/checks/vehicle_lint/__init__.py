@@ -16,6 +16,7 @@ from undertow.checks.finding import Finding
 from undertow.checks.vehicle_lint import hydrodynamics, layout, mass, statics, transcription
 from undertow.checks.vehicle_lint.layout import scaled
 from undertow.scenario.build import Built
+from undertow.scenario.vehicle_schema import angles_of
 from undertow.vehicles.facts import Facts as Facts
 from undertow.vehicles.facts import facts_of as facts_of
 from undertow.vehicles.vehicle import Vehicle
@@ -24,7 +25,9 @@ _RULES = (*mass.RULES, *statics.RULES, *hydrodynamics.RULES, *layout.RULES, *tra
 
 
 def lint(facts: Facts) -> tuple[Finding, ...]:
-    """All errors and advice on a vehicle, errors first."""
+    """All errors and advice on a vehicle, errors first; angles in radians alone, because they cause others."""
+    if units := tuple(layout.degrees(facts)):
+        return units
     findings = [finding for rule in _RULES for finding in rule(facts)]
     return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
 
@@ -66,20 +69,25 @@ def vehicle_facts(built: Built) -> Facts | None:
     known: dict[str, Any] = {
         key: np.asarray(file[key], dtype=float) for key in ("size", "water_density") if key in file
     }
+    if file:
+        known["angles"] = angles_of(file["thrusters"])
     if "thruster_matrix" in file:
         running = [number - 1 for number in plant.get("thrusters") or range(1, vehicle.thrusters + 1)]
         known["printed_matrix"] = np.asarray(file["thruster_matrix"], dtype=float)[:, running]
     return facts_of(vehicle)._replace(**known)
 
 
-def vehicle_warnings(built: Built) -> tuple[str, ...]:
-    """A sentence for each impossible property, and for a weight that is not that of the mass.
+_SHOWN = ("gravity", "degrees")  # advice that matters before a run
 
-    The latter results from changing the mass only, in a scenario or from trial to trial.
+
+def vehicle_warnings(built: Built) -> tuple[str, ...]:
+    """A sentence for each impossible property, for a weight that is not that of the mass, and for angles in radians.
+
+    A weight differs where only the mass is changed, in a scenario or from trial to trial.
     """
     facts = vehicle_facts(built)
     findings = () if facts is None else lint(facts)
-    shown = [finding for finding in findings if finding.level == "error" or finding.rule == "gravity"]
+    shown = [finding for finding in findings if finding.level == "error" or finding.rule in _SHOWN]
     if _mass_alone(built):
         stays = "With `mass` alone changed, weight and buoyancy stay: give `weight` and `buoyancy`, too"
         shown = [finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in shown]
