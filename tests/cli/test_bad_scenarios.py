@@ -72,12 +72,12 @@ MISTAKES = {
     "quoted number": (
         "duration: 0.1",
         "duration: '1e-3'",
-        "`loop.duration` must be a number, but is '1e-3' (s.yaml, line 9)",
+        "`loop.duration` must be a number, but is '1e-3' (s.yaml, line 9). Write it without quotes: 1e-3",
     ),
     "number for a boolean": (
         "seed: 3",
         "model: {speed_sensor: 1}",
-        "`model.speed_sensor` must be true or false, but is 1 (s.yaml, line 11)",
+        "`model.speed_sensor` must be true or false, but is 1 (s.yaml, line 11). Write true or false, without quotes",
     ),
     "list for a number": (
         "mass: 125",
@@ -212,7 +212,7 @@ MISTAKES = {
     "disturbance of the wrong size": (
         "kind: u1",
         "kind: wrench, value: [1, 2]",
-        "`disturbance.value` must have 6 entries, but is of shape (2,) (s.yaml, line 8)",
+        "`disturbance.value` must have 6 entries (surge, sway, heave, roll, pitch, yaw), but is of shape (2,) (s.yaml, line 8)",
     ),
     "negative noise": (
         "seed: 3",
@@ -228,13 +228,13 @@ MISTAKES = {
     "duplicate key": (
         "seed: 3",
         "seed: 3\nseed: 4",
-        f'{YAML} found duplicate key "seed" with value "4" (original value: "3") (s.yaml, line 12)',
+        f"{YAML} the key `seed` is given twice, first in line 11 (s.yaml, line 12). Remove one of them",
     ),
-    "tab": ("seed: 3", "\tseed: 3", f"{YAML} found character '\\t' that cannot start any token (s.yaml, line 11)"),
+    "tab": ("seed: 3", "\tseed: 3", f"{YAML} it has a tab (s.yaml, line 11). Indent with spaces"),
     "unclosed bracket": (
         "seed: 3",
         "seed: [3",
-        f"{YAML} expected ',' or ']', but got '<stream end>' (s.yaml, line 12)",
+        f"{YAML} a `[` is not closed, or lacks a comma (s.yaml, line 11). Add `]`, and commas between the entries",
     ),
     "unknown alias": ("seed: 3", "seed: *other", f"{YAML} found undefined alias 'other' (s.yaml, line 11)"),
 }
@@ -270,7 +270,9 @@ def test_file_that_is_no_scenario(refused, tmp_path, text, said):
 
 def test_file_that_is_not_text(refused, tmp_path):
     (tmp_path / "s.yaml").write_bytes(b"\xff\xfe\x00\x01")
-    assert refused("simulate", "s.yaml") == "`SCENARIO` must be a text file, but is s.yaml"
+    assert refused("simulate", "s.yaml") == (
+        "`SCENARIO` must be a text file in UTF-8, but is s.yaml. Save it with this encoding"
+    )
 
 
 def test_file_that_is_missing(refused):

@@ -49,7 +49,7 @@ def test_scenario_as_data():
         ),
         (
             {"disturbance": ut.disturbances.wrench([1.0])},
-            "`disturbance.value` must have 6 entries, but is of shape (1,)",
+            "`disturbance.value` must have 6 entries (surge, sway, heave, roll, pitch, yaw), but is of shape (1,)",
         ),
         ({"navigation": 3}, "`navigation` must be an AbstractNavigation, but is a int"),
     ],

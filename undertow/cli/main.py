@@ -124,7 +124,8 @@ def tune(
     method: Annotated[
         str,
         typer.Option(
-            metavar="METHOD", help="gradient (quasi-Newton), or search (differential evolution, for costs not smooth)."
+            metavar="METHOD",
+            help="gradient (quasi-Newton), or search (differential evolution, for costs that are not smooth).",
         ),
     ] = "gradient",
     budget: Annotated[
@@ -230,7 +231,8 @@ def describe(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A part (see `undertow list`), ./file.py:function, a vehicle file, scenario, metrics or signals.",
+            help="A part (see `undertow list`), ./file.py:function, a vehicle file, or one of the words scenario, "
+            "metrics and signals.",
         ),
     ],
 ) -> None:

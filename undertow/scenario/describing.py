@@ -90,10 +90,15 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
         name=name,
         summary=_prose(part),
         options=_options(kind, part),
-        parameters=tuple(parameters(shown)) if described else (),
+        parameters=tuple(map(_depending, parameters(shown))) if described else (),
         advice=advise(),
         signals=_signals(kind, description or name, instance),
     )
+
+
+def _depending(parameter: Parameter) -> Parameter:
+    """A parameter of a class, which a part computes from its options."""
+    return parameter._replace(value="by the options") if parameter.value == "required" else parameter
 
 
 def _instance(kind: str, name: Any, part: Any) -> Any:

@@ -93,8 +93,8 @@ def no_file(path: Path, what: str, must: str = "be an existing file") -> BadInpu
     folder = path.parent
     if not folder.is_dir():
         return BadInput(what, must, str(path), hint=f"There is no folder {folder}")
-    known = [str(folder / one.name) for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)]
-    return BadInput(what, must, str(path), hint=nearest(str(path), known))
+    known = [one.name for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)]
+    return BadInput(what, must, str(path), hint=nearest(path.name, known))
 
 
 def dump(data: Mapping[str, Any]) -> str:

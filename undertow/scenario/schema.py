@@ -75,8 +75,8 @@ class Loop(Strict):
 class Initial(Strict):
     """State at t = 0; zero by default."""
 
-    position: Numbers | None = Field(None, description="one entry per output, m and rad")
-    velocity: Numbers | None = Field(None, description="one entry per output, m/s and rad/s")
+    position: Numbers | None = Field(None, description="one entry per output, m and rad; default: zero")
+    velocity: Numbers | None = Field(None, description="one entry per output, m/s and rad/s; default: zero")
 
 
 class Window(Strict):
@@ -138,7 +138,7 @@ class Tune(Strict):
     train: TrainingRuns = Field(default_factory=TrainingRuns, description="training runs")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     held_out: TrainingRuns = Field(
         default_factory=lambda: TrainingRuns.model_validate({"seeds": 4}),
-        description="held-out runs for the final evaluation; default: 4 seeds",
+        description="held-out runs for the final evaluation",
     )
     weights: Weights = Field(default_factory=Weights, description="weights of the cost")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
 
@@ -148,7 +148,8 @@ class Scenario(Strict):
 
     description: str = Field("", description="free text")
     plant: Annotated[Part, _named("hybrid_vehicle")] = Field(
-        Part(kind="hybrid_vehicle"), description="the system that is controlled"
+        Part(kind="hybrid_vehicle"),
+        description="the system that is controlled: for a vehicle with the options vehicle and thruster",
     )
     model: dict[str, Any] = Field(
         default_factory=dict, description="options of the nominal model, which the controller uses; default: the plant"
@@ -167,8 +168,8 @@ class Scenario(Strict):
     )
     success: dict[str, float] | None = Field(
         None,
-        description="metric -> what it must stay below in the steady window; position_rms 0.05 m and attitude_rms "
-        "0.05 rad unless given",
+        description="metric -> what it must stay below in the steady window; default: position_rms 0.05 m and "
+        "attitude_rms 0.05 rad",
     )
     tune: Tune = Field(default_factory=Tune, description="settings of `undertow tune`")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all random numbers")
@@ -233,7 +234,8 @@ def _must(error: Any) -> str:
 
 def _remedy(error: Any) -> str:
     """How to write what was meant, where a number, or true or false, is missing."""
-    return remedy_of(error["input"]) if error["type"] in ("float_type", "int_type", "bool_type") else ""
+    kind = error["type"]
+    return remedy_of(error["input"], kind == "bool_type") if kind in ("float_type", "int_type", "bool_type") else ""
 
 
 # Sections of parts whose names newcomers write at the top.
@@ -275,18 +277,24 @@ class Key(NamedTuple):
     meaning: str
 
 
-def keys(model: type[BaseModel] = Scenario, prefix: str = "") -> Iterator[Key]:
-    """Every key a scenario may have, nested ones included."""
+def keys(model: type[BaseModel] = Scenario, prefix: str = "", defaults: BaseModel | None = None) -> Iterator[Key]:
+    """Every key a scenario may have, nested ones included.
+
+    Args:
+        model: with the keys.
+        prefix: goes before them.
+        defaults: a section with default values, where these are not those of its class.
+    """
     for name, field in model.model_fields.items():
         inner = field.annotation if isinstance(field.annotation, type) else None
-        meaning = field.description or ""
+        meaning, _, said = (field.description or "").partition("; default: ")
+        default = getattr(defaults, name) if defaults else field.get_default(call_default_factory=True)
         if inner is not None and issubclass(inner, Strict):
             yield Key(f"{prefix}{name}", "mapping", "see below", meaning)
-            yield from keys(inner, f"{prefix}{name}.")
+            yield from keys(inner, f"{prefix}{name}.", default)
         else:
-            default = field.get_default(call_default_factory=True)
             shown = default.kind if isinstance(default, Part) else "required" if field.is_required() else default
-            yield Key(f"{prefix}{name}", _type_name(field.annotation), shown, meaning)
+            yield Key(f"{prefix}{name}", _type_name(field.annotation), said or shown, meaning)
 
 
 def _type_name(annotation: Any) -> str:

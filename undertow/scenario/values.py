@@ -35,7 +35,7 @@ def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
     plain = all(kind in _WORDS for kind in kinds)
     if not (any(_is(value, kind) for kind in kinds) if plain else _numbers(value)):
         must = " or ".join(_WORDS[kind] for kind in kinds) if plain else "a number or a list of numbers"
-        raise BadInput(name, f"be {must}", repr(value), hint=remedy_of(value))
+        raise BadInput(name, f"be {must}", repr(value), hint=remedy_of(value, bool in kinds))
     if int in kinds and value is not None and abs(value) > _LARGEST_COUNT:
         raise BadInput(name, f"be at most {_LARGEST_COUNT}", value)
     if not isinstance(value, str):
@@ -49,15 +49,13 @@ def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
     return value
 
 
-def remedy_of(value: Any) -> str:
-    """How to write what was meant as a number or as true or false; "" where that is unknown."""
+def remedy_of(value: Any, yes_or_no: bool = False) -> str:
+    """How to write what was meant as a number, or as true or false; "" where that is unknown."""
     if isinstance(value, list):
         return next(filter(None, map(remedy_of, value)), "")
-    if not isinstance(value, str):
-        return ""
+    if yes_or_no or not isinstance(value, str):
+        return "Write true or false, without quotes" if yes_or_no else ""
     text = value.strip()
-    if text.lower() in ("yes", "no", "on", "off", "true", "false"):
-        return "Write true or false, without quotes"
     if _NUMBER.fullmatch(text):
         return f"Write it without quotes: {text}"
     if _NUMBER.fullmatch(text.replace(",", ".", 1)):
