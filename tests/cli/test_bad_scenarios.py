@@ -77,7 +77,7 @@ MISTAKES = {
     "number for a boolean": (
         "seed: 3",
         "model: {speed_sensor: 1}",
-        "`model.speed_sensor` must be true or false, but is 1 (s.yaml, line 11). Write true or false, without quotes",
+        "`model.speed_sensor` must be true or false, but is 1 (s.yaml, line 11)",
     ),
     "list for a number": (
         "mass: 125",

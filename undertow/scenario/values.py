@@ -53,8 +53,8 @@ def remedy_of(value: Any, yes_or_no: bool = False) -> str:
     """How to write what was meant as a number, or as true or false; "" where that is unknown."""
     if isinstance(value, list):
         return next(filter(None, map(remedy_of, value)), "")
-    if yes_or_no or not isinstance(value, str):
-        return "Write true or false, without quotes" if yes_or_no else ""
+    if not isinstance(value, str) or yes_or_no:
+        return "Write it without quotes" if yes_or_no and str(value).lower() in ("true", "false") else ""
     text = value.strip()
     if _NUMBER.fullmatch(text):
         return f"Write it without quotes: {text}"
@@ -64,7 +64,7 @@ def remedy_of(value: Any, yes_or_no: bool = False) -> str:
         size = float(turn[2] or 1) * math.pi / float(turn[3] or 1)
         return f"Write the number: {turn[1]}{size:.6g}"
     if _NUMBER.match(text):
-        return "Write the number alone, in the unit that `undertow describe` names"
+        return "Write the number alone, without a unit"
     return ""
 
 
