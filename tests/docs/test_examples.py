@@ -80,7 +80,7 @@ def test_python_api(capsys):
 
 @pytest.mark.slow
 def test_mujoco_comparison(capsys, tmp_path):
-    """Not worse than docs/independent-physics.md says."""
+    """Not worse than docs/how-to/independent-physics.md says."""
     found = example("mujoco_comparison").main(fast=True, figure=str(tmp_path / "agreement.png"))
     said = {"nu_dot": 1e-12, "position": 1e-7, "attitude": 1e-7, "voltage": 1e-5}
     assert len(found) == 4

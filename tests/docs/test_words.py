@@ -1,4 +1,4 @@
-"""Words that were retired in favour of the field's own (docs/glossary.md) do not come back: in names, keys, help, text.
+"""Words that were retired in favour of the field's own (see the glossary) do not come back: in names, keys, help, text.
 
 A retired word is looked for as a whole word and as a part of a name (`told`, `as_told`, `ToldLaw`), ignoring case.
 """
@@ -67,7 +67,7 @@ RETIRED = {
 
 # A file (or a folder) and the retired words that mean something else there.
 ALLOWED = {
-    "docs/simd.md": {r"lanes?"},  # vector lanes of a processor
+    "docs/explanation/simd.md": {r"lanes?"},  # vector lanes of a processor
     "undertow/report/figures": {r"ticks?"},  # matplotlib's axes
 }
 

@@ -49,7 +49,7 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
     advice: dict[str, str] = {}
     for row, built in firsts:
         _check(campaign, built, metrics)
-        for sentence in (*built.advice(), *vehicle_warnings(built)):
+        for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
     by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
     why = unavailable() if by_simd else ""

@@ -140,7 +140,7 @@ def _of_scenario(text: Text) -> list[Report]:
     loop = built.closed_loop
     said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
     reports = [_report(said, title="scenario")]
-    if (facts := vehicle_facts(built)) is not None:
+    if (facts := vehicle_facts(loop.plant, built.resolved["plant"])) is not None:
         reports.append(_of_vehicle(facts, lambda key: text.location("plant.vehicle")))
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
         reports.append(_of_thruster(thruster, "thruster"))

@@ -50,7 +50,8 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
             warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures").failures)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
-        typer.echo(f"Advice: the run used backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
+        slower = "the run used backend xla, which is slower than simd (docs/explanation/simd.md)"
+        typer.echo(f"Advice: {slower}: {why}.", err=True)
     expected = predicted.metrics if predicted else None
     console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
     if predicted:
@@ -68,7 +69,7 @@ def _run(path: Path, console: Console, prediction: bool, allow_code: bool) -> tu
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
         built = build(text)
-    for sentence in (*built.advice(), *vehicle_warnings(built)):
+    for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
         typer.echo(f"Advice: {sentence}", err=True)
     with stage(console, "compiling, running and predicting" if prediction else "compiling and running"):
         return interruptible(lambda: with_prediction(lambda: execute(built), built, prediction))

@@ -53,7 +53,7 @@ def drifts(sensors: Sequence[AbstractSensor], duration: float) -> dict[str, floa
     noise, bias = (np.broadcast_to(np.asarray(one, dtype=float), 8) for one in (imu.sampling.noise, imu.sampling.bias))
     g, period = float(gravity()[2]), float(imu.sampling.period)
     error = lambda index, of_gravity: _Error(
-        period * (noise[index] ** 2 + (of_gravity * noise[0]) ** 2), np.hypot(bias[index], of_gravity * bias[0])
+        period * (noise[index] ** 2 + (of_gravity * noise[0]) ** 2), float(np.hypot(bias[index], of_gravity * bias[0]))
     )
     found = {}
     if not {"north", "east"} <= fixed:
@@ -72,7 +72,7 @@ def _of_position(sensors: Sequence[AbstractSensor], acceleration: _Error, axis: 
             held = float(one.sampling.period / one.blend)
             offset = float(np.ravel(np.broadcast_to(np.asarray(one.sampling.bias, dtype=float), 3))[axis])
             density = float(one.sampling.period) * noise**2 + acceleration.density * held**2
-            return _once(_Error(density, np.hypot(offset, acceleration.offset * held)), duration)
+            return _once(_Error(density, float(np.hypot(offset, acceleration.offset * held))), duration)
     return float(np.sqrt(acceleration.density * duration**3 / 3 + (acceleration.offset * duration**2 / 2) ** 2))
 
 

@@ -64,9 +64,11 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
     counted = {} if rules(loop) is None else {"rules": rules(loop)}
     covered = status is Status.OK and how.window[0] < ended
     dataset = to_dataset(outcome, loop)
-    over = lambda start, stop: (
-        measure(outcome, loop.plant, start, stop, how.own) | closure(dataset, start, stop) | counted
-    )
+
+    def over(start: float, stop: float) -> dict[str, Any]:
+        residuals = closure(dataset, start, stop)
+        return measure(outcome, loop.plant, start, stop, how.own) | residuals | counted
+
     # A run ended by an invalid command has no input at that instant.
     last = ended - how.dt / 2 if status is Status.COMMAND_NOT_FINITE else ended
     steady, whole = over(*how.window) if covered else None, over(0.0, last)

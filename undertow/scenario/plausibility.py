@@ -175,7 +175,7 @@ def _members(loop: ClosedLoop, kind: type) -> list:
 
 def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) -> Motion:
     at = _targets(reference, jnp.asarray(time))
-    return Motion(time, *(np.asarray(part, dtype=float) for part in at[:2]), start)
+    return Motion(time, np.asarray(at.position, dtype=float), np.asarray(at.velocity, dtype=float), start)
 
 
 @eqx.filter_jit

@@ -264,8 +264,9 @@ def _keys_beside(path: tuple, model: Any) -> list[str]:
 
 def _beside_none(annotation: Any) -> Any:
     """The type of an optional value without None."""
-    members = [one for one in typing.get_args(annotation) if one is not type(None)]
-    return members[0] if len(members) == 1 else annotation
+    members = typing.get_args(annotation)
+    others = [one for one in members if one is not type(None)]
+    return others[0] if len(others) == 1 < len(members) else annotation
 
 
 class Key(NamedTuple):
@@ -302,16 +303,19 @@ def _type_name(annotation: Any) -> str:
         return "part"
     if typing.get_origin(annotation) is Literal:
         return " or ".join(typing.get_args(annotation))
+    annotation = _beside_none(annotation)
+    if typing.get_origin(annotation) is Annotated:
+        annotation = typing.get_args(annotation)[0]
     words = {
         float: "number",
         bool: "true or false",
         int: "integer",
         str: "text",
         Numbers: "list of numbers",
-        Numbers | None: "list of numbers",
-        float | None: "number",
-        list[str] | None: "list of names",
+        list[str]: "list of names",
+        list[Any]: "list of values",
         list[NamedPart]: "list of parts",
         typing.get_args(OneOrMore)[0]: "part or list of parts",
+        str | dict[str, Any]: "name of a file, or mapping",
     }
     return words.get(annotation, "mapping")

@@ -1,4 +1,4 @@
-"""A vehicle from a YAML file. See docs/your-own-vehicle.md."""
+"""A vehicle from a YAML file. See docs/how-to/your-own-vehicle.md."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -54,7 +54,7 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
         raise BadInput("contents", "be a mapping, as in a vehicle file", kept)
     text = read(path, what) if kept is None else from_data(kept)
     if kept is None and (kind := kind_of(text.data)) in ("scenario", "campaign"):
-        hint = "A vehicle file has the keys mass, inertia, thrusters, ...: see docs/your-own-vehicle.md"
+        hint = "A vehicle file has the keys mass, inertia, thrusters, ..., as in examples/my_rov.yaml"
         raise BadInput(what, "be a vehicle file", f"{path.name}, a {kind}", hint=hint)
     forgotten = {other for key in changes for other in INSTEAD.get(key, ())} - set(changes)
     contents = {"name": path.stem, **text.data, **changes}
