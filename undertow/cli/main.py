@@ -39,6 +39,7 @@ app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, 
 def undertow(
     context: typer.Context,
     traceback: Annotated[bool, typer.Option("--traceback", help="Show the traceback of an error.")] = False,
+    short_version: Annotated[bool, typer.Option("--version", help="Show the version of undertow.")] = False,
 ) -> None:
     """Simulate, analyse and tune robust adaptive control of underwater vehicles with voltage-driven thrusters.
 
@@ -47,6 +48,9 @@ def undertow(
     """
     if traceback:
         os.environ["UNDERTOW_TRACEBACK"] = "1"
+    if short_version:
+        typer.echo(f"undertow {importlib.metadata.version('undertow')}")
+        raise typer.Exit
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 
@@ -131,7 +135,8 @@ def tune(
     method: Annotated[
         str,
         typer.Option(
-            metavar="METHOD", help="gradient (quasi-Newton), or search (differential evolution, for costs not smooth)."
+            metavar="METHOD",
+            help="gradient (quasi-Newton), or search (differential evolution, for costs that are not smooth).",
         ),
     ] = "gradient",
     budget: Annotated[
@@ -281,7 +286,8 @@ def describe(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A part (see `undertow list`), ./file.py:function, a vehicle file, scenario, metrics or signals.",
+            help="A part (see `undertow list`), ./file.py:function, a vehicle file, or one of the words scenario, "
+            "metrics and signals.",
         ),
     ],
 ) -> None:

@@ -91,10 +91,15 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
         name=name,
         summary=_prose(part),
         options=_options(kind, part),
-        parameters=tuple(parameters(shown)) if described else (),
+        parameters=tuple(map(_depending, parameters(shown))) if described else (),
         advice=advise(),
         signals=_signals(kind, description or name, instance),
     )
+
+
+def _depending(parameter: Parameter) -> Parameter:
+    """A parameter of a class, which a part computes from its options."""
+    return parameter._replace(value="by the options") if parameter.value == "required" else parameter
 
 
 def _instance(kind: str, name: Any, part: Any) -> Any:
@@ -148,8 +153,8 @@ def _meanings(text: str) -> dict[str, str]:
 
 def text_of(value: Any) -> str:
     """A short text for the value of an option, a parameter or a key; a diagonal matrix is shown as its diagonal."""
-    if isinstance(value, str) or value is None:
-        return "none" if value is None else value
+    if isinstance(value, str) or value is None or (isinstance(value, list | dict) and not value):
+        return value if isinstance(value, str) else "none"
     if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
         return str(value).lower()
     if isinstance(value, list | tuple) and any(isinstance(entry, str) for entry in value):
