@@ -14,17 +14,19 @@ from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import stage
-from undertow.cli.tables import certificate_table, metrics_table, wide_console
+from undertow.cli.tables import terminal_table, wide_console
 from undertow.core.status import Status
 from undertow.core.user_code import python_says
 from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.figures import run_plots, save_all
+from undertow.report.run_page import write_run_page
+from undertow.report.run_tables import certificate_rows, metrics_rows
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.execute import Executed, execute, write
 from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of
 from undertow.scenario.reading import read
 
-_WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
+_WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures", "run.html")
 
 
 class PredictedMetrics(NamedTuple):
@@ -43,20 +45,27 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
     ):
         executed, predicted = _run(scenario, console, prediction, allow_code)
         known, certificate = metrics_of(executed.dataset), certificate_of(executed.dataset)
-        with stage(console, "files and figures"):
+        expected = predicted.metrics if predicted else None
+        with stage(console, "files, figures and page"):
             write(executed, draft.path, in_results(predicted))
             repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # before the figures, which may fail
-            warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures").failures)
+            saved = save_all(lambda: run_plots(executed.dataset), draft.path / "figures")
+            loop, vectors = (
+                executed.built.closed_loop,
+                {n: file.read_text("utf-8") for n, file in saved.vectors.items()},
+            )
+            warn_of(saved.failures)
+            warn_of(write_run_page(draft.path / "run.html", executed.dataset, loop, vectors, expected))
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
         typer.echo(f"Advice: the run used backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
-    expected = predicted.metrics if predicted else None
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
+    window = executed.built.window()
+    console.print(terminal_table(metrics_rows(executed.steady, executed.whole, window, known, expected)))
     if predicted:
         console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)
     if certificate is not None:
-        console.print(certificate_table(certificate, executed.built.window()))
+        console.print(terminal_table(certificate_rows(certificate, window)))
     verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
     console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
     codes = [_ending_code(executed)] + ([_repetition_code(repetition, console)] if repetition else [])

@@ -1,4 +1,4 @@
-"""One self-contained HTML page: no script, nothing loaded from anywhere, readable on a phone and on paper."""
+"""One self-contained HTML page: nothing loaded from anywhere, readable on a phone and on paper."""
 
 import base64
 import html
@@ -75,9 +75,9 @@ def section(identity: str, title: str, *content: Any) -> Html:
     return tag("section", tag("h2", title), *content, id=identity)
 
 
-def document(title: str, *content: Any) -> str:
-    """The whole page as text."""
-    looks = files("undertow.report").joinpath("page.css").read_text(encoding="utf-8")
+def document(title: str, *content: Any, looks: str = "") -> str:
+    """The whole page as text; `looks` are style sheets of its own."""
+    looks = files("undertow.report").joinpath("page.css").read_text(encoding="utf-8") + looks
     head = (
         f'<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{html.escape(title)}</title><style>{looks}</style>"
