@@ -7,6 +7,7 @@
   const COLOUR = { water: "#1695a3", uncertainty: "#222222", estimate: "#d1495b", faint: "#d9d9d9", ink: "#222222" };
   const OUTPUT_AXES = ["north", "east", "down", "roll", "pitch", "yaw"];
   const BODY_AXES = ["surge", "sway", "heave", "roll", "pitch", "yaw"];
+  const LEAST_FOR_NAMES = 80; // px; names of thrusters would cover each other on a smaller vehicle
   const SPEEDS = [0.25, 0.5, 1, 2, 5, 10, 20];
   const UP = new THREE.Vector3(0, 1, 0);
 
@@ -105,7 +106,7 @@
     const slider = element("input", { type: "range", min: start, max: end, step: 0.01, value: start, "aria-label": "time" });
     const time = element("output", { class: "time" });
     const speed = choice("speed", SPEEDS.map((one) => [one, `${one} times`]), 1);
-    const camera = choice("camera", [["whole", "whole path"], ["follow", "follow"], ["top", "from above"]], "whole");
+    const camera = choice("camera", [["follow", "follow"], ["whole", "whole path"], ["top", "from above"]], "follow");
     const which = choice("run", runs.map((run, i) => [i, run.label]), 0);
     const labels = switchOf("names"), forces = switchOf("disturbance");
     const options = element(
@@ -161,16 +162,16 @@
     arrow.head.position.y = length - tip / 2;
   }
 
-  // A hull as a box with a cone on its bow and a light plate on top.
+  // A hull as a box with a cone on its bow and a light plate on top; one sees the arrows inside it.
   function makeHull(run, colour, opacity) {
     const [length, width, height] = run.size;
-    const look = (shade) => new THREE.MeshLambertMaterial({ color: shade, transparent: true, opacity, depthWrite: opacity > 0.5 });
+    const look = (shade, share = opacity) => new THREE.MeshLambertMaterial({ color: shade, transparent: true, opacity: share, depthWrite: false });
     const hull = new THREE.Group();
     const box = new THREE.BoxGeometry(length, width, height);
-    const bow = new THREE.Mesh(new THREE.ConeGeometry(0.3 * Math.min(width, height), 0.25 * length, 20), look(colour));
+    const bow = new THREE.Mesh(new THREE.ConeGeometry(0.3 * Math.min(width, height), 0.25 * length, 20), look(colour, 2 * opacity));
     bow.rotation.z = -Math.PI / 2;
     bow.position.x = 0.625 * length;
-    const top = new THREE.Mesh(new THREE.BoxGeometry(0.7 * length, 0.7 * width, 0.05 * height), look("#ffffff"));
+    const top = new THREE.Mesh(new THREE.BoxGeometry(0.7 * length, 0.7 * width, 0.05 * height), look("#ffffff", 1.5 * opacity));
     top.position.z = -0.525 * height;
     hull.add(new THREE.Mesh(box, look(colour)), bow, top);
     hull.add(new THREE.LineSegments(new THREE.EdgesGeometry(box), new THREE.LineBasicMaterial({ color: colour })));
@@ -197,12 +198,12 @@
     const vehicle = {
       run, arrows,
       body: new THREE.Group(),
-      ghost: makeHull(run, "#9a9a9a", 0.25),
+      ghost: makeHull(run, "#9a9a9a", 0.2),
       path: makePath(run, "position", run.colour, 3, false),
       reference: makePath(run, "desired_position", "#777777", 1.5, true),
       uncertainty: makeArrow(COLOUR.uncertainty), estimate: makeArrow(COLOUR.estimate), water: makeArrow(COLOUR.water),
     };
-    vehicle.body.add(makeHull(run, run.colour, 0.8), ...arrows);
+    vehicle.body.add(makeHull(run, run.colour, 0.4), ...arrows);
     world.add(vehicle.body, vehicle.ghost, vehicle.path, vehicle.reference);
     world.add(vehicle.uncertainty, vehicle.estimate, vehicle.water);
     return vehicle;
@@ -218,7 +219,7 @@
       }
     }
     const longest = Math.max(...runs.map((run) => run.longest));
-    return { box: extent.expandByScalar(longest), longest };
+    return { box: extent.expandByScalar(0.6 * longest), longest };
   }
 
   function niceStep(length) {
@@ -264,18 +265,32 @@
     return vector(worldPoint).applyMatrix4(worldToScreen());
   }
 
-  // Place the camera: over the whole path, behind and above the vehicle, or straight above it with north at the top.
+  // Place the camera: over the whole path, behind and above the vehicle, or straight above the path with north at the top.
   function placeCamera(scene, kind, position) {
     const { camera, controls, box, longest } = scene, here = screenPoint(position);
-    const centre = kind === "whole" ? box.getCenter(new THREE.Vector3()) : here;
-    const radius = kind === "follow" ? 2.2 * longest : box.getSize(new THREE.Vector3()).length() / 2;
-    const distance = (1.05 * radius) / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, camera.aspect);
+    const shown = kind === "follow" ? new THREE.Box3(here, here.clone()).expandByScalar(0.85 * longest) : box;
     const direction = kind === "top" ? new THREE.Vector3(0, 1, 1e-4) : new THREE.Vector3(0.55, 0.5, 0.8);
-    if (kind === "top") box.getCenter(centre);
-    controls.target.copy(centre);
-    camera.position.copy(centre).addScaledVector(direction.normalize(), distance);
+    shown.getCenter(controls.target);
+    fitInView(camera, shown, controls.target, direction.normalize());
     controls.update();
     scene.followed = kind === "follow" ? here : null;
+  }
+
+  // Distance at which a box just fills the view: its size there is inversely proportional to the distance, nearly.
+  function fitInView(camera, box, centre, direction) {
+    let distance = 2 * box.getSize(new THREE.Vector3()).length();
+    for (let step = 0; step < 4; step += 1) {
+      camera.position.copy(centre).addScaledVector(direction, distance);
+      camera.lookAt(centre);
+      camera.updateMatrixWorld();
+      let most = 0;
+      for (let corner = 0; corner < 8; corner += 1) {
+        const at = [corner & 1, corner & 2, corner & 4].map((high, i) => (high ? box.max : box.min).getComponent(i));
+        const seen = vector(at).project(camera);
+        most = Math.max(most, Math.abs(seen.x), Math.abs(seen.y));
+      }
+      distance *= most / 0.92;
+    }
   }
 
   // Move the camera with the vehicle, as far as it has moved since the last frame.
@@ -287,10 +302,9 @@
     scene.controls.update();
   }
 
-  // Blue for little, orange for half, red for all.
+  // Amber for little, red for all.
   function shareColour(share) {
-    const low = new THREE.Color("#0072b2"), middle = new THREE.Color("#e6a100"), high = new THREE.Color("#c1121f");
-    return share < 0.5 ? low.lerp(middle, 2 * share) : middle.lerp(high, Math.min(1, 2 * share - 1));
+    return new THREE.Color("#eab64d").lerp(new THREE.Color("#b3001b"), Math.min(1, share));
   }
 
   function shareOfLimit(thruster, thrust) {
@@ -309,7 +323,7 @@
       const share = shareOfLimit(thruster, thrust[i]), arrow = vehicle.arrows[i];
       arrow.material.color.copy(shareColour(share));
       const along = vector(thruster.direction).multiplyScalar(Math.sign(thrust[i]));
-      setArrow(arrow, vector(thruster.position), along, 0.9 * share * run.longest, thin);
+      setArrow(arrow, vector(thruster.position), along, 1.5 * share * run.longest, thin);
     });
     for (const name of ["uncertainty", "estimate"]) {
       const along = run.series[name] && showForces ? vector(at(name)) : new THREE.Vector3();
@@ -358,12 +372,13 @@
       const { run } = vehicle;
       if (runs.length > 1) write(run.label, within(vehicle.body, new THREE.Vector3(0, 0, -0.8 * run.size[2])), run.colour);
       if (!page.labels.checked) return;
-      for (const thruster of run.thrusters) {
-        write(thruster.name.split(" ")[0], within(vehicle.body, vector(thruster.position)), COLOUR.ink);
-      }
       if (vehicle.water.visible) {
         const speed = Math.hypot(...valueAt(run, "water", time));
-        write(`water ${speed.toFixed(2)} m/s`, within(scene.world, vehicle.water.position.clone()), COLOUR.water);
+        write(`water ${speed.toFixed(2)} m/s`, within(scene.world, vehicle.water.position.clone().add(new THREE.Vector3(0, 0, -0.12 * run.longest))), COLOUR.water);
+      }
+      if (sizeInView(scene, vehicle, width) < LEAST_FOR_NAMES) return;
+      for (const thruster of run.thrusters) {
+        write(thruster.name.split(" ")[0], within(vehicle.body, vector(thruster.position)), COLOUR.ink);
       }
     });
     paintCompass(pen, scene.camera, height);
@@ -371,6 +386,12 @@
     pen.textAlign = "right";
     pen.fillText(`grid ${Number(scene.step.toPrecision(3))} m`, width - 8, height - 12);
     pen.textAlign = "left";
+  }
+
+  // Length of a vehicle in the view, px.
+  function sizeInView(scene, vehicle, width) {
+    const { camera } = scene, away = camera.position.distanceTo(screenPoint(vehicle.body.position.toArray()));
+    return (width * vehicle.run.longest) / (2 * away * Math.tan((camera.fov * Math.PI) / 360) * camera.aspect);
   }
 
   // Directions of north, east and down as the camera sees them.
@@ -424,7 +445,7 @@
     const thrust = valueAt(run, "thrust", time);
     run.thrusters.forEach((thruster, i) => {
       const share = shareOfLimit(thruster, thrust[i]);
-      const bar = paintRow(pen, width, 18 * i, 18, thruster.name, `${withDigits(thrust[i])} N`);
+      const bar = paintRow(pen, width, 18 * i, 18, thruster.name, `${withDigits(thrust[i], thruster.limits[1])} N`);
       bar(Math.sign(thrust[i]) * share, 4, 10, `#${shareColour(share).getHexString()}`);
     });
   }
@@ -433,7 +454,7 @@
     const actual = valueAt(run, "uncertainty", time);
     const estimate = run.series.estimate ? valueAt(run, "estimate", time) : null;
     run.axes.forEach((axis, i) => {
-      const bar = paintRow(pen, width, 20 * i, 20, axis, withDigits(actual[i]));
+      const bar = paintRow(pen, width, 20 * i, 20, axis, withDigits(actual[i], run.scale.uncertainty[i]));
       bar(actual[i] / run.scale.uncertainty[i], 3, 6, COLOUR.uncertainty);
       if (estimate) bar(estimate[i] / run.scale.uncertainty[i], 10, 6, COLOUR.estimate);
     });
@@ -466,13 +487,15 @@
     return peaks;
   }
 
-  function withDigits(value) {
-    const digits = Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 1 : Math.abs(value) >= 0.01 || value === 0 ? 2 : 4;
-    return value.toFixed(digits).replace("-", "\u2212");
+  // A number with as many decimals as tell 1/500 of the scale, and no negative zero.
+  function withDigits(value, scale) {
+    const text = value.toFixed(Math.min(Math.max(2 - Math.floor(Math.log10(scale)), 0), 6));
+    return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
   }
 
   function showReadings(page, runs, time) {
-    const row = (kind, cells) => element("tr", {}, ...cells.map((cell) => element(kind, {}, cell)));
+    const named = (cells) => (runs.length > 1 ? cells : cells.slice(1));
+    const row = (kind, cells) => element("tr", {}, ...named(cells).map((cell) => element(kind, {}, cell)));
     const head = ["", "position error, m", "attitude error, deg", "energy, J"];
     const rows = runs.map((run) => {
       const [position, attitude] = valueAt(run, "error", time), [energy] = valueAt(run, "energy", time);
@@ -568,6 +591,9 @@
       event.preventDefault();
     }
 
+    // `run.html#t=12` opens at 12 s.
+    const asks = /^#t=([\d.]+)$/.exec(window.location.hash);
+    if (asks) setTime(Number(asks[1]));
     page.play.addEventListener("click", () => setPlaying(!playing));
     page.slider.addEventListener("input", () => setTime(Number(page.slider.value)));
     page.camera.addEventListener("change", () => { placeCamera(scene, page.camera.value, place()); ask(); });
@@ -576,8 +602,6 @@
     box.addEventListener("keydown", pressed);
     new ResizeObserver(resize).observe(page.view);
     resize();
-    const path = scene.box.getSize(new THREE.Vector3()).length();
-    page.camera.value = path > 14 * scene.longest ? "follow" : "whole";
     placeCamera(scene, page.camera.value, place());
     show();
   }

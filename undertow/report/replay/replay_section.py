@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from importlib.resources import files
 
+from undertow.report.formats import prose
 from undertow.report.page import Html, section, tag
 from undertow.report.replay.replay_data import Replay, page_data
 
@@ -13,7 +14,7 @@ _MISSING = (
 )
 _KEYS = (
     "Drag to turn the view, drag with two fingers or the right button to move it; click it before you zoom with the "
-    "wheel. Space plays and pauses, the arrow keys step by 1 s (with Shift by 10 s). Arrows at the thrusters show the "
+    "wheel. Space plays and pauses, the arrow keys step by 1 s (with Shift by 10 s), and `#t=12` after the address of the page opens it at 12 s. Arrows at the thrusters show the "
     "force on the vehicle, computed from the recorded input with the model of the thruster."
 )
 
@@ -31,7 +32,7 @@ def replay_section(replays: Sequence[Replay]) -> Html:
         "replay",
         "Replay",
         Html('<div class="replay" data-source="replay-data"><p>The replay needs JavaScript.</p></div>'),
-        tag("p", _KEYS, class_="small"),
+        tag("p", prose(_KEYS), class_="small"),
         Html(f'<script type="application/json" id="replay-data">{page_data(replays)}</script>'),
         Html(f"<script>{three}</script>"),
         Html(f"<script>{script}</script>"),
