@@ -77,9 +77,11 @@ class Run:
         Raises:
             OSError: the file cannot be written.
         """
-        from undertow.report.run_page import write_run_page
+        from undertow.report.run_page import shown, write_run_page
 
-        for sentence in write_run_page(Path(path), self.dataset, self.loop):
+        parts = shown(self.dataset, self.loop)
+        write_run_page(Path(path), self.dataset, parts)
+        for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)
 
     def save(self, path: str | Path) -> None:

@@ -13,13 +13,16 @@ from undertow.checks.vehicle_lint import vehicle_warnings
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.stages import stage
+from undertow.cli.stages import shares, stage
 from undertow.cli.tables import terminal_table, wide_console
+from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.core.user_code import python_says
 from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.figures import run_plots, save_all
-from undertow.report.run_page import write_run_page
+from undertow.report.replay.replay_data import can_be_shown
+from undertow.report.replay.video import check_video, write_video
+from undertow.report.run_page import shown, write_run_page
 from undertow.report.run_tables import certificate_rows, metrics_rows
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.execute import Executed, execute, write
@@ -36,14 +39,18 @@ class PredictedMetrics(NamedTuple):
     why_not: str
 
 
-def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool) -> int:
+def simulate(
+    scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool, video: Path | None
+) -> int:
     """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
     console = wide_console()
     with (
         output_folder(out, Path("runs") / scenario.stem) as folder,
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
     ):
-        executed, predicted = _run(scenario, console, prediction, allow_code)
+        if video is not None:
+            check_video(video, folder)
+        executed, predicted = _run(scenario, console, prediction, allow_code, video is not None)
         known, certificate = metrics_of(executed.dataset), certificate_of(executed.dataset)
         expected = predicted.metrics if predicted else None
         with stage(console, "files, figures and page"):
@@ -51,12 +58,12 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
             repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # before the figures, which may fail
             saved = save_all(lambda: run_plots(executed.dataset), draft.path / "figures")
-            loop, vectors = (
-                executed.built.closed_loop,
-                {n: file.read_text("utf-8") for n, file in saved.vectors.items()},
-            )
-            warn_of(saved.failures)
-            warn_of(write_run_page(draft.path / "run.html", executed.dataset, loop, vectors, expected))
+            looks = shown(executed.dataset, executed.built.closed_loop, saved)
+            warn_of(looks.failures)
+            write_run_page(draft.path / "run.html", executed.dataset, looks, expected)
+    if video is not None and looks.replay is not None:
+        with shares(console) as progress:
+            write_video(looks.replay, video, progress)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
         typer.echo(f"Advice: the run used backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
@@ -72,11 +79,15 @@ def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool
     return max(codes)
 
 
-def _run(path: Path, console: Console, prediction: bool, allow_code: bool) -> tuple[Executed, PredictedMetrics | None]:
+def _run(
+    path: Path, console: Console, prediction: bool, allow_code: bool, video: bool
+) -> tuple[Executed, PredictedMetrics | None]:
     with stage(console, "reading"):
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
         built = build(text)
+    if video and not can_be_shown(built.closed_loop.plant):
+        raise BadInput("--video", "be left out for a plant that is no vehicle with thrusters", "given")
     for sentence in (*built.advice(), *vehicle_warnings(built)):
         typer.echo(f"Advice: {sentence}", err=True)
     with stage(console, "compiling, running and predicting" if prediction else "compiling and running"):

@@ -61,10 +61,11 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
     return tag("div", whole, class_="scroll", tabindex="0")
 
 
-def figure(svg: str, name: str, alternative: str, caption: Any) -> Html:
-    """A figure with its caption, embedded in the page."""
-    data = base64.b64encode(svg.encode()).decode()
-    image = Html(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(alternative)}">')
+def figure(picture: str | bytes, name: str, alternative: str, caption: Any) -> Html:
+    """A figure with its caption, embedded in the page; the picture is SVG (text) or PNG (bytes)."""
+    kind, content = ("svg+xml", picture.encode()) if isinstance(picture, str) else ("png", picture)
+    data = base64.b64encode(content).decode()
+    image = Html(f'<img src="data:image/{kind};base64,{data}" alt="{html.escape(alternative)}">')
     return tag(
         "figure", tag("div", image, class_="scroll", tabindex="0"), tag("figcaption", caption), id=f"figure-{name}"
     )

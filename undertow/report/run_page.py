@@ -1,22 +1,29 @@
 """The page of one run: status, replay, metrics, certificate, figures and scenario, in one file that opens anywhere."""
 
+import io
 import json
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import xarray as xr
+from PIL import Image
 
 from undertow.analysis.success import Success
 from undertow.core.user_code import python_says
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.report.figures.run import run_plots
-from undertow.report.figures.writing import svg
+from undertow.report.figures.writing import Saved, save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, document, figure, section, table, tag
-from undertow.report.replay.replay_data import replay_of
+from undertow.report.replay.replay_data import Replay, replay_of
 from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
 from undertow.scenario.finished_run import certificate_of, metrics_of, window_of
+
+# Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
+_LARGE, _COLOURS = 100_000, 32
 
 _CAPTIONS = {
     "tracking": "Desired and actual outputs.",
@@ -28,53 +35,65 @@ _CAPTIONS = {
 }
 
 
-def write_run_page(
-    path: Path,
-    run: xr.Dataset,
-    loop: ClosedLoop,
-    vectors: Mapping[str, str] | None = None,
-    predicted: Mapping[str, float] | None = None,
-) -> list[str]:
-    """Write the page of a run; return a sentence for each part that could not be made.
+class Shown(NamedTuple):
+    """What a run looks like: figures by name, the replay (None for a plant that is no vehicle), and failures."""
+
+    figures: Mapping[str, str | bytes]
+    replay: Replay | None
+    failures: list[str]  # a sentence for each part that could not be made
+
+
+def shown(run: xr.Dataset, loop: ClosedLoop, saved: Saved | None = None) -> Shown:
+    """What the page and the video of a run show. A failed part affects neither the others nor the results.
+
+    Args:
+        run: dataset of the run.
+        loop: the closed loop that was run.
+        saved: the figures of the run, where they have been written; None to make them here.
+    """
+    if saved is None:
+        with tempfile.TemporaryDirectory() as folder:
+            return shown(run, loop, save_all(lambda: run_plots(run), Path(folder)))
+    figures = {name: _picture(vector) for name, vector in saved.vectors.items()}
+    failures = list(saved.failures)
+    try:
+        replay = replay_of(run, loop)
+    except Exception as error:  # a user's part may run and yet not be differentiable
+        replay = None
+        failures.append(f"the replay could not be made ({python_says(error)}); the results are complete")
+    return Shown(figures, replay, failures)
+
+
+def _picture(vector: Path) -> str | bytes:
+    """A figure for the page: the SVG, or the PNG beside it in few colours where the SVG is large."""
+    if vector.stat().st_size <= _LARGE:
+        return vector.read_text(encoding="utf-8")
+    data = io.BytesIO()
+    with Image.open(vector.with_suffix(".png")) as image:
+        few = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        few.save(data, "PNG", optimize=True)
+    return data.getvalue()
+
+
+def write_run_page(path: Path, run: xr.Dataset, shown: Shown, predicted: Mapping[str, float] | None = None) -> None:
+    """Write the page of a run.
 
     Args:
         path: of the page.
         run: dataset of the run.
-        loop: the closed loop that was run.
-        vectors: figures as SVG, by name; None to make them here.
+        shown: what it looks like.
         predicted: predicted metrics of the steady window, where there are any.
 
     Raises:
         OSError: the file cannot be written.
     """
-    failures: list[str] = []
-    shown = _vectors(run, failures) if vectors is None else vectors
-    replay = _replay(run, loop, failures)
-    path.write_text(_page(run, shown, replay, predicted), encoding="utf-8")
-    return failures
+    replay = Html("") if shown.replay is None else replay_section([shown.replay])
+    path.write_text(_page(run, shown.figures, replay, predicted), encoding="utf-8")
 
 
-def _vectors(run: xr.Dataset, failures: list[str]) -> dict[str, str]:
-    made = {}
-    for name, make in run_plots(run).items():
-        try:
-            made[name] = svg(make())
-        except Exception as error:  # matplotlib raises many kinds of errors for unusual numbers
-            failures.append(f"figure `{name}` could not be made ({python_says(error)})")
-    return made
-
-
-def _replay(run: xr.Dataset, loop: ClosedLoop, failures: list[str]) -> Html:
-    """The section of the replay; empty for a plant that is no vehicle."""
-    try:
-        replay = replay_of(run, loop, "vehicle")
-    except Exception as error:  # a user's part may run and yet not be differentiable
-        failures.append(f"the replay could not be made ({python_says(error)}); the results are complete")
-        return Html("")
-    return Html("") if replay is None else replay_section([replay])
-
-
-def _page(run: xr.Dataset, vectors: Mapping[str, str], replay: Html, predicted: Mapping[str, float] | None) -> str:
+def _page(
+    run: xr.Dataset, figures: Mapping[str, str | bytes], replay: Html, predicted: Mapping[str, float] | None
+) -> str:
     title, window = str(run.attrs.get("title", "a closed loop")), window_of(run)
     metrics = json.loads(run.attrs["metrics"])
     measured = metrics_rows(metrics["steady"], metrics["whole"], window, metrics_of(run), predicted)
@@ -85,8 +104,8 @@ def _page(run: xr.Dataset, vectors: Mapping[str, str], replay: Html, predicted: 
         below = [tag("p", prose(sentence)) for sentence in hypotheses.sentences]
         sections.append(section("certificate", hypotheses.title, _table(hypotheses), *below))
     plotted = [
-        figure(vector, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
-        for name, vector in vectors.items()
+        figure(picture, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
+        for name, picture in figures.items()
     ]
     if plotted:
         sections.append(section("figures", "Figures", *plotted))

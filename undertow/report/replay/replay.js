@@ -19,21 +19,21 @@
 
   // ---------------------------------------------------------------- data
 
-  function unpackSeries(packed, frames) {
+  function unpackSeries(packed) {
     const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
     const whole = packed.bytes === 1 ? bytes : new Uint16Array(bytes.buffer);
     const width = packed.low.length, levels = 256 ** packed.bytes - 1;
-    const values = new Float32Array(frames * width);
+    const values = new Float32Array(whole.length);
     for (let i = 0; i < values.length; i += 1) {
       const low = packed.low[i % width];
       values[i] = low + (whole[i] / levels) * (packed.high[i % width] - low);
     }
-    return { width, values };
+    return { width, values, frames: whole.length / width };
   }
 
   function unpackRun(run) {
     const series = {};
-    for (const name of Object.keys(run.series)) series[name] = unpackSeries(run.series[name], run.frames);
+    for (const name of Object.keys(run.series)) series[name] = unpackSeries(run.series[name]);
     const axes = run.body_axes ? BODY_AXES : OUTPUT_AXES;
     const rules = series.weights ? series.weights.width / axes.length : 0;
     const longest = Math.max(...run.size);
@@ -43,10 +43,10 @@
 
   // Components of a series at a time, s, between the two frames around it.
   function valueAt(run, name, time) {
-    const { width, values } = run.series[name];
+    const { width, values, frames } = run.series[name];
     const share = (time - run.start) / Math.max(run.end - run.start, 1e-9);
-    const place = Math.min(Math.max(share, 0), 1) * (run.frames - 1);
-    const before = Math.floor(place), after = Math.min(before + 1, run.frames - 1), part = place - before;
+    const place = Math.min(Math.max(share, 0), 1) * (frames - 1);
+    const before = Math.floor(place), after = Math.min(before + 1, frames - 1), part = place - before;
     return Array.from({ length: width }, (_, i) => {
       const from = values[before * width + i];
       return from + part * (values[after * width + i] - from);
@@ -56,8 +56,8 @@
   // Size of a vector (components `first` to `last`) that is exceeded in 1 % of the frames: the full length of its arrow.
   function usualSize(run, name, first, last) {
     if (!run.series[name]) return 0;
-    const { width, values } = run.series[name], sizes = [];
-    for (let i = 0; i < run.frames; i += 1) sizes.push(Math.hypot(...values.slice(i * width + first, i * width + last)));
+    const { width, values, frames } = run.series[name], sizes = [];
+    for (let i = 0; i < frames; i += 1) sizes.push(Math.hypot(...values.slice(i * width + first, i * width + last)));
     return sizes.sort((a, b) => a - b)[Math.floor(0.99 * (sizes.length - 1))];
   }
 
@@ -335,7 +335,7 @@
     const above = position.clone().add(new THREE.Vector3(0, 0, -0.9 * run.longest));
     setArrow(vehicle.water, above, water, (water.length() / Math.max(run.scale.water, 1e-9)) * run.longest, 1.3 * thin);
     const share = (time - run.start) / Math.max(run.end - run.start, 1e-9);
-    vehicle.path.geometry.instanceCount = Math.max(1, Math.ceil(Math.min(share, 1) * (run.frames - 1)));
+    vehicle.path.geometry.instanceCount = Math.max(1, Math.ceil(Math.min(share, 1) * (run.series.position.frames - 1)));
   }
 
   // ---------------------------------------------------------------- flat pictures: names in the view, and bars

@@ -16,8 +16,9 @@ import numpy as np
 import xarray as xr
 
 from undertow.core import runtime
+from undertow.core.contracts import AbstractPlant
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.numerics.rotations import quaternion_from_euler
+from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.plants.hybrid_model import BodyCoordinates
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.report.replay.recomputed import firing_along, surroundings, thrust_along, thrust_limits
@@ -29,6 +30,7 @@ COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7")  # of several runs; safe 
 
 _FASTEST = 0.05  # s between frames
 _FRAMES = 2400  # at most: two minutes at the fastest
+_VALUES = 80_000  # of one series in the page
 _THINNEST = 0.12  # share of its longest side that a vehicle is at least thick
 
 
@@ -80,6 +82,11 @@ SERIES = {
     "weights": (1, "weight of each fuzzy rule, axis by axis, m/s^2, rad/s^2"),
     "firing": (1, "fuzzy basis function of each rule, axis by axis"),
 }
+
+
+def can_be_shown(plant: AbstractPlant) -> bool:
+    """Whether a replay can show runs of a plant: a vehicle with thrusters."""
+    return isinstance(plant, HybridVehicle)
 
 
 def replay_of(run: xr.Dataset, loop: ClosedLoop, label: str = "") -> Replay | None:
@@ -176,6 +183,12 @@ def _attitude(angles: np.ndarray) -> np.ndarray:
     return found * np.concatenate([[1.0], np.cumprod(turned)])[:, None]
 
 
+def rotations(attitude: np.ndarray) -> np.ndarray:
+    """Rotations, body to world, of quaternions of shape (frames, 4)."""
+    with runtime.on_processor():
+        return np.asarray(jax.vmap(rotation_from_quaternion)(jnp.asarray(attitude)))
+
+
 def _limits(plant: HybridVehicle, thrust: np.ndarray) -> tuple[np.ndarray, bool]:
     """Largest thrust in reverse and forward, N, shape (N, 2), and whether it is that of the limited input."""
     limits = thrust_limits(plant.thruster, plant.inputs())
@@ -224,7 +237,6 @@ def _described(replay: Replay, colour: str) -> dict[str, Any]:
         "status": replay.status,
         "start": float(replay.time[0]),
         "end": float(replay.time[-1]),
-        "frames": len(replay.time),
         "size": numbers(replay.size),
         "thrusters": [
             {"name": name, "position": numbers(position), "direction": numbers(direction), "limits": numbers(limit)}
@@ -232,8 +244,14 @@ def _described(replay: Replay, colour: str) -> dict[str, Any]:
         ],
         "limited": replay.limited,
         "body_axes": replay.body_axes,
-        "series": {name: packed(values, SERIES[name][0]) for name, values in replay.series.items()},
+        "series": {name: packed(_thinned(values), SERIES[name][0]) for name, values in replay.series.items()},
     }
+
+
+def _thinned(values: np.ndarray) -> np.ndarray:
+    """A series of few enough values: of many rules, fewer frames, the first and the last among them."""
+    most = max(2, _VALUES // values.shape[1])
+    return values if len(values) <= most else values[np.round(np.linspace(0, len(values) - 1, most)).astype(int)]
 
 
 def packed(values: np.ndarray, size: int) -> dict[str, Any]:

@@ -14,8 +14,9 @@ _MISSING = (
 )
 _KEYS = (
     "Drag to turn the view, drag with two fingers or the right button to move it; click it before you zoom with the "
-    "wheel. Space plays and pauses, the arrow keys step by 1 s (with Shift by 10 s), and `#t=12` after the address of the page opens it at 12 s. Arrows at the thrusters show the "
-    "force on the vehicle, computed from the recorded input with the model of the thruster."
+    "wheel. Space plays and pauses, the arrow keys step by 1 s (with Shift by 10 s). Add `#t=12` to the address of the "
+    "page to open it at 12 s. Arrows at the thrusters show the force on the vehicle, computed from the recorded input "
+    "with the model of the thruster."
 )
 
 
