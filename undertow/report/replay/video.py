@@ -1,12 +1,14 @@
 """A video of a run, frame by frame with matplotlib and encoded by ffmpeg: plan view, side view, thrust and errors."""
 
+import contextlib
 import os
+import shutil
+import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from matplotlib.animation import FFMpegWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.ticker import FuncFormatter
@@ -19,7 +21,10 @@ _RATE = 20  # frames per second
 _LONGEST = 30.0  # s of video; a longer run is shown faster
 _DOTS = 100  # per inch
 _FAINT, _THRUST, _WATER, _ESTIMATE = "#9a9a9a", "#b3001b", "#1695a3", "#d1495b"
-_WIDEST = 7.0  # half of a view in lengths of the vehicle; it follows the vehicle along a path that is longer
+_WIDEST = 12.0  # half of a view in lengths of the vehicle; along a path that is longer it follows the vehicle
+_MIDDLE = 0.6  # share of half a view: when the vehicle is farther from its centre, the view follows
+
+_LEGEND = (("thrust", _THRUST), ("uncertainty", style.INK), ("estimate", _ESTIMATE), ("water", _WATER))
 
 # One line through all edges of a box: its corners, some of them twice.
 _EDGES = (
@@ -40,7 +45,7 @@ def check_video(path: Path, folder: Path) -> None:
     """
     if path.suffix != ".mp4":
         raise BadInput("--video", "be a file whose name ends in .mp4", str(path))
-    if not FFMpegWriter.isAvailable():
+    if shutil.which("ffmpeg") is None:
         hint = (
             "Install it (Debian: apt-get install ffmpeg; macOS: brew install ffmpeg). run.html has a replay without it"
         )
@@ -70,11 +75,9 @@ def write_video(
     handle, temporary = tempfile.mkstemp(suffix=".mp4", dir=path.resolve().parent)
     os.close(handle)
     try:
-        writer = FFMpegWriter(fps=_RATE, codec="libx264", extra_args=["-pix_fmt", "yuv420p", "-loglevel", "error"])
-        with writer.saving(scenes.figure, temporary, _DOTS):
+        with _encoder(temporary, scenes.size()) as encode:
             for number, frame in enumerate(frames):
-                scenes.show(int(frame))
-                writer.grab_frame()
+                encode(scenes.pixels(int(frame)))
                 if number % _RATE == 0:
                     progress("video", number / len(frames))
         os.chmod(temporary, 0o644)
@@ -82,6 +85,32 @@ def write_video(
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+    progress("video", 1.0)
+
+
+@contextlib.contextmanager
+def _encoder(path: str, size: tuple[int, int]) -> Iterator[Callable[[bytes], None]]:
+    """A function that adds a frame, RGBA, to a video; ffmpeg is stopped where the caller fails."""
+    given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", "{}x{}".format(*size), "-r", str(_RATE), "-i", "-"]
+    made = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", path]
+    command = ["ffmpeg", "-y", "-loglevel", "error", *given, *made]
+    with tempfile.TemporaryFile() as says:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=says)
+        try:
+            assert process.stdin is not None
+            yield process.stdin.write
+            process.stdin.close()
+            failed = process.wait() != 0
+        except BrokenPipeError:
+            failed = True
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
+        if failed:
+            process.wait()
+            says.seek(0)
+            raise OSError(f"ffmpeg failed: {says.read().decode(errors='replace').strip()}")
 
 
 class _Scenes:
@@ -90,7 +119,8 @@ class _Scenes:
     def __init__(self, replay: Replay, speed: float):
         self.replay, self.speed = replay, speed
         self.figure = style.blank(12.8, 7.2)
-        FigureCanvasAgg(self.figure)
+        self.figure.dpi = _DOTS
+        self.canvas = FigureCanvasAgg(self.figure)
         self.turns, self.ghosts = (rotations(replay.series[name]) for name in ("attitude", "desired_attitude"))
         self.shares = np.where(replay.series["thrust"] < 0, -1, 1) * _shares(replay)
         left = {"plan view": 3.75, "side view": 0.2}
@@ -103,7 +133,17 @@ class _Scenes:
             )
         )
         self.curves = self._errors(self._panel(7.8, 3.7, 4.6, 1.1, ""), self._panel(7.8, 5.2, 4.6, 1.1, ""))
-        self.words = self.figure.text(0.06, 0.965, "", fontsize=11, color=style.INK)
+        for number, (word, colour) in enumerate(_LEGEND):
+            self.figure.text(0.62 + 0.085 * number, 0.03, word, fontsize=style.TEXT, color=colour)
+        self.words = self.figure.text(0.62, 0.96, "", fontsize=11, color=style.INK)
+        self.moving = [*self.bars, *self.curves, self.words, *(artist for view in self.views for artist in view.moving)]
+        for artist in self.moving:
+            artist.set_animated(True)
+        self.still = None  # all that does not move, painted
+
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.canvas.get_width_height()
 
     def _panel(self, left: float, top: float, width: float, height: float, title: str) -> Axes:
         panel = style.place(self.figure, left, top, width, height)
@@ -127,11 +167,10 @@ class _Scenes:
             style.label(panel, "time, s" if panel is attitude else "", words)
         return [panel.axvline(time[0], color=_THRUST, linewidth=1.0) for panel in (position, attitude)]
 
-    def show(self, frame: int) -> None:
-        """Move everything to a frame."""
+    def pixels(self, frame: int) -> bytes:
+        """The figure at a frame, RGBA. What does not move is painted once, or when a view has followed the vehicle."""
         replay, time = self.replay, self.replay.time[frame]
-        for view in self.views:
-            view.show(frame, self.turns[frame], self.ghosts[frame], self.shares[frame])
+        followed = [view.show(frame, self.turns[frame], self.ghosts[frame], self.shares[frame]) for view in self.views]
         for bar, share in zip(self.bars, self.shares[frame], strict=True):
             bar.set_width(share)
         for line in self.curves:
@@ -139,6 +178,13 @@ class _Scenes:
         energy = replay.series["energy"][frame, 0]
         shown = "" if self.speed == 1 else f", shown {self.speed:.3g} times faster"
         self.words.set_text(f"{time:.1f} s of {replay.time[-1]:g} s{shown}. Energy {energy:.0f} J")
+        if self.still is None or any(followed):
+            self.canvas.draw()
+            self.still = self.canvas.copy_from_bbox(self.figure.bbox)
+        self.canvas.restore_region(self.still)
+        for artist in self.moving:
+            (artist.axes or self.figure).draw_artist(artist)
+        return bytes(self.canvas.buffer_rgba())
 
 
 class _View:
@@ -148,10 +194,10 @@ class _View:
         self.replay, self.panel = replay, panel
         self.right, self.up, self.sign = _VIEWS[name]
         self.longest = float(replay.size.max())
-        panel.set_aspect("equal", adjustable="datalim")
-        style.label(panel, _AXES[self.right], _AXES[self.up])
+        self.ratio = panel.bbox.height / panel.bbox.width
+        style.label(panel, _AXES[self.right], _AXES[self.up], name)
         if self.sign < 0:  # depth grows downwards
-            panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{-value:g}"))
+            panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{0.0 - value:g}"))
         panel.plot(*self._flat(replay.series["desired_position"]), color=_FAINT, linestyle="--", linewidth=1.0)
         (self.path,) = panel.plot([], [], **style.SOLID.line)
         (self.ghost,) = panel.plot([], [], color=_FAINT, linewidth=0.8)
@@ -160,6 +206,7 @@ class _View:
         arrows = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "zorder": 5}
         self.thrust = panel.quiver(*np.zeros((4, count)), color=_THRUST, width=0.004, **arrows)
         self.loads = panel.quiver(*np.zeros((4, 3)), color=[_WATER, style.INK, _ESTIMATE], width=0.005, **arrows)
+        self.moving = [self.path, self.ghost, self.hull, self.thrust, self.loads]
         self._frame_all()
 
     def _flat(self, points: np.ndarray) -> np.ndarray:
@@ -171,16 +218,17 @@ class _View:
         both = self._flat(np.concatenate([self.replay.series["position"], self.replay.series["desired_position"]]))
         low, high = both.min(axis=1), both.max(axis=1)
         most = _WIDEST * self.longest
-        self.half = min(float((high - low).max()) / 2 + 1.2 * self.longest, most)
-        self.centre = (low + high) / 2 if self.half < most else None
-        self._look_at(both[:, 0] if self.centre is None else self.centre)
+        needed = max(high[0] - low[0], (high[1] - low[1]) / self.ratio) / 2 + 1.2 * self.longest / self.ratio
+        self.half, self.long = min(float(needed), most), needed > most
+        self._look_at(both[:, 0] if self.long else (low + high) / 2)
 
     def _look_at(self, centre: np.ndarray) -> None:
+        self.centre = centre
         self.panel.set_xlim(centre[0] - self.half, centre[0] + self.half)
-        self.panel.set_ylim(centre[1] - self.half / 2, centre[1] + self.half / 2)
+        self.panel.set_ylim(centre[1] - self.half * self.ratio, centre[1] + self.half * self.ratio)
 
-    def show(self, frame: int, turn: np.ndarray, ghost: np.ndarray, shares: np.ndarray) -> None:
-        """Move everything to a frame."""
+    def show(self, frame: int, turn: np.ndarray, ghost: np.ndarray, shares: np.ndarray) -> bool:
+        """Move everything to a frame; whether the view has followed the vehicle."""
         series, corners = self.replay.series, _EDGES * self.replay.size
         position, thrusters = series["position"][frame], self.replay.thrusters
         self.path.set_data(*self._flat(series["position"][: frame + 1]))
@@ -191,8 +239,11 @@ class _View:
         self.thrust.set_UVC(*self._flat(along @ turn.T))
         self.loads.set_offsets(np.tile(self._flat(position), (3, 1)))
         self.loads.set_UVC(*self._flat(self._loads(frame, turn)))
-        if self.centre is None:
-            self._look_at(self._flat(position))
+        here = self._flat(position)
+        away = bool((np.abs(here - self.centre) > _MIDDLE * self.half * np.array([1.0, self.ratio])).any())
+        if follows := away and self.long:
+            self._look_at(here)
+        return follows
 
     def _loads(self, frame: int, turn: np.ndarray) -> np.ndarray:
         """Arrows of water, uncertainty and estimate: north, east, down; as long as the vehicle for a usual value."""
