@@ -101,16 +101,20 @@ def simulate(
     ] = True,
     allow_code: AllowCode = False,
     pdf: Pdf = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mp4", help="Also write a video of the run, at most 30 s long. It needs ffmpeg."),
+    ] = None,
 ) -> int:
     """Simulate one scenario.
 
-    The command writes run.nc, metrics.json, scenario.yaml and figures/ when the run has ended. If SCENARIO is a result
-    file, its run is repeated, and the command reports whether the results are identical bit for bit. Other files in DIR
-    are not changed.
+    The command writes run.nc, metrics.json, scenario.yaml, figures/ and run.html when the run has ended. run.html holds
+    metrics, figures and a replay in three dimensions, and needs no network. If SCENARIO is a result file, its run is
+    repeated, and the command reports whether the results are identical bit for bit. Other files in DIR are not changed.
     """
     from undertow.cli.simulate import simulate
 
-    return simulate(scenario, out, overwrite, prediction, allow_code, pdf)
+    return simulate(scenario, out, overwrite, prediction, allow_code, pdf, video)
 
 
 @app.command()
