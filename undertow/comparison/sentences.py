@@ -78,8 +78,8 @@ def _between(found: Findings, contestant: str, baseline: str) -> str:
     if found.all_equal:
         parts = [f"{metric_name(one.metric)} {relative(one, found.units[one.metric])}" for one in several]
         return f"{said}: {', '.join(parts)}. All trials are equal, so that nothing is established by statistics."
-    if pairs < FEWEST:
-        return f"{said}: too few to establish a difference; at least {FEWEST} pairs are needed."
+    if pairs < (needed := _needed(found)):
+        return f"{said}: too few to establish a difference; at least {needed} pairs are needed."
     smaller = [_counted(found, one, one.smaller) for one in several if one.established and one.median < 0]
     larger = [_counted(found, one, one.larger) for one in several if one.established and one.median > 0]
     others = [metric_name(one.metric) for one in several if not one.established]
@@ -87,6 +87,12 @@ def _between(found: Findings, contestant: str, baseline: str) -> str:
     parts += [f"larger {', '.join(larger)}"] if larger else []
     parts += [f"no difference is established in {', '.join(others)}"] if others else []
     return f"{said}: {'; '.join(parts)}."
+
+
+def _needed(found: Findings) -> int:
+    """Pairs from which on the smallest p of the rank test, 2^(1 - n), is below 5 % after correction for all tests."""
+    tests = sum(bool(one.smaller or one.larger) for one in found.differences)
+    return max(FEWEST, math.floor(1 + math.log2(tests / LEVEL)) + 1)
 
 
 def _counted(found: Findings, one: Difference, number: int) -> str:
