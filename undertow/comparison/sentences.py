@@ -9,7 +9,8 @@ from undertow.comparison.paired import FEWEST, LEVEL, Completion, Difference
 HOW = (
     "A difference counts as established where the two-sided Wilcoxon signed-rank test is below 5 % with Holm's "
     "correction for all tests of this comparison, and the 95 % bootstrap interval of the median difference excludes "
-    "zero. A pair is a trial that both completed, with the same sample and seed."
+    "zero. A pair is a trial that both completed, with the same sample and seed. A metric that is infinite in some trial "
+    "is not tested."
 )
 
 
@@ -53,7 +54,7 @@ def shown(value: float, unit: str) -> str:
 
 def digits(value: float) -> str:
     """A number in three digits, whole from 1000 on; a power of ten where it is very small or large."""
-    if value and math.isfinite(value) and not 1e-3 <= abs(value) < 1e5:
+    if value and math.isfinite(value) and not 1e-4 <= abs(value) < 1e5:
         return f"{value:.2e}"
     return f"{value:.3g}" if not 1000 <= abs(value) < math.inf else f"{value:.0f}"
 

@@ -63,7 +63,7 @@ def write_comparison(comparison: Comparison, results: Results, subject: str, fol
         section("tuning", "Tuning", tag("p", prose(_FAIR)), _tuning(found.tuning)),
         section("figures", "Figures", *figures),
         section("endings", "Status of the trials", _endings(found)),
-        section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), wide=True)),
+        section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), words=2)),
         section("configuration", "Configuration", *asked(results)),
     )
     path = folder / "comparison.html"
@@ -79,9 +79,10 @@ def _lead(found: Findings, subject: str) -> str:
     return f"{of}{found.trials} trials for each, with the same samples and seeds."
 
 
-def _rows(rows: Rows, wide: bool = False) -> Html:
+def _rows(rows: Rows, words: int = 1) -> Html:
+    """A table; its first columns hold words, the others numbers."""
     cells = [tuple(map(_cell, row)) for row in rows.rows]
-    return table(rows.head, cells, numeric=range(1, len(rows.head)), wide=wide)
+    return table(rows.head, cells, numeric=range(words, len(rows.head)), wide=len(rows.head) > 3)
 
 
 def _cell(content: str) -> Html:
