@@ -9,8 +9,8 @@ from undertow.comparison.paired import FEWEST, LEVEL, Completion, Difference
 HOW = (
     "A difference counts as established where the two-sided Wilcoxon signed-rank test is below 5 % with Holm's "
     "correction for all tests of this comparison, and the 95 % bootstrap interval of the median difference excludes "
-    "zero. A pair is a trial that both completed, with the same sample and seed. A metric that is infinite in some trial "
-    "is not tested."
+    "zero. A pair is a trial that both completed, with the same sample and seed. A metric that is infinite in some "
+    "trial is not tested."
 )
 
 
