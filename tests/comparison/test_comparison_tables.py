@@ -65,6 +65,13 @@ def test_sentences(findings):
     assert "c against b_1 (8 pairs): larger position rms" in said[5]
 
 
+def test_too_few_pairs_for_the_correction(findings):
+    """With four tests, 4 x 2^(1 - n) is below 5 % from n = 8 on: 3.1 %."""
+    assert sum(bool(one.smaller or one.larger) for one in findings.differences) == 4
+    few = findings._replace(differences=tuple(one._replace(pairs=7) for one in findings.differences))
+    assert "b_1 against a (7 pairs): too few to establish a difference; at least 8 pairs are needed." in sentences(few)
+
+
 def test_latex(findings):
     text = table(findings, "latex")
     assert text.startswith(

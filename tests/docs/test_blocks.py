@@ -66,9 +66,9 @@ def quicker(arguments: list[str], page: str) -> list[str]:
 
 
 def compared(arguments: list[str]) -> None:
-    """Build the controllers of a comparison, without the preset `robust`, and run nothing."""
-    entries = arguments[arguments.index("--controllers") + 1].split(",")
-    assert contest([Path(arguments[1])], [one for one in entries if one != "robust"]).campaign.number > 1
+    """Build the controllers of a comparison, with the scenario's own for the preset `robust`, and run nothing."""
+    entries = arguments[arguments.index("--controllers") + 1].replace("robust", "scenario").split(",")
+    assert contest([Path(arguments[1])], entries).campaign.number > 1
 
 
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built

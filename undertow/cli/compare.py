@@ -83,7 +83,7 @@ def _conclude(console: Console, ready: Contest, folder: Path) -> int:
         for style, name in _TABLES.items():
             (folder / name).write_text(comparison.table(style), encoding="utf-8")
         (folder / "comparison.json").write_text(to_json(found.data(), indent=1) + "\n", encoding="utf-8")
-        page, failures = write_comparison(comparison, results, folder)
+        page, failures = write_comparison(comparison, results, ready.subject, folder)
     warn_of(failures)
     rows = medians(found)
     table = titled(f"Median of {found.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))

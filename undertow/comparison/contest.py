@@ -52,6 +52,12 @@ class Contest(NamedTuple):
     advice: tuple[str, ...]
 
     @property
+    def subject(self) -> str:
+        """What is simulated: the description of the scenario, or the name of its file."""
+        scenario = self.prepared.trials.scenario
+        return str(scenario.data.get("description") or scenario.name)
+
+    @property
     def campaign(self) -> Campaign:
         """The campaign as it runs."""
         return self.prepared.trials.campaign

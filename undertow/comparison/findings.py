@@ -42,7 +42,7 @@ class Findings(NamedTuple):
         all_equal: whether these are all equal, so that one of them tells all.
         units: metric -> unit, empty for a dimensionless number, in the order of tables.
         medians: metric -> contestant -> median.
-        differences: every two contestants in every metric.
+        differences: every two contestants in every metric that is finite in all completed trials.
         completions: every two contestants, by the trials that only one of them completed.
         endings: contestant -> how its trials ended -> how many.
         failed_at: contestant -> median time at which its failed trials ended, s; NaN without any.
@@ -111,7 +111,7 @@ def find(
         all_equal=all_equal,
         units={metric: dataset[metric].attrs["units"].removesuffix("1") for metric in metrics},
         medians={metric: {name: _median(one) for name, one in each.items()} for metric, each in values.items()},
-        differences=tuple(differences(values)),
+        differences=tuple(differences({metric: each for metric, each in values.items() if _finite(each)})),
         completions=tuple(completions(lasted)) if not all_equal else (),
         endings={name: _counts(one["status"].values, ENDINGS) for name, one in rows.items()},
         failed_at={name: float(np.median(each)) if each.size else math.nan for name, each in ended.items()},
@@ -119,6 +119,11 @@ def find(
         tuning=dict(tuning),
         differing=dict(differing),
     )
+
+
+def _finite(by_name: Mapping[str, np.ndarray]) -> bool:
+    """Whether no value is infinite: to leave out the trials that do not settle would favour who does not."""
+    return not any(np.isinf(one).any() for one in by_name.values())
 
 
 def _constant(values: np.ndarray) -> bool:

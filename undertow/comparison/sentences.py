@@ -9,7 +9,8 @@ from undertow.comparison.paired import FEWEST, LEVEL, Completion, Difference
 HOW = (
     "A difference counts as established where the two-sided Wilcoxon signed-rank test is below 5 % with Holm's "
     "correction for all tests of this comparison, and the 95 % bootstrap interval of the median difference excludes "
-    "zero. A pair is a trial that both completed, with the same sample and seed."
+    "zero. A pair is a trial that both completed, with the same sample and seed. A metric that is infinite in some "
+    "trial is not tested."
 )
 
 
@@ -53,7 +54,7 @@ def shown(value: float, unit: str) -> str:
 
 def digits(value: float) -> str:
     """A number in three digits, whole from 1000 on; a power of ten where it is very small or large."""
-    if value and math.isfinite(value) and not 1e-3 <= abs(value) < 1e5:
+    if value and math.isfinite(value) and not 1e-4 <= abs(value) < 1e5:
         return f"{value:.2e}"
     return f"{value:.3g}" if not 1000 <= abs(value) < math.inf else f"{value:.0f}"
 
@@ -78,8 +79,8 @@ def _between(found: Findings, contestant: str, baseline: str) -> str:
     if found.all_equal:
         parts = [f"{metric_name(one.metric)} {relative(one, found.units[one.metric])}" for one in several]
         return f"{said}: {', '.join(parts)}. All trials are equal, so that nothing is established by statistics."
-    if pairs < FEWEST:
-        return f"{said}: too few to establish a difference; at least {FEWEST} pairs are needed."
+    if pairs < (needed := _needed(found)):
+        return f"{said}: too few to establish a difference; at least {needed} pairs are needed."
     smaller = [_counted(found, one, one.smaller) for one in several if one.established and one.median < 0]
     larger = [_counted(found, one, one.larger) for one in several if one.established and one.median > 0]
     others = [metric_name(one.metric) for one in several if not one.established]
@@ -87,6 +88,12 @@ def _between(found: Findings, contestant: str, baseline: str) -> str:
     parts += [f"larger {', '.join(larger)}"] if larger else []
     parts += [f"no difference is established in {', '.join(others)}"] if others else []
     return f"{said}: {'; '.join(parts)}."
+
+
+def _needed(found: Findings) -> int:
+    """Pairs from which on the smallest p of the rank test, 2^(1 - n), is below 5 % after correction for all tests."""
+    tests = sum(bool(one.smaller or one.larger) for one in found.differences)
+    return max(FEWEST, math.floor(1 + math.log2(tests / LEVEL)) + 1)
 
 
 def _counted(found: Findings, one: Difference, number: int) -> str:

@@ -32,8 +32,14 @@ _FAIR = (
 )
 
 
-def write_comparison(comparison: Comparison, results: Results, folder: Path) -> tuple[Path, list[str]]:
+def write_comparison(comparison: Comparison, results: Results, subject: str, folder: Path) -> tuple[Path, list[str]]:
     """Write `comparison.html`, and every figure into `figures/`; return a sentence for each figure that failed.
+
+    Args:
+        comparison: what is shown.
+        results: of its campaign.
+        subject: what is simulated, in words.
+        folder: of the page.
 
     Raises:
         OSError: the folder cannot be written.
@@ -48,7 +54,7 @@ def write_comparison(comparison: Comparison, results: Results, folder: Path) -> 
     page = document(
         title,
         tag("h1", prose(title)),
-        tag("p", prose(_lead(found)), class_="lead"),
+        tag("p", prose(_lead(found, subject)), class_="lead"),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
         _rows(medians(found)),
         tag("p", prose(NOTE), class_="small"),
@@ -57,7 +63,7 @@ def write_comparison(comparison: Comparison, results: Results, folder: Path) -> 
         section("tuning", "Tuning", tag("p", prose(_FAIR)), _tuning(found.tuning)),
         section("figures", "Figures", *figures),
         section("endings", "Status of the trials", _endings(found)),
-        section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), wide=True)),
+        section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), words=2)),
         section("configuration", "Configuration", *asked(results)),
     )
     path = folder / "comparison.html"
@@ -65,17 +71,18 @@ def write_comparison(comparison: Comparison, results: Results, folder: Path) -> 
     return path, saved.failures
 
 
-def _lead(found: Findings) -> str:
-    if found.trials == 1:
-        return "One trial each. Nothing in the scenario is random, so that further trials would be equal."
+def _lead(found: Findings, subject: str) -> str:
+    of = f"{subject}: " if subject and not found.differing else ""
     if found.all_equal:
-        return f"{found.trials} trials each, which are all equal: nothing in the scenario is random."
-    return f"{found.trials} trials each, with the same samples and seeds."
+        trials = "one trial" if found.trials == 1 else f"{found.trials} trials, which are all equal,"
+        return f"{of}{trials} for each, because nothing in the scenario is random."
+    return f"{of}{found.trials} trials for each, with the same samples and seeds."
 
 
-def _rows(rows: Rows, wide: bool = False) -> Html:
+def _rows(rows: Rows, words: int = 1) -> Html:
+    """A table; its first columns hold words, the others numbers."""
     cells = [tuple(map(_cell, row)) for row in rows.rows]
-    return table(rows.head, cells, numeric=range(1, len(rows.head)), wide=wide)
+    return table(rows.head, cells, numeric=range(words, len(rows.head)), wide=len(rows.head) > 3)
 
 
 def _cell(content: str) -> Html:

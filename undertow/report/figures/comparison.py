@@ -130,7 +130,10 @@ def _distributions(dataset: xr.Dataset, found: Findings) -> Figure:
         for metric in found.units
     }
     values = {metric: each for metric, each in values.items() if any(one.size for one in each.values())}
-    return distributions_figure(values, dict.fromkeys(found.names, found.trials), found.units)
+    units = {metric: for_people(1.0, unit) for metric, unit in found.units.items()}
+    scaled = {metric: {name: units[metric][0] * one for name, one in each.items()} for metric, each in values.items()}
+    counts = dict.fromkeys(found.names, found.trials)
+    return distributions_figure(scaled, counts, {metric: unit for metric, (_, unit) in units.items()})
 
 
 def _values(dataset: xr.Dataset, found: Findings, metric: str, name: str) -> np.ndarray:
