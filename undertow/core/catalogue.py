@@ -40,7 +40,7 @@ KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation", "metrics"
 # Kind of a part -> where it stands in a scenario.
 KEY_OF = {kind: key for key, kind in KIND_OF.items()}
 KEY_OF |= {"vehicles": "plant.vehicle", "thrusters": "plant.thruster", "power": "plant.battery` or `plant.esc"}
-KEY_OF |= {"sensors": "navigation.sensors"}
+KEY_OF |= {"sensors": "navigation.sensors` of `kind: observer"}
 
 Part = Callable[..., Any]
 

@@ -85,7 +85,8 @@ def _angles(loop: ClosedLoop, desired: Motion):
     places = {"reference": [desired.position[-1], desired.position[0]], "initial.position": [desired.start]}
     for name, positions in places.items():
         for axis in np.flatnonzero(loop.controller.model.coordinates.angles):
-            whole = [row[axis] for row in positions if abs(row[axis]) > _FULL_TURN and row[axis] == round(row[axis])]
+            values = [float(row[axis]) for row in positions]
+            whole = [value for value in values if abs(value) > _FULL_TURN and value % 1 == 0]
             if whole:
                 output, value = plant.outputs[axis], whole[0]
                 yield (
@@ -104,7 +105,9 @@ def _angles(loop: ClosedLoop, desired: Motion):
 def _unfinished(reference: AbstractReference, desired: Motion):
     """A reference that comes to rest after the end of the run."""
     duration = float(desired.time[-1])
-    late = _sampled(reference, np.geomspace(duration, _LONG, _SAMPLES), desired.start)
+    late = _sampled(reference, np.geomspace(duration, max(_LONG, 2 * duration), _SAMPLES), desired.start)
+    if not np.isfinite(late.position).all():
+        return
     goal, size = late.position[-1], 1e-9 * np.ptp(late.position, axis=0).max()
     there = np.abs(late.position - goal).max(axis=1) <= size
     if there.all() or not there[-2:].all() or late.velocity[-2:].any() or size == 0:
@@ -128,13 +131,13 @@ def _above(loop: ClosedLoop, desired: Motion):
             if value < surface:
                 yield (
                     f"`{name}` is at down = {value:.4g} m, above the surface at down = {surface:.4g} m (`depth` of the "
-                    "waves): down is positive downward"
+                    "waves): down is positive downward, from the world's origin"
                 )
         return
     if highest < -_RISES and down.max() <= 0 <= start:
         yield (
             f"`reference` leads to down = {highest:.4g} m, {start - highest:.4g} m above the start at down = "
-            f"{start:.4g} m: down is positive downward"
+            f"{start:.4g} m: down is positive downward, and a depth of {-highest:.4g} m is {-highest:.4g}"
         )
 
 
@@ -145,9 +148,9 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
         return
     flows = [one.velocity for one in _members(loop, Current)] + [one.mean for one in _members(loop, GaussMarkovCurrent)]
     flow = float(np.linalg.norm(np.sum([np.asarray(one, dtype=float) for one in flows], axis=0))) if flows else 0.0
-    most = f"the thrusters give the vehicle at most {top:.3g} m/s"
+    most = f"the thrusters give the vehicle at most {top:.3g} m/s through the water"
     if flow > _SPARE * top:
-        yield f"the current is {flow:.3g} m/s, but {most} through the water: it drifts away"
+        yield f"the current is {flow:.3g} m/s, but {most}: it drifts away. 1 knot is 0.514 m/s"
         return
     speed = float(np.linalg.norm(desired.velocity[:, :3], axis=1).max())
     duration, way = float(desired.time[-1]), desired.position[:, :3] - desired.start[:3]
@@ -180,7 +183,7 @@ def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) 
 
 @eqx.filter_jit
 def _targets(reference: AbstractReference, times):
-    return jax.vmap(reference.at)(times)
+    return jax.lax.map(reference.at, times)
 
 
 def _sphere(count: int) -> Float[np.ndarray, "count 3"]:

@@ -66,7 +66,7 @@ def read(path: Path, what: str = "SCENARIO", allow_code: bool = False) -> Text:
     if path.suffix == _RESULT:
         return _from_result(path, what, allow_code)
     if path.suffix not in _YAML:
-        hint = f"If it is text in YAML, rename it to {path.stem}.yaml"
+        hint = f"If it holds YAML, rename it to {path.stem}.yaml"
         raise BadInput(what, "be a .yaml file, or the run.nc of an earlier run", path.name, hint=hint)
     try:
         text = path.read_text(encoding="utf-8")
@@ -92,7 +92,7 @@ def no_file(path: Path, what: str, must: str = "be an existing file") -> BadInpu
         return BadInput(what, must, f"{path}, a folder", hint=hint)
     folder = path.parent
     if not folder.is_dir():
-        return BadInput(what, must, str(path), hint=f"There is no folder {folder}")
+        return BadInput(what, must, str(path), hint=f"The folder {folder} does not exist")
     known = [one.name for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)]
     return BadInput(what, must, str(path), hint=nearest(path.name, known))
 
