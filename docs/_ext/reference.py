@@ -13,7 +13,6 @@ from undertow.campaign.campaign_schema import Campaign, Distribution, Requiremen
 from undertow.cli.exit_codes import MEANINGS as EXIT_CODES
 from undertow.cli.main import app as command_line
 from undertow.core import catalogue
-from undertow.core.runtime import in_precision
 from undertow.core.status import Status
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
@@ -42,12 +41,8 @@ class Parts(FromCode):
 
     def contents(self) -> list[nodes.Node]:
         (kind,) = self.arguments
-        with in_precision("float64"):
-            return [
-                described(one)
-                for name in sorted(catalogue.names(kind))
-                for one in describing.describe(f"{kind}/{name}")
-            ]
+        names = sorted(catalogue.names(kind))
+        return [described(one) for name in names for one in describing.describe(f"{kind}/{name}")]
 
 
 def described(part: Description) -> nodes.section:

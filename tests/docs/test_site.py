@@ -44,6 +44,12 @@ def test_relative_links_lead_to_files(page):
     assert not broken
 
 
+@pytest.mark.parametrize("page", READ, ids=lambda page: str(page.relative_to(ROOT)))
+def test_named_code_files_exist(page):
+    named = set(re.findall(r"`([\w-]+/[\w/-]+\.py)`", page.read_text("utf-8")))
+    assert [name for name in named if not (ROOT / name).exists() and not (ROOT / "undertow" / name).exists()] == []
+
+
 def test_every_kind_of_part_has_a_page():
     assert {path.stem for path in (DOCS / "reference" / "parts").glob("*.md")} - {"index"} == set(catalogue.KINDS)
 
