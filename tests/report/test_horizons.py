@@ -73,7 +73,7 @@ def test_damping_and_what_is_asked_of_it_share_a_panel():
 
 def test_page_says_how_long_everything_lasted(results, tmp_path):
     page = write_report(results | {key: RESULTS[key] for key in ("horizons", "lags")}, {}, tmp_path).read_text("utf-8")
-    words = re.sub(r"<[^>]+>", " ", page)
+    words = re.sub(r"<[^>]+>|&nbsp;", " ", page)
     for said in ("diverged at 139 s", "diverged at 1.5 s", "lasts 200 s", "Long runs: 200 s", "10 to 20 s"):
         assert said in words
     assert "above 453" in words and "876 to 4382" in words and "never" in words
