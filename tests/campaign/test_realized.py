@@ -59,19 +59,19 @@ def test_a_realized_bias_that_causes_the_error_is_found(
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     found = json.loads((out / "summary.json").read_text())["sensitivity"]
     names = list(found)
-    assert names[:2] == ["disturbance.deviation", "|disturbance.bias| (./push.py:push)"]
-    assert "disturbance.bias (./push.py:push)" in names and "disturbance.unused[1] (./push.py:push)" in names
+    assert names[:2] == ["disturbance.deviation", "|disturbance.bias| (push)"]
+    assert "disturbance.bias (push)" in names and "disturbance.unused[1] (push)" in names
     assert not any("series" in name for name in names), "a process is no scalar"
     assert found[names[1]]["position_rms"] > 0.98
-    assert abs(found["disturbance.bias (./push.py:push)"]["position_rms"]) < 0.5
-    assert abs(found["disturbance.unused[0] (./push.py:push)"]["position_rms"]) < 0.5
+    assert abs(found["disturbance.bias (push)"]["position_rms"]) < 0.5
+    assert abs(found["disturbance.unused[0] (push)"]["position_rms"]) < 0.5
     assert "scalars that the seed of a trial determines" in (out / "campaign.html").read_text()
 
 
 def test_the_scalars_are_those_of_the_runs(campaign_file, campaign_folder):
     several = prepare(pushed(campaign_file, campaign_folder, name="again"), False).trials
     rows = [0, 1, 2, 5]
-    found = realized_scalars(several, rows)["disturbance.bias (./push.py:push)"]
+    found = realized_scalars(several, rows)["disturbance.bias (push)"]
     for value, row in zip(found, rows, strict=True):
         built = build_trial(several, PartCache(), row)
         realization = built.closed_loop.realize(key_of_seed(built.scenario.seed))
