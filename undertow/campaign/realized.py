@@ -105,7 +105,7 @@ def _name(path: tuple[Any, ...]) -> str:
 
 
 def _kind(resolved: Any, name: str) -> str:
-    """Kind of the innermost part on a key path of a scenario."""
+    """Kind of the innermost part on a key path of a scenario; of a part in a file, the name of its function."""
     kind = ""
     for step in key_path(name):
         try:
@@ -113,4 +113,4 @@ def _kind(resolved: Any, name: str) -> str:
         except (KeyError, IndexError, TypeError):
             break
         kind = resolved.get("kind", kind) if isinstance(resolved, dict) else kind
-    return kind
+    return kind.rpartition(":")[2]

@@ -25,7 +25,7 @@ _RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u20
 _SIGNS = {"&lt;=": "&le;", "&gt;=": "&ge;"}
 
 # Between a number and its unit no line ends.
-_UNITS = re.compile(r"(?<=\d) (?=(?:[mk]?[msVNW]|[kM]?Hz|rad|deg|mH|cm|mm|mrad|1/s|%)(?![\w]))")
+_UNITS = re.compile(r"(?:(?<=\d)|(?<=</sup>)) (?=(?:[mk]?[msVNW]|[kM]?Hz|rad|deg|mH|cm|mm|mrad|1/s|%)(?![\w]))")
 
 
 def number(value: Any, digits: int = _DIGITS) -> Html:
@@ -76,11 +76,11 @@ def prose(content: Any) -> Html:
 def _typeset(words: str) -> Html:
     marked = _TINY.sub(lambda found: _scientific(len(found[1]), found[2]), with_symbols(words))
     marked = _POWER.sub(lambda found: _with_power(found[1], f"{found[2]}{found[3]}".lstrip("+")), marked)
+    marked = re.sub(r"\^(-?\d)", lambda found: f"<sup>{_minus(found[1])}</sup>", marked)
     marked = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", marked))
     for sign, entity in _SIGNS.items():
         marked = marked.replace(sign, entity)
     marked = _UNITS.sub("&nbsp;", marked)
-    marked = re.sub(r"\^(-?\d)", lambda found: f"<sup>{_minus(found[1])}</sup>", marked)
     return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked))
 
 

@@ -71,8 +71,8 @@ def distributions_figure(
             panel.xaxis.set_minor_formatter(NullFormatter())  # their numbers would run into one another
         panel.set_ylim(0, 1)
         said = [style.power(unit) for unit in units[metric].split(", ") if unit]
-        style.label(panel, ", ".join([metric.replace("_", " "), *said]))
-        panel.xaxis.set_label_coords(0.5, -0.19)  # clear of powers of ten
+        words = ", ".join([metric.replace("_", " "), *said])
+        style.label(panel, words, "" if column else "share of the trials", below=0.27)  # clear of powers of ten
     return figure
 
 

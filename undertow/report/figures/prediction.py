@@ -32,7 +32,7 @@ def _poles(prediction: Prediction) -> Figure:
     panel = style.place(figure, 0.75, 0.55, 8.6, 3.1)
     for point, mark, colour in zip(prediction.points, _MARKS, _COLOURS, strict=False):
         marked: Any = {"color": colour, "markerfacecolor": "none", "markersize": 5.5}
-        words = f"{point.share:.0%} quantile of the load"
+        words = f"{100 * point.share:.0f} % quantile of the load"
         panel.plot(np.real(point.poles), np.imag(point.poles), mark, **marked, label=words)
     panel.set_xscale("symlog", linthresh=1.0, linscale=0.5)
     panel.set_yscale("symlog", linthresh=1.0, linscale=0.5)
@@ -88,8 +88,8 @@ def force_label(plant: AbstractPlant) -> str:
 
 
 def _stacked(name: str) -> str:
-    """A name in two lines, the number above."""
-    return name.replace(" ", "\n", 1)
+    """A name in lines: number, `vertical`, place."""
+    return name.replace(" ", "\n", 2 if "vertical" in name else 1)
 
 
 def _log(figure: Figure, left: float) -> Axes:

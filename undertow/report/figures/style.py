@@ -68,12 +68,15 @@ def few_log_ticks(*axes: Axis, most: int = 5) -> None:
         axis.set_minor_locator(NullLocator())
 
 
-def label(panel: Axes, x: str = "", y: str = "", title: str = "", size: float = TEXT) -> None:
-    """Axis labels, with units, and a title at the upper left of a panel, at fixed distances from it."""
+def label(panel: Axes, x: str = "", y: str = "", title: str = "", size: float = TEXT, below: float = 0.2) -> None:
+    """Axis labels, with units, and a title at the upper left of a panel, at fixed distances from it.
+
+    `below` is that of the x label, in.
+    """
     panel.set_xlabel(x, fontsize=SMALL, color=INK)
     panel.set_ylabel(y, fontsize=SMALL, color=INK)
     # Without coordinates of their own the labels would be moved clear of the tick labels: most of the plotting time.
-    panel.xaxis.set_label_coords(0.5, 0, transform=_shifted(panel, 0, -0.2))
+    panel.xaxis.set_label_coords(0.5, 0, transform=_shifted(panel, 0, -below))
     panel.yaxis.set_label_coords(0, 0.5, transform=_shifted(panel, -0.42, 0))
     panel.set_title(title, fontsize=size, color=INK, loc="left", fontweight="bold", y=1, pad=3)
 

@@ -74,8 +74,8 @@ def _lags(rows: Sequence[Mapping[str, Any]], windows: Sequence[Sequence[float]])
     """One row per run of the map, with the prediction for drifted weights beside five sets."""
     shown = []
     for row in rows:
-        unit = "ms" if row["kind"] == "lag" else "mH"
-        behind = f"{'lag' if row['kind'] == 'lag' else 'winding'} {1e3 * row['value']:g} {unit}"
+        size = f"{1e3 * row['value']:g}"
+        behind = f"lag {size} ms" if row["kind"] == "lag" else f"winding {size} mH"
         between = row["damping"]
         theory = "" if row["law"] != "five" else "never" if between is None else _between(between)
         shown.append((prose(behind), row["words"], theory, _ended(row), *_by_window(row, windows)))
