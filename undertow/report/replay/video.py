@@ -94,21 +94,19 @@ def _encoder(path: str, size: tuple[int, int]) -> Iterator[Callable[[bytes], Non
     given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", "{}x{}".format(*size), "-r", str(_RATE), "-i", "-"]
     made = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", path]
     command = ["ffmpeg", "-y", "-loglevel", "error", *given, *made]
-    with tempfile.TemporaryFile() as says:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=says)
+    with tempfile.TemporaryFile() as says, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=says) as process:
+        assert process.stdin is not None
         try:
-            assert process.stdin is not None
             yield process.stdin.write
-            process.stdin.close()
-            failed = process.wait() != 0
         except BrokenPipeError:
-            failed = True
+            pass  # ffmpeg has ended, and says why
         except BaseException:
             process.kill()
-            process.wait()
             raise
-        if failed:
-            process.wait()
+        finally:
+            with contextlib.suppress(BrokenPipeError):
+                process.stdin.close()
+        if process.wait() != 0:
             says.seek(0)
             raise OSError(f"ffmpeg failed: {says.read().decode(errors='replace').strip()}")
 
