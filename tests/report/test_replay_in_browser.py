@@ -38,14 +38,14 @@ def share_near(pixels, colour, within=60):
 @pytest.mark.parametrize("width", [1280, 500])
 def test_replay_of_two_vehicles_is_shown(two_minutes, tmp_path, width):
     other = two_minutes._replace(
-        label="two", series=two_minutes.series | {"position": two_minutes.series["position"] + 1}
+        label="two", series=two_minutes.series | {"position": two_minutes.series["position"] + 0.4}
     )
     page = tmp_path / "run.html"
     page.write_text(document("two", replay_section([two_minutes, other]), looks=replay_looks()), encoding="utf-8")
     _, complaints = browse(page, tmp_path, f"--screenshot={tmp_path / 'shot.png'}", f"--window-size={width},900")
     assert complaints == []
     view = (image.imread(tmp_path / "shot.png")[120:480, 30 : min(width, 800) - 30] * 255).round()
-    assert share_near(view, "#0072b2") > 1e-3 and share_near(view, "#e07b00") > 1e-3  # the paths of both
+    assert share_near(view, "#0072b2") > 2e-4 and share_near(view, "#e07b00") > 2e-4  # the paths of both
     assert share_near(view, "#f6f9fb", 12) > 0.05  # the water around them
     text, complaints = browse(page, tmp_path, "--dump-dom")
     assert complaints == [] and re.search(r'data-first-frame="\d+"', text)

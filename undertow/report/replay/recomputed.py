@@ -98,12 +98,15 @@ def surroundings(loop: ClosedLoop, seed: int, time: Series, position: Series, ve
         position: outputs, shape (records, 6).
         velocity: their rates, shape (records, 6).
     """
-    found = _surroundings(loop.realize(key_of_seed(seed)), jnp.asarray(time), position, velocity)
+    along = map(jnp.asarray, (time, position, velocity))
+    found = _surroundings(loop.realize(key_of_seed(seed)), *along)
     return Surroundings(*(None if series is None else np.asarray(series) for series in found))
 
 
 @eqx.filter_jit
-def _surroundings(realization: Realization, time: Array, position: Array, velocity: Array) -> Surroundings:
+def _surroundings(
+    realization: Realization, time: Array, position: Array, velocity: Array
+) -> tuple[Array | None, Array | None]:
     loop = realization.loop
 
     def at(t, outputs, rates):
@@ -111,7 +114,7 @@ def _surroundings(realization: Realization, time: Array, position: Array, veloci
         load = loop.disturbance.at(realization.disturbance_realization, t, pose, loop.plant.no_load())
         water = None if load.water is None else load.water.velocity
         share = None if load.scaling is None else jnp.broadcast_to(load.scaling.thrust, (loop.plant.inputs(),))
-        return Surroundings(water, share)
+        return water, share
 
     return jax.vmap(at)(time, position, velocity)
 

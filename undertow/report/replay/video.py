@@ -89,7 +89,7 @@ def write_video(
 
 
 @contextlib.contextmanager
-def _encoder(path: str, size: tuple[int, int]) -> Iterator[Callable[[bytes], None]]:
+def _encoder(path: str, size: tuple[int, int]) -> Iterator[Callable[[bytes], object]]:
     """A function that adds a frame, RGBA, to a video; ffmpeg is stopped where the caller fails."""
     given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", "{}x{}".format(*size), "-r", str(_RATE), "-i", "-"]
     made = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", path]
