@@ -197,7 +197,13 @@ def test_frames_of_a_video_differ(two_minutes):
 def test_video_is_checked_before_the_run(tmp_path, monkeypatch, name, found, says):
     monkeypatch.setattr("shutil.which", lambda program: "/usr/bin/ffmpeg" if found else None)
     with pytest.raises(ut.BadInput, match=re.escape(says)):
-        check_video(tmp_path / name, tmp_path / "out")
-    if found:
-        check_video(tmp_path / "run.mp4", tmp_path / "out")
-        check_video(tmp_path / "out" / "run.mp4", tmp_path / "out")
+        check_video(tmp_path / name, tmp_path / "out", False)
+
+
+def test_video_may_stand_beside_the_results_and_replaces_a_file_only_if_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.which", lambda program: "/usr/bin/ffmpeg")
+    check_video(tmp_path / "out" / "run.mp4", tmp_path / "out", False)
+    (tmp_path / "run.mp4").touch()
+    check_video(tmp_path / "run.mp4", tmp_path / "out", True)
+    with pytest.raises(ut.BadInput, match=re.escape("`--video` must be a new file")):
+        check_video(tmp_path / "run.mp4", tmp_path / "out", False)

@@ -37,11 +37,11 @@ _VIEWS = {"plan view": (1, 0, 1.0), "side view": (0, 2, -1.0)}
 _AXES = ("north, m", "east, m", "depth, m")
 
 
-def check_video(path: Path, folder: Path) -> None:
+def check_video(path: Path, folder: Path, overwrite: bool) -> None:
     """Check, before anything is run, that a video can be written; `folder` will exist by then.
 
     Raises:
-        BadInput: ffmpeg is missing, the name does not end in .mp4, or its folder does not exist.
+        BadInput: ffmpeg is missing, the name does not end in .mp4, its folder does not exist, or it would replace a file.
     """
     if path.suffix != ".mp4":
         raise BadInput("--video", "be a file whose name ends in .mp4", str(path))
@@ -52,6 +52,8 @@ def check_video(path: Path, folder: Path) -> None:
         raise BadInput("--video", "be left out where ffmpeg is missing", "given", hint=hint)
     if not path.parent.is_dir() and path.parent.resolve() != folder.resolve():
         raise BadInput("--video", "be in an existing folder", str(path))
+    if path.exists() and not overwrite:
+        raise BadInput("--video", "be a new file", f"{path}, which exists", hint="Add --overwrite to replace it")
 
 
 def write_video(
