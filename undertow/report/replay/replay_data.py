@@ -21,7 +21,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.plants.hybrid_model import BodyCoordinates
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.report.replay.recomputed import firing_along, environment, thrust_along, thrust_limits
+from undertow.report.replay.recomputed import environment, firing_along, thrust_along, thrust_limits
 from undertow.scenario.reading import parse
 from undertow.vehicles.facts import facts_of
 from undertow.vehicles.vehicle import Vehicle

@@ -41,7 +41,7 @@ def check_video(path: Path, folder: Path, overwrite: bool) -> None:
     """Check, before anything is run, that a video can be written; `folder` will exist by then.
 
     Raises:
-        BadInput: ffmpeg is missing, the name does not end in .mp4, its folder does not exist, or it would replace a file.
+        BadInput: ffmpeg is missing, the name does not end in .mp4, its folder does not exist, or it would replace one.
     """
     if path.suffix != ".mp4":
         raise BadInput("--video", "be a file whose name ends in .mp4", str(path))
