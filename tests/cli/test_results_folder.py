@@ -172,6 +172,7 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "figures",
         "metrics.json",
+        "run.html",
         "run.nc",
         "scenario.yaml",
     ]

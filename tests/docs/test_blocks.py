@@ -4,8 +4,8 @@ Blocks of one page run in order, in one folder, with one namespace. A block that
 an output) is not marked python or bash, or stands after a line `<!-- not run -->`. A block of Python or YAML whose
 first line is `# my_part.py` is that file: it is written into the folder.
 
-By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures are
-written, and PID stands for the preset `robust`: most of the time of a short run. Slow tests run everything as it stands.
+By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures and
+no replay are written, and PID stands for the preset `robust`: most of the time of a short run. Slow tests run everything as it stands.
 """
 
 import re
@@ -18,6 +18,7 @@ import pytest
 from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
 from undertow.comparison.contest import contest
+from undertow.report import run_page
 from undertow.report.figures import writing
 
 ROOT = Path(__file__).parents[2]
@@ -93,6 +94,7 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch):
     if not whole:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+        monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}

@@ -57,7 +57,7 @@ def simulate(
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
     ):
         if video is not None:
-            check_video(video, folder)
+            check_video(video, folder, overwrite)
         executed, predicted = _run(scenario, console, prediction, allow_code, video is not None)
         known, certificate = metrics_of(executed.dataset), certificate_of(executed.dataset)
         expected = predicted.metrics if predicted else None

@@ -3,7 +3,7 @@
 from rich.console import Console
 from rich.table import Column, Table
 
-from undertow.report.run_tables import RunTable
+from undertow.report.run_tables import RunTable, plain
 
 
 def titled(title: str, *columns: str | Column) -> Table:
@@ -21,7 +21,7 @@ def terminal_table(rows: RunTable) -> Table:
     first, *others = rows.head
     table = titled(rows.title, first, *(title if title == "unit" else numbers(title) for title in others))
     for row in rows.rows:
-        table.add_row(*row)
+        table.add_row(*map(plain, row))
     if rows.sentences:
         table.caption, table.caption_justify = "\n".join(rows.sentences), "left"
     return table

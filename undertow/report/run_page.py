@@ -15,15 +15,16 @@ from undertow.core.user_code import python_says
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import Saved, save_all
-from undertow.report.formats import prose
-from undertow.report.page import Html, document, figure, section, table, tag
+from undertow.report.formats import number, prose
+from undertow.report.page import Html, document, figure, marked, section, table, tag
 from undertow.report.replay.replay_data import Replay, replay_of
 from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
 from undertow.scenario.finished_run import certificate_of, metrics_of, window_of
 
 # Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
-_LARGE, _COLOURS = 100_000, 32
+_LARGE, _COLOURS = 80_000, 32
+_DIGITS = 4
 
 _CAPTIONS = {
     "tracking": "Desired and actual outputs.",
@@ -101,7 +102,8 @@ def _page(
     sections = [replay, section("metrics", measured.title, _table(measured))]
     if certificate is not None:
         hypotheses = certificate_rows(certificate, window)
-        below = [tag("p", prose(sentence)) for sentence in hypotheses.sentences]
+        power = lambda shown: number(float(shown), _DIGITS)
+        below = [tag("p", marked(r"(\d[\d.]*e[+-]\d+)", one, power, prose)) for one in hypotheses.sentences]
         sections.append(section("certificate", hypotheses.title, _table(hypotheses), *below))
     plotted = [
         figure(picture, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
@@ -121,7 +123,8 @@ def _page(
 
 def _table(rows: RunTable) -> Html:
     numeric = [place for place, title in enumerate(rows.head) if place and title != "unit"]
-    cells = [[prose(cell) for cell in row] for row in rows.rows]
+    shown = lambda cell: prose(cell) if isinstance(cell, str) else number(cell, _DIGITS)
+    cells = [[shown(cell) for cell in row] for row in rows.rows]
     return table([prose(title) for title in rows.head], cells, numeric=numeric)
 
 

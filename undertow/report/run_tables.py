@@ -8,11 +8,11 @@ from undertow.core.metric import Metric
 
 
 class RunTable(NamedTuple):
-    """A table: title, column titles, rows, and sentences below it."""
+    """A table: title, column titles, rows of words and of numbers to be formatted, and sentences below it."""
 
     title: str
     head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
+    rows: list[tuple[str | float, ...]]
     sentences: tuple[str, ...] = ()
 
 
@@ -27,7 +27,7 @@ def metrics_rows(
     rows = []
     for name, metric in known.items():
         if name in whole:
-            said = lambda values, name=name, metric=metric: _number(for_people(values[name], metric.unit)[0])
+            said = lambda values, name=name, metric=metric: _defined(for_people(values[name], metric.unit)[0])
             shown = [said(predicted) if name in predicted else ""] if predicted else []
             late = said(steady) if steady and name in steady else "-"
             rows.append((name, *shown, late, said(whole), for_people(0.0, metric.unit)[1]))
@@ -82,8 +82,15 @@ def _share(value: float | None) -> str:
     return f"{100 * value:.0f} %"
 
 
+def _defined(value: float | None) -> str | float:
+    """A number, or the word for one that is not: null in JSON, which stands for an infinite value, is `-`."""
+    return "-" if value is None else "never" if value == float("inf") else value
+
+
+def plain(value: str | float) -> str:
+    """A cell as plain text: numbers in four digits."""
+    return value if isinstance(value, str) else f"{value:.4g}"
+
+
 def _number(value: float | None) -> str:
-    """A number in four digits; null in JSON, which stands for an infinite value, is `-`."""
-    if value is None:
-        return "-"
-    return "never" if value == float("inf") else f"{value:.4g}"
+    return plain(_defined(value))

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from undertow.core.contracts import AbstractController, Pose
 from undertow.loop.closed_loop import ClosedLoop, Realization
@@ -81,14 +81,14 @@ def thrust_limits(thruster: AbstractThruster, count: int) -> Series:
     return np.stack(limits, axis=-1)
 
 
-class Surroundings(NamedTuple):
+class Environment(NamedTuple):
     """What the disturbance does at the vehicle, one entry per record; None where it does nothing of the kind."""
 
     water: Series | None  # velocity of the water over ground, m/s: north, east, down
     thrust_share: Series | None  # share of its thrust that each thruster gives
 
 
-def surroundings(loop: ClosedLoop, seed: int, time: Series, position: Series, velocity: Series) -> Surroundings:
+def environment(loop: ClosedLoop, seed: int, time: Series, position: Series, velocity: Series) -> Environment:
     """Water and thrust losses at the vehicle along a run; the random part of the disturbance is that of the run.
 
     Args:
@@ -98,12 +98,15 @@ def surroundings(loop: ClosedLoop, seed: int, time: Series, position: Series, ve
         position: outputs, shape (records, 6).
         velocity: their rates, shape (records, 6).
     """
-    found = _surroundings(loop.realize(key_of_seed(seed)), jnp.asarray(time), position, velocity)
-    return Surroundings(*(None if series is None else np.asarray(series) for series in found))
+    along = map(jnp.asarray, (time, position, velocity))
+    found = _environment(loop.realize(key_of_seed(seed)), *along)
+    return Environment(*(None if series is None else np.asarray(series) for series in found))
 
 
 @eqx.filter_jit
-def _surroundings(realization: Realization, time: Array, position: Array, velocity: Array) -> Surroundings:
+def _environment(
+    realization: Realization, time: Array, position: Array, velocity: Array
+) -> tuple[Array | None, Array | None]:
     loop = realization.loop
 
     def at(t, outputs, rates):
@@ -111,7 +114,7 @@ def _surroundings(realization: Realization, time: Array, position: Array, veloci
         load = loop.disturbance.at(realization.disturbance_realization, t, pose, loop.plant.no_load())
         water = None if load.water is None else load.water.velocity
         share = None if load.scaling is None else jnp.broadcast_to(load.scaling.thrust, (loop.plant.inputs(),))
-        return Surroundings(water, share)
+        return water, share
 
     return jax.vmap(at)(time, position, velocity)
 
@@ -125,5 +128,4 @@ def firing_along(controller: AbstractController, run: xr.Dataset) -> Series | No
         inputs = np.stack([run["measured_position"].values, run["measured_velocity"].values], axis=-1)
     else:
         inputs = run["modelling_error"].values[..., None]
-    flat: Float[Array, "n p"] = jnp.asarray(inputs.reshape(-1, inputs.shape[-1]))
-    return np.asarray(fuzzy.basis(flat)).reshape(*inputs.shape[:2], -1)
+    return np.asarray(fuzzy.basis(jnp.asarray(inputs.reshape(-1, inputs.shape[-1])))).reshape(*inputs.shape[:2], -1)

@@ -106,7 +106,7 @@
     const slider = element("input", { type: "range", min: start, max: end, step: 0.01, value: start, "aria-label": "time" });
     const time = element("output", { class: "time" });
     const speed = choice("speed", SPEEDS.map((one) => [one, `${one} times`]), 1);
-    const camera = choice("camera", [["follow", "follow"], ["whole", "whole path"], ["top", "from above"]], "follow");
+    const camera = choice("camera", [["follow", "follow"], ["whole", "whole path"], ["top", "from above"]], runs.length > 1 ? "whole" : "follow");
     const which = choice("run", runs.map((run, i) => [i, run.label]), 0);
     const labels = switchOf("names"), forces = switchOf("disturbance");
     const options = element(

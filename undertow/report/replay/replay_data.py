@@ -21,7 +21,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.plants.hybrid_model import BodyCoordinates
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.report.replay.recomputed import firing_along, surroundings, thrust_along, thrust_limits
+from undertow.report.replay.recomputed import environment, firing_along, thrust_along, thrust_limits
 from undertow.scenario.reading import parse
 from undertow.vehicles.facts import facts_of
 from undertow.vehicles.vehicle import Vehicle
@@ -90,7 +90,7 @@ def can_be_shown(plant: AbstractPlant) -> bool:
 
 
 def replay_of(run: xr.Dataset, loop: ClosedLoop, label: str = "") -> Replay | None:
-    """What a replay shows of a run; None for a plant that is no vehicle with thrusters.
+    """What a replay shows of a run; None for a plant that is no vehicle with thrusters, or a single record.
 
     Args:
         run: dataset of the run.
@@ -98,7 +98,7 @@ def replay_of(run: xr.Dataset, loop: ClosedLoop, label: str = "") -> Replay | No
         label: name of the run, for a replay of several.
     """
     plant = loop.plant
-    if not isinstance(plant, HybridVehicle):
+    if not isinstance(plant, HybridVehicle) or run.sizes["time"] < 2:
         return None
     lived = run.isel(time=slice(0, max(2, int((run["time"].values <= run.attrs.get("ended", np.inf)).sum()))))
     lived = lived.map(_finite)
@@ -110,7 +110,7 @@ def _replay_of(run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, label: s
     time, frames = run["time"].values, _frames(run["time"].values)
     shown = run.isel(time=frames)
     position, reference = shown["position"].values, shown["reference"].values
-    around = surroundings(loop, int(run.attrs.get("seed", 0)), shown["time"].values, position, shown["velocity"].values)
+    around = environment(loop, int(run.attrs.get("seed", 0)), shown["time"].values, position, shown["velocity"].values)
     step = float(time[1] - time[0])
     thrust = _finite_values(thrust_along(plant.thruster, run["input"].values, step)[frames])
     if around.thrust_share is not None:

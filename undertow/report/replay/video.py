@@ -37,11 +37,11 @@ _VIEWS = {"plan view": (1, 0, 1.0), "side view": (0, 2, -1.0)}
 _AXES = ("north, m", "east, m", "depth, m")
 
 
-def check_video(path: Path, folder: Path) -> None:
+def check_video(path: Path, folder: Path, overwrite: bool) -> None:
     """Check, before anything is run, that a video can be written; `folder` will exist by then.
 
     Raises:
-        BadInput: ffmpeg is missing, the name does not end in .mp4, or its folder does not exist.
+        BadInput: ffmpeg is missing, the name does not end in .mp4, its folder does not exist, or it would replace one.
     """
     if path.suffix != ".mp4":
         raise BadInput("--video", "be a file whose name ends in .mp4", str(path))
@@ -52,6 +52,8 @@ def check_video(path: Path, folder: Path) -> None:
         raise BadInput("--video", "be left out where ffmpeg is missing", "given", hint=hint)
     if not path.parent.is_dir() and path.parent.resolve() != folder.resolve():
         raise BadInput("--video", "be in an existing folder", str(path))
+    if path.exists() and not overwrite:
+        raise BadInput("--video", "be a new file", f"{path}, which exists", hint="Add --overwrite to replace it")
 
 
 def write_video(
@@ -89,26 +91,24 @@ def write_video(
 
 
 @contextlib.contextmanager
-def _encoder(path: str, size: tuple[int, int]) -> Iterator[Callable[[bytes], None]]:
+def _encoder(path: str, size: tuple[int, int]) -> Iterator[Callable[[bytes], object]]:
     """A function that adds a frame, RGBA, to a video; ffmpeg is stopped where the caller fails."""
     given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", "{}x{}".format(*size), "-r", str(_RATE), "-i", "-"]
     made = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", path]
     command = ["ffmpeg", "-y", "-loglevel", "error", *given, *made]
-    with tempfile.TemporaryFile() as says:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=says)
+    with tempfile.TemporaryFile() as says, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=says) as process:
+        assert process.stdin is not None
         try:
-            assert process.stdin is not None
             yield process.stdin.write
-            process.stdin.close()
-            failed = process.wait() != 0
         except BrokenPipeError:
-            failed = True
+            pass  # ffmpeg has ended, and says why
         except BaseException:
             process.kill()
-            process.wait()
             raise
-        if failed:
-            process.wait()
+        finally:
+            with contextlib.suppress(BrokenPipeError):
+                process.stdin.close()
+        if process.wait() != 0:
             says.seek(0)
             raise OSError(f"ffmpeg failed: {says.read().decode(errors='replace').strip()}")
 
