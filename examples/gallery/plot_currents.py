@@ -13,6 +13,8 @@ import matplotlib.pyplot as plt
 import undertow as ut
 from undertow.core.contracts import Load, Pose
 
+jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
+
 
 def velocity(disturbance, realization, time, depth):
     """Velocity of the water at a depth below the origin, north, east, down, m/s."""

@@ -6,6 +6,7 @@ The linearised loop says how much delay between measurement and controller it su
 much and more delay show whether that is true.
 """
 
+import jax
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -13,6 +14,8 @@ import undertow as ut
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.loop.closed_loop import ClosedLoop
+
+jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 
 plant = ut.plants.double_integrator(axes=1)
 law = ut.controllers.pid(plant.model(), frequency=2.0)  # rad/s

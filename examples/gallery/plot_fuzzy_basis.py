@@ -7,10 +7,13 @@ by their sum. The paper uses five sets on the modelling error. The robust varian
 nearly constant.
 """
 
+import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 
 from undertow.estimation.fuzzy_system import gaussian_sets
+
+jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 
 error = jnp.linspace(-2.0, 2.0, 401)[:, None]  # m/s
 paper, wide = gaussian_sets(5, reach=(1.0,)), gaussian_sets(5, reach=(50.0,))

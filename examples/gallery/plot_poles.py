@@ -6,12 +6,15 @@ The whole closed loop, vehicle, motors and sampled controller, is linearised exa
 margins follow without a simulation.
 """
 
+import jax
 import matplotlib.pyplot as plt
 
 import undertow as ut
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.loop.closed_loop import ClosedLoop
+
+jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 
 plant = ut.plants.double_integrator(axes=1)
 nothing, exact, hold = ut.disturbances.none(), ut.navigation.perfect(), ut.references.setpoint([0.0])

@@ -12,6 +12,8 @@ import numpy as np
 
 import undertow as ut
 
+jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
+
 references = {
     "lawn_mower": (ut.references.lawn_mower(length=10.0, spacing=2.0, count=4, speed=0.5), 104.0),
     "helix": (ut.references.helix(radius=2.0, period=40.0, sink_rate=0.05), 80.0),

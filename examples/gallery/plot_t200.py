@@ -6,11 +6,14 @@ The Blue Robotics T200 as a brushed DC motor that was fitted to the manufacturer
 functions, so its steady state can be computed without a run.
 """
 
+import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 
 import undertow as ut
+
+jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 
 voltage = jnp.linspace(-16.0, 16.0, 641)  # V
 static = ut.thrusters.t200(fidelity="static")

@@ -15,6 +15,8 @@ import undertow as ut
 from undertow.core.contracts import Load, Pose
 from undertow.disturbances.waves import spectrum
 
+jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
+
 waves = ut.disturbances.waves(height=0.5, period=5.0, components=64)  # m, s
 realization = waves.realize(jax.random.key(0))
 

@@ -1,5 +1,6 @@
 """`undertow init`: write a commented scenario to start from, and the files that it names."""
 
+import contextlib
 import json
 from collections.abc import Mapping
 from importlib.resources import files
@@ -88,6 +89,7 @@ def _check_free(folder: Path, names: Mapping[str, str]) -> None:
 def _write(folder: Path, contents: Mapping[str, str]) -> None:
     """All files, or none of them."""
     written: list[Path] = []
+    made = [part for part in (folder, *folder.parents) if not part.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in contents.items():
@@ -97,4 +99,7 @@ def _write(folder: Path, contents: Mapping[str, str]) -> None:
     except BaseException:
         for path in written:
             path.unlink(missing_ok=True)
+        for part in made:
+            with contextlib.suppress(OSError):
+                part.rmdir()
         raise
