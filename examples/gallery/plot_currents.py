@@ -16,10 +16,15 @@ from undertow.core.contracts import Load, Pose
 jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 
 
-def velocity(disturbance, realization, time, depth):
-    """Velocity of the water at a depth below the origin, north, east, down, m/s."""
-    pose = Pose(jnp.array([0.0, 0.0, depth]), jnp.eye(3), jnp.zeros(3))
-    return disturbance.at(realization, time, pose, Load(jnp.zeros(6), jnp.zeros(6))).water.velocity
+@jax.jit
+def northward(current, realization, times, depths):
+    """Velocity of the water to the north, m/s, at times (s) and depths below the origin (m)."""
+
+    def at(time, depth):
+        pose = Pose(jnp.array([0.0, 0.0, depth]), jnp.eye(3), jnp.zeros(3))
+        return current.at(realization, time, pose, Load(jnp.zeros(6), jnp.zeros(6))).water.velocity[0]
+
+    return jax.vmap(at)(times, depths)
 
 
 # %%
@@ -32,8 +37,7 @@ profiles = {
     "sheared": ut.disturbances.sheared_current(depths=(0.0, 5.0, 20.0), velocities=((0.8, 0), (0.4, 0), (0.1, 0))),
 }
 for name, current in profiles.items():
-    north = jax.vmap(lambda depth, current=current: velocity(current, (), 0.0, depth)[0])(depths)
-    left.plot(north, depths, label=name)
+    left.plot(northward(current, (), jnp.zeros(101), depths), depths, label=name)
 left.set(xlabel="current to the north, m/s", ylabel="depth, m")
 left.invert_yaxis()
 left.legend()
@@ -42,7 +46,7 @@ random = ut.disturbances.gauss_markov_current(mean=(0.3, 0, 0), deviation=(0.1, 
 times = jnp.linspace(0.0, 600.0, 601)  # s
 for seed in range(3):
     realization = random.realize(jax.random.key(seed))
-    north = jax.vmap(lambda t, realization=realization: velocity(random, realization, t, 0.0)[0])(times)
+    north = northward(random, realization, times, jnp.zeros(601))
     right.plot(times, north, label=f"seed {seed}")
     print(f"seed {seed}: mean {float(north.mean()):.3f} m/s, standard deviation {float(north.std()):.3f} m/s")
 right.set(xlabel="time, s", ylabel="current to the north, m/s")

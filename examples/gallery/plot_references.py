@@ -26,7 +26,7 @@ references = {
 figure, panels = plt.subplots(1, 3, figsize=(8, 3.0), layout="constrained")
 for panel, (name, (reference, duration)) in zip(panels, references.items(), strict=True):
     time = jnp.arange(0.0, duration, 0.1)  # s
-    target = jax.vmap(reference.at)(time)
+    target = jax.jit(jax.vmap(reference.at))(time)
     north, east = target.position[:, 0], target.position[:, 1]
     panel.plot(east, north)
     panel.plot(east[::100], north[::100], ".")

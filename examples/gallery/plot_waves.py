@@ -21,10 +21,12 @@ waves = ut.disturbances.waves(height=0.5, period=5.0, components=64)  # m, s
 realization = waves.realize(jax.random.key(0))
 
 
-def velocity(time, depth):
-    """Velocity of the water at a depth below the surface, north, east, down, m/s."""
+@jax.jit
+def sinking(times, depth):
+    """Downward velocity of the water at a depth below the surface, m/s; times in s."""
     pose = Pose(jnp.array([0.0, 0.0, depth - waves.depth]), jnp.eye(3), jnp.zeros(3))
-    return waves.at(realization, time, pose, Load(jnp.zeros(6), jnp.zeros(6))).water.velocity
+    still = Load(jnp.zeros(6), jnp.zeros(6))
+    return jax.vmap(lambda t: waves.at(realization, t, pose, still).water.velocity[2])(times)
 
 
 # %%
@@ -38,16 +40,17 @@ left.plot(realization.frequency, np.zeros(64), "|", markersize=12)
 left.set(xlabel="frequency, rad/s", ylabel="energy density, share of its peak")
 time = jnp.linspace(0.0, 60.0, 601)  # s
 for depth in (1.0, 6.0):  # m
-    down = jax.vmap(lambda t, depth=depth: velocity(t, depth)[2])(time)
+    down = sinking(time, depth)
     right.plot(time, down, label=f"{depth:g} m deep: {float(down.std()):.3f} m/s rms")
 right.set(xlabel="time, s", ylabel="velocity of the water, down, m/s")
 right.legend()
 plt.show()
 
 # %%
-# The components together have the energy of the sea state: the standard deviation of the surface is a quarter of the
-# significant height. At the surface, vertical velocity divided by frequency is elevation.
+# The surface itself is the integral of the vertical velocity there. The significant height of a sea state is four times
+# the standard deviation of its surface.
 
-amplitude = 0.25 * float(waves.height) * np.sqrt(2 / 64)
-print(f"Standard deviation of the surface: {np.sqrt(64 * amplitude**2 / 2):.4f} m")
-print(f"A quarter of the significant height: {float(waves.height) / 4:.4f} m")
+long = jnp.arange(0.0, 600.0, 0.1)  # s
+surface = jnp.cumsum(-sinking(long, 0.0)) * 0.1
+print(f"Significant height of ten minutes of this realisation: {4 * float(surface.std()):.3f} m")
+print(f"Significant height asked for: {float(waves.height):.3f} m")
