@@ -38,6 +38,6 @@ for share in (0.7, 0.95, 1.1):
     early, late = (float(np.abs(error.sel(time=slice(*window))).max()) for window in ((2, 6), (16, 20)))
     word = "grows" if late > early else "decays"
     print(f"{1e3 * delay:.0f} ms: the oscillation {word}, from {early:.2g} to {late:.2g} mm")
-axes.set(xlabel="time, s", ylabel="position error, mm", ylim=(-30, 30))
+axes.set(xlabel="time, s", ylabel="position error, mm", ylim=(-15, 15))
 axes.legend(title="delay")
 plt.show()

@@ -23,7 +23,7 @@ axes[0].set(ylabel="angle, rad")
 axes[0].legend()
 axes[1].plot(run.dataset["time"], run.dataset["uncertainty"], "k:", label="true")
 axes[1].plot(run.dataset["time"], run.dataset["estimate"], label="estimate")
-axes[1].set(xlabel="time, s", ylabel="lumped uncertainty, rad/s²", ylim=(-2, 2))
+axes[1].set(xlabel="time, s", ylabel="lumped uncertainty, rad/s²", ylim=(-0.15, 0.15))
 axes[1].legend()
 plt.show()
 

@@ -67,7 +67,9 @@ def test_own_parts_fit(empty_folder, capsys, schema):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("options", [*(["--vehicle", name] for name in _THRUSTERS), ["--own-vehicle", "--own-controller"]])
+@pytest.mark.parametrize(
+    "options", [*(["--vehicle", name] for name in _THRUSTERS), ["--own-vehicle", "--own-controller"]]
+)
 def test_it_is_simulated(options, empty_folder, capsys):
     """As it is written, and the controller keeps the vehicle within the bounds that the file states."""
     assert run(["init", *options]) == 0

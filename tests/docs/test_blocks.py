@@ -133,7 +133,11 @@ def test_absent_lines():
     printed = "\n| a |  1.5 | m |\nReading 0.3 s\nDone.\n"
     assert absent("| a | 1.5 | m |\n\nDone.\n", printed) == []
     assert absent("Reading ... s\n", printed) == []
-    assert absent("| a | 1.6 | m |\nDone.\n| a | 1.5 | m |\n", printed) == ["| a | 1.6 | m |", "Done.", "| a | 1.5 | m |"]
+    assert absent("| a | 1.6 | m |\nDone.\n| a | 1.5 | m |\n", printed) == [
+        "| a | 1.6 | m |",
+        "Done.",
+        "| a | 1.5 | m |",
+    ]
 
 
 def test_blocks_are_found(tmp_path):
