@@ -21,8 +21,8 @@ nothing, exact, hold = ut.disturbances.none(), ut.navigation.perfect(), ut.refer
 step = 1e-3  # s
 
 # %%
-# One axis with the robust variant, for three bandwidths of its estimator, whose damping ratio is 0.7. A faster estimator
-# leaves less room for delay.
+# One axis with the robust variant, for three bandwidths of its estimator, whose damping ratio is 0.7. A faster
+# estimator leaves less room for delay.
 
 figure, axes = plt.subplots(figsize=(6, 3.6), layout="constrained")
 for bandwidth in (10.0, 20.0, 40.0):  # rad/s

@@ -91,7 +91,11 @@ def test_no_second_version():
     """The files that `init` writes are those of the examples and of the page on own controllers."""
     assert (TEMPLATES / "my_rov.yaml").read_text() == (ROOT / "examples" / "my_rov.yaml").read_text()
     (page,) = (ROOT / "docs").rglob("your-own-controller.md")
-    assert f"```python\n{(TEMPLATES / 'my_controller.py').read_text()}```" in page.read_text()
+    law = (TEMPLATES / "my_controller.py").read_text()
+    assert f"```python\n{law}```" in page.read_text()
+    tutorial = (ROOT / "docs" / "tutorials" / "3-your-controller.md").read_text()
+    excerpts = re.findall(r"```python\n(.*?)```", tutorial, re.DOTALL)
+    assert len(excerpts) == 3 and all(excerpt in law for excerpt in excerpts)
 
 
 def test_nothing_is_replaced(empty_folder, capsys):

@@ -38,7 +38,7 @@ def test_names_exist(path):
     for module, chain in found:
         thing = importlib.import_module(module)
         for name in chain:
-            thing = getattr(thing, name)
+            thing = getattr(thing, name) if hasattr(thing, name) else importlib.import_module(f"{module}.{name}")
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
