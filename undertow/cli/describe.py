@@ -1,5 +1,6 @@
 """`undertow list` and `undertow describe`: available parts, and one part, the scenario file, metrics or signals."""
 
+import json
 from collections.abc import Mapping
 
 from rich.console import Console
@@ -14,6 +15,7 @@ from undertow.core.signals import Signal
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.describing import summary, text_of
+from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.schema import keys
 
 _PARTS = (
@@ -23,10 +25,17 @@ _PARTS = (
 )
 
 
-def describe(name: str) -> None:
-    """Print the description of a part, the keys of a scenario, the metrics, or the signals of every run."""
+def describe(name: str, json_schema: bool = False) -> None:
+    """Print the description of a part, the keys of a scenario, the metrics, or the signals of every run.
+
+    With `json_schema`, print the keys of a scenario as a JSON schema.
+    """
     console = wide_console()
-    if name == "scenario":
+    if json_schema:
+        if name != "scenario":
+            raise BadInput("--json-schema", "follow `describe scenario`", f"given for `{name}`")
+        print(json.dumps(scenario_schema(), indent=1))
+    elif name == "scenario":
         rows = [(key.path, key.type, text_of(key.default), key.meaning) for key in keys()]
         _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
         console.print(_PARTS, highlight=False, markup=False, soft_wrap=True)

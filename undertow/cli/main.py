@@ -79,6 +79,32 @@ def reproduce(
 
 
 @app.command()
+def init(
+    path: Annotated[
+        Path,
+        typer.Argument(metavar="[PATH]", help="Folder for scenario.yaml, or a name that ends in .yaml. Default: here."),
+    ] = Path(),
+    vehicle: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Vehicle: bluerov2, bluerov2_heavy (default), odin or rexrov.")
+    ] = None,
+    own_vehicle: Annotated[
+        bool, typer.Option("--own-vehicle", help="Also write my_rov.yaml, a vehicle to put your numbers in.")
+    ] = False,
+    own_controller: Annotated[
+        bool, typer.Option("--own-controller", help="Also write my_controller.py, a sliding-mode law to change.")
+    ] = False,
+) -> None:
+    """Write a commented scenario to start from.
+
+    The command writes scenario.yaml and scenario.schema.json, with which editors complete and explain its keys. The
+    scenario runs as it is: `undertow simulate scenario.yaml`. Existing files are not changed.
+    """
+    from undertow.cli.init import init
+
+    init(path, vehicle, own_vehicle, own_controller)
+
+
+@app.command()
 def simulate(
     scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
     out: Annotated[
@@ -294,6 +320,9 @@ def describe(
             "metrics and signals.",
         ),
     ],
+    json_schema: Annotated[
+        bool, typer.Option("--json-schema", help="With NAME scenario: print the JSON schema that editors use.")
+    ] = False,
 ) -> None:
     """Describe a part.
 
@@ -302,7 +331,7 @@ def describe(
     """
     from undertow.cli.describe import describe
 
-    describe(name)
+    describe(name, json_schema)
 
 
 @app.command()

@@ -90,7 +90,7 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
         kind=kind,
         name=name,
         summary=_prose(part),
-        options=_options(kind, part),
+        options=options_of(kind, part),
         parameters=tuple(map(_depending, parameters(shown))) if described else (),
         advice=advise(),
         signals=_signals(kind, description or name, instance),
@@ -125,7 +125,8 @@ def _prose(part: Any) -> str:
     return re.split(r"\n\s*(?:Args|Raises|Returns):", inspect.getdoc(part) or "")[0].strip()
 
 
-def _options(kind: str, part: Any) -> tuple[Option, ...]:
+def options_of(kind: str, part: Any) -> tuple[Option, ...]:
+    """Options of a part, from the signature and docstring of its function."""
     meanings = _meanings(inspect.getdoc(part) or "")
     options = []
     for name, parameter in inspect.signature(part).parameters.items():
