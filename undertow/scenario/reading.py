@@ -93,7 +93,8 @@ def no_file(path: Path, what: str, must: str = "be an existing file") -> BadInpu
     folder = path.parent
     if not folder.is_dir():
         return BadInput(what, must, str(path), hint=f"The folder {folder} does not exist")
-    known = [one.name for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)]
+    files = [one for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)]
+    known = [one.name for one in files if nearest(path.stem, [one.stem])]  # not alike by their ending alone
     return BadInput(what, must, str(path), hint=nearest(path.name, known))
 
 
