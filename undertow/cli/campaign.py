@@ -30,6 +30,7 @@ from undertow.core import checks
 from undertow.core.disk import alone
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import by_xla, write_campaign
+from undertow.scenario.build import Built
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
@@ -53,15 +54,15 @@ def campaign(
         check_cluster(where)
     first = Path("runs") / path.stem
     with output_folder(out or (first if resume else None), first) as folder:
-        check_folder(folder, resume, overwrite)
+        check_folder(folder, _WRITTEN, resume, overwrite)
         console = wide_console()
         with stage(console, "building first trials"):
             prepared = interruptible(lambda: prepare(path, allow_code))
         for sentence in prepared.advice:
             typer.echo(f"Advice: {sentence}", err=True)
         if not resume:
-            clear_folder(folder)
-        with chosen(where, count) as executor, _live(console) as watch:
+            clear_folder(folder, _WRITTEN)
+        with chosen(where, count) as executor, live(console) as watch:
             try:
                 interruptible(lambda: run_campaign(prepared, folder, executor, watch))
             except (KeyboardInterrupt, OSError):
@@ -112,7 +113,7 @@ def status(folder: Path, options: Sequence[str]) -> int:
 
 
 @contextlib.contextmanager
-def _live(console: Console) -> Iterator[Watch]:
+def live(console: Console) -> Iterator[Watch]:
     """Show the number of finished trials, their rate and the remaining time."""
     begun, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
@@ -134,17 +135,21 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     folder.mkdir()
     part_cache = PartCache()
     for trial in trials:
-        data = build_trial(prepared.trials, part_cache, trial).resolved  # includes the contents of named files
-        data = data | {"steady": data["steady"] | {"every_step": True}}
-        text = f"# Trial {trial} of the campaign.\n{dump(data)}"
+        text = trial_text(build_trial(prepared.trials, part_cache, trial), f"Trial {trial} of the campaign.")
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
+
+
+def trial_text(built: Built, sentence: str) -> str:
+    """The scenario of a trial, which `undertow simulate` repeats, with a sentence above it."""
+    data = built.resolved | {"steady": built.resolved["steady"] | {"every_step": True}}  # with contents of named files
+    return f"# {sentence}\n{dump(data)}"
 
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
 
-def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
-    """Check that a campaign may be written to a folder.
+def check_folder(folder: Path, names: Sequence[str], resume: bool, overwrite: bool) -> None:
+    """Check that a campaign may be written to a folder; `names` are the files and folders that it writes.
 
     Raises:
         BadInput: the folder cannot be used.
@@ -154,13 +159,13 @@ def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
         raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
     if not resume:
         hint = "Add --resume to continue it, or --overwrite to replace it"
-        results_folder.check_folder(folder, _WRITTEN, STORE, overwrite, hint)
+        results_folder.check_folder(folder, names, STORE, overwrite, hint)
     elif not (folder / STORE).exists():
         raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
 
 
-def clear_folder(folder: Path) -> None:
-    """Remove all files of a campaign that is replaced.
+def clear_folder(folder: Path, names: Sequence[str]) -> None:
+    """Remove all files of a campaign that is replaced, by their names.
 
     Raises:
         BadInput: another process is running it.
@@ -168,7 +173,7 @@ def clear_folder(folder: Path) -> None:
     if not folder.exists():
         return
     with alone(folder / STORE):
-        for name in _WRITTEN:
+        for name in names:
             results_folder.remove(folder / name)
 
 

@@ -39,6 +39,7 @@ app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, 
 def undertow(
     context: typer.Context,
     traceback: Annotated[bool, typer.Option("--traceback", help="Show the traceback of an error.")] = False,
+    short_version: Annotated[bool, typer.Option("--version", help="Show the version of undertow.")] = False,
 ) -> None:
     """Simulate, analyse and tune robust adaptive control of underwater vehicles with voltage-driven thrusters.
 
@@ -47,6 +48,9 @@ def undertow(
     """
     if traceback:
         os.environ["UNDERTOW_TRACEBACK"] = "1"
+    if short_version:
+        typer.echo(f"undertow {importlib.metadata.version('undertow')}")
+        raise typer.Exit
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 
@@ -75,6 +79,32 @@ def reproduce(
 
 
 @app.command()
+def init(
+    path: Annotated[
+        Path,
+        typer.Argument(metavar="[PATH]", help="Folder for scenario.yaml, or a name that ends in .yaml. Default: here."),
+    ] = Path(),
+    vehicle: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Vehicle: bluerov2, bluerov2_heavy (default), odin or rexrov.")
+    ] = None,
+    own_vehicle: Annotated[
+        bool, typer.Option("--own-vehicle", help="Also write my_rov.yaml, a vehicle to put your numbers in.")
+    ] = False,
+    own_controller: Annotated[
+        bool, typer.Option("--own-controller", help="Also write my_controller.py, a sliding-mode law to change.")
+    ] = False,
+) -> None:
+    """Write a commented scenario to start from.
+
+    The command writes scenario.yaml and scenario.schema.json, with which editors complete and explain its keys. The
+    scenario runs as it is: `undertow simulate scenario.yaml`. Existing files are not changed.
+    """
+    from undertow.cli.init import init
+
+    init(path, vehicle, own_vehicle, own_controller)
+
+
+@app.command()
 def simulate(
     scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
     out: Annotated[
@@ -97,16 +127,20 @@ def simulate(
     ] = True,
     allow_code: AllowCode = False,
     pdf: Pdf = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mp4", help="Also write a video of the run, at most 30 s long. It needs ffmpeg."),
+    ] = None,
 ) -> int:
     """Simulate one scenario.
 
-    The command writes run.nc, metrics.json, scenario.yaml and figures/ when the run has ended. If SCENARIO is a result
-    file, its run is repeated, and the command reports whether the results are identical bit for bit. Other files in DIR
-    are not changed.
+    The command writes run.nc, metrics.json, scenario.yaml, figures/ and run.html when the run has ended. run.html holds
+    metrics, figures and a replay in three dimensions, and needs no network. If SCENARIO is a result file, its run is
+    repeated, and the command reports whether the results are identical bit for bit. Other files in DIR are not changed.
     """
     from undertow.cli.simulate import simulate
 
-    return simulate(scenario, out, overwrite, prediction, allow_code, pdf)
+    return simulate(scenario, out, overwrite, prediction, allow_code, pdf, video)
 
 
 @app.command()
@@ -131,7 +165,8 @@ def tune(
     method: Annotated[
         str,
         typer.Option(
-            metavar="METHOD", help="gradient (quasi-Newton), or search (differential evolution, for costs not smooth)."
+            metavar="METHOD",
+            help="gradient (quasi-Newton), or search (differential evolution, for costs that are not smooth).",
         ),
     ] = "gradient",
     budget: Annotated[
@@ -221,6 +256,47 @@ def campaign(
     return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code, pdf)
 
 
+@app.command()
+def compare(
+    scenarios: Annotated[
+        list[Path], typer.Argument(metavar="SCENARIO...", help="A .yaml file, several of them, or one campaign file.")
+    ],
+    controllers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="What to compare on one scenario, separated by commas: presets (robust, paper), controllers (pid), "
+            "./file.py:function, scenario files whose controller is taken (tuned.yaml), and the word `scenario` for "
+            "the scenario's own controller. NAME=ENTRY gives a name.",
+        ),
+    ] = None,
+    trials: Annotated[
+        int | None, typer.Option(metavar="N", help="Trials of each. Default: 20, or the number of the campaign file.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Folder for the results. Default: runs/NAME-comparison, or the next free one."
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue an interrupted comparison, or add trials.")
+    ] = False,
+    workers: Annotated[int | None, typer.Option(metavar="N", help="Number of threads. Default: all cores.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier comparison in DIR.")] = False,
+    allow_code: AllowCode = False,
+) -> int:
+    """Compare controllers on one scenario, or several scenarios, on the same seeds.
+
+    The command runs the same samples and seeds for each, and writes the medians, the paired differences with confidence
+    intervals and a rank test, and the failures: comparison.html, .json, .csv, .tex and .md, figures/, trials.zarr, and
+    the scenario of each contestant.
+    """
+    from undertow.cli.compare import compare
+
+    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code)
+
+
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,
@@ -240,9 +316,13 @@ def describe(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A part (see `undertow list`), ./file.py:function, a vehicle file, scenario, metrics or signals.",
+            help="A part (see `undertow list`), ./file.py:function, a vehicle file, or one of the words scenario, "
+            "metrics and signals.",
         ),
     ],
+    json_schema: Annotated[
+        bool, typer.Option("--json-schema", help="With NAME scenario: print the JSON schema that editors use.")
+    ] = False,
 ) -> None:
     """Describe a part.
 
@@ -251,7 +331,7 @@ def describe(
     """
     from undertow.cli.describe import describe
 
-    describe(name)
+    describe(name, json_schema)
 
 
 @app.command()

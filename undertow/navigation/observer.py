@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.errors import BadInput
+from undertow.navigation.drift import drift_advice
 from undertow.numerics.random_keys import numbered
 from undertow.sensors.estimate import Estimate, estimate_of, motion_of
 from undertow.sensors.imu import IMU
@@ -108,6 +109,10 @@ class Navigation(AbstractInformedNavigation):
             estimate = _either(fresh, sensor.correct(estimate, reading), estimate)
         states = tuple(states for _, states in deliveries)
         return estimate.measurement(), NavigationState(t, motion.velocity, states, estimate, ignored)
+
+    def advice(self, duration: float = 60.0) -> tuple[str, ...]:
+        """What is not measured, and how far its estimate drifts in `duration` (s)."""
+        return drift_advice(self.sensors, duration)
 
     def ignored(self, state: NavigationState):
         return state.ignored

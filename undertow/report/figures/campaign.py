@@ -20,7 +20,7 @@ _SHOWN = (
     "input_variation",
     "saturated_fraction",
 )
-_LOOKS = (
+LOOKS = (
     style.SOLID,
     style.DASHED,
     style.Look("#00785a", "-", 1.7, 4),
@@ -51,7 +51,7 @@ def distributions_figure(
     shown = [name for name in _SHOWN if name in values]
     rows = -(-len(shown) // _COLUMNS)
     names = list(dict.fromkeys(name for each in values.values() for name in each))
-    looks = dict(zip(names, _LOOKS, strict=False))
+    looks = dict(zip(names, LOOKS, strict=False))
     beside = max(1, int(9.4 / (0.8 + 0.065 * max(map(len, looks)))))  # entries of the key in a line
     key = 0.2 * -(-len(looks) // beside) if len(looks) > 1 else 0.0
     figure = style.blank(9.6, 0.35 + key + 2.25 * rows)
