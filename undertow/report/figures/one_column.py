@@ -1,4 +1,4 @@
-"""A figure in the width of one column of a journal: panels below each other, the key above them, the title left out."""
+"""A figure in the width of one printed column: panels below each other, the key above them, no title."""
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -27,7 +27,7 @@ _PATH = re.compile(r'( d=")([^"]+)(")')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
 
 
-PDF_WIDTHS = ("wide", "one-column")  # as on the page, or rearranged for a column of a journal
+PDF_WIDTHS = ("wide", "one-column")  # as on the page, or rearranged for one column of a printed page
 
 Plots = Mapping[str, Callable[[], Figure]]  # functions that make the figures, by name
 
@@ -61,7 +61,7 @@ def png(figure: Figure) -> bytes:
 
 
 def pdf(figure: Figure) -> bytes:
-    """The figure as PDF, without date, with text as TrueType fonts, which journals accept."""
+    """The figure as PDF, without date, with text as TrueType fonts."""
     data = io.BytesIO()
     with _WRITING, matplotlib.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType] - keys of Matplotlib
         FigureCanvasPdf(figure).print_pdf(data, metadata={"CreationDate": None, "Creator": "undertow"})
