@@ -7,8 +7,11 @@ import importlib.metadata
 import sys
 from pathlib import Path
 
+from undertow.process_setup import prepare
+
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
+prepare()  # as the command line does: double precision, and compiled code is kept for the next build
 
 project = "undertow"
 author = "The undertow developers"
@@ -39,12 +42,15 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_theme_options = {"source_directory": "docs/"}
 html_copy_source = False
+html_show_copyright = False
 html_show_sourcelink = False
+html_show_search_summary = False  # it would be fetched, which pages from disk may not
 
+default_role = "literal"  # `name` in docstrings
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_typehints = "signature"
-python_maximum_signature_line_length = 88
+python_maximum_signature_line_length = 110
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 

@@ -5,15 +5,18 @@ from collections.abc import Iterable, Sequence
 
 from docutils import nodes
 
+_SHORT = 24  # characters that stay on one line
+
 _CODE = re.compile(r"`([^`]+)`")
+_PATH = re.compile(r"(?<=[\w.-]{4})/(?=\w{4})")
 
 
 def paragraph(text: str) -> nodes.paragraph:
-    """A paragraph; what stands between backquotes is code."""
+    """A paragraph; what stands between backquotes is code, and a path may be broken after a slash."""
     found = nodes.paragraph()
     for number, piece in enumerate(_CODE.split(text)):
         if piece:
-            found += nodes.literal(piece, piece) if number % 2 else nodes.Text(piece)
+            found += nodes.literal(piece, piece) if number % 2 else nodes.Text(_PATH.sub("/\u200b", piece))
     return found
 
 
@@ -22,11 +25,11 @@ def paragraphs(text: str) -> list[nodes.paragraph]:
     return [paragraph(" ".join(one.split())) for one in text.split("\n\n") if one.strip()]
 
 
-def code(text: str) -> nodes.paragraph:
+def code(text: str) -> nodes.line_block:
     """A cell of code; each of its lines stands on its own."""
-    found = nodes.paragraph()
-    for number, line in enumerate(text.splitlines()):
-        found += [nodes.Text(" ")] * (number > 0) + [nodes.literal(line, line)]
+    found = nodes.line_block()
+    for line in text.splitlines():
+        found += nodes.line("", "", nodes.literal(line, line, classes=["short"] if len(line) < _SHORT else []))
     return found
 
 
@@ -40,7 +43,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]], codes: Sequence
     head += _row([paragraph(columns[k]) for k in shown])
     body += [_row([code(row[k]) if columns[k] in codes else paragraph(row[k]) for k in shown]) for row in rows]
     group += [head, body]
-    return nodes.table("", group, classes=["colwidths-auto"])
+    return nodes.table("", group, classes=["colwidths-auto", "facts"])
 
 
 def section(title: str, name: str, *contents: nodes.Node) -> nodes.section:
@@ -51,7 +54,7 @@ def section(title: str, name: str, *contents: nodes.Node) -> nodes.section:
     return found
 
 
-def _row(cells: list[nodes.paragraph]) -> nodes.row:
+def _row(cells: Sequence[nodes.Node]) -> nodes.row:
     row = nodes.row()
     row += [nodes.entry("", cell) for cell in cells]
     return row

@@ -1,7 +1,8 @@
-"""Directive that shows the folders as layers, from the import contract in pyproject.toml and the folders' docstrings."""
+"""Directive that shows the folders as layers: from the import contract in pyproject.toml and their docstrings."""
 
 import ast
 import html
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -33,15 +34,13 @@ class Layers(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         rows = "".join(f'<div class="layer">{"".join(map(_box, layer))}</div>' for layer in layers())
-        for layer in layers():
-            for name in layer:
-                self.env.note_dependency(str(ROOT / "undertow" / name / "__init__.py"))
-        self.env.note_dependency(str(ROOT / "pyproject.toml"))
+        self.env.note_reread()
         return [nodes.raw("", f'<div class="layers">{rows}</div>', format="html")]
 
 
 def _box(name: str) -> str:
-    return f"<div><b>{name}</b><span>{html.escape(purpose(name))}</span></div>"
+    said = re.sub(r"`(.*?)`", r"<code>\1</code>", html.escape(purpose(name)))
+    return f"<div><b>{name}</b><span>{said}</span></div>"
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

@@ -5,13 +5,16 @@
 
 import html
 import re
+import xml.etree.ElementTree as ET
 from typing import Any
 
 from docutils import nodes
 from docutils.utils.math import MathError
-from docutils.utils.math.latex2mathml import tex2mathml
+from docutils.utils.math.latex2mathml import accents, tex2mathml
 from sphinx.application import Sphinx
 from sphinx.util import logging
+
+ET.register_namespace("", "http://www.w3.org/1998/Math/MathML")
 
 _TAG = re.compile(r"\\tag\{([^}]*)\}")
 
@@ -23,9 +26,28 @@ def mathml(tex: str, block: bool = False) -> str:
         ValueError: the formula has a command that is not known, or a brace without its partner.
     """
     try:
-        return tex2mathml(tex, as_block=block)
+        found = tex2mathml(tex, as_block=block)
     except MathError as error:
         raise ValueError(f"{error} in the formula {tex}") from None
+    root = ET.fromstring(found.replace("&ApplyFunction;", "\u2061"))
+    for element in root.findall(".//{*}munderover"):
+        _index_beside_accent(element)
+    for sign in root.iterfind(".//{*}mo"):
+        if sign.text == "|":  # of an absolute value, not of a division
+            sign.attrib |= {"lspace": "0", "rspace": "0"}
+    return ET.tostring(root, "unicode", short_empty_elements=False)
+
+
+def _index_beside_accent(element: ET.Element) -> None:
+    r"""The index of `\dot x_i` stands beside the accented letter; docutils puts it below, as that of a sum."""
+    base, index, accent = element
+    if accent.text not in accents.values():
+        return
+    space = element.tag.removesuffix("munderover")
+    accented = ET.Element(f"{space}mover", accent="true")
+    accented.extend([base, accent])
+    element.tag = f"{space}msub"
+    element[:] = [accented, index]
 
 
 def _inline(translator: Any, node: nodes.math) -> None:

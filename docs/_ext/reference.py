@@ -3,11 +3,11 @@
 from typing import Any
 
 import typer
-from docutils import nodes
-from docutils.parsers.rst import Directive
-from sphinx.application import Sphinx
-
 from blocks import paragraph, paragraphs, section, table
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
 from undertow.cli.exit_codes import MEANINGS as EXIT_CODES
@@ -22,17 +22,31 @@ from undertow.scenario.schema import Scenario, keys
 _PARAMETERS = ("parameter", "value", "unit", "symbol", "meaning", "source")
 
 
-class Parts(Directive):
+class FromCode(SphinxDirective):
+    """What is made from the code; its page is read again in every build."""
+
+    def run(self) -> list[nodes.Node]:
+        self.env.note_reread()
+        return self.contents()
+
+    def contents(self) -> list[nodes.Node]:
+        """The nodes that stand in the place of the directive."""
+        raise NotImplementedError
+
+
+class Parts(FromCode):
     """Every part of a kind, as `undertow describe` has it: options, parameters with units and sources, signals."""
 
     required_arguments = 1
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         (kind,) = self.arguments
-        return [_part(one) for name in sorted(catalogue.names(kind)) for one in describing.describe(f"{kind}/{name}")]
+        names = sorted(catalogue.names(kind))
+        return [described(one) for name in names for one in describing.describe(f"{kind}/{name}")]
 
 
-def _part(part: Description) -> nodes.section:
+def described(part: Description) -> nodes.section:
+    """The section of one part, or of one preset of it."""
     preset = [option.default for option in part.options if option.name == "preset"]
     title = f"`{part.name}`, preset `{preset[0]}`" if preset else f"`{part.name}`"
     found = section(title, title, *paragraphs(part.summary))
@@ -48,16 +62,16 @@ def _part(part: Description) -> nodes.section:
     return found
 
 
-class Keys(Directive):
+class Keys(FromCode):
     """Every key of a scenario or a campaign file."""
 
     required_arguments = 1
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         if self.arguments == ["scenario"]:
             return [_keys(Scenario)]
-        entries = {"vary": Distribution, "requirements": Requirement, "series": Series}
-        each = [section(f"Keys of `{name}`", f"keys-of-{name}", _keys(model)) for name, model in entries.items()]
+        entries = {"each distribution in `vary`": Distribution, "each requirement": Requirement, "`series`": Series}
+        each = [section(f"Keys of {name}", f"keys of {name}", _keys(model)) for name, model in entries.items()]
         return [_keys(Campaign), *each]
 
 
@@ -66,19 +80,19 @@ def _keys(model: Any) -> nodes.table:
     return table(("key", "type", "default", "meaning"), rows, ("key", "default"))
 
 
-class Metrics(Directive):
+class Metrics(FromCode):
     """Metrics of a run."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         unit = lambda metric: metric.unit.replace("[axis]", "[output]")
         rows = [(name, unit(one), PER_AXIS.get(name, ""), one.meaning) for name, one in MEANINGS.items()]
         return [table(("metric", "unit", "of each output", "meaning"), rows, ("metric", "of each output"))]
 
 
-class Signals(Directive):
+class Signals(FromCode):
     """Signals of every run."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         return [_signals(RECORDED)]
 
 
@@ -87,24 +101,24 @@ def _signals(declared: Any) -> nodes.table:
     return table(("signal", "dimensions", "unit", "meaning"), rows, ("signal",))
 
 
-class Statuses(Directive):
+class Statuses(FromCode):
     """How a run can end."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         return [table(("status", "meaning"), [(one.word, one.sentence) for one in Status], ("status",))]
 
 
-class ExitCodes(Directive):
+class ExitCodes(FromCode):
     """Exit codes of every command."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         return [table(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()], ("code",))]
 
 
-class Commands(Directive):
+class Commands(FromCode):
     """Arguments and options of every command."""
 
-    def run(self) -> list[nodes.Node]:
+    def contents(self) -> list[nodes.Node]:
         main: Any = typer.main.get_command(command_line)
         return [_command(f"undertow {name}", command) for name, command in main.commands.items()]
 

@@ -33,7 +33,7 @@ def test_part_from_a_file_runs(undertow, tmp_path):
     ("part", "code", "said"),
     [
         ("./his_rov.py:my_rov", GOOD, "`plant.vehicle.kind` must name an existing file, but is ./his_rov.py"),
-        ("./my_rov.py:my_rv", GOOD, "`plant.vehicle.kind` must name a callable of my_rov.py, but is my_rv"),
+        ("./my_rov.py:my_rv", GOOD, "`plant.vehicle.kind` must name a function in my_rov.py, but is my_rv"),
         (
             "./my_rov.py:my_rov",
             "1 / 0",

@@ -42,11 +42,14 @@ def test_scenario_as_data():
     [
         ({"duration": -1.0}, "`duration` must be greater than 0, but is -1.0"),
         ({"loop": "both"}, "`loop` must be 'sampled' or 'continuous', but is 'both'"),
-        ({"position": [1, 2]}, "`position` must have 6 entries (one per output of the plant), but is 2 long"),
-        ({"record": 1.5e-3}, "`record` must be a whole number of steps (0.001 s), but is 0.0015 s"),
+        ({"position": [1, 2]}, "`position` must have 6 entries (north, east, down, roll, pitch, yaw), but is 2 long"),
+        (
+            {"record": 1.5e-3},
+            "`record` must be a whole number of steps of `loop.dt` (0.001 s), but is 0.0015 s. Take 0.001 or 0.002 s",
+        ),
         (
             {"disturbance": ut.disturbances.wrench([1.0])},
-            "`disturbance.value` must have 6 entries, but is of shape (1,)",
+            "`disturbance.value` must have 6 entries (surge, sway, heave, roll, pitch, yaw), but is of shape (1,)",
         ),
         ({"navigation": 3}, "`navigation` must be an AbstractNavigation, but is a int"),
     ],

@@ -25,7 +25,9 @@ def ran(undertow, tmp_path, request):
 @pytest.mark.parametrize("ran", [NOISY], indirect=True, ids=["vehicle"])
 def test_files_of_a_run(ran, whole_figures, tmp_path):
     folder = tmp_path / "runs" / "s"
-    assert sorted(path.name for path in folder.iterdir()) == ["figures", "metrics.json", "run.nc", "scenario.yaml"]
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["figures", "metrics.json", "run.html", "run.nc", "scenario.yaml"]
+    assert 'class="replay"' in (folder / "run.html").read_text()
     assert {".png", ".svg"} == {path.suffix for path in (folder / "figures").iterdir()}
     metrics = json.loads((folder / "metrics.json").read_text())
     assert metrics["status"] == "completed" and metrics["ended"] == pytest.approx(0.1)

@@ -4,10 +4,14 @@ Blocks of one page run in order, in one folder, with one namespace. A block that
 an output) is not marked python or bash, or stands after a line `<!-- not run -->`. A block of Python or YAML whose
 first line is `# my_part.py` is that file: it is written into the folder.
 
-By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures are
-written, and PID stands for the preset `robust`: most of the time of a short run. Slow tests run everything as it stands.
+A block of text on a page of docs/tutorials is what the command before it prints: each of its lines must occur in the
+output, in this order; `...` stands for anything. Where it shows an error, the command must fail with exit code 2.
+
+By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures and
+no replay are written, and PID stands for the preset `robust`: most of the time of a short run. Slow tests run everything as it stands.
 """
 
+import itertools
 import re
 import shlex
 from pathlib import Path
@@ -18,12 +22,13 @@ import pytest
 from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
 from undertow.comparison.contest import contest
+from undertow.report import run_page
 from undertow.report.figures import writing
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 BLOCK = re.compile(
-    r"(?P<skip><!-- not run -->\s*\n)?^```(?P<language>python|yaml|bash)\n(?P<code>.*?)^```", re.S | re.M
+    r"(?P<skip><!-- not run -->\s*\n)?^```(?P<language>python|yaml|bash|text)\n(?P<code>.*?)^```", re.S | re.M
 )
 FILE = re.compile(r"# (?P<name>\w+\.(?:py|yaml))\n")
 
@@ -73,11 +78,23 @@ def compared(arguments: list[str]) -> None:
 
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built
 # but not run.
-WHOLE, SIMULATED, BUILT = (
-    {"your-own-plant"},
-    {"README", "your-own-controller", "your-own-vehicle"},
-    {"campaign", "compare"},
-)
+WHOLE, SIMULATED = {"your-own-plant"}, {"README", "your-own-controller", "your-own-vehicle"}
+BUILT = {"campaign", "compare", "4-monte-carlo-study"}
+
+
+def lines_of(text: str) -> list[str]:
+    """Lines without the width of their columns."""
+    return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+
+
+def absent(shown: str, printed: str) -> list[str]:
+    """Lines of a block that the output does not have after those before them."""
+    output, missing = iter(lines_of(printed)), []
+    for line in lines_of(shown):
+        pattern = re.escape(line).replace(re.escape("..."), ".*")
+        if not any(re.fullmatch(pattern, one) for one in output):
+            missing.append(line)
+    return missing
 
 
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
@@ -89,14 +106,19 @@ WHOLE, SIMULATED, BUILT = (
         for whole, slow in ([(True, False)] if page.stem in WHOLE else [(False, False), (True, True)])
     ],
 )
-def test_blocks_run(page, whole, tmp_path, monkeypatch):
+def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
     if not whole:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+        monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}
-    for block in blocks(page):
+    several = blocks(page)
+    shown = {one.line: two.code for one, two in itertools.pairwise(several) if two.language == "text"}
+    if page.parent.name != "tutorials":
+        shown = {}
+    for block in several:
         if file := FILE.match(block.code):
             code = block.code if whole or not file["name"].endswith(".yaml") else block.code.replace(ROBUST, QUICKER)
             (tmp_path / file["name"]).write_text(code, encoding="utf-8")
@@ -114,7 +136,22 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch):
                     compared(arguments)
                     continue
                 arguments = arguments if whole else quicker(arguments, page.stem)
-                assert run(arguments) in (0, 1), f"{page.name}, line {block.line}: undertow {shlex.join(arguments)}"
+                allowed = (2,) if "Error:" in shown.get(block.line, "") else (0, 1)
+                assert run(arguments) in allowed, f"{page.name}, line {block.line}: undertow {shlex.join(arguments)}"
+        printed = "".join(capsys.readouterr())
+        if whole and block.line in shown:
+            assert not absent(shown[block.line], printed), f"{page.name}, line {block.line}, printed:\n{printed}"
+
+
+def test_absent_lines():
+    printed = "\n| a |  1.5 | m |\nReading 0.3 s\nDone.\n"
+    assert absent("| a | 1.5 | m |\n\nDone.\n", printed) == []
+    assert absent("Reading ... s\n", printed) == []
+    assert absent("| a | 1.6 | m |\nDone.\n| a | 1.5 | m |\n", printed) == [
+        "| a | 1.6 | m |",
+        "Done.",
+        "| a | 1.5 | m |",
+    ]
 
 
 def test_blocks_are_found(tmp_path):

@@ -22,6 +22,7 @@ from undertow.campaign.task import build_trial
 from undertow.cli import results_folder
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import shares, stage
 from undertow.cli.tables import titled, wide_console
@@ -43,8 +44,10 @@ def campaign(
     where: str | None,
     overwrite: bool,
     allow_code: bool,
+    pdf: str | None,
 ) -> int:
     """Run a campaign and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
     count = os.cpu_count() or 1 if workers is None else workers
     checks.positive("--workers", count)
     if where is not None:
@@ -66,10 +69,10 @@ def campaign(
                 if (folder / STORE).is_dir():
                     typer.echo(f"Stopped. To resume: undertow campaign {path} --out {folder} --resume", err=True)
                 raise
-        return _conclude(console, prepared, folder)
+        return _conclude(console, prepared, folder, pdf)
 
 
-def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
+def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | None) -> int:
     """Write page, summary and the scenarios of the worst trials; print the summary."""
     with stage(console, "summary and page"):
         results = load(folder)
@@ -77,7 +80,7 @@ def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
         (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
         _write_worst(prepared, found["worst"], folder / "worst")
         title = prepared.trials.campaign.description or f"Campaign {prepared.trials.text.name}"
-        page, failures = write_campaign(title, results, found, folder)
+        page, failures = write_campaign(title, results, found, folder, pdf)
     warn_of(failures)
     console.print(table(results, found))
     for sentence in sentences(found):

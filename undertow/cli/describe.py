@@ -1,5 +1,6 @@
 """`undertow list` and `undertow describe`: available parts, and one part, the scenario file, metrics or signals."""
 
+import json
 from collections.abc import Mapping
 
 from rich.console import Console
@@ -14,15 +15,30 @@ from undertow.core.signals import Signal
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.describing import summary, text_of
+from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.schema import keys
 
+_PARTS = (
+    "A part is given by its name, such as `thruster: t200`, or with options, such as `thruster: {kind: t200, supply: "
+    "16}`. `undertow list` shows the names, `undertow describe t200` the options of one, `undertow describe "
+    "hybrid_vehicle` those of a vehicle with thrusters."
+)
 
-def describe(name: str) -> None:
-    """Print the description of a part, the keys of a scenario, the metrics, or the signals of every run."""
+
+def describe(name: str, json_schema: bool = False) -> None:
+    """Print the description of a part, the keys of a scenario, the metrics, or the signals of every run.
+
+    With `json_schema`, print the keys of a scenario as a JSON schema.
+    """
     console = wide_console()
-    if name == "scenario":
+    if json_schema:
+        if name != "scenario":
+            raise BadInput("--json-schema", "follow `describe scenario`", f"given for `{name}`")
+        print(json.dumps(scenario_schema(), indent=1))
+    elif name == "scenario":
         rows = [(key.path, key.type, text_of(key.default), key.meaning) for key in keys()]
         _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
+        console.print(_PARTS, highlight=False, markup=False, soft_wrap=True)
     elif name == "metrics":
         rows = [
             (key, one.unit.replace("[axis]", "[output]"), PER_AXIS.get(key, ""), one.meaning)
@@ -72,4 +88,6 @@ def list_parts(kind: str | None) -> None:
         for name, part in sorted(catalogue.names(shown).items()):
             table.add_row(shown, name, Text(summary(part)))
         table.add_section()
-    wide_console().print(table)
+    console = wide_console()
+    console.print(table)
+    console.print("`undertow describe NAME` shows one of them with its options.", highlight=False, soft_wrap=True)

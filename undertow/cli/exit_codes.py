@@ -64,7 +64,7 @@ def _explain(error: Exception) -> tuple[int, str]:
         sentence = getattr(error, "format_message", error.__str__)().rstrip(".")
         context = getattr(error, "ctx", None)
         path = context.command_path if context is not None else "undertow"
-        return BAD_INPUT, f"{sentence}. See `{path} --help`"
+        return BAD_INPUT, f"{sentence}{'' if sentence.endswith('?') else '.'} See `{path} --help`"
     from undertow.core.errors import BadInput
 
     if isinstance(error, BadInput):

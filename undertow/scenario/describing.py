@@ -90,11 +90,16 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
         kind=kind,
         name=name,
         summary=_prose(part),
-        options=_options(kind, part),
-        parameters=tuple(parameters(shown)) if described else (),
+        options=options_of(kind, part),
+        parameters=tuple(map(_depending, parameters(shown))) if described else (),
         advice=advise(),
         signals=_signals(kind, description or name, instance),
     )
+
+
+def _depending(parameter: Parameter) -> Parameter:
+    """A parameter of a class, which a part computes from its options."""
+    return parameter._replace(value="by the options") if parameter.value == "required" else parameter
 
 
 def _instance(kind: str, name: Any, part: Any) -> Any:
@@ -120,7 +125,8 @@ def _prose(part: Any) -> str:
     return re.split(r"\n\s*(?:Args|Raises|Returns):", inspect.getdoc(part) or "")[0].strip()
 
 
-def _options(kind: str, part: Any) -> tuple[Option, ...]:
+def options_of(kind: str, part: Any) -> tuple[Option, ...]:
+    """Options of a part, from the signature and docstring of its function."""
     meanings = _meanings(inspect.getdoc(part) or "")
     options = []
     for name, parameter in inspect.signature(part).parameters.items():
@@ -148,8 +154,8 @@ def _meanings(text: str) -> dict[str, str]:
 
 def text_of(value: Any) -> str:
     """A short text for the value of an option, a parameter or a key; a diagonal matrix is shown as its diagonal."""
-    if isinstance(value, str) or value is None:
-        return "none" if value is None else value
+    if isinstance(value, str) or value is None or (isinstance(value, list | dict) and not value):
+        return value if isinstance(value, str) else "none"
     if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
         return str(value).lower()
     if isinstance(value, list | tuple) and any(isinstance(entry, str) for entry in value):

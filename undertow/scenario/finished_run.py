@@ -116,6 +116,14 @@ def certificate_of(dataset: xr.Dataset) -> dict[str, Any] | None:
     return json.loads(dataset.attrs["certificate"]) if "certificate" in dataset.attrs else None
 
 
+def window_of(dataset: xr.Dataset) -> tuple[float, float] | None:
+    """Start and stop of the steady window of a run, s, from its scenario; None for a run that was made from objects."""
+    if not dataset.attrs.get("scenario"):
+        return None
+    steady = parse(dataset.attrs["scenario"], "scenario", Path(), "scenario").data["steady"]
+    return steady["start"], steady["stop"]
+
+
 def to_json(value: Any, indent: int | None = None) -> str:
     """Standard JSON: numbers that are not finite become null."""
     return json.dumps(_finite(value), indent=indent, allow_nan=False)

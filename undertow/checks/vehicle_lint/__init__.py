@@ -17,6 +17,7 @@ from undertow.checks.finding import Finding
 from undertow.checks.vehicle_lint import hydrodynamics, layout, mass, statics, transcription
 from undertow.checks.vehicle_lint.layout import scaled
 from undertow.core.contracts import AbstractPlant
+from undertow.scenario.vehicle_schema import angles_of
 from undertow.vehicles.facts import Facts as Facts
 from undertow.vehicles.facts import facts_of as facts_of
 from undertow.vehicles.vehicle import Vehicle
@@ -25,7 +26,9 @@ _RULES = (*mass.RULES, *statics.RULES, *hydrodynamics.RULES, *layout.RULES, *tra
 
 
 def lint(facts: Facts) -> tuple[Finding, ...]:
-    """All errors and advice on a vehicle, errors first."""
+    """All errors and advice on a vehicle, errors first; angles in radians alone, because they cause others."""
+    if units := tuple(layout.degrees(facts)):
+        return units
     findings = [finding for rule in _RULES for finding in rule(facts)]
     return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
 
@@ -71,20 +74,25 @@ def vehicle_facts(plant: AbstractPlant, description: Mapping[str, Any]) -> Facts
     known: dict[str, Any] = {
         key: np.asarray(file[key], dtype=float) for key in ("size", "water_density") if key in file
     }
+    if file:
+        known["angles"] = angles_of(file["thrusters"])
     if "thruster_matrix" in file:
         running = [number - 1 for number in description.get("thrusters") or range(1, vehicle.thrusters + 1)]
         known["printed_matrix"] = np.asarray(file["thruster_matrix"], dtype=float)[:, running]
     return facts_of(vehicle)._replace(**known)
 
 
-def vehicle_warnings(plant: AbstractPlant, description: Mapping[str, Any]) -> tuple[str, ...]:
-    """A sentence for each impossible property, and for a weight that is not that of the mass.
+_SHOWN = ("gravity", "degrees")  # advice that matters before a run
 
-    The latter results from changing the mass only, in a scenario or from trial to trial. Arguments as `vehicle_facts`.
+
+def vehicle_warnings(plant: AbstractPlant, description: Mapping[str, Any]) -> tuple[str, ...]:
+    """A sentence for each impossible property, for a weight that is not that of the mass, and for angles in radians.
+
+    A weight differs where only the mass is changed, in a scenario or from trial to trial. Arguments as `vehicle_facts`.
     """
     facts = vehicle_facts(plant, description)
     findings = () if facts is None else lint(facts)
-    shown = [finding for finding in findings if finding.level == "error" or finding.rule == "gravity"]
+    shown = [finding for finding in findings if finding.level == "error" or finding.rule in _SHOWN]
     given = description.get("vehicle", {})
     if "mass" in given and "weight" not in given:
         stays = "With `mass` alone changed, weight and buoyancy stay: give `weight` and `buoyancy`, too"

@@ -2,7 +2,8 @@
 
 What is MuJoCo's own: the rigid body (mass matrix, Coriolis and centripetal forces), weight, buoyancy, thruster
 geometry, kinematics, integration. What it has not, added mass and damping, is computed here in plain NumPy and applied
-as a force. Nothing of the plant that it is compared with is called. docs/how-to/independent-physics.md says what agrees.
+as a force. Nothing of the plant that it is compared with is called. docs/how-to/independent-physics.md says what
+agrees.
 """
 
 import importlib.util

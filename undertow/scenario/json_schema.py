@@ -1,0 +1,75 @@
+"""JSON schema of a scenario file for editors: its keys from `Scenario`, the parts and their options from the catalogue.
+
+It completes and explains. What it lets pass is still checked by `undertow check`, which knows more.
+"""
+
+from typing import Any
+
+from undertow.core import catalogue
+from undertow.scenario import describing, factory
+from undertow.scenario.schema import Scenario
+
+# Kind of part -> the part that stands where its name is left out.
+_DEFAULTS = {"plants": "hybrid_vehicle", "controllers": "rcaf", "vehicles": "odin", "thrusters": "paper_table3"}
+
+_FILES = {"vehicles": r"\.ya?ml$", "": r"\.py:\w+$"}
+
+
+def scenario_schema() -> dict[str, Any]:
+    """JSON schema (draft 7) of a scenario file."""
+    schema = Scenario.model_json_schema()
+    for key, kind in catalogue.KIND_OF.items():
+        part = _reference(kind)
+        several = {"type": "array", "items": part}
+        shapes = {"disturbance": {"anyOf": [part, several]}, "metrics": several}
+        found = schema["properties"][key]
+        schema["properties"][key] = {**shapes.get(key, part), "description": found["description"]}
+    definitions = {name: one for name, one in schema["$defs"].items() if name != "Part"}
+    definitions |= {kind: _kind(kind) for kind in (*catalogue.KINDS, "metrics")}
+    return {**schema, "$schema": "http://json-schema.org/draft-07/schema#", "$defs": definitions}
+
+
+def _reference(kind: str) -> dict[str, Any]:
+    return {"$ref": f"#/$defs/{kind}"}
+
+
+def _kind(kind: str) -> dict[str, Any]:
+    """A part by name, or a mapping whose further keys depend on the name."""
+    parts = catalogue.names(kind)
+    known = [{"const": name, "description": describing.summary(part)} for name, part in sorted(parts.items())]
+    own = [{"type": "string", "pattern": pattern} for key, pattern in _FILES.items() if key in (kind, "")]
+    mapping = {"type": "object", "properties": {"kind": {"anyOf": [*known, *own]}}}
+    if kind not in _DEFAULTS and kind != "power":  # `battery` and `esc` have a default each
+        mapping["required"] = ["kind"]
+    found = {"anyOf": [*known, *own, mapping]}
+    options = [
+        {
+            "if": {
+                "properties": {"kind": {"const": name}},
+                "required": [] if name == _DEFAULTS.get(kind) else ["kind"],
+            },
+            "then": {"properties": _options(kind, part)},
+        }
+        for name, part in sorted(parts.items())
+    ]
+    return {**found, "allOf": options} if options else found
+
+
+def _options(kind: str, part: Any) -> dict[str, Any]:
+    """Options of a part, those of all its presets."""
+    presets = factory.presets_of(part)
+    found: dict[str, Any] = {"preset": {"enum": list(presets)}} if presets else {}
+    for function in presets.values() or (part,):
+        for option in describing.options_of(kind, function):
+            found.setdefault(option.name, _option(option))
+    return found
+
+
+def _option(option: describing.Option) -> dict[str, Any]:
+    if option.name in factory.INNER:
+        part = _reference(factory.INNER[option.name][0])
+        return {"type": "array", "items": part} if option.name == "sensors" else part
+    known = isinstance(option.default, bool | int | float | str) and option.default != "required"
+    kind = {"type": "boolean"} if isinstance(option.default, bool) else {}
+    default = {"default": option.default} if known and option.default not in (float("inf"), -float("inf")) else {}
+    return {"description": option.meaning, **kind, **default}
