@@ -66,9 +66,11 @@ def compare(
                 interruptible(lambda: run_campaign(ready.prepared, folder, executor, watch))
             except (KeyboardInterrupt, OSError):
                 if (folder / STORE).is_dir():
-                    again = shlex.join(["undertow", "compare", *map(str, paths)])
-                    chosen_ones = f" --controllers {shlex.quote(entries)}" if entries else ""
-                    typer.echo(f"Stopped. To resume: {again}{chosen_ones} --out {folder} --resume", err=True)
+                    again = ["undertow", "compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
+                    again += ["--trials", str(trials)] if trials is not None else []
+                    typer.echo(
+                        f"Stopped. To resume: {shlex.join([*again, '--out', str(folder), '--resume'])}", err=True
+                    )
                 raise
         return _conclude(console, ready, folder)
 
