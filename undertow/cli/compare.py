@@ -17,6 +17,7 @@ from undertow.campaign.task import build_trial
 from undertow.cli.campaign import check_folder, clear_folder, live, trial_text
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
@@ -44,8 +45,10 @@ def compare(
     workers: int | None,
     overwrite: bool,
     allow_code: bool,
+    pdf: str | None,
 ) -> int:
     """Run a comparison and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
     count = os.cpu_count() or 1 if workers is None else workers
     checks.positive("--workers", count)
     if trials is not None:
@@ -72,10 +75,10 @@ def compare(
                         f"Stopped. To resume: {shlex.join([*again, '--out', str(folder), '--resume'])}", err=True
                     )
                 raise
-        return _conclude(console, ready, folder)
+        return _conclude(console, ready, folder, pdf)
 
 
-def _conclude(console: Console, ready: Contest, folder: Path) -> int:
+def _conclude(console: Console, ready: Contest, folder: Path, pdf: str | None) -> int:
     """Write page, tables and scenarios; print the findings."""
     with stage(console, "statistics and page"):
         results = load(folder)
@@ -85,7 +88,7 @@ def _conclude(console: Console, ready: Contest, folder: Path) -> int:
         for style, name in _TABLES.items():
             (folder / name).write_text(comparison.table(style), encoding="utf-8")
         (folder / "comparison.json").write_text(to_json(found.data(), indent=1) + "\n", encoding="utf-8")
-        page, failures = write_comparison(comparison, results, ready.subject, folder)
+        page, failures = write_comparison(comparison, results, ready.subject, folder, pdf)
     warn_of(failures)
     rows = medians(found)
     table = titled(f"Median of {found.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))

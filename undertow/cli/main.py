@@ -285,6 +285,7 @@ def compare(
     workers: Annotated[int | None, typer.Option(metavar="N", help="Number of threads. Default: all cores.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier comparison in DIR.")] = False,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
 ) -> int:
     """Compare controllers on one scenario, or several scenarios, on the same seeds.
 
@@ -294,7 +295,7 @@ def compare(
     """
     from undertow.cli.compare import compare
 
-    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code)
+    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf)
 
 
 @app.command("list")

@@ -12,8 +12,8 @@ from undertow.comparison.tables import NOTE, Rows, medians, paired
 from undertow.report.campaign_page import asked
 from undertow.report.figures.comparison import comparison_plots
 from undertow.report.figures.writing import save_all
-from undertow.report.formats import number, prose
-from undertow.report.page import Html, bullets, document, figure, marked, section, table, tag
+from undertow.report.formats import prose
+from undertow.report.page import Html, bullets, document, figure, section, table, tag
 
 _CAPTIONS = {
     "differences": "Each point is one trial: the metric of the contestant less that of the first one, with the same "
@@ -32,7 +32,9 @@ _FAIR = (
 )
 
 
-def write_comparison(comparison: Comparison, results: Results, subject: str, folder: Path) -> tuple[Path, list[str]]:
+def write_comparison(
+    comparison: Comparison, results: Results, subject: str, folder: Path, pdf: str | None = None
+) -> tuple[Path, list[str]]:
     """Write `comparison.html`, and every figure into `figures/`; return a sentence for each figure that failed.
 
     Args:
@@ -40,12 +42,13 @@ def write_comparison(comparison: Comparison, results: Results, subject: str, fol
         results: of its campaign.
         subject: what is simulated, in words.
         folder: of the page.
+        pdf: width of PDF files; None for none.
 
     Raises:
         OSError: the folder cannot be written.
     """
     found = comparison.findings
-    saved = save_all(lambda: comparison_plots(comparison.dataset, found), folder / "figures")
+    saved = save_all(lambda: comparison_plots(comparison.dataset, found), folder / "figures", pdf)
     title = f"Comparison: {', '.join(found.names)}"
     figures = [
         figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
@@ -87,8 +90,7 @@ def _rows(rows: Rows, words: int = 1) -> Html:
 
 def _cell(content: str) -> Html:
     """A cell with its numbers typeset."""
-    content = re.sub(r"(?<![\w.])-(?=[\d.])", "\u2212", re.sub(r"\binf\b", "\u221e", content))
-    return marked(r"(\u2212?\d\.\d+e[+-]\d+)", content, lambda one: number(float(one.replace("\u2212", "-"))), prose)
+    return prose(re.sub(r"\binf\b", "\u221e", content))
 
 
 def _differing(found: Findings) -> Html:

@@ -18,7 +18,7 @@ _SMALL, _LARGE = 1e-3, 1e5  # outside of these a number is written with a power 
 
 # In plain text, as Python prints them: powers of ten, minus signs (not hyphens), and plus or minus.
 _POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?!\w)")
-_NEGATIVE = re.compile(r"(?<![\w.)\]}>])-(?=\d)")
+_NEGATIVE = re.compile(r"(?<![\w.)\]}>])-(?=[\d\u221e])")
 _EITHER = re.compile(r"\+-(?=\s?\d)")
 _TINY = re.compile(r"(?<![\w.])0\.000(0*)(\d+)(?!\w)")
 _RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")

@@ -16,7 +16,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import Saved, save_all
 from undertow.report.formats import number, prose
-from undertow.report.page import Html, document, figure, marked, section, table, tag
+from undertow.report.page import Html, document, figure, section, table, tag
 from undertow.report.replay.replay_data import Replay, replay_of
 from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
@@ -102,8 +102,7 @@ def _page(
     sections = [replay, section("metrics", measured.title, _table(measured))]
     if certificate is not None:
         hypotheses = certificate_rows(certificate, window)
-        power = lambda shown: number(float(shown), _DIGITS)
-        below = [tag("p", marked(r"(\d[\d.]*e[+-]\d+)", one, power, prose)) for one in hypotheses.sentences]
+        below = [tag("p", prose(one)) for one in hypotheses.sentences]
         sections.append(section("certificate", hypotheses.title, _table(hypotheses), *below))
     plotted = [
         figure(picture, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
