@@ -67,7 +67,7 @@ def test_packing_is_exact_to_half_a_level(size):
 
 
 def test_script_turns_north_east_down_into_the_axes_of_the_screen():
-    script = files("undertow.report.replay").joinpath("replay.js").read_text()
+    script = files("undertow.report.replay").joinpath("scene.js").read_text()
     numbers = re.search(r"Matrix4\(\)\.set\(([^)]*)\)", script)
     turn = np.array([float(one) for one in numbers[1].split(",")]).reshape(4, 4)[:3, :3]
     north, east, down = turn.T

@@ -8,6 +8,7 @@ from undertow.report.page import Html, section, tag
 from undertow.report.replay.replay_data import Replay, page_data
 
 _THREE_JS = ("jupyter_threejs_sage", "static/r130/three.min.js")
+_SCRIPTS = ("unpack.js", "scene.js", "panels.js", "replay.js")  # one after the other they are one script
 _MISSING = (
     "There is no replay: the package jupyter_threejs_sage, which holds three.js, is not installed. Run: pip install "
     "jupyter-threejs-sage==130"
@@ -28,7 +29,7 @@ def replay_section(replays: Sequence[Replay]) -> Html:
     three = three_js()
     if three is None:
         return section("replay", "Replay", tag("p", _MISSING))
-    script = files("undertow.report.replay").joinpath("replay.js").read_text(encoding="utf-8")
+    script = "\n".join(_text(name) for name in _SCRIPTS)
     return section(
         "replay",
         "Replay",
@@ -36,13 +37,13 @@ def replay_section(replays: Sequence[Replay]) -> Html:
         tag("p", prose(_KEYS), class_="small"),
         Html(f'<script type="application/json" id="replay-data">{page_data(replays)}</script>'),
         Html(f"<script>{three}</script>"),
-        Html(f"<script>{script}</script>"),
+        Html(f'<script>"use strict";\n(() => {{\n{script}}})();\n</script>'),
     )
 
 
 def replay_looks() -> str:
     """Style sheet of the replay."""
-    return files("undertow.report.replay").joinpath("replay.css").read_text(encoding="utf-8")
+    return _text("replay.css")
 
 
 def three_js() -> str | None:
@@ -52,3 +53,7 @@ def three_js() -> str | None:
         return files(package).joinpath(name).read_text(encoding="utf-8")
     except (ModuleNotFoundError, FileNotFoundError):
         return None
+
+
+def _text(name: str) -> str:
+    return files("undertow.report.replay").joinpath(name).read_text(encoding="utf-8")
