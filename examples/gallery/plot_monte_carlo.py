@@ -3,8 +3,8 @@ A Monte Carlo study in Python
 =============================
 
 Twenty runs of one axis under random disturbances, and the empirical distribution function (ECDF) of their error, for
-two natural frequencies of the controller. Both see the same seeds. For thousands of runs, ``undertow campaign`` compiles
-them as a batch and resumes after interruptions.
+two natural frequencies of the controller. Both see the same seeds. For thousands of runs, ``undertow campaign``
+compiles them as a batch and resumes after interruptions.
 """
 
 import matplotlib.pyplot as plt

@@ -8,7 +8,8 @@ A block of text on a page of docs/tutorials is what the command before it prints
 output, in this order; `...` stands for anything. Where it shows an error, the command must fail with exit code 2.
 
 By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures are
-written, and PID stands for the preset `robust`: most of the time of a short run. Slow tests run everything as it stands.
+written, and PID stands for the preset `robust`: most of the time of a short run. Of a tutorial, only `undertow init` runs,
+and the scenarios are validated. Slow tests run everything as it stands.
 """
 
 import itertools
@@ -22,6 +23,8 @@ import pytest
 from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
 from undertow.report.figures import writing
+from undertow.scenario.reading import read
+from undertow.scenario.schema import validate
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -71,7 +74,7 @@ def quicker(arguments: list[str], page: str) -> list[str]:
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built
 # but not run.
 WHOLE, SIMULATED = {"your-own-plant"}, {"README", "your-own-controller", "your-own-vehicle"}
-BUILT = {"campaign", "4-monte-carlo-study"}
+BUILT = {"campaign"}
 
 
 def lines_of(text: str) -> list[str]:
@@ -87,6 +90,14 @@ def absent(shown: str, printed: str) -> list[str]:
         if not any(re.fullmatch(pattern, one) for one in output):
             missing.append(line)
     return missing
+
+
+def begun(arguments: list[str]) -> None:
+    """Run `init`; of other commands, validate the scenario that they name."""
+    if arguments[0] == "init":
+        assert run(arguments) == 0
+    elif arguments[1].endswith(".yaml") and "plant" in (text := read(Path(arguments[1]))).data:
+        validate(text)
 
 
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
@@ -106,9 +117,8 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}
     several = blocks(page)
-    shown = {one.line: two.code for one, two in itertools.pairwise(several) if two.language == "text"}
-    if page.parent.name != "tutorials":
-        shown = {}
+    tutorial, pairs = page.parent.name == "tutorials", itertools.pairwise(several)
+    shown = {one.line: two.code for one, two in pairs if two.language == "text" and tutorial}
     for block in several:
         if file := FILE.match(block.code):
             code = block.code if whole or not file["name"].endswith(".yaml") else block.code.replace(ROBUST, QUICKER)
@@ -117,6 +127,9 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
             for arguments in commands(block.code):
                 if arguments[1].endswith(".yaml"):
                     assert prepare(tmp_path / arguments[1]).trials.number > 0
+        elif not whole and tutorial:
+            for arguments in commands(block.code) if block.language == "bash" else ():
+                begun(arguments)
         elif block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
         elif block.language == "bash":
