@@ -22,7 +22,7 @@ runs = {
 # %%
 # The difference stays small, because a stable loop forgets rounding errors.
 
-position = {name: run.dataset["position"][:, :3] for name, run in runs.items()}
+position = {name: run.dataset["position"].values[:, :3] for name, run in runs.items()}
 difference = np.linalg.norm(position["float32"] - position["float64"], axis=1)
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 axes.semilogy(runs["float64"].dataset["time"][1:], 1e3 * difference[1:])

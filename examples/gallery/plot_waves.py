@@ -1,5 +1,5 @@
 """
-Wave spectrum and a realisation of it
+Wave spectrum and a realization of it
 =====================================
 
 Waves are a sum of components that carry equal shares of the energy of a JONSWAP spectrum. A seed fixes their
@@ -30,7 +30,7 @@ def sinking(times, depth):
 
 
 # %%
-# The spectrum, with the frequencies of the realisation below it, and one minute of water motion at two depths.
+# The spectrum, with the frequencies of the realization below it, and one minute of water motion at two depths.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2), layout="constrained", width_ratios=(2, 3))
 frequency = jnp.linspace(0.6, 4.0, 400)  # rad/s
@@ -52,5 +52,5 @@ plt.show()
 
 long = jnp.arange(0.0, 600.0, 0.1)  # s
 surface = jnp.cumsum(-sinking(long, 0.0)) * 0.1
-print(f"Significant height of ten minutes of this realisation: {4 * float(surface.std()):.3f} m")
+print(f"Significant height of ten minutes of this realization: {4 * float(surface.std()):.3f} m")
 print(f"Significant height asked for: {float(waves.height):.3f} m")

@@ -7,8 +7,14 @@ first line is `# my_part.py` is that file: it is written into the folder.
 A block of text on a page of docs/tutorials is what the command before it prints: each of its lines must occur in the
 output, in this order; `...` stands for anything. Where it shows an error, the command must fail with exit code 2.
 
+<<<<<<< HEAD
 By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures and
 no replay are written, and PID stands for the preset `robust`: most of the time of a short run. Slow tests run everything as it stands.
+=======
+By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures are
+written, and PID stands for the preset `robust`: most of the time of a short run. Of a tutorial, only `undertow init` runs,
+and the scenarios are validated. Slow tests run everything as it stands.
+>>>>>>> tutorials
 """
 
 import itertools
@@ -24,6 +30,8 @@ from undertow.cli.main import run
 from undertow.comparison.contest import contest
 from undertow.report import run_page
 from undertow.report.figures import writing
+from undertow.scenario.reading import read
+from undertow.scenario.schema import validate
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -79,7 +87,11 @@ def compared(arguments: list[str]) -> None:
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built
 # but not run.
 WHOLE, SIMULATED = {"your-own-plant"}, {"README", "your-own-controller", "your-own-vehicle"}
+<<<<<<< HEAD
 BUILT = {"campaign", "compare", "4-monte-carlo-study"}
+=======
+BUILT = {"campaign"}
+>>>>>>> tutorials
 
 
 def lines_of(text: str) -> list[str]:
@@ -95,6 +107,14 @@ def absent(shown: str, printed: str) -> list[str]:
         if not any(re.fullmatch(pattern, one) for one in output):
             missing.append(line)
     return missing
+
+
+def begun(arguments: list[str]) -> None:
+    """Run `init`; of other commands, validate the scenario that they name."""
+    if arguments[0] == "init":
+        assert run(arguments) == 0
+    elif arguments[1].endswith(".yaml") and "plant" in (text := read(Path(arguments[1]))).data:
+        validate(text)
 
 
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
@@ -115,9 +135,8 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}
     several = blocks(page)
-    shown = {one.line: two.code for one, two in itertools.pairwise(several) if two.language == "text"}
-    if page.parent.name != "tutorials":
-        shown = {}
+    tutorial, pairs = page.parent.name == "tutorials", itertools.pairwise(several)
+    shown = {one.line: two.code for one, two in pairs if two.language == "text" and tutorial}
     for block in several:
         if file := FILE.match(block.code):
             code = block.code if whole or not file["name"].endswith(".yaml") else block.code.replace(ROBUST, QUICKER)
@@ -128,6 +147,9 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
                     compared(arguments)
                 elif arguments[1].endswith(".yaml"):
                     assert prepare(tmp_path / arguments[1]).trials.number > 0
+        elif not whole and tutorial:
+            for arguments in commands(block.code) if block.language == "bash" else ():
+                begun(arguments)
         elif block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
         elif block.language == "bash":

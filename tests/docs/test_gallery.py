@@ -110,7 +110,7 @@ PRINTED = {
     "plot_thruster_loss": [(rf"100% .* most {NUMBER} mm", 0, 10), (rf"^0% .* most {NUMBER} mm", 1, 100)],
     "plot_two_link_arm": [(rf"shoulder: {NUMBER} mrad", 0.3, 0.4), (rf"elbow: {NUMBER} mrad", 0.7, 0.8)],
     "plot_voltage_limits": [(rf"24 V: {NUMBER} m", 0.05, 100), (rf"96 V: {NUMBER} m", 0, 0.05)],
-    "plot_waves": [(rf"realisation: {NUMBER} m", 0.45, 0.55)],
+    "plot_waves": [(rf"realization: {NUMBER} m", 0.45, 0.55)],
     "plot_weight_drift": [
         (rf"without a bound: .* {NUMBER} m/s", 100, 1000),
         (rf"bounded .* weight {NUMBER} m/s", 4.9, 5),
