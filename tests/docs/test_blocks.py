@@ -7,14 +7,9 @@ first line is `# my_part.py` is that file: it is written into the folder.
 A block of text on a page of docs/tutorials is what the command before it prints: each of its lines must occur in the
 output, in this order; `...` stands for anything. Where it shows an error, the command must fail with exit code 2.
 
-<<<<<<< HEAD
 By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures and
-no replay are written, and PID stands for the preset `robust`: most of the time of a short run. Slow tests run everything as it stands.
-=======
-By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures are
-written, and PID stands for the preset `robust`: most of the time of a short run. Of a tutorial, only `undertow init` runs,
-and the scenarios are validated. Slow tests run everything as it stands.
->>>>>>> tutorials
+no replay are written, and PID stands for the preset `robust`: most of the time of a short run. Of a tutorial, only
+`undertow init` runs, and the scenarios are validated. Slow tests run everything as it stands.
 """
 
 import itertools
@@ -87,11 +82,7 @@ def compared(arguments: list[str]) -> None:
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built
 # but not run.
 WHOLE, SIMULATED = {"your-own-plant"}, {"README", "your-own-controller", "your-own-vehicle"}
-<<<<<<< HEAD
-BUILT = {"campaign", "compare", "4-monte-carlo-study"}
-=======
-BUILT = {"campaign"}
->>>>>>> tutorials
+BUILT = {"campaign", "compare"}
 
 
 def lines_of(text: str) -> list[str]:
