@@ -5,6 +5,7 @@ import pytest
 from good_scenario import SCENARIO
 
 import undertow as ut
+from undertow.report.figures import writing
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +14,7 @@ def parts():
     return plant, ut.rcaf(plant.model(), preset="paper"), ut.references.setpoint([2, 3, 4, 0, 0, 1])
 
 
-def test_run_has_series_metrics_and_figures(parts, tmp_path):
+def test_run_has_series_metrics_figures_and_a_page(parts, tmp_path, monkeypatch):
     run = ut.simulate(*parts, duration=0.1, seed=7)
     assert isinstance(run, ut.Run) and run.status == 0
     assert run.dataset["position"].shape == (11, 6) and run.dataset.attrs["seed"] == 7
@@ -23,6 +24,11 @@ def test_run_has_series_metrics_and_figures(parts, tmp_path):
     assert "tracking" in run.plot()
     run.save(tmp_path / "run.nc")
     assert (tmp_path / "run.nc").is_file()
+    monkeypatch.setattr(writing, "svg", lambda figure: "<svg/>")
+    monkeypatch.setattr(writing, "png", lambda figure: b"")
+    run.page(tmp_path / "run.html")
+    page = (tmp_path / "run.html").read_text()
+    assert all(part in page for part in ('class="replay"', 'id="metrics"', 'id="certificate"', 'id="figure-tracking"'))
 
 
 def test_python_and_scenario_agree_bit_for_bit(parts, tmp_path):

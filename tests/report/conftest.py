@@ -137,6 +137,7 @@ def two_minutes():
     random = np.random.default_rng(1)
     series = {name: random.normal(size=(len(time), width)) for name, width in widths.items()}
     series["position"] = 2 * np.stack([np.cos(time / 20), np.sin(time / 20), time / 120], axis=-1)
+    series["error"] = np.abs(series["error"])
     series["desired_position"] = series["position"] + 0.1
     positions = np.concatenate([corners, corners]) * 0.2
     thrusters = Thrusters(

@@ -20,7 +20,6 @@ from undertow.report.replay.recomputed import thrust_along, thrust_limits
 from undertow.report.replay.replay_data import hull_size, packed, page_data, replay_of, thruster_names
 from undertow.report.replay.video import _Scenes, check_video
 from undertow.report.run_page import Shown, write_run_page
-from undertow.thrusters.commanded_thrust import commanded_thrust
 from undertow.thrusters.first_order import first_order
 
 WATER = (0.3, -0.2, 0.1)  # m/s
@@ -33,7 +32,9 @@ def loop():
         ut.vehicles.bluerov2_heavy(), first_order(thrust_per_volt=2.0, time_constant=0.5, supply=16)
     )
     load = Together((ut.disturbances.current(WATER), ut.disturbances.thruster_loss(failing=[3], start=10.0)))
-    return ClosedLoop(plant, ut.controllers.pid(plant.model()), ut.references.setpoint([0.0] * 6), load, perfect())
+    return ClosedLoop(
+        plant, ut.controllers.pid(plant.model(), frequency=1.0), ut.references.setpoint([0.0] * 6), load, perfect()
+    )
 
 
 @pytest.fixture
@@ -91,9 +92,9 @@ def test_thrust_without_a_state_is_that_of_the_input():
 
 
 def test_limits_of_thrust():
-    limits = thrust_limits(commanded_thrust(thrust_forward_max=50.0, thrust_reverse_max=40.0), 2)
-    assert limits == pytest.approx(np.array([[-40.0, 50.0]] * 2), rel=1e-3)
-    assert np.isinf(thrust_limits(first_order(), 1)).all()
+    limited = first_order(thrust_per_volt=2.0, supply=16.0, reverse_share=0.8)
+    assert thrust_limits(limited, 2) == pytest.approx(np.array([[-25.6, 32.0]] * 2), rel=1e-3)
+    assert np.isinf(thrust_limits(first_order(), 2)).all()
 
 
 def test_replay_of_a_run(run, loop):
@@ -178,6 +179,7 @@ def test_failed_replay_is_a_sentence(run, loop, monkeypatch):
     assert shown.replay is None and "the replay could not be made" in shown.failures[0]
 
 
+@pytest.mark.slow
 def test_frames_of_a_video_differ(two_minutes):
     scenes = _Scenes(two_minutes, 4.0)
     width, height = scenes.size()

@@ -23,7 +23,7 @@ from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
 from undertow.scenario.finished_run import certificate_of, metrics_of, window_of
 
 # Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
-_LARGE, _COLOURS = 80_000, 32
+_LARGE, _COLOURS = 80_000, 48
 _DIGITS = 4
 
 _CAPTIONS = {
@@ -71,7 +71,7 @@ def _picture(vector: Path) -> str | bytes:
         return vector.read_text(encoding="utf-8")
     data = io.BytesIO()
     with Image.open(vector.with_suffix(".png")) as image:
-        few = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        few = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
         few.save(data, "PNG", optimize=True)
     return data.getvalue()
 
