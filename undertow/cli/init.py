@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import shlex
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -34,7 +35,7 @@ def init(path: Path, vehicle: str | None, own_vehicle: bool, own_controller: boo
         BadInput: options that do not go together, or a file of such a name is there.
         OSError: the files cannot be written; none of them is left.
     """
-    scenario = path if path.suffix == ".yaml" else path / "scenario.yaml"
+    scenario = path if path.suffix in (".yaml", ".yml") else path / "scenario.yaml"
     folder = scenario.parent
     contents = {scenario.name: _scenario(scenario.name, vehicle, own_vehicle, own_controller)}
     contents |= {_VEHICLE: _template(_VEHICLE)} if own_vehicle else {}
@@ -44,8 +45,9 @@ def init(path: Path, vehicle: str | None, own_vehicle: bool, own_controller: boo
         contents[_SCHEMA] = json.dumps(scenario_schema(), indent=1) + "\n"
     _write(folder, contents)
     print(f"Wrote {', '.join(str(folder / name) for name in contents)}")
-    inside = "" if folder.resolve() == Path().resolve() else f"cd {folder} && "
-    print(f"Next: {inside}undertow check {scenario.name} && undertow simulate {scenario.name}")
+    inside = "" if folder.resolve() == Path().resolve() else f"cd {shlex.quote(str(folder))} && "
+    name = shlex.quote(scenario.name)
+    print(f"Next: {inside}undertow check {name} && undertow simulate {name}")
 
 
 def _scenario(name: str, vehicle: str | None, own_vehicle: bool, own_controller: bool) -> str:
