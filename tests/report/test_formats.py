@@ -36,10 +36,10 @@ def test_angles_are_degrees_and_units_stand_with_their_number():
 @pytest.mark.parametrize(
     ("words", "shown"),
     [
-        ("rms 1.6e-4 m", f"rms 1.6{TIMES}<sup>{MINUS}4</sup>&nbsp;m"),
-        ("2.4e+05 V/s", f"2.4{TIMES}<sup>5</sup>&nbsp;V/s"),
+        ("rms 1.6e-4 m", f"rms 1.6{TIMES}<sup>{MINUS}4</sup> m"),
+        ("2.4e+05 V/s", f"2.4{TIMES}<sup>5</sup> V/s"),
         ("0.00016 and 0.0016", f"1.6{TIMES}<sup>{MINUS}4</sup> and 0.0016"),
-        ("0.0002 m", f"2{TIMES}<sup>{MINUS}4</sup>&nbsp;m"),
+        ("0.0002 m", f"2{TIMES}<sup>{MINUS}4</sup> m"),
         ("0.0000512", f"5.12{TIMES}<sup>{MINUS}5</sup>"),
         ("from -1 to 1, (-2)", f"from {MINUS}1 to 1, ({MINUS}2)"),
         ("-1.5 +- 4.2j", f"{MINUS}1.5 &plusmn; 4.2j"),

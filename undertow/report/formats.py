@@ -24,9 +24,6 @@ _TINY = re.compile(r"(?<![\w.])0\.000(0*)(\d+)(?!\w)")
 _RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 _SIGNS = {"&lt;=": "&le;", "&gt;=": "&ge;"}
 
-# Between a number and its unit no line ends.
-_UNITS = re.compile(r"(?:(?<=\d)|(?<=</sup>)) (?=(?:[mk]?[msVNW]|[kM]?Hz|rad|deg|mH|cm|mm|mrad|1/s|%)(?![\w]))")
-
 
 def number(value: Any, digits: int = _DIGITS) -> Html:
     """A number with the given digits; powers of ten are written out, and a dash stands for a missing number."""
@@ -80,7 +77,6 @@ def _typeset(words: str) -> Html:
     marked = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", marked))
     for sign, entity in _SIGNS.items():
         marked = marked.replace(sign, entity)
-    marked = _UNITS.sub("&nbsp;", marked)
     return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked))
 
 
