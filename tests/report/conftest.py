@@ -3,7 +3,7 @@ import pytest
 import xarray as xr
 
 from undertow.report.figures import fidelity_figure, run_figures
-from undertow.report.replay.replay_data import Replay, Thrusters, thruster_names
+from undertow.report.replay.replay_data import Replay, Thrusters
 from undertow.report.reproduction.report import write_report
 
 
@@ -140,7 +140,6 @@ def two_minutes():
     series["error"] = np.abs(series["error"])
     series["desired_position"] = series["position"] + 0.1
     positions = np.concatenate([corners, corners]) * 0.2
-    thrusters = Thrusters(
-        thruster_names(positions), positions, np.tile([0.0, 0.0, 1.0], (8, 1)), np.tile([-40.0, 50.0], (8, 1))
-    )
+    names = tuple(f"T{number}" for number in range(1, 9))
+    thrusters = Thrusters(names, positions, np.tile([0.0, 0.0, 1.0], (8, 1)), np.tile([-40.0, 50.0], (8, 1)))
     return Replay("one", "completed", time, np.array([0.5, 0.4, 0.3]), thrusters, True, True, series)

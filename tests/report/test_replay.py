@@ -17,7 +17,7 @@ from undertow.navigation.perfect import perfect
 from undertow.report import run_page
 from undertow.report.replay import replay_section
 from undertow.report.replay.recomputed import thrust_along, thrust_limits
-from undertow.report.replay.replay_data import hull_size, packed, page_data, replay_of, thruster_names
+from undertow.report.replay.replay_data import hull_size, packed, page_data, replay_of
 from undertow.report.replay.video import _Scenes, check_video
 from undertow.report.run_page import Shown, write_run_page
 from undertow.thrusters.first_order import first_order
@@ -135,12 +135,6 @@ def test_size_is_that_of_the_file_or_follows_from_mass_and_inertia(run):
     assert hull_size(odin, run) == pytest.approx([np.sqrt(6 * 8.0 / 125)] * 2 + [low])  # its sphere is 0.62 m wide
     scenario = "plant: {vehicle: {kind: my_rov.yaml, contents: {size: [1.0, 0.5, 0.4]}}}"
     assert hull_size(odin, run.assign_attrs(scenario=scenario)).tolist() == [1.0, 0.5, 0.4]
-
-
-def test_names_of_thrusters():
-    assert thruster_names(np.array([[-0.5, 0.0, 0.0]])) == ("T1",)
-    four = np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]]) * 0.3
-    assert thruster_names(four) == ("T1 fore starboard", "T2 fore port", "T3 aft starboard", "T4 aft port")
 
 
 def test_several_runs_have_labels_and_colours_of_their_own(two_minutes):

@@ -145,7 +145,7 @@ def _replay_of(run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, label: s
         status=str(run.attrs.get("status", "")),
         time=shown["time"].values,
         size=hull_size(vehicle, run),
-        thrusters=Thrusters(thruster_names(positions), positions, np.asarray(vehicle.thruster_directions), limits),
+        thrusters=Thrusters(vehicle.thruster_names(), positions, np.asarray(vehicle.thruster_directions), limits),
         limited=limited,
         body_axes=isinstance(loop.controller.model.coordinates, BodyCoordinates),
         series=series,
@@ -210,17 +210,6 @@ def hull_size(vehicle: Vehicle, run: xr.Dataset) -> np.ndarray:
     about = np.diag(facts.inertia)
     sides = np.sqrt(np.maximum(6 * (about.sum() - 2 * about) / facts.mass, 0.0))
     return np.maximum(sides, _THINNEST * max(float(sides.max()), facts.scale))
-
-
-def thruster_names(positions: np.ndarray) -> tuple[str, ...]:
-    """`T1 fore starboard`, ...: numbers in the order of the data, with the place where it is off the centre."""
-    middle, words = positions.mean(axis=0), (("aft", "fore"), ("port", "starboard"))
-    apart = 0.1 * np.abs(positions - middle).max()
-    names = []
-    for number, offset in enumerate(positions - middle, 1):
-        where = [word[int(offset[axis] > 0)] for axis, word in enumerate(words) if abs(offset[axis]) > apart]
-        names.append(" ".join([f"T{number}", *where]))
-    return tuple(names)
 
 
 def page_data(replays: Sequence[Replay]) -> str:
