@@ -25,7 +25,8 @@ class Push(AbstractDisturbance):
     def realize(self, key):
         bias, unused, series = jax.random.split(key, 3)
         draw = jax.random.normal
-        return {"bias": self.deviation * draw(bias), "unused": draw(unused, (2,)), "series": draw(series, (40,))}
+        found = {"bias": self.deviation * draw(bias), "unused": draw(unused, (2,)), "series": draw(series, (40,))}
+        return found | {"share": 0.5, "typed": jax.random.key(1)}
 
     def at(self, realization, t, pose, load):
         return load._replace(acceleration=load.acceleration + realization["bias"])

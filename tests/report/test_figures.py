@@ -6,6 +6,7 @@ import pytest
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from PIL import Image
 
+from undertow import vehicles
 from undertow.report.figures import fidelity_figure, paper_figures, png, run_figures, save, svg, sweep_figure
 from undertow.report.figures.paper import effort, uncertainty
 from undertow.reproduction.thruster_response import thruster_response
@@ -221,3 +222,24 @@ def test_sweep_draws_points_and_theory():
     assert line(panel, "RAFC, measured").get_xdata() == pytest.approx([1.0, 10.0])
     assert "RAFC, theory" not in [one.get_label() for one in panel.lines]
     assert "rad/s" in panel.get_xlabel()
+
+
+def test_thrusters_are_named_by_where_they_stand():
+    names = vehicles.bluerov2_heavy().thruster_names()
+    assert names[:2] == ("T1 bow starboard", "T2 bow port") and names[-1] == "T8 vertical stern port"
+    assert vehicles.remus100().thruster_names() == ("T1 stern",)
+
+
+def test_results_without_names_have_numbers(make_run):
+    run = make_run(axes=1, inputs=2)
+    del run["actuator"].attrs["names"]
+    assert [panel.get_title(loc="left") for panel in run_figures(run)["effort"].axes] == ["input 1", "input 2"]
+
+
+def test_small_values_have_their_power_of_ten_in_the_unit(make_run):
+    run = make_run(axes=1, inputs=1)
+    run["input"] = 2e-5 * np.sin(run["time"]) + 0 * run["input"]
+    run["commanded_input"] = run["input"]
+    panel = run_figures(run)["effort"].axes[0]
+    assert panel.get_ylabel() == "input, $10^{-6}$ V"
+    assert panel.yaxis.get_major_formatter()(-1e-5, 0) == "\u221210"

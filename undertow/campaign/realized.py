@@ -83,7 +83,12 @@ def _realized(built: Built, other: int = 0, trace: bool = False) -> dict[str, An
     key = jax.random.fold_in(run.key, other) if other else run.key
     tree = eqx.filter_eval_shape(_start, run.loop, run.start, key) if trace else _compiled(run.loop, run.start, key)
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
-    short = lambda leaf: np.issubdtype(leaf.dtype, np.floating) and leaf.ndim <= 1 and leaf.size <= _LONGEST
+    short = lambda leaf: (
+        hasattr(leaf, "dtype")  # a constant that is a plain number has none
+        and jnp.issubdtype(leaf.dtype, jnp.floating)
+        and leaf.ndim <= 1
+        and leaf.size <= _LONGEST
+    )
     return {_name(path): leaf if trace else np.asarray(leaf) for path, leaf in leaves if short(leaf)}
 
 
