@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from undertow import sensors as sensors
     from undertow import thrusters as thrusters
     from undertow import vehicles as vehicles
+    from undertow.comparison.comparison import Comparison as Comparison
+    from undertow.comparison.comparison import compare as compare
     from undertow.controllers.rcaf import rcaf as rcaf
     from undertow.core.errors import BadInput as BadInput
     from undertow.plants.hybrid_vehicle import HybridVehicle as HybridVehicle
@@ -33,8 +35,10 @@ if TYPE_CHECKING:
 # Public name -> module; packages of parts stand for themselves.
 _HOMES = {
     "BadInput": "undertow.core.errors",
+    "Comparison": "undertow.comparison.comparison",
     "HybridVehicle": "undertow.plants.hybrid_vehicle",
     "Run": "undertow.run",
+    "compare": "undertow.comparison.comparison",
     "rcaf": "undertow.controllers.rcaf",
     "read_samples": "undertow.scenario.csv_table",
     "simulate": "undertow.run",

@@ -50,6 +50,7 @@ class Run:
         status: how it ended.
         outcome: the same series as arrays, and the final states.
         success: whether control succeeded, by the scenario's criterion or the default one; None without one.
+        loop: the closed loop that was run.
     """
 
     dataset: xr.Dataset
@@ -57,6 +58,7 @@ class Run:
     status: Status
     outcome: Outcome
     success: Success | None
+    loop: ClosedLoop
 
     @property
     def certificate(self) -> dict[str, Any] | None:
@@ -68,6 +70,19 @@ class Run:
         from undertow.report.figures import run_figures
 
         return run_figures(self.dataset)
+
+    def page(self, path: str | Path) -> None:
+        """Write one HTML page with metrics, certificate, figures and, for a vehicle, a replay in three dimensions.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        from undertow.report.run_page import shown, write_run_page
+
+        parts = shown(self.dataset, self.loop)
+        write_run_page(Path(path), self.dataset, parts)
+        for sentence in parts.failures:
+            warnings.warn(sentence, stacklevel=2)
 
     def save(self, path: str | Path) -> None:
         """Write the dataset as netCDF; the file appears whole or not at all.
@@ -165,7 +180,7 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
         attributes["status_sentence"] = why
     criterion = criterion_of(None, meanings(closed_loop))
     how = Measuring(window.of_run(settings.duration), settings.dt, criterion=criterion)
-    return _run(outcome, *label(closed_loop, outcome, how, attributes))
+    return _run(closed_loop, outcome, *label(closed_loop, outcome, how, attributes))
 
 
 def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool = False) -> Run:
@@ -179,14 +194,20 @@ def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool
         BadInput: anything wrong with it, with key path and line.
     """
     text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
-    _, outcome, *labelled = execute.execute(text)
-    return _run(outcome, *labelled)  # pyright: ignore[reportArgumentType] - five values in this order
+    built, outcome, *labelled = execute.execute(text)
+    return _run(built.closed_loop, outcome, *labelled)  # pyright: ignore[reportArgumentType] - five values in this order
 
 
 def _run(
-    outcome: Outcome, status: Status, steady: Any, whole: Any, success: Success | None, dataset: xr.Dataset
+    loop: ClosedLoop,
+    outcome: Outcome,
+    status: Status,
+    steady: Any,
+    whole: Any,
+    success: Success | None,
+    dataset: xr.Dataset,
 ) -> Run:
-    return Run(dataset, {"steady": steady, "whole": whole}, status, outcome, success)
+    return Run(dataset, {"steady": steady, "whole": whole}, status, outcome, success, loop)
 
 
 def _plain(value: Any) -> Any:

@@ -6,6 +6,7 @@ import pytest
 
 from undertow.campaign.task import site
 from undertow.loop import vmap_batch
+from undertow.report import run_page
 from undertow.report.figures import writing
 
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
@@ -64,6 +65,7 @@ def blank_figures(monkeypatch, request):
     if "whole_figures" not in request.fixturenames:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+        monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
 
 
 @pytest.fixture(params=["simd", "xla"])

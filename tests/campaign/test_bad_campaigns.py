@@ -137,11 +137,11 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
     [
         (
             ["campaign", "scenario.yaml"],
-            r"`CAMPAIGN` must be a campaign, but is a scenario .*Run it with `undertow simulate`",
+            r"`CAMPAIGN` must be a campaign, but is scenario.yaml, a scenario. Run it: undertow simulate scenario.yaml",
         ),
         (
             ["simulate", "campaign.yaml"],
-            r"`scenario` must be a key of campaigns only .*Run a campaign with `undertow campaign`",
+            r"`SCENARIO` must be a scenario, but is campaign.yaml, a campaign. Run it: undertow campaign campaign.yaml",
         ),
         (["campaign", "campaign.yaml", "out"], r"`DIR` must follow the word `status`, but is out. .*`--out out`"),
         (["campaign", "status", "out", "--resume"], r"`--resume` must be left out with `status`"),

@@ -91,7 +91,7 @@ def test_ctrl_c_ends_a_cluster_in_one_line(campaign_file, tmp_path):
     os.killpg(process.pid, signal.SIGINT)
     complaint = process.communicate(timeout=60)[1].decode()
     assert process.returncode == 130
-    assert complaint == f"Stopped. To resume: undertow campaign {path} --out {out} --resume\n"
+    assert complaint == f"\nInterrupted: stopping.\nStopped. To resume: undertow campaign {path} --out {out} --resume\n"
     waited = time.monotonic() + 60
     with pytest.raises(ProcessLookupError):  # soon nobody is left
         while time.monotonic() < waited:

@@ -3,6 +3,7 @@ from typing import NamedTuple
 import pytest
 
 from undertow.cli.main import run
+from undertow.report import run_page
 from undertow.report.figures import writing
 
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
@@ -16,7 +17,7 @@ class Said(NamedTuple):
 
 @pytest.fixture
 def whole_figures():
-    """For tests that look at figures: they are drawn, which takes most of the time of a short run."""
+    """For tests that look at figures and at the replay: making them takes most of the time of a short run."""
 
 
 @pytest.fixture
@@ -29,6 +30,7 @@ def undertow(tmp_path, monkeypatch, capsys, request):
     if "whole_figures" not in request.fixturenames:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+        monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
     monkeypatch.delenv("UNDERTOW_TRACEBACK", raising=False)
 
     def call(*arguments: str) -> Said:

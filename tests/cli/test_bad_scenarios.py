@@ -72,7 +72,7 @@ MISTAKES = {
     "quoted number": (
         "duration: 0.1",
         "duration: '1e-3'",
-        "`loop.duration` must be a number, but is '1e-3' (s.yaml, line 9)",
+        "`loop.duration` must be a number, but is '1e-3' (s.yaml, line 9). Write it without quotes: 1e-3",
     ),
     "number for a boolean": (
         "seed: 3",
@@ -87,7 +87,7 @@ MISTAKES = {
     "wrong vector length": (
         "position: [2, 3, 4, 0, 0, 1]",
         "position: [2, 3, 4]",
-        "`reference.position` must have 6 entries, one per output of the plant, but is of shape (3,) (s.yaml, line 7)",
+        "`reference.position` must have 6 entries (north, east, down, roll, pitch, yaw), but is 3 long (s.yaml, line 7)",
     ),
     "short centre of gravity": (
         "mass: 125",
@@ -176,12 +176,12 @@ MISTAKES = {
     "record not a multiple of dt": (
         "record: 1e-2",
         "record: 1.5e-3",
-        "`loop.record` must be a whole number of steps (0.001 s), but is 0.0015 s (s.yaml, line 9)",
+        "`loop.record` must be a whole number of steps of `loop.dt` (0.001 s), but is 0.0015 s (s.yaml, line 9). Take 0.001 or 0.002 s",
     ),
     "record shorter than dt": (
         "record: 1e-2",
         "record: 1e-4",
-        "`loop.record` must be a whole number of steps (0.001 s), but is 0.0001 s (s.yaml, line 9)",
+        "`loop.record` must be a whole number of steps of `loop.dt` (0.001 s), but is 0.0001 s (s.yaml, line 9). Take 0.001 s",
     ),
     "unknown loop": (
         "dt: 1e-3",
@@ -197,7 +197,7 @@ MISTAKES = {
     "short initial state": (
         "position: [0, 0, 0, 0, 0, 0]",
         "position: [0, 0]",
-        "`initial.position` must have 6 entries (one per output of the plant), but is 2 long (s.yaml, line 10)",
+        "`initial.position` must have 6 entries (north, east, down, roll, pitch, yaw), but is 2 long (s.yaml, line 10)",
     ),
     "word in the initial state": (
         "position: [0, 0, 0, 0, 0, 0]",
@@ -212,7 +212,7 @@ MISTAKES = {
     "disturbance of the wrong size": (
         "kind: u1",
         "kind: wrench, value: [1, 2]",
-        "`disturbance.value` must have 6 entries, but is of shape (2,) (s.yaml, line 8)",
+        "`disturbance.value` must have 6 entries (surge, sway, heave, roll, pitch, yaw), but is of shape (2,) (s.yaml, line 8)",
     ),
     "negative noise": (
         "seed: 3",
@@ -228,13 +228,13 @@ MISTAKES = {
     "duplicate key": (
         "seed: 3",
         "seed: 3\nseed: 4",
-        f'{YAML} found duplicate key "seed" with value "4" (original value: "3") (s.yaml, line 12)',
+        f"{YAML} the key `seed` is given twice, first in line 11 (s.yaml, line 12). Remove one of them",
     ),
-    "tab": ("seed: 3", "\tseed: 3", f"{YAML} found character '\\t' that cannot start any token (s.yaml, line 11)"),
+    "tab": ("seed: 3", "\tseed: 3", f"{YAML} it has a tab (s.yaml, line 11). Indent with spaces"),
     "unclosed bracket": (
         "seed: 3",
         "seed: [3",
-        f"{YAML} expected ',' or ']', but got '<stream end>' (s.yaml, line 12)",
+        f"{YAML} a `[` is not closed, or lacks a comma (s.yaml, line 11). Add `]`, and commas between the entries",
     ),
     "unknown alias": ("seed: 3", "seed: *other", f"{YAML} found undefined alias 'other' (s.yaml, line 11)"),
 }
@@ -270,7 +270,9 @@ def test_file_that_is_no_scenario(refused, tmp_path, text, said):
 
 def test_file_that_is_not_text(refused, tmp_path):
     (tmp_path / "s.yaml").write_bytes(b"\xff\xfe\x00\x01")
-    assert refused("simulate", "s.yaml") == "`SCENARIO` must be a text file, but is s.yaml"
+    assert refused("simulate", "s.yaml") == (
+        "`SCENARIO` must be a text file in UTF-8, but is s.yaml. Save it with this encoding"
+    )
 
 
 def test_file_that_is_missing(refused):

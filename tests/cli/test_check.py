@@ -55,7 +55,7 @@ def test_variant_of_a_catalogue_vehicle(undertow):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["oddin"], "`THING` must be a file or the name of a part, but is oddin. Did you mean `odin`?"),
+        (["oddin"], "`THING` must be a .yaml file, or the name of a part, but is oddin. Did you mean `odin`?"),
         (["bluerov2_heavy", "--option", "parameters=wu"], "`parameters` must be one of vonbenzon2022, wu2018"),
         (["bluerov2_heavy", "--option", "parameters"], "`--option` must be KEY=VALUE, but is parameters"),
         (["bluerov2_heavy", "--option", "mas=3"], "`mas` must be an option or parameter here, but is unknown"),

@@ -22,8 +22,8 @@ FEW, MANY = 6, 1500
 @pytest.fixture
 def undrawn(monkeypatch, tmp_path):
     """Drawing takes most of the time of a short run, and has tests of its own. Files that examples name are there."""
-    monkeypatch.setattr(simulate, "save_all", lambda plots, folder: Saved({}, []))
-    monkeypatch.setattr(campaign, "write_campaign", lambda title, results, found, folder: (folder, []))
+    monkeypatch.setattr(simulate, "save_all", lambda plots, folder, pdf: Saved({}, []))
+    monkeypatch.setattr(campaign, "write_campaign", lambda title, results, found, folder, pdf: (folder, []))
     for name in ("d.csv", "my_rov.yaml"):
         shutil.copy(malformed.EXAMPLES / name, tmp_path / name)
 

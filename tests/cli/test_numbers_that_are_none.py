@@ -3,7 +3,8 @@
 import jax
 import pytest
 
-from undertow.cli.tables import certificate_table, wide_console
+from undertow.cli.tables import terminal_table, wide_console
+from undertow.report.run_tables import certificate_rows
 from undertow.scenario.execute import execute
 from undertow.scenario.finished_run import certificate_of
 
@@ -34,12 +35,12 @@ def test_what_is_not_finite_is_a_dash(capsys, preset, velocity, precision):
     certificate = certificate_of(done.dataset)
     assert done.status.word == "command_not_finite"
     assert certificate is not None and certificate["start"] is None
-    wide_console().print(certificate_table(certificate, (0.025, 0.05)))
+    wide_console().print(terminal_table(certificate_rows(certificate, (0.025, 0.05))))
     assert ": - at the start" in capsys.readouterr().out
 
 
 def test_bound_that_is_not_finite_is_a_dash(capsys):
     known = {"function": "V", "start": 1.0, "end": None, "rising": {"whole": 0.0, "steady": None}, "hypotheses": []}
     bound = {"estimation_bound": [1.0, None], "estimation_within": {"whole": 0.0, "steady": 0.0}}
-    wide_console().print(certificate_table(known | bound, (0.0, 1.0)))
+    wide_console().print(terminal_table(certificate_rows(known | bound, (0.0, 1.0))))
     assert "(up to -) for 0 % of the steady window." in " ".join(capsys.readouterr().out.split())

@@ -33,7 +33,7 @@ def test_part_from_a_file_runs(undertow, tmp_path):
     ("part", "code", "said"),
     [
         ("./his_rov.py:my_rov", GOOD, "`plant.vehicle.kind` must name an existing file, but is ./his_rov.py"),
-        ("./my_rov.py:my_rv", GOOD, "`plant.vehicle.kind` must name a callable of my_rov.py, but is my_rv"),
+        ("./my_rov.py:my_rv", GOOD, "`plant.vehicle.kind` must name a function in my_rov.py, but is my_rv"),
         (
             "./my_rov.py:my_rov",
             "1 / 0",
@@ -89,7 +89,7 @@ def my_bytes():
 def test_a_part_that_simd_lacks_is_reported_once_with_the_reason(undertow, tmp_path):
     (tmp_path / "my_bytes.py").write_text(BYTES)
     (tmp_path / "s.yaml").write_text(SMALL.replace("kind: sinusoid, amplitude: 1", "kind: ./my_bytes.py:my_bytes"))
-    reason = "slower than simd (docs/simd.md): numbers of type int8."
+    reason = "slower than simd (docs/explanation/simd.md): numbers of type int8."
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0, said.err
     assert said.err.count(reason) == 1

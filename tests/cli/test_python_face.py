@@ -5,6 +5,7 @@ import pytest
 from good_scenario import SCENARIO
 
 import undertow as ut
+from undertow.report.figures import writing
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +14,7 @@ def parts():
     return plant, ut.rcaf(plant.model(), preset="paper"), ut.references.setpoint([2, 3, 4, 0, 0, 1])
 
 
-def test_run_has_series_metrics_and_figures(parts, tmp_path):
+def test_run_has_series_metrics_figures_and_a_page(parts, tmp_path, monkeypatch):
     run = ut.simulate(*parts, duration=0.1, seed=7)
     assert isinstance(run, ut.Run) and run.status == 0
     assert run.dataset["position"].shape == (11, 6) and run.dataset.attrs["seed"] == 7
@@ -23,6 +24,11 @@ def test_run_has_series_metrics_and_figures(parts, tmp_path):
     assert "tracking" in run.plot()
     run.save(tmp_path / "run.nc")
     assert (tmp_path / "run.nc").is_file()
+    monkeypatch.setattr(writing, "svg", lambda figure: "<svg/>")
+    monkeypatch.setattr(writing, "png", lambda figure: b"")
+    run.page(tmp_path / "run.html")
+    page = (tmp_path / "run.html").read_text()
+    assert all(part in page for part in ('class="replay"', 'id="metrics"', 'id="certificate"', 'id="figure-tracking"'))
 
 
 def test_python_and_scenario_agree_bit_for_bit(parts, tmp_path):
@@ -42,11 +48,14 @@ def test_scenario_as_data():
     [
         ({"duration": -1.0}, "`duration` must be greater than 0, but is -1.0"),
         ({"loop": "both"}, "`loop` must be 'sampled' or 'continuous', but is 'both'"),
-        ({"position": [1, 2]}, "`position` must have 6 entries (one per output of the plant), but is 2 long"),
-        ({"record": 1.5e-3}, "`record` must be a whole number of steps (0.001 s), but is 0.0015 s"),
+        ({"position": [1, 2]}, "`position` must have 6 entries (north, east, down, roll, pitch, yaw), but is 2 long"),
+        (
+            {"record": 1.5e-3},
+            "`record` must be a whole number of steps of `loop.dt` (0.001 s), but is 0.0015 s. Take 0.001 or 0.002 s",
+        ),
         (
             {"disturbance": ut.disturbances.wrench([1.0])},
-            "`disturbance.value` must have 6 entries, but is of shape (1,)",
+            "`disturbance.value` must have 6 entries (surge, sway, heave, roll, pitch, yaw), but is of shape (1,)",
         ),
         ({"navigation": 3}, "`navigation` must be an AbstractNavigation, but is a int"),
     ],

@@ -46,7 +46,7 @@ def test_earlier_reproduction_is_replaced_and_other_files_stay(undertow, tmp_pat
 
 def test_impossible_folder_is_refused_first(refused, tmp_path):
     (tmp_path / "file").touch()
-    assert refused("reproduce", "--out", "file") == "`--out` must be a folder, but is file, and file is a file"
+    assert refused("reproduce", "--out", "file") == "`--out` must be a folder, but is file, a file. Choose another name"
 
 
 def test_a_report_that_cannot_be_written_costs_no_results(undertow, tmp_path, short_study, monkeypatch):

@@ -131,11 +131,11 @@ def test_what_is_published_stays_whatever_follows(tmp_path):
 @pytest.mark.parametrize(
     ("out", "said"),
     [
-        ("file", "`--out` must be a folder, but is file, and file is a file"),
-        ("file/below", "`--out` must be a folder, but is file/below, and file is a file"),
+        ("file", "`--out` must be a folder, but is file, a file. Choose another name"),
+        ("file/below", "`--out` must be a folder, but is file/below, and file is a file. Choose another name"),
         (
             "/proc/undertow",
-            "`--out` must be a folder that can be written, but is /proc/undertow: No such file or directory",
+            "`--out` must be a folder that can be written, but is /proc/undertow: No such file or directory. Choose a folder of yours",
         ),
     ],
 )
@@ -172,6 +172,7 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "figures",
         "metrics.json",
+        "run.html",
         "run.nc",
         "scenario.yaml",
     ]

@@ -25,7 +25,9 @@ def ran(undertow, tmp_path, request):
 @pytest.mark.parametrize("ran", [NOISY], indirect=True, ids=["vehicle"])
 def test_files_of_a_run(ran, whole_figures, tmp_path):
     folder = tmp_path / "runs" / "s"
-    assert sorted(path.name for path in folder.iterdir()) == ["figures", "metrics.json", "run.nc", "scenario.yaml"]
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["figures", "metrics.json", "run.html", "run.nc", "scenario.yaml"]
+    assert 'class="replay"' in (folder / "run.html").read_text()
     assert {".png", ".svg"} == {path.suffix for path in (folder / "figures").iterdir()}
     metrics = json.loads((folder / "metrics.json").read_text())
     assert metrics["status"] == "completed" and metrics["ended"] == pytest.approx(0.1)
@@ -65,6 +67,13 @@ def test_result_file_repeats_bit_for_bit(ran, undertow, tmp_path):
     assert resolved.code == 0
     with xr.open_dataset(tmp_path / "again/run.nc") as second, xr.open_dataset(tmp_path / "third/run.nc") as third:
         assert second.attrs["content_hash"] == third.attrs["content_hash"]
+
+
+def test_video_is_refused_for_a_plant_that_is_no_vehicle(refused, tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.which", lambda program: "/usr/bin/ffmpeg")
+    (tmp_path / "s.yaml").write_text(SMALL)
+    line = "`--video` must be left out for a plant that is no vehicle with thrusters, but is given"
+    assert refused("simulate", "s.yaml", "--video", "s.mp4") == line
 
 
 def changed(tmp_path, change):

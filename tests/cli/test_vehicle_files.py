@@ -151,7 +151,7 @@ MISTAKES = {
     "unit in the value": (
         "mass: 13.5",
         "mass: 13.5 kg",
-        "`mass` must be a number, but is '13.5 kg' (my_rov.yaml, line 7)",
+        "`mass` must be a number, but is '13.5 kg' (my_rov.yaml, line 7). Write the number alone, without a unit",
     ),
     "negative mass": ("mass: 13.5", "mass: -13.5", "`mass` must be positive, but is -13.5 kg (my_rov.yaml, line 7)"),
     "two weights": (

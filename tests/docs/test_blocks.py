@@ -7,9 +7,9 @@ first line is `# my_part.py` is that file: it is written into the folder.
 A block of text on a page of docs/tutorials is what the command before it prints: each of its lines must occur in the
 output, in this order; `...` stands for anything. Where it shows an error, the command must fail with exit code 2.
 
-By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures are
-written, and PID stands for the preset `robust`: most of the time of a short run. Of a tutorial, only `undertow init` runs,
-and the scenarios are validated. Slow tests run everything as it stands.
+By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures and
+no replay are written, and PID stands for the preset `robust`: most of the time of a short run. Of a tutorial, only
+`undertow init` runs, and the scenarios are validated. Slow tests run everything as it stands.
 """
 
 import itertools
@@ -22,6 +22,8 @@ import pytest
 
 from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
+from undertow.comparison.contest import contest
+from undertow.report import run_page
 from undertow.report.figures import writing
 from undertow.scenario.reading import read
 from undertow.scenario.schema import validate
@@ -71,10 +73,16 @@ def quicker(arguments: list[str], page: str) -> list[str]:
     return [*arguments, "--no-prediction"] if page in SIMULATED else ["check", arguments[1]]
 
 
+def compared(arguments: list[str]) -> None:
+    """Build the controllers of a comparison, with the scenario's own for the preset `robust`, and run nothing."""
+    entries = arguments[arguments.index("--controllers") + 1].replace("robust", "scenario").split(",")
+    assert contest([Path(arguments[1])], entries).campaign.number > 1
+
+
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built
 # but not run.
 WHOLE, SIMULATED = {"your-own-plant"}, {"README", "your-own-controller", "your-own-vehicle"}
-BUILT = {"campaign"}
+BUILT = {"campaign", "compare"}
 
 
 def lines_of(text: str) -> list[str]:
@@ -113,6 +121,7 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
     if not whole:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+        monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}
@@ -125,7 +134,9 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
             (tmp_path / file["name"]).write_text(code, encoding="utf-8")
         elif not whole and page.stem in BUILT:
             for arguments in commands(block.code):
-                if arguments[1].endswith(".yaml"):
+                if arguments[0] == "compare":
+                    compared(arguments)
+                elif arguments[1].endswith(".yaml"):
                     assert prepare(tmp_path / arguments[1]).trials.number > 0
         elif not whole and tutorial:
             for arguments in commands(block.code) if block.language == "bash" else ():
@@ -134,6 +145,9 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
             exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
         elif block.language == "bash":
             for arguments in commands(block.code):
+                if not whole and arguments[0] == "compare":
+                    compared(arguments)
+                    continue
                 arguments = arguments if whole else quicker(arguments, page.stem)
                 allowed = (2,) if "Error:" in shown.get(block.line, "") else (0, 1)
                 assert run(arguments) in allowed, f"{page.name}, line {block.line}: undertow {shlex.join(arguments)}"

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from undertow.cli.main import run
+from undertow.report import run_page
 from undertow.report.figures import writing
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import build
@@ -56,6 +57,7 @@ def test_long_scenario_is_built(name):
 def test_scenario(name, tmp_path, monkeypatch):
     monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
     monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+    monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
     assert run(["simulate", str(EXAMPLES / f"{name}.yaml"), "--out", str(tmp_path / "out"), "--no-prediction"]) == 0
     steady = with_all_outputs(json.loads((tmp_path / "out" / "metrics.json").read_text())["steady"])
     for metric, (value, tolerance) in KNOWN[name].items():
@@ -80,7 +82,7 @@ def test_python_api(capsys):
 
 @pytest.mark.slow
 def test_mujoco_comparison(capsys, tmp_path):
-    """Not worse than docs/independent-physics.md says."""
+    """Not worse than docs/how-to/independent-physics.md says."""
     found = example("mujoco_comparison").main(fast=True, figure=str(tmp_path / "agreement.png"))
     said = {"nu_dot": 1e-12, "position": 1e-7, "attitude": 1e-7, "voltage": 1e-5}
     assert len(found) == 4

@@ -5,7 +5,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 README, SIMD, LIMITS = (
-    (ROOT / name).read_text("utf-8") for name in ("README.md", "docs/simd.md", "docs/known-limits.md")
+    (ROOT / name).read_text("utf-8")
+    for name in ("README.md", "docs/explanation/simd.md", "docs/explanation/known-limits.md")
 )
 
 
@@ -15,7 +16,7 @@ def plain(text):
 
 
 def test_speed():
-    """Nanoseconds per step and the factor over NumPy of README are those of the table in docs/simd.md."""
+    """Nanoseconds per step and the factor over NumPy of README are those of the table in docs/explanation/simd.md."""
     said = re.search(r"about (\d+) ns per step .*?, (\d+) times faster than plain NumPy", plain(README))
     assert said is not None
     ns, times = said.groups()
@@ -29,7 +30,7 @@ def plain_rows(text):
 
 def test_times_of_divergence():
     """Seconds after which the paper's laws end, in the section of failures, are those of the page of limits."""
-    section = plain(README).split("## Where the paper's claims fail")[1].split("## Beyond the paper")[0]
+    section = plain(README).split("## Where the paper's claims fail")[1].split("## What there is")[0]
     ends = re.findall(r"(?:after|lasts|with none) (\d+(?:\.\d+)?) s\b", section)
     assert {"60", "1829", "135", "547", "122"} <= set(ends)
     for end in ("60", "1829", "135", "547", "122"):

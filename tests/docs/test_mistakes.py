@@ -236,7 +236,7 @@ MISTAKES = [
 @pytest.mark.parametrize(("page", "file", "right", "wrong", "said"), MISTAKES)
 def test_mistake(page, file, right, wrong, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    path = ROOT / "docs" / f"your-own-{page}.md"
+    path = ROOT / "docs" / "how-to" / f"your-own-{page}.md"
     (code,) = [block.code for block in blocks(path) if (at := FILE.match(block.code)) and at["name"] == f"{file}.py"]
     assert right in code
     (tmp_path / f"{file}.py").write_text(code.replace(right, wrong))

@@ -1,4 +1,4 @@
-"""The law of docs/your-own-controller.md is tuned by the ranges that it declares, and tries what it says of itself."""
+"""The law of the page `your-own-controller` is tuned by the ranges that it declares, and tries what it says of itself."""
 
 import json
 
@@ -27,7 +27,7 @@ AXIS = {
 @pytest.fixture
 def own_law(tmp_path, monkeypatch):
     """The file of the page in the current folder."""
-    page = ROOT / "docs" / "your-own-controller.md"
+    page = ROOT / "docs" / "how-to" / "your-own-controller.md"
     (code,) = [block.code for block in blocks(page) if (at := FILE.match(block.code)) and at["name"].endswith(".py")]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_controller.py").write_text(code)

@@ -223,7 +223,7 @@ def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
     ]
     sensor = observer(parts)
     level = lambda t: measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
-    realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).states[0].offset[5:]
+    realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).sensors[0].offset[5:]
     velocity = errors(parts, level, 0.01, 40.0, key)[2000:, 6:9]
     before_correction = np.abs(velocity).max(0)
     expected = np.abs(np.asarray(realization)) * period / alpha * (1 - alpha)

@@ -1,4 +1,4 @@
-"""Every equation of the paper has a row in docs/paper-map.md, and the file it names carries its tag."""
+"""Every equation of the paper has a row in docs/reference/paper-map.md, and the file it names carries its tag."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,7 @@ _TAG = re.compile(r"Eqs?\.\s+((?:\(\d+\)(?:\s*(?:-|,|and)\s*)?)+)")
 
 
 def rows():
-    for line in (ROOT / "docs" / "paper-map.md").read_text().splitlines():
+    for line in (ROOT / "docs" / "reference" / "paper-map.md").read_text().splitlines():
         cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
         if len(cells) == 4 and re.match(r"\(\d+\)", cells[0]):
             yield cells

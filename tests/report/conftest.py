@@ -3,6 +3,7 @@ import pytest
 import xarray as xr
 
 from undertow.report.figures import fidelity_figure, run_figures
+from undertow.report.replay.replay_data import Replay, Thrusters
 from undertow.report.reproduction.report import write_report
 
 
@@ -31,6 +32,7 @@ def run_of(controller="rcafc", axes=6, inputs=8, status="completed", ended=20.0,
         "predicted_position": desired - error + 2e-3,
     }
     per_input = {"input": volts, "commanded_input": 2 * volts}
+    numbers = np.arange(1, inputs + 1)
     names = ["north", "east", "down", "roll", "pitch", "yaw", "extra"][:axes]
     units = ["m", "m", "m", "rad", "rad", "rad", "1"][:axes]
     return xr.Dataset(
@@ -39,7 +41,7 @@ def run_of(controller="rcafc", axes=6, inputs=8, status="completed", ended=20.0,
         coords={
             "time": ("time", time),
             "axis": ("axis", names, {"unit_of_each": ", ".join(units)}),
-            "actuator": ("actuator", np.arange(1, inputs + 1)),
+            "actuator": ("actuator", numbers, {"names": ", ".join(f"T{n}" for n in numbers)}),
         },
         attrs={"status": status, "ended": ended},
     )
@@ -57,6 +59,8 @@ def make_run():
 
 def metrics(scale):
     overall = {
+        "position_rms": 1.6e-4,
+        "attitude_rms": 1.6e-4,
         "tracking_rms": 1.6e-4,
         "tracking_max": 6e-4,
         "estimation_rms": 0.201,
@@ -122,3 +126,20 @@ def page(runs, tmp_path_factory):
     written = write_report(results, figures, folder)
     assert written == folder / "report.html"
     return written.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def two_minutes():
+    """A made-up replay of two minutes with eight thrusters and five rules on each of six axes."""
+    time, corners = np.linspace(0.0, 120.0, 2401), np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
+    widths = {"position": 3, "attitude": 4, "desired_position": 3, "desired_attitude": 4, "thrust": 8, "error": 2}
+    widths |= {"energy": 1, "uncertainty": 6, "estimate": 6, "water": 3, "weights": 30, "firing": 30}
+    random = np.random.default_rng(1)
+    series = {name: random.normal(size=(len(time), width)) for name, width in widths.items()}
+    series["position"] = 2 * np.stack([np.cos(time / 20), np.sin(time / 20), time / 120], axis=-1)
+    series["error"] = np.abs(series["error"])
+    series["desired_position"] = series["position"] + 0.1
+    positions = np.concatenate([corners, corners]) * 0.2
+    names = tuple(f"T{number}" for number in range(1, 9))
+    thrusters = Thrusters(names, positions, np.tile([0.0, 0.0, 1.0], (8, 1)), np.tile([-40.0, 50.0], (8, 1)))
+    return Replay("one", "completed", time, np.array([0.5, 0.4, 0.3]), thrusters, True, True, series)

@@ -35,7 +35,7 @@ def test_names_and_panels(figures):
         assert [p.get_title(loc="left") for p in figures[name].axes if p.get_title(loc="left")] == AXES
     for name in ("fig09", "fig13"):
         titles = [p.get_title(loc="left") for p in figures[name].axes if p.get_title(loc="left")]
-        assert titles == [f"thruster {n}" for n in range(1, 9)]
+        assert titles == [f"T{n}" for n in range(1, 9)]
 
 
 def test_every_panel_says_its_unit(figures):
@@ -84,7 +84,7 @@ def test_what_leaves_a_panel_is_written_above_it(figures):
 
 
 def test_voltages_are_split_into_start_and_rest(figures, runs):
-    start, rest = titled(figures["fig09"], "thruster 3")
+    start, rest = titled(figures["fig09"], "T3")
     drawn = np.concatenate([line(p, "RCAFC").get_ydata() for p in (start, rest)])
     volts = runs["rcafc"]["input"].values[:, 2]
     assert start.get_xlim() == pytest.approx((0, 1))

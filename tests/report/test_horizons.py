@@ -18,7 +18,7 @@ def row(level, law, composite, bounded, ended, **more):
     return {
         "level": level, "law": law, "words": law, "composite": composite, "bounded": bounded,
         "scenario": f"scenarios/long_{level}_{law}.yaml", "status": "completed" if lasted else "diverged", "ended": ended,
-        "lasted": lasted, "tracking_rms": by_window(1e-4), "estimation_rms": by_window(0.2),
+        "lasted": lasted, "within": lasted and not bounded, "tracking_rms": by_window(1e-4), "estimation_rms": by_window(0.2),
         "input_variation": by_window(50.0), "weights_peak": by_window(14.0),
         "growth": {"time": [1.0, 10.0, min(ended, 150.0)], "weights_peak": [3.0, 30.0, 300.0]},
     } | more  # fmt: skip
@@ -73,9 +73,11 @@ def test_damping_and_what_is_asked_of_it_share_a_panel():
 
 def test_page_says_how_long_everything_lasted(results, tmp_path):
     page = write_report(results | {key: RESULTS[key] for key in ("horizons", "lags")}, {}, tmp_path).read_text("utf-8")
-    words = re.sub(r"<[^>]+>", " ", page)
+    words = re.sub(r"<[^>]+>|&nbsp;", " ", page)
     for said in ("diverged at 139 s", "diverged at 1.5 s", "lasts 200 s", "Long runs: 200 s", "10 to 20 s"):
         assert said in words
     assert "above 453" in words and "876 to 4382" in words and "never" in words
     assert "Simulated: level ideal, 10 s." in words
     assert "lasts 20 s" in words, "the comparison over 20 s says so, too"
+    colours = dict.fromkeys(re.findall(r'chip (\w+)">(lasts 200 s|diverged at 139 s)', page))
+    assert list(colours) == [("holds", "lasts 200 s"), ("partly", "lasts 200 s"), ("fails", "diverged at 139 s")]

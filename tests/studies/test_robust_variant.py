@@ -1,17 +1,24 @@
 """The last chapter: what is run, what is concluded from made-up numbers, and how it stands on the page."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from undertow.report.figures.ablations import ablations_figure
 from undertow.report.figures.fidelity import robust_fidelity_figure
+from undertow.report.page import Html
+from undertow.report.reproduction.ablations_page import ablations_page
 from undertow.report.reproduction.report import write_report
+from undertow.reproduction.ablations import verdicts
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import validate
+
+FOLDER = Path(verdicts.__file__).parent
+ABLATIONS_OF_THE_PAPER = verdicts.ABLATIONS
 
 
 def spread(median):
@@ -35,7 +42,14 @@ def ablation(identity, medians, failures=0):
         }
         for name, m in medians.items()
     ]
-    told = {"question": "What?", "prediction": "This.", "agrees": "partly", "answer": "So.", "left_out": "all else"}
+    told = {
+        "campaigns": [f"a{int(identity[1:]):02d}_made_up"],
+        "question": "What?",
+        "prediction": "This.",
+        "agrees": "partly",
+        "answer": "So.",
+        "left_out": "all else",
+    }
     return {"id": identity, **told, "variants": variants}
 
 
@@ -49,7 +63,9 @@ def row(place, law, tracking=None, ended=None):
         "scenario": f"scenarios/robust_variant_{place}_{law}.yaml",
         "status": "completed" if ended is None else "diverged",
         "diverged_at": ended,
-        "steady": None if tracking is None else metrics | {"tracking_rms": tracking},
+        "steady": None
+        if tracking is None
+        else metrics | dict.fromkeys(("tracking_rms", "position_rms", "attitude_rms"), tracking),
         "largest_after": 1.25,
     }
 
@@ -125,20 +141,37 @@ def test_the_chapter_on_the_page(tmp_path):
         "ablations": ABLATIONS,
         "conclusions": conclusions(ROWS, ABLATIONS),
     }
-    page = write_report({"robust_variant": chapter}, {"ablations": ablations_figure(ABLATIONS)}, tmp_path).read_text(
-        "utf-8"
-    )
+    first = write_report({"robust_variant": chapter}, {"ablations": ablations_figure(ABLATIONS)}, tmp_path)
+    second = (tmp_path / "ablations.html").read_text("utf-8")
+    page = first.read_text("utf-8")
     words = re.sub(r"<[^>]+>", "", page)
-    for said in (
-        "The robust variant",
-        "Disadvantages of the paper",
-        "are random, with 8 seeds",
-        "leaves out A2",
-        "30 of 30",
-    ):
+    for said in ("The robust variant", "Disadvantages of the paper", "leaves out A2", "30 of 30", "diverged at 1.5 s"):
         assert said in words
-    assert "diverged at 1.5 s" in words and "most ended early" in words
-    colours = set(re.findall(r'<span class="chip (holds|fails)">(completed|diverged)', page))
-    assert colours == {("holds", "completed"), ("fails", "diverged")}
+    colours = set(re.findall(r'<span class="chip (\w+)">(completed|diverged)', page))
+    assert colours == {("holds", "completed"), ("partly", "completed"), ("fails", "diverged")}
+    assert "completed with an rms error below 0.05 m in position and 2.86 deg in attitude" in words
     assert words.count("scenarios/robust_variant_") == len(ROWS)
-    assert "figure-ablations" in page
+    assert "figure-ablations" in second and "figure-ablations" not in page
+    words = re.sub(r"<[^>]+>", "", second)
+    assert "are random, with 8 seeds" in words and "most ended early" in words
+
+
+def test_both_pages_link_each_other(tmp_path):
+    chapter = {"quick": False, "seeds": 8, "left_out": [], "fidelity": ROWS, "ablations": ABLATIONS}
+    page = write_report({"robust_variant": chapter | {"conclusions": conclusions(ROWS, ABLATIONS)}}, {}, tmp_path)
+    first, second = page.read_text("utf-8"), (tmp_path / "ablations.html").read_text("utf-8")
+    linked = re.findall(r'href="ablations.html(?:#(\w+))?"', first)
+    assert set(linked) == {"", "A3", "A10", "A18"} and linked.count("A3") == 1
+    assert set(linked) - {""} <= set(re.findall(r'id="(\w+)"', second))
+    assert 'href="report.html"' in second and "src=" not in second
+
+
+def test_every_ablation_names_its_file_and_the_command_that_runs_it(tmp_path):
+    """With the names that results.json would have; the files are those of the package."""
+    found = [ablation(one.id, {"a": 1.0}) | {"campaigns": list(one.campaigns)} for one in ABLATIONS_OF_THE_PAPER]
+    chapter = {"seeds": 8, "left_out": [], "ablations": found}
+    words = re.sub(r"<[^>]+>", "", ablations_page(chapter, Html(""), "report.html"))
+    named = re.findall(r"undertow/reproduction/ablations/(\w+\.yaml)", words)
+    assert len(named) >= 21 and all((FOLDER / file).is_file() for file in named)
+    assert {path.name for path in FOLDER.glob("a*_*.yaml")} == set(named)
+    assert re.findall(r"undertow campaign campaigns/(\S+)", words) == named

@@ -252,6 +252,21 @@ def test_no_figure_is_predicted_that_the_law_forbids(bound):
     assert metrics is None and "requires a robust term of" in why_not and "limits to 10" in why_not
 
 
+@pytest.mark.parametrize(("limit", "predictable"), [(2.0, False), (20.0, True)])
+def test_no_figure_is_predicted_beyond_the_limits_of_the_inputs(limit, predictable):
+    """A slow load of amplitude 5 takes inputs of 5 / sqrt(2) (rms): a limit of 2 forbids that, one of 20 does not."""
+    slow = {"kind": "sinusoid", "amplitude": [5.0], "frequency": [2 * np.pi / 60]}
+    plant = {"kind": "double_integrator", "axes": 1, "limit": limit}
+    run = {"controller": {"kind": "pid", "frequency": 3}, "disturbance": slow, "loop": {"duration": 120, "dt": 1e-2}}
+    metrics, why_not = predicted(
+        operating_point(build({"plant": plant, "reference": {"kind": "setpoint", "position": [0.0]}} | run))
+    )
+    if predictable:
+        assert metrics is not None and metrics["input_rms"] == pytest.approx(5 / np.sqrt(2), rel=0.01)
+    else:
+        assert metrics is None and "limited to 2" in why_not
+
+
 def _odin(fidelity, choices):
     return {
         "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": fidelity}},

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from undertow.campaign.labels import by_name, words
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import Text, dump, parse, read
-from undertow.scenario.schema import Scenario, Strict, complaint
+from undertow.scenario.schema import Scenario, Strict, complaint, kind_of
 
 # List entries in brackets only: each key has one spelling, so that duplicates are noticed.
 _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
@@ -132,15 +132,22 @@ class Campaign(Strict):
         return math.prod(len(entries) for entries in self.axes.values()) * self.trials
 
 
+_SHARED = set(Scenario.model_fields) & set(Campaign.model_fields)
+_REMEDIES = {
+    "scenario": "Run it: undertow simulate {name}; or name it in a campaign file: `scenario: {name}`",
+    "vehicle file": "Name it in a scenario, as `plant: {{vehicle: {name}}}`, and that in a campaign",
+}
+
+
 def validate(text: Text) -> Campaign:
     """Validate the contents of a campaign file.
 
     Raises:
         BadInput: unknown key, wrong type, value out of range.
     """
-    if "scenario" not in text.data and set(text.data) & set(Scenario.model_fields) - set(Campaign.model_fields):
-        hint = f"Run it with `undertow simulate`, or name it in a campaign file: `scenario: {text.name or '...'}`"
-        raise BadInput("CAMPAIGN", "be a campaign", "a scenario", hint=hint, where=text.name)
+    if (kind := kind_of({key: text.data[key] for key in text.data if key not in _SHARED})) in _REMEDIES:
+        name = text.name or "NAME.yaml"
+        raise BadInput("CAMPAIGN", "be a campaign", f"{name}, a {kind}", hint=_REMEDIES[kind].format(name=name))
     try:
         found = Campaign.model_validate(text.data)
     except ValidationError as errors:

@@ -1,6 +1,7 @@
 """Summary of a campaign: distributions, sensitivities, requirements, failures and the worst trials."""
 
-from collections.abc import Iterable
+import itertools
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.stats import binom, spearmanr
 
 from undertow.campaign.batch_runner import XLA
 from undertow.campaign.columns import ENDINGS, JUDGEMENTS
+from undertow.campaign.realized import realized_scalars
 from undertow.campaign.requirements import verdict
 from undertow.campaign.store_results import Results
 from undertow.campaign.task import reasons
@@ -42,25 +44,39 @@ def defined_quantiles(rows: xr.Dataset, metrics: Iterable[str], which: np.ndarra
     return {name: quantiles(values) for name, values in chosen.items() if not np.isnan(values).all()}
 
 
-def correlations(results: Results) -> dict[str, dict[str, float]]:
-    """Rank correlation (Spearman) of every metric with every sampled number, mean over the combinations."""
+def correlations(results: Results, realized: Mapping[str, np.ndarray]) -> dict[str, dict[str, float]]:
+    """Rank correlation (Spearman) of every metric with every input, mean over the combinations.
+
+    The inputs are the sampled numbers, then the scalars that the seeds determine, those with most effect first.
+
+    Args:
+        results: of the campaign.
+        realized: see `realized_scalars`; one value per completed trial.
+    """
+    sampled = {key: results.rows[f"vary:{key}"] for key in results.campaign.vary}
+    columns = {key: one.values[results.lasted] for key, one in sampled.items() if "choices" not in one.attrs}
+    of_vary = _correlations(results, columns)
+    of_seeds = _correlations(results, realized)
+    effect = lambda key: max(map(abs, of_seeds[key].values()))
+    return of_vary | {key: of_seeds[key] for key in sorted(of_seeds, key=effect, reverse=True)}
+
+
+def _correlations(results: Results, columns: Mapping[str, np.ndarray]) -> dict[str, dict[str, float]]:
+    """Input -> metric -> rank correlation, for columns with one value per completed trial."""
     found: dict[str, dict[str, float]] = {}
-    groups = [results.lasted & (results.combinations == number) for number in np.unique(results.combinations)]
-    for key in results.campaign.vary:
-        column = results.rows[f"vary:{key}"]
-        if "choices" in column.attrs:
-            continue
-        for name in results.metrics:
-            values = results.rows[name].values
-            finite = [group & np.isfinite(values) for group in groups]
-            pairs = [(column.values[group], values[group]) for group in finite]
-            known = [
-                float(spearmanr(*pair)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
-                for pair in pairs
-                if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
-            ]
-            if known:
-                found.setdefault(key, {})[name] = sum(known) / len(known)
+    numbers = results.combinations[results.lasted]
+    metrics = {name: results.rows[name].values[results.lasted] for name in results.metrics}
+    for (key, column), (name, values) in itertools.product(columns.items(), metrics.items()):
+        known = np.isfinite(column) & np.isfinite(values)
+        groups = [known & (numbers == number) for number in np.unique(numbers)]
+        pairs = [(column[group], values[group]) for group in groups]
+        each = [
+            float(spearmanr(*pair)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
+            for pair in pairs
+            if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
+        ]
+        if each:
+            found.setdefault(key, {})[name] = sum(each) / len(each)
     return found
 
 
@@ -83,7 +99,8 @@ _WORST = 5
 
 def summary(results: Results, several: Trials) -> dict[str, Any]:
     """The contents of summary.json; the trials tell why some were invalid."""
-    invalid = results.rows["trial"].values[~results.ran]
+    trials = results.rows["trial"].values
+    invalid, lasted = trials[~results.ran], trials[results.lasted]
     return {
         "trials": results.total,
         "done": results.rows.sizes["trial"],
@@ -91,7 +108,7 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
         "by_xla": int((results.rows["backend"].values == XLA).sum()),
         "invalid": [one._asdict() for one in reasons(several, invalid)],  # pyright: ignore[reportArgumentType] - an array serves as rows
         "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
-        "sensitivity": correlations(results),
+        "sensitivity": correlations(results, realized_scalars(several, lasted)),  # pyright: ignore[reportArgumentType] - likewise
         "choices": by_choice(results),
         "worst": [int(trial) for trial in _worst(results)],
     }

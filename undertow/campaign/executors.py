@@ -113,7 +113,7 @@ _DASK = {
 # Dask's dashboards have no authentication: those started here listen on this machine only.
 _PAGE = "127.0.0.1:0"
 
-_INSTALL = "pip install 'undertow[campaign]'"
+_INSTALL = "In the folder of undertow, run: pip install -c constraints.txt '.[cluster]'"
 
 
 def check_cluster(kind: str) -> None:

@@ -17,6 +17,7 @@ from undertow.loop.simd_batch import unavailable
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.finished_run import rules
+from undertow.scenario.reading import Text
 
 
 class Prepared(NamedTuple):
@@ -32,14 +33,21 @@ class Prepared(NamedTuple):
 
 
 def prepare(path: Path, allow_code: bool = False) -> Prepared:
-    """Read a campaign and build the first trials of every combination, so that errors appear before the first run.
+    """Read a campaign and build its first trials; see `prepare_campaign`."""
+    return prepare_campaign(*read_campaign(path), allow_code)
 
-    `allow_code` lets the code run that an earlier run.nc names, if the scenario is one.
+
+def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False) -> Prepared:
+    """Build the first trials of every combination of a campaign, so that errors appear before the first run.
+
+    Args:
+        campaign: what to run.
+        source: its text.
+        allow_code: whether the code may run that an earlier run.nc names, if the scenario is one.
 
     Raises:
         BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
     """
-    campaign, source = read_campaign(path)
     several = trials(campaign, source, allow_code)
     text, folder = whole(campaign, several.scenario.data), several.scenario.folder
     here = tasks.site(text, str(folder))
@@ -49,7 +57,7 @@ def prepare(path: Path, allow_code: bool = False) -> Prepared:
     advice: dict[str, str] = {}
     for row, built in firsts:
         _check(campaign, built, metrics)
-        for sentence in (*built.advice(), *vehicle_warnings(built)):
+        for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
             advice.setdefault(sentence, f"trial {row}: {sentence}")
     by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
     why = unavailable() if by_simd else ""

@@ -12,19 +12,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+import zarr
+from zarr.codecs import ZstdCodec
+from zarr.storage import MemoryStore
 
 from undertow.campaign.columns import DONE, FLAGS, Label
 from undertow.campaign.fingerprint import Identity, samples
 from undertow.campaign.store_layout import Layout
 from undertow.core.disk import alone, sync
 from undertow.core.errors import BadInput
-
-try:
-    import zarr
-    from zarr.codecs import ZstdCodec
-    from zarr.storage import MemoryStore
-except ModuleNotFoundError:
-    raise BadInput("campaign", "find zarr installed", "not", hint="pip install 'undertow[campaign]'") from None
 
 # The checksum reveals a chunk that was written only in part.
 _CODEC = ZstdCodec(level=3, checksum=True)

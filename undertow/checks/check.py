@@ -20,8 +20,8 @@ from undertow.core.user_code import place_of
 from undertow.plants.double_integrator import double_integrator
 from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
-from undertow.scenario.reading import Text, read
-from undertow.scenario.schema import Scenario
+from undertow.scenario.reading import Text, no_file, read
+from undertow.scenario.schema import Scenario, kind_of
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 from undertow.scenario.vehicle_schema import KEYS
 from undertow.thrusters.thruster import AbstractThruster
@@ -71,14 +71,14 @@ def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> R
 
 def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Report:
     text = read(path, "THING", allow_code)
-    if "scenario" in text.data:
+    kind = kind_of(text.data)
+    if kind == "campaign":
         hint = "`undertow campaign` checks a campaign before it runs; check its scenario in a file of its own"
         raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, a campaign", hint=hint)
-    own, scenario = (sum(key in known for key in text.data) for known in (KEYS, Scenario.model_fields))
-    if not own and not scenario:
+    if not kind:
         hint = did_you_mean(next(iter(text.data), ""), {*KEYS, *Scenario.model_fields})
         raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, without a key of either", hint=hint)
-    if own >= scenario:
+    if kind == "vehicle file":
         return _joined([_of_vehicle_file(path, options)])
     if options:
         raise BadInput("--option", "be left out for a scenario", next(iter(options)))
@@ -140,7 +140,7 @@ def _of_scenario(text: Text) -> list[Report]:
     loop = built.closed_loop
     said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
     reports = [_report(said, title="scenario")]
-    if (facts := vehicle_facts(built)) is not None:
+    if (facts := vehicle_facts(loop.plant, built.resolved["plant"])) is not None:
         reports.append(_of_vehicle(facts, lambda key: text.location("plant.vehicle")))
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
         reports.append(_of_thruster(thruster, "thruster"))
@@ -158,7 +158,7 @@ def _of_scenario(text: Text) -> list[Report]:
 
 def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[..., Any]]:
     """Name and instance of a part, and a function that makes another one, for a given model."""
-    if ".py:" in thing:
+    if ".py:" in thing or thing.endswith(".py"):
         function = catalogue.find("", thing, what="THING")
         make = lambda *given: factory.call(function, options, given, Path())[0]
         part, name = make(*_leading(function)), thing.rpartition(":")[2]
@@ -172,7 +172,10 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
             make = lambda *given, kind=kind: factory.make(kind, {"kind": short, **options}, Path(), given)[0]
             return short, make(*_leading(names[short])), make
     every = {name for names in known.values() for name in names}
-    raise BadInput("THING", "be a file or the name of a part", thing, hint=did_you_mean(short, every))
+    must = "be a .yaml file, or the name of a part"
+    if Path(thing).exists() or Path(thing).suffix:
+        raise no_file(Path(thing), "THING", must)
+    raise BadInput("THING", must, thing, hint=did_you_mean(short, every))
 
 
 def _no_part(name: str, thing: Any) -> BadInput:

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import titled, wide_console
@@ -21,8 +22,9 @@ from undertow.scenario.reading import read
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 
 
-def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool) -> int:
+def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool, pdf: str | None) -> int:
     """Predict a scenario and write the page to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
     console = wide_console()
     with (
         output_folder(out, Path("runs") / f"{scenario.stem}-prediction") as folder,
@@ -35,7 +37,7 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool)
         text = to_json(summary(prediction), indent=1) + "\n"
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail
-        warn_of(write_prediction(prediction, warnings, draft.path))
+        warn_of(write_prediction(prediction, warnings, draft.path, pdf))
     for rows in tables(prediction):
         console.print(_table(rows))
     if prediction.why_not:

@@ -22,6 +22,7 @@ from undertow.campaign.task import build_trial
 from undertow.cli import results_folder
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import shares, stage
 from undertow.cli.tables import titled, wide_console
@@ -29,6 +30,7 @@ from undertow.core import checks
 from undertow.core.disk import alone
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import by_xla, write_campaign
+from undertow.scenario.build import Built
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
@@ -42,33 +44,35 @@ def campaign(
     where: str | None,
     overwrite: bool,
     allow_code: bool,
+    pdf: str | None,
 ) -> int:
     """Run a campaign and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
     count = os.cpu_count() or 1 if workers is None else workers
     checks.positive("--workers", count)
     if where is not None:
         check_cluster(where)
     first = Path("runs") / path.stem
     with output_folder(out or (first if resume else None), first) as folder:
-        check_folder(folder, resume, overwrite)
+        check_folder(folder, _WRITTEN, resume, overwrite)
         console = wide_console()
         with stage(console, "building first trials"):
             prepared = interruptible(lambda: prepare(path, allow_code))
         for sentence in prepared.advice:
             typer.echo(f"Advice: {sentence}", err=True)
         if not resume:
-            clear_folder(folder)
-        with chosen(where, count) as executor, _live(console) as watch:
+            clear_folder(folder, _WRITTEN)
+        with chosen(where, count) as executor, live(console) as watch:
             try:
                 interruptible(lambda: run_campaign(prepared, folder, executor, watch))
             except (KeyboardInterrupt, OSError):
                 if (folder / STORE).is_dir():
                     typer.echo(f"Stopped. To resume: undertow campaign {path} --out {folder} --resume", err=True)
                 raise
-        return _conclude(console, prepared, folder)
+        return _conclude(console, prepared, folder, pdf)
 
 
-def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
+def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | None) -> int:
     """Write page, summary and the scenarios of the worst trials; print the summary."""
     with stage(console, "summary and page"):
         results = load(folder)
@@ -76,7 +80,7 @@ def _conclude(console: Console, prepared: Prepared, folder: Path) -> int:
         (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
         _write_worst(prepared, found["worst"], folder / "worst")
         title = prepared.trials.campaign.description or f"Campaign {prepared.trials.text.name}"
-        page, failures = write_campaign(title, results, found, folder)
+        page, failures = write_campaign(title, results, found, folder, pdf)
     warn_of(failures)
     console.print(table(results, found))
     for sentence in sentences(found):
@@ -109,7 +113,7 @@ def status(folder: Path, options: Sequence[str]) -> int:
 
 
 @contextlib.contextmanager
-def _live(console: Console) -> Iterator[Watch]:
+def live(console: Console) -> Iterator[Watch]:
     """Show the number of finished trials, their rate and the remaining time."""
     begun, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
@@ -131,17 +135,21 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     folder.mkdir()
     part_cache = PartCache()
     for trial in trials:
-        data = build_trial(prepared.trials, part_cache, trial).resolved  # includes the contents of named files
-        data = data | {"steady": data["steady"] | {"every_step": True}}
-        text = f"# Trial {trial} of the campaign.\n{dump(data)}"
+        text = trial_text(build_trial(prepared.trials, part_cache, trial), f"Trial {trial} of the campaign.")
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
+
+
+def trial_text(built: Built, sentence: str) -> str:
+    """The scenario of a trial, which `undertow simulate` repeats, with a sentence above it."""
+    data = built.resolved | {"steady": built.resolved["steady"] | {"every_step": True}}  # with contents of named files
+    return f"# {sentence}\n{dump(data)}"
 
 
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
 
-def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
-    """Check that a campaign may be written to a folder.
+def check_folder(folder: Path, names: Sequence[str], resume: bool, overwrite: bool) -> None:
+    """Check that a campaign may be written to a folder; `names` are the files and folders that it writes.
 
     Raises:
         BadInput: the folder cannot be used.
@@ -151,13 +159,13 @@ def check_folder(folder: Path, resume: bool, overwrite: bool) -> None:
         raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
     if not resume:
         hint = "Add --resume to continue it, or --overwrite to replace it"
-        results_folder.check_folder(folder, _WRITTEN, STORE, overwrite, hint)
+        results_folder.check_folder(folder, names, STORE, overwrite, hint)
     elif not (folder / STORE).exists():
         raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
 
 
-def clear_folder(folder: Path) -> None:
-    """Remove all files of a campaign that is replaced.
+def clear_folder(folder: Path, names: Sequence[str]) -> None:
+    """Remove all files of a campaign that is replaced, by their names.
 
     Raises:
         BadInput: another process is running it.
@@ -165,7 +173,7 @@ def clear_folder(folder: Path) -> None:
     if not folder.exists():
         return
     with alone(folder / STORE):
-        for name in _WRITTEN:
+        for name in names:
             results_folder.remove(folder / name)
 
 

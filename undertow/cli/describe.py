@@ -2,9 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
@@ -16,9 +14,15 @@ from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.signals import Signal
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
-from undertow.scenario.describing import summary
+from undertow.scenario.describing import summary, text_of
 from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.schema import keys
+
+_PARTS = (
+    "A part is given by its name, such as `thruster: t200`, or with options, such as `thruster: {kind: t200, supply: "
+    "16}`. `undertow list` shows the names, `undertow describe t200` the options of one, `undertow describe "
+    "hybrid_vehicle` those of a vehicle with thrusters."
+)
 
 
 def describe(name: str, json_schema: bool = False) -> None:
@@ -32,8 +36,9 @@ def describe(name: str, json_schema: bool = False) -> None:
             raise BadInput("--json-schema", "follow `describe scenario`", f"given for `{name}`")
         print(json.dumps(scenario_schema(), indent=1))
     elif name == "scenario":
-        rows = [(key.path, key.type, _text(key.default), key.meaning) for key in keys()]
+        rows = [(key.path, key.type, text_of(key.default), key.meaning) for key in keys()]
         _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
+        console.print(_PARTS, highlight=False, markup=False, soft_wrap=True)
     elif name == "metrics":
         rows = [
             (key, one.unit.replace("[axis]", "[output]"), PER_AXIS.get(key, ""), one.meaning)
@@ -51,10 +56,10 @@ def _show_part(console: Console, part: describing.Description) -> None:
     console.print(Text(f"{part.name} {part.kind}".rstrip(), style="bold"))
     console.print(Text(part.summary))
     if part.options:
-        rows = [(option.name, _text(option.default), option.meaning) for option in part.options]
+        rows = [(option.name, text_of(option.default), option.meaning) for option in part.options]
         _show_table(console, "Options", ("option", "default", "meaning"), rows)
     if part.parameters:
-        rows = [(p.name, _text(p.value), p.unit, p.symbol, p.meaning, p.source) for p in part.parameters]
+        rows = [(p.name, text_of(p.value), p.unit, p.symbol, p.meaning, p.source) for p in part.parameters]
         _show_table(console, "Parameters", ("parameter", "value", "unit", "symbol", "meaning", "source"), rows)
     if part.signals:
         _show_signals(console, "Signals", part.signals)
@@ -74,26 +79,6 @@ def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: li
     console.print(table)
 
 
-def _text(value: Any) -> str:
-    """A short text for a value; a diagonal matrix is shown as its diagonal."""
-    if isinstance(value, str) or value is None:
-        return "none" if value is None else value
-    if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
-        return str(value).lower()
-    if isinstance(value, list | tuple) and any(isinstance(entry, str) for entry in value):
-        return ", ".join(value)
-    array = np.asarray(value, dtype=float)
-    if array.ndim == 0:
-        return f"{array:.6g}"
-    if array.ndim == 2 and array.shape[0] == array.shape[1] and not np.any(array - np.diag(np.diag(array))):
-        return f"diag{_row(np.diag(array))}"
-    return "\n".join(map(_row, np.atleast_2d(array)))
-
-
-def _row(entries: np.ndarray) -> str:
-    return f"({', '.join(f'{entry:.6g}' for entry in entries)})"
-
-
 def list_parts(kind: str | None) -> None:
     """Print the parts of one kind, or of all kinds, with one line each."""
     if kind is not None and kind not in catalogue.KINDS:
@@ -103,4 +88,6 @@ def list_parts(kind: str | None) -> None:
         for name, part in sorted(catalogue.names(shown).items()):
             table.add_row(shown, name, Text(summary(part)))
         table.add_section()
-    wide_console().print(table)
+    console = wide_console()
+    console.print(table)
+    console.print("`undertow describe NAME` shows one of them with its options.", highlight=False, soft_wrap=True)

@@ -1,6 +1,7 @@
 """Exit codes, and one line on stderr for an error."""
 
 import os
+import signal
 import sys
 import traceback
 from collections.abc import Iterable, Sequence
@@ -17,6 +18,18 @@ INTERNAL_ERROR = 3
 FILES_FAILED = 4
 INTERRUPTED = 130  # by Ctrl-C; 143 by SIGTERM
 _BY_SIGNAL = 128  # and the number of the signal
+
+# Exit code -> when a command ends with it, for the documentation.
+MEANINGS = {
+    DONE: "Done.",
+    RUN_FAILED: "Done, but a run failed or was not reproduced; the files are there.",
+    BAD_INPUT: "Bad input, explained in one line, nothing written; or `check` found errors.",
+    INTERNAL_ERROR: "Internal error: please report it, with the output of `undertow --traceback ...`.",
+    FILES_FAILED: "Files could not be read or written.",
+    INTERRUPTED: "Interrupted by Ctrl-C.",
+    _BY_SIGNAL
+    + signal.SIGTERM: "Ended by SIGTERM, for example by `kill` or the end of a SLURM job; otherwise like Ctrl-C.",
+}
 
 
 def run_guarded(command: Any, arguments: Sequence[str]) -> int:
@@ -51,7 +64,7 @@ def _explain(error: Exception) -> tuple[int, str]:
         sentence = getattr(error, "format_message", error.__str__)().rstrip(".")
         context = getattr(error, "ctx", None)
         path = context.command_path if context is not None else "undertow"
-        return BAD_INPUT, f"{sentence}. See `{path} --help`"
+        return BAD_INPUT, f"{sentence}{'' if sentence.endswith('?') else '.'} See `{path} --help`"
     from undertow.core.errors import BadInput
 
     if isinstance(error, BadInput):

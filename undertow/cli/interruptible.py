@@ -1,5 +1,6 @@
 """End a command at once on Ctrl-C or SIGTERM, also while modules are imported or compiled code runs."""
 
+import os
 import signal
 import threading
 import time
@@ -19,7 +20,8 @@ _asked: list[tuple[int, float]] = []  # the signals received, with their times
 def remember_interrupts() -> None:
     """Make Ctrl-C and SIGTERM raise KeyboardInterrupt, and remember a signal that compiled code swallows.
 
-    During an import the exception waits until it ends: a half-imported compiled module crashes.
+    The first one is answered by a line on stderr. During an import the exception waits until it ends: a half-imported
+    compiled module crashes.
     """
     for one in _SIGNALS:
         signal.signal(one, _handler)
@@ -40,6 +42,8 @@ def raise_if_interrupted() -> None:
 
 def _handler(number: int, frame: FrameType | None) -> None:
     if number != signal.SIGALRM:
+        if not _asked:
+            os.write(2, b"\nInterrupted: stopping.\n")  # not buffered, so that it appears at once
         _asked.append((number, time.monotonic()))
     if _importing(frame) and time.monotonic() - _asked[0][1] < _LONGEST:
         signal.setitimer(signal.ITIMER_REAL, _AGAIN)

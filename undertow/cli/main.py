@@ -23,6 +23,15 @@ AllowCode = Annotated[
     ),
 ]
 
+Pdf = Annotated[
+    str | None,
+    typer.Option(
+        "--pdf",
+        metavar="WIDTH",
+        help="Also write every figure as PDF: wide (as on the page), or one-column (3.5 in, without its title).",
+    ),
+]
+
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
@@ -30,6 +39,7 @@ app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, 
 def undertow(
     context: typer.Context,
     traceback: Annotated[bool, typer.Option("--traceback", help="Show the traceback of an error.")] = False,
+    short_version: Annotated[bool, typer.Option("--version", help="Show the version of undertow.")] = False,
 ) -> None:
     """Simulate, analyse and tune robust adaptive control of underwater vehicles with voltage-driven thrusters.
 
@@ -38,6 +48,9 @@ def undertow(
     """
     if traceback:
         os.environ["UNDERTOW_TRACEBACK"] = "1"
+    if short_version:
+        typer.echo(f"undertow {importlib.metadata.version('undertow')}")
+        raise typer.Exit
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 
@@ -53,15 +66,16 @@ def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="Skip the parameter sweeps. The other results stay the same.")
     ] = False,
+    pdf: Pdf = None,
 ) -> None:
     """Reproduce the paper.
 
-    The command computes every figure and table of the paper, checks its claims, and writes one HTML page,
-    DIR/report.html.
+    The command computes every figure and table of the paper, checks its claims, and writes two HTML pages,
+    DIR/report.html and DIR/ablations.html.
     """
     from undertow.cli.reproduce import reproduce
 
-    reproduce(out, quick)
+    reproduce(out, quick, pdf)
 
 
 @app.command()
@@ -112,16 +126,21 @@ def simulate(
         ),
     ] = True,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mp4", help="Also write a video of the run, at most 30 s long. It needs ffmpeg."),
+    ] = None,
 ) -> int:
     """Simulate one scenario.
 
-    The command writes run.nc, metrics.json, scenario.yaml and figures/ when the run has ended. If SCENARIO is a result
-    file, its run is repeated, and the command reports whether the results are identical bit for bit. Other files in DIR
-    are not changed.
+    The command writes run.nc, metrics.json, scenario.yaml, figures/ and run.html when the run has ended. run.html holds
+    metrics, figures and a replay in three dimensions, and needs no network. If SCENARIO is a result file, its run is
+    repeated, and the command reports whether the results are identical bit for bit. Other files in DIR are not changed.
     """
     from undertow.cli.simulate import simulate
 
-    return simulate(scenario, out, overwrite, prediction, allow_code)
+    return simulate(scenario, out, overwrite, prediction, allow_code, pdf, video)
 
 
 @app.command()
@@ -146,7 +165,8 @@ def tune(
     method: Annotated[
         str,
         typer.Option(
-            metavar="METHOD", help="gradient (quasi-Newton), or search (differential evolution, for costs not smooth)."
+            metavar="METHOD",
+            help="gradient (quasi-Newton), or search (differential evolution, for costs that are not smooth).",
         ),
     ] = "gradient",
     budget: Annotated[
@@ -156,6 +176,7 @@ def tune(
     resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted tuning.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")] = False,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
 ) -> int:
     """Tune the gains of a controller.
 
@@ -166,7 +187,7 @@ def tune(
     """
     from undertow.cli.tune import tune_scenario
 
-    return tune_scenario(scenario, out, method, budget, resume, overwrite, allow_code)
+    return tune_scenario(scenario, out, method, budget, resume, overwrite, allow_code, pdf)
 
 
 @app.command()
@@ -178,6 +199,7 @@ def analyze(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier prediction in DIR.")] = False,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
 ) -> int:
     """Predict closed-loop performance and stability margins without simulating.
 
@@ -187,7 +209,7 @@ def analyze(
     """
     from undertow.cli.analyze import analyze
 
-    return analyze(scenario, out, overwrite, allow_code)
+    return analyze(scenario, out, overwrite, allow_code, pdf)
 
 
 @app.command()
@@ -216,6 +238,7 @@ def campaign(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier campaign in DIR.")] = False,
     allow_code: AllowCode = False,
+    pdf: Pdf = None,
 ) -> int:
     """Run a Monte Carlo study or a parameter sweep of one scenario.
 
@@ -226,11 +249,53 @@ def campaign(
 
     if str(campaign) == "status":
         given = {"--out": out, "--resume": resume, "--workers": workers, "--cluster": cluster, "--overwrite": overwrite}
-        given["--allow-code"] = allow_code
+        given |= {"--allow-code": allow_code, "--pdf": pdf}
         return command.status(folder or Path(), [name for name, value in given.items() if value])
     if folder is not None:
         command.refuse_second(folder)
-    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code)
+    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code, pdf)
+
+
+@app.command()
+def compare(
+    scenarios: Annotated[
+        list[Path], typer.Argument(metavar="SCENARIO...", help="A .yaml file, several of them, or one campaign file.")
+    ],
+    controllers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="What to compare on one scenario, separated by commas: presets (robust, paper), controllers (pid), "
+            "./file.py:function, scenario files whose controller is taken (tuned.yaml), and the word `scenario` for "
+            "the scenario's own controller. NAME=ENTRY gives a name.",
+        ),
+    ] = None,
+    trials: Annotated[
+        int | None, typer.Option(metavar="N", help="Trials of each. Default: 20, or the number of the campaign file.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Folder for the results. Default: runs/NAME-comparison, or the next free one."
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue an interrupted comparison, or add trials.")
+    ] = False,
+    workers: Annotated[int | None, typer.Option(metavar="N", help="Number of threads. Default: all cores.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier comparison in DIR.")] = False,
+    allow_code: AllowCode = False,
+    pdf: Pdf = None,
+) -> int:
+    """Compare controllers on one scenario, or several scenarios, on the same seeds.
+
+    The command runs the same samples and seeds for each, and writes the medians, the paired differences with confidence
+    intervals and a rank test, and the failures: comparison.html, .json, .csv, .tex and .md, figures/, trials.zarr, and
+    the scenario of each contestant.
+    """
+    from undertow.cli.compare import compare
+
+    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf)
 
 
 @app.command("list")
@@ -252,7 +317,8 @@ def describe(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A part (see `undertow list`), ./file.py:function, a vehicle file, scenario, metrics or signals.",
+            help="A part (see `undertow list`), ./file.py:function, a vehicle file, or one of the words scenario, "
+            "metrics and signals.",
         ),
     ],
     json_schema: Annotated[

@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import os
 import shutil
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -89,10 +90,19 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
     """
     check_folder(folder, names, marker, overwrite)
     staging = _stage(folder)
-    publish = lambda: _publish(staging, folder, names, marker)
+    published = []
+
+    def publish() -> None:
+        _publish(staging, folder, names, marker)
+        published.append(folder)
+
     try:
         yield Draft(staging, publish)
         publish()
+    except KeyboardInterrupt:
+        left = f"The results are in {folder}, without figures" if published else f"No results were written to {folder}"
+        print(f"{left}.", file=sys.stderr)
+        raise
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
@@ -122,11 +132,13 @@ def check_folder(
 def _check_place(folder: Path) -> None:
     for part in (folder, *folder.parents):
         if part.exists() and not part.is_dir():
-            raise BadInput("--out", "be a folder", f"{folder}, and {part} is a file")
+            got = f"{folder}, a file" if part == folder else f"{folder}, and {part} is a file"
+            raise BadInput("--out", "be a folder", got, hint="Choose another name")
 
 
 def _unwritable(folder: Path, error: OSError) -> BadInput:
-    return BadInput("--out", "be a folder that can be written", f"{folder}: {error.strerror}")
+    hint = "Choose a folder of yours"
+    return BadInput("--out", "be a folder that can be written", f"{folder}: {error.strerror}", hint=hint)
 
 
 def _staging_name(folder: Path) -> str:

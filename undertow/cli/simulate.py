@@ -12,19 +12,25 @@ from undertow.analysis.linearization.response import compare_metrics
 from undertow.checks.vehicle_lint import vehicle_warnings
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.stages import stage
-from undertow.cli.tables import certificate_table, metrics_table, wide_console
+from undertow.cli.stages import shares, stage
+from undertow.cli.tables import terminal_table, wide_console
+from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.core.user_code import python_says
 from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.figures import run_plots, save_all
+from undertow.report.replay.replay_data import can_be_shown
+from undertow.report.replay.video import check_video, write_video
+from undertow.report.run_page import shown, write_run_page
+from undertow.report.run_tables import certificate_rows, metrics_rows
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.execute import Executed, execute, write
 from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of
 from undertow.scenario.reading import read
 
-_WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures")
+_WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures", "run.html")
 
 
 class PredictedMetrics(NamedTuple):
@@ -34,41 +40,64 @@ class PredictedMetrics(NamedTuple):
     why_not: str
 
 
-def simulate(scenario: Path, out: Path | None, overwrite: bool, prediction: bool, allow_code: bool) -> int:
+def simulate(
+    scenario: Path,
+    out: Path | None,
+    overwrite: bool,
+    prediction: bool,
+    allow_code: bool,
+    pdf: str | None,
+    video: Path | None,
+) -> int:
     """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
     console = wide_console()
     with (
         output_folder(out, Path("runs") / scenario.stem) as folder,
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
     ):
-        executed, predicted = _run(scenario, console, prediction, allow_code)
+        if video is not None:
+            check_video(video, folder, overwrite)
+        executed, predicted = _run(scenario, console, prediction, allow_code, video is not None)
         known, certificate = metrics_of(executed.dataset), certificate_of(executed.dataset)
-        with stage(console, "files and figures"):
+        expected = predicted.metrics if predicted else None
+        with stage(console, "files, figures and page"):
             write(executed, draft.path, in_results(predicted))
             repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # before the figures, which may fail
-            warn_of(save_all(lambda: run_plots(executed.dataset), draft.path / "figures").failures)
+            saved = save_all(lambda: run_plots(executed.dataset), draft.path / "figures", pdf)
+            looks = shown(executed.dataset, executed.built.closed_loop, saved)
+            warn_of(looks.failures)
+            write_run_page(draft.path / "run.html", executed.dataset, looks, expected)
+    if video is not None and looks.replay is not None:
+        with shares(console) as progress:
+            write_video(looks.replay, video, progress)
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
-        typer.echo(f"Advice: the run used backend xla, which is slower than simd (docs/simd.md): {why}.", err=True)
-    expected = predicted.metrics if predicted else None
-    console.print(metrics_table(executed.steady, executed.whole, executed.built.window(), known, expected))
+        slower = "the run used backend xla, which is slower than simd (docs/explanation/simd.md)"
+        typer.echo(f"Advice: {slower}: {why}.", err=True)
+    window = executed.built.window()
+    console.print(terminal_table(metrics_rows(executed.steady, executed.whole, window, known, expected)))
     if predicted:
         console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)
     if certificate is not None:
-        console.print(certificate_table(certificate, executed.built.window()))
+        console.print(terminal_table(certificate_rows(certificate, window)))
     verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
     console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
     codes = [_ending_code(executed)] + ([_repetition_code(repetition, console)] if repetition else [])
     return max(codes)
 
 
-def _run(path: Path, console: Console, prediction: bool, allow_code: bool) -> tuple[Executed, PredictedMetrics | None]:
+def _run(
+    path: Path, console: Console, prediction: bool, allow_code: bool, video: bool
+) -> tuple[Executed, PredictedMetrics | None]:
     with stage(console, "reading"):
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
         built = build(text)
-    for sentence in (*built.advice(), *vehicle_warnings(built)):
+    if video and not can_be_shown(built.closed_loop.plant):
+        raise BadInput("--video", "be left out for a plant that is no vehicle with thrusters", "given")
+    for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
         typer.echo(f"Advice: {sentence}", err=True)
     with stage(console, "compiling, running and predicting" if prediction else "compiling and running"):
         return interruptible(lambda: with_prediction(lambda: execute(built), built, prediction))

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.core import checks
@@ -28,9 +29,17 @@ _CHECKPOINT = "tuning.jsonl"
 
 
 def tune_scenario(
-    scenario: Path, out: Path | None, method: str, budget: float, resume: bool, overwrite: bool, allow_code: bool
+    scenario: Path,
+    out: Path | None,
+    method: str,
+    budget: float,
+    resume: bool,
+    overwrite: bool,
+    allow_code: bool,
+    pdf: str | None,
 ) -> int:
     """Tune a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
     checks.choice("--method", method, METHODS)
     checks.positive("--budget", budget, "s")
     console = wide_console()
@@ -48,7 +57,7 @@ def tune_scenario(
         (draft.path / "tuning.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
         draft.publish()  # before the figure, which may fail
         checkpoint.unlink()
-        warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures").failures)
+        warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures", pdf).failures)
     console.print(_table(found))
     for line in _sentences(found):
         console.print(line, highlight=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""Controllers. They use a nominal model, never the plant. A new one: CONTRIBUTING.md, docs/your-own-controller.md."""
+"""Controllers. They use a nominal model, never the plant. A new one: docs/how-to/your-own-controller.md."""
 
 from undertow.controllers.composite_law import RCAF as RCAF
 from undertow.core.catalogue import publish

@@ -165,9 +165,9 @@ def pid(
         if frequency is None:
             axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
             frequency = alike([pid_frequency(axis) for axis in axes])
-        for name, value in (("frequency", frequency), ("damping", damping)):
-            checks.positive(name, value)
-        checks.not_negative("integral_share", integral_share)
+        for name, value in (("frequency", frequency), ("damping", damping), ("integral_share", integral_share)):
+            checks.per_axis(name, value, len(model.coordinates.angles))
+            checks.not_negative(name, value) if name == "integral_share" else checks.positive(name, value)
         w, zeta, share = (jnp.asarray(value, dtype=float) for value in (frequency, damping, integral_share))
         proportional, integral, derivative = w**2, share * w**3, 2 * zeta * w
     else:

@@ -5,6 +5,7 @@ with `def odin()`. Other parts are named `./my_rov.py:my_rov`, or come as Python
 `undertow.<kind>`.
 """
 
+import ast
 import functools
 import importlib
 import importlib.metadata
@@ -35,6 +36,11 @@ KINDS = (
 # Key of a scenario -> kind of its part.
 KIND_OF = {"plant": "plants", "controller": "controllers", "reference": "references"}
 KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation", "metrics": "metrics"}
+
+# Kind of a part -> where it stands in a scenario.
+KEY_OF = {kind: key for key, kind in KIND_OF.items()}
+KEY_OF |= {"vehicles": "plant.vehicle", "thrusters": "plant.thruster", "power": "plant.battery` or `plant.esc"}
+KEY_OF |= {"sensors": "navigation.sensors` of `kind: observer"}
 
 Part = Callable[..., Any]
 
@@ -90,9 +96,14 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
     """
     if ".py:" in name:
         return _from_file(name, folder or Path(), what)
+    if name.endswith(".py"):
+        hint = f"Add its name: {name}:{(_functions_in((folder or Path()) / name) or ['function'])[0]}"
+        raise BadInput(what, "name a file and a function in it", name, hint=hint)
     parts = names(kind)
     if name not in parts:
         hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
+        other = next((one for one in KINDS if one != kind and name in names(one)), None) if parts else None
+        hint = f"`{name}` is one of the {other}: give it at `{KEY_OF[other]}`" if other else hint
         raise BadInput(what, f"be a part in {kind}", name, hint=hint)
     return parts[name]
 
@@ -120,6 +131,16 @@ def _from_file(name: str, folder: Path, what: str) -> Part:
         raise BadInput(what, "name a file that Python can run", f"{path_text}: {python_says(error)}") from error
     part = getattr(module, attribute, None)
     if not callable(part):
-        hint = did_you_mean(attribute, [n for n, v in vars(module).items() if callable(v) and n[0] != "_"])
-        raise BadInput(what, f"name a callable of {path.name}", attribute, hint=hint)
+        hint = did_you_mean(attribute, _functions_in(path))
+        raise BadInput(what, f"name a function in {path.name}", attribute or "empty", hint=hint)
     return part
+
+
+def _functions_in(path: Path) -> list[str]:
+    """Names of the functions and classes that a file defines, without running it; [] where it cannot be read."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return []
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    return [node.name for node in tree.body if isinstance(node, kinds) and not node.name.startswith("_")]

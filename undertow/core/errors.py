@@ -57,7 +57,7 @@ class BadInput(ValueError):
         for place in reversed(_PLACES.get()):
             where = where or place.location(name)
             where = ", ".join(filter(None, (where, place.note)))
-            name = ".".join(filter(None, (place.key, name)))
+            name = ".".join(filter(None, (place.key, name))).replace(".[", "[")
         self.name, self.must, self.got, self.hint, self.where = name, must, got, hint, where
         super().__init__(name, must, got)
 
@@ -79,9 +79,10 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Sentence naming the nearest known word; empty when none is near."""
-    near = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.6)
-    return f"Did you mean `{near[0]}`?" if near else ""
+    """Sentence naming the nearest known word, capital letters aside; empty when none is near."""
+    by_small = {one.lower(): one for one in known}
+    near = difflib.get_close_matches(str(word).lower(), list(by_small), n=1, cutoff=0.6)
+    return f"Did you mean `{by_small[near[0]]}`?" if near else ""
 
 
 def _one_line(value: object) -> str:

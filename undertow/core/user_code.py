@@ -43,7 +43,9 @@ class Fault(NamedTuple):
 def fault_of(error: BaseException) -> Fault:
     """The cause of an exception in a part: `cannot run `Mine.command`: NumPy needs ... (mine.py, line 7)`."""
     if isinstance(error, SyntaxError):
-        return Fault(f"{type(error).__name__}: {error.msg}, line {error.lineno}", "")
+        return Fault(
+            f"{type(error).__name__}: {error.msg} ({Path(error.filename or '').name}, line {error.lineno})", ""
+        )
     text = " ".join(str(error).split())
     frames = [(f, line) for f, line in traceback.walk_tb(error.__traceback__) if _is_own(f.f_globals.get("__name__"))]
     if abstract := _ABSTRACT.match(text):
@@ -88,6 +90,9 @@ def _reason(error: BaseException, text: str) -> tuple[str, str]:
     if isinstance(error, FrozenInstanceError) and (assigned := _ASSIGNED.match(text)):
         why = f"it assigns `self.{assigned[1]}`, but a part holds parameters only"
         return why, "Keep what changes in the state: it goes in as an argument and comes out as a result"
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        hint = f"Install `{error.name}` beside undertow; if it is a file of yours, add its folder to PYTHONPATH"
+        return f"{type(error).__name__}: {text}", hint
     shown = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
     return f"{type(error).__name__}: {shown}", ""
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling, Payload, Pose, Water
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, within
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross
 
@@ -34,8 +34,9 @@ class Together(AbstractDisturbance):
         return tuple(member.realize(own) for member, own in zip(self.members, keys, strict=True))
 
     def at(self, realization, t, pose, load: Load) -> Load:
-        for member, own in zip(self.members, realization, strict=True):
-            load = member.at(own, t, pose, load)
+        for i, (member, own) in enumerate(zip(self.members, realization, strict=True)):
+            with within(f"[{i}]"):
+                load = member.at(own, t, pose, load)
         return load
 
     def jumps(self, duration: float) -> tuple[float, ...]:

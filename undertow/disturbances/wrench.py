@@ -20,7 +20,9 @@ class ConstantWrench(AbstractSmoothDisturbance):
 
     def at(self, realization, t, pose, load: Load) -> Load:
         if np.shape(self.value) != load.wrench.shape:
-            raise BadInput("value", f"have {load.wrench.shape[0]} entries", f"of shape {np.shape(self.value)}")
+            entries = f"have {load.wrench.shape[0]} entries"
+            must = f"{entries} (surge, sway, heave, roll, pitch, yaw)" if pose is not None else entries
+            raise BadInput("value", must, f"of shape {np.shape(self.value)}")
         return load._replace(wrench=load.wrench + self.value)
 
 

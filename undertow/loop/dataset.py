@@ -11,15 +11,20 @@ from undertow.loop.outcome import Outcome
 
 
 def to_dataset(outcome: Outcome, loop: ClosedLoop) -> xr.Dataset:
-    """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1)."""
+    """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1).
+
+    Attribute `names` of `actuator` names the inputs.
+    """
     variables = {
         name: series(dimensions(signal), np.asarray(outcome.signals[name]), *meaning(signal, loop.plant))
         for name, signal in loop.signals().items()
     }
     status = Status(int(outcome.status))
+    found = coordinates(np.asarray(outcome.time), loop.plant)
+    found["actuator"].attrs["names"] = ", ".join(input_names(loop.plant))
     return xr.Dataset(
         variables,
-        coords=coordinates(np.asarray(outcome.time), loop.plant),
+        coords=found,
         attrs={"status": status.word, "status_sentence": outcome.sentence(), "ended": float(outcome.ended)},
     )
 
@@ -33,6 +38,13 @@ def coordinates(time: np.ndarray, plant: AbstractPlant) -> dict[str, xr.Variable
         "axis": axis,
         "actuator": series(("actuator",), np.arange(1, plant.inputs() + 1), "input"),
     }
+
+
+def input_names(plant: AbstractPlant) -> tuple[str, ...]:
+    """Names of the inputs: those of the thrusters of a vehicle, else `input 1`, `input 2`, ..."""
+    vehicle = getattr(plant, "vehicle", None)
+    numbered = tuple(f"input {number}" for number in range(1, plant.inputs() + 1))
+    return numbered if vehicle is None else vehicle.thruster_names()
 
 
 def dimensions(signal: Signal) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.errors import BadInput
+from undertow.navigation.drift import drift_advice
 from undertow.numerics.random_keys import numbered
 from undertow.sensors.estimate import Estimate, estimate_of, motion_of
 from undertow.sensors.imu import IMU
@@ -25,7 +26,7 @@ class NavigationState(NamedTuple):
 
     time: Float[Array, ""]  # of the last step, s
     velocity: Float[Array, "3"]  # true velocity then, m/s; accelerometers measure its change
-    states: tuple[SensorState, ...]  # one per sensor
+    sensors: tuple[SensorState, ...]  # state of each
     estimate: Estimate
     ignored: Int[Array, ""]  # readings so far that were not finite
 
@@ -87,7 +88,7 @@ class Navigation(AbstractInformedNavigation):
         deliveries = [
             sensor.sampling.deliver(states, t, reading, chance)
             for sensor, states, reading, chance in zip(
-                self.sensors, state.states, readings, _chances(realization, numbers, readings), strict=True
+                self.sensors, state.sensors, readings, _chances(realization, numbers, readings), strict=True
             )
         ]
         arrivals = [arrival for arrival, _ in deliveries]
@@ -108,6 +109,10 @@ class Navigation(AbstractInformedNavigation):
             estimate = _either(fresh, sensor.correct(estimate, reading), estimate)
         states = tuple(states for _, states in deliveries)
         return estimate.measurement(), NavigationState(t, motion.velocity, states, estimate, ignored)
+
+    def advice(self, duration: float = 60.0) -> tuple[str, ...]:
+        """What is not measured, and how far its estimate drifts in `duration` (s)."""
+        return drift_advice(self.sensors, duration)
 
     def ignored(self, state: NavigationState):
         return state.ignored

@@ -2,7 +2,7 @@
 
 The paper distinguishes cases by the number of inputs m, but the rank decides. For m < n the product G G+ is an
 orthogonal projector of rank < n, so [G G+]^-1 in Eq. (24) never exists; the uncontrolled part is the residual
-sigma of Eq. (28). See docs/known-limits.md.
+sigma of Eq. (28). See docs/explanation/known-limits.md.
 """
 
 import jax

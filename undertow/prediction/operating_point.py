@@ -65,7 +65,7 @@ def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     every = max(1, round(settings.record / settings.dt))
     begun = from_start(known.linear, known.mean, *_start(known))
     signals = signals_within(known.mean, begun, known.around, (start, stop), every)
-    forbidden = _forbidden(known.built.closed_loop.controller, signals)
+    forbidden = _forbidden(known.built.closed_loop.controller, signals) or _beyond_limits(known, signals["u"])
     units = known.built.closed_loop.plant.output_units
     return (None, forbidden) if forbidden else (metrics_of(signals, units), "")
 
@@ -80,6 +80,27 @@ def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
             required = f"the linear model requires a {meaning} of {abs(signals[name][row, axis]):.3g}"
             return f"{required}, which the controller limits to {limit:.3g}: the loop leaves its linear range"
     return ""
+
+
+def _beyond_limits(known: OperatingPoint, inputs: np.ndarray) -> str:
+    """A sentence where an input would have to be beyond its limit on average; short peaks only saturate for a while."""
+    size = np.sqrt((inputs**2).mean(axis=0))
+    low, high = input_limits(known.built, known.mean)
+    share = size / np.maximum(-low, high)
+    if share.max(initial=0.0) <= 1:
+        return ""
+    worst, unit = int(share.argmax()), known.built.closed_loop.plant.input_unit
+    required = f"the linear model requires {size[worst]:.3g} {unit} (rms) of input {worst + 1}"
+    limit = f"which is limited to {max(-low[worst], high[worst]):.3g} {unit}"
+    return f"{required}, {limit}: the loop leaves its linear range"
+
+
+def input_limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest input that reaches the actuators; infinite without a limit."""
+    plant, (x, _) = built.closed_loop.plant, at.parts.states(at.at)
+    ask = as_array(np.full(plant.inputs(), 1e9))
+    low, high = (np.asarray(plant.admissible(x, side * ask)) for side in (-1, 1))
+    return np.where(low < -1e8, -np.inf, low), np.where(high > 1e8, np.inf, high)
 
 
 def _start(known: OperatingPoint) -> list[np.ndarray]:

@@ -13,7 +13,7 @@ from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.plants.reachability import open_loop_advice
-from undertow.prediction.operating_point import OperatingPoint, operating_point, predicted
+from undertow.prediction.operating_point import OperatingPoint, input_limits, operating_point, predicted
 from undertow.scenario.build import Built, in_its_precision
 
 # Quantiles of the loads along the reference at which the loop is linearised.
@@ -111,7 +111,7 @@ def _point(known: OperatingPoint, share: float, load: np.ndarray) -> Point:
     loop, settings = known.built.closed_loop, known.built.scenario.loop
     at = equilibrium(loop, settings.dt, known.mean.parts.target.position, load)
     linear = margins.closed(at, settings.dt, settings.kind)
-    low, high = _limits(known.built, at)
+    low, high = input_limits(known.built, at)
     used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
     return Point(share, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear))
 
@@ -133,19 +133,11 @@ def _noise(known: OperatingPoint) -> Noise:
     one = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
     gain = lambda name: margins.noise_gain(sampled, name, one) / _NOISE
     of_input, of_estimate = gain("u"), gain("estimate") if "estimate" in sampled.signals else np.zeros(axes)
-    low, high = _limits(known.built, known.mean)
+    low, high = input_limits(known.built, known.mean)
     room = np.minimum(high - known.mean.at["u"], known.mean.at["u"] - low)
     with np.errstate(divide="ignore", invalid="ignore"):
         largest = float(np.maximum(room / (_DEVIATIONS * of_input), 0.0).min())
     return Noise(of_input, of_estimate, largest)
-
-
-def _limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest and largest input that reaches the actuators."""
-    plant, (x, _) = built.closed_loop.plant, at.parts.states(at.at)
-    ask = as_array(np.full(plant.inputs(), 1e9))
-    low, high = (np.asarray(plant.admissible(x, side * ask)) for side in (-1, 1))
-    return np.where(low < -1e8, -np.inf, low), np.where(high > 1e8, np.inf, high)
 
 
 def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

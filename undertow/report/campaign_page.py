@@ -1,5 +1,6 @@
 """The page of a campaign: status, requirements, distributions, sensitivities, the worst trials, the configuration."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,9 @@ from undertow.campaign.columns import ENDINGS
 from undertow.campaign.labels import words
 from undertow.campaign.store_results import Results
 from undertow.core.status import Status
-from undertow.report.figures.campaign import distributions_figure, sensitivity_figure
+from undertow.report.figures.campaign import distributions_figure, sensitivity_figure, shown_inputs
 from undertow.report.figures.writing import Plots, Saved, save_all
-from undertow.report.formats import chip, ending, number, prose, unit
+from undertow.report.formats import chip, ending, number, prose, quantity, unit
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
 
 _CAPTIONS = {
@@ -22,23 +23,30 @@ _CAPTIONS = {
     "has failed trials. Smaller values are better. Metrics are computed over the steady window: the second half of a "
     "run, unless `steady` of the scenario says otherwise.",
     "sensitivity": "Spearman's rank correlation over the completed trials, mean over the combinations: +1 where a "
-    "metric increases with a parameter, -1 where it decreases, 0 where they are unrelated.",
+    "metric increases with an input, -1 where it decreases, 0 where they are unrelated. Above the line are the keys of "
+    "`vary`, below it scalars that the seed of a trial determines: offsets of sensors, factors of a parameter error "
+    "and the like, those with the largest correlation first.",
 }
 _INTERVALS = (
     "Share of the trials that keep each requirement, with its 95 % Clopper-Pearson interval. The interval is exact for "
     "random samples and conservative for Latin hypercube and Sobol samples, which are more even. A failed trial does "
     "not keep the requirement; an invalid trial is not counted. The verdict `open` means that more trials are needed: "
-    "increase `trials` and use `--resume`. The interval assumes that the number of trials was fixed beforehand."
+    "increase `trials` and use `--resume`. The interval assumes that the number of trials was fixed beforehand. Green: "
+    "the whole interval is above the required share. Red: it is below it. Grey: open."
 )
 
 
-def write_campaign(title: str, results: Results, found: Mapping[str, Any], folder: Path) -> tuple[Path, list[str]]:
-    """Write `campaign.html`, and every figure as SVG and PNG into `figures/`; return a sentence for each failed figure.
+def write_campaign(
+    title: str, results: Results, found: Mapping[str, Any], folder: Path, pdf: str | None = None
+) -> tuple[Path, list[str]]:
+    """Write `campaign.html`, and every figure into `figures/`; return a sentence for each failed figure.
+
+    `pdf` is the width of PDF files; None for none.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    saved = save_all(lambda: _plots(results, found), folder / "figures")
+    saved = save_all(lambda: _plots(results, found), folder / "figures", pdf)
     plotted = _figures(saved)
     page = document(
         title,
@@ -46,9 +54,9 @@ def write_campaign(title: str, results: Results, found: Mapping[str, Any], folde
         tag("p", f"{found['done']} of {found['trials']} trials", class_="lead"),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
         section("status", "Status of the trials", *_endings(found)),
-        *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(found)),
+        *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(results, found)),
         section("metrics", "Distributions", plotted["distributions"], distributions(results, found)),
-        *_optional("sensitivity", "Sensitivity", plotted["sensitivity"], *_choices(results, found)),
+        *_optional("sensitivity", "Sensitivity", *_chance(found), plotted["sensitivity"], *_choices(results, found)),
         section("worst", "The worst trials", _how(found), worst(results, found)),
         section("configuration", "Configuration", *asked(results)),
     )
@@ -63,6 +71,18 @@ def _endings(found: Mapping[str, Any]) -> list[Html]:
         return [ended]
     errors = [prose(f"{one['trials']} with this error: {one['why']}") for one in found["invalid"]]
     return [ended, tag("p", "The following trials are invalid and did not run:"), bullets(errors)]
+
+
+def _chance(found: Mapping[str, Any]) -> list[Html]:
+    """What unrelated inputs reach by chance, and how many inputs the figure leaves out."""
+    lasted = [one["status"].get("completed", 0) for one in found["combinations"]]
+    if not found["sensitivity"] or max(lasted, default=0) < 3:
+        return []
+    chance = join("With ", str(max(lasted)), " trials, 95 % of the correlations of unrelated quantities are within ")
+    size = join(Html("&plusmn;"), number(min(1.96 / math.sqrt(max(lasted) - 1), 1.0), 2), ".")
+    hidden = len(found["sensitivity"]) - len(shown_inputs(found["sensitivity"]))
+    more = f" {hidden} further inputs with smaller correlations are in summary.json." if hidden else ""
+    return [tag("p", join(chance, size, more))]
 
 
 def _choices(results: Results, found: Mapping[str, Any]) -> list[Html]:
@@ -84,11 +104,12 @@ def _how(found: Mapping[str, Any]) -> Html:
 
 def _plots(results: Results, found: Mapping[str, Any]) -> Plots:
     """What makes each figure; nothing where there is nothing to sample."""
-    values, units = _values(results, found), {metric: results.unit(metric) for metric in results.metrics}
+    values, units = _values(results, found), {name: _people(results, name)[1] for name in results.metrics}
+    varied = sum(key in results.campaign.vary for key in found["sensitivity"])
     ran = {named(one): one["trials"] - one["invalid"] for one in found["combinations"]}
     figures = {
         "distributions": (lambda: distributions_figure(values, ran, units)) if values else None,
-        "sensitivity": (lambda: sensitivity_figure(found["sensitivity"])) if found["sensitivity"] else None,
+        "sensitivity": (lambda: sensitivity_figure(found["sensitivity"], varied)) if found["sensitivity"] else None,
     }
     return {name: make for name, make in figures.items() if make is not None}
 
@@ -102,13 +123,13 @@ def _figures(saved: Saved) -> dict[str, Html]:
 
 
 def _values(results: Results, found: Mapping[str, Any]) -> dict[str, dict[str, np.ndarray]]:
-    """Finite values of each metric by combination."""
+    """Finite values of each metric by combination; angles in degrees."""
     values: dict[str, dict[str, np.ndarray]] = {}
     numbers = np.unique(results.combinations)
     for combination, one in zip(numbers, found["combinations"], strict=True):
         rows = results.rows.isel(trial=results.combinations == combination)
         for metric in one["metrics"]:
-            whole = rows[metric].values
+            whole = _people(results, metric)[0] * rows[metric].values
             if np.isfinite(whole).any():
                 values.setdefault(metric, {})[named(one)] = whole[np.isfinite(whole)]
     return values
@@ -145,15 +166,15 @@ def by_xla(found: Mapping[str, Any]) -> str:
     )
 
 
-def requirements(found: Mapping[str, Any]) -> Html:
+def requirements(results: Results, found: Mapping[str, Any]) -> Html:
     """The requirements and their verdicts; empty where there are none."""
     rows = []
     for one in found["combinations"]:
         for required in one["requirements"]:
             low, high = required["interval"]
-            bound = f"{_metric(required['metric'])} < {required['below']:g}"
+            bound = quantity(required["below"], results.unit(required["metric"]))
             share = f"{100 * required['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
-            words = f"{bound} in {100 * required['share']:g} % of the trials"
+            words = join(_metric(required["metric"]), " < ", bound, f" in {100 * required['share']:g} % of the trials")
             rows.append((words, named(one), chip(required["verdict"]), share))
     head = ("requirement", "combination", "verdict", "share of the trials [95 % interval]")
     return table(head, rows) if rows else Html("")
@@ -243,7 +264,12 @@ def _words(spread: Distribution) -> str:
 
 def _headed(results: Results, name: str) -> Html:
     """A metric and its unit; angles in degrees."""
-    return join(_metric(name), " ", unit(for_people(0.0, results.unit(name))[1]))
+    return join(_metric(name), " ", unit(_people(results, name)[1]))
+
+
+def _people(results: Results, name: str) -> tuple[float, str]:
+    """Factor from a metric to what people read, and its unit."""
+    return for_people(1.0, results.unit(name))
 
 
 def _shown(results: Results, name: str, value: float | None) -> Html:

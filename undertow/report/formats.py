@@ -1,14 +1,28 @@
-"""Numbers, units, text and verdicts as HTML."""
+"""Numbers, units, text and verdicts of every page: the one place that decides how they look.
+
+A number has three significant digits, a typographic minus sign, and a power of ten below 0.001 and from 100 000 on.
+"""
 
 import math
 import re
 from collections.abc import Mapping
 from typing import Any
 
+from undertow.analysis.metrics import for_people
+from undertow.analysis.success import DEFAULT, judged
 from undertow.report.mathml import with_symbols
 from undertow.report.page import Html, join, marked, tag, text
 
 _DIGITS = 3
+_SMALL, _LARGE = 1e-3, 1e5  # outside of these a number is written with a power of ten
+
+# In plain text, as Python prints them: powers of ten, minus signs (not hyphens), and plus or minus.
+_POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?!\w)")
+_NEGATIVE = re.compile(r"(?<![\w.)\]}>])-(?=[\d\u221e])")
+_EITHER = re.compile(r"\+-(?=\s?\d)")
+_TINY = re.compile(r"(?<![\w.])0\.000(0*)(\d+)(?!\w)")
+_RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+_SIGNS = {"&lt;=": "&le;", "&gt;=": "&ge;"}
 
 
 def number(value: Any, digits: int = _DIGITS) -> Html:
@@ -17,10 +31,27 @@ def number(value: Any, digits: int = _DIGITS) -> Html:
         return Html("&ndash;")
     if isinstance(value, float) and not math.isfinite(value):
         return text(value)
-    if value and not 1e-3 <= abs(value) < 1e5:
+    if value and not _SMALL <= abs(value) < _LARGE:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return join(_minus(mantissa), Html("&thinsp;&times;&thinsp;10"), tag("sup", _minus(str(int(exponent)))))
-    return text(_minus(f"{value:.{digits}g}" if abs(value) < 1000 else f"{value:.0f}"))
+        return _with_power(_minus(mantissa), str(int(exponent)))
+    return text(plain(value, digits))
+
+
+def plain(value: float, digits: int = _DIGITS) -> str:
+    """A number as text, for figures; whole numbers have no zeros after the point."""
+    if value and not _SMALL <= abs(value) < _LARGE:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{_minus(mantissa)} \u00d7 10{str(int(exponent)).translate(_RAISED)}"
+    whole = float(value).is_integer() or abs(value) >= 10 ** (digits - 0.5)
+    return _minus(f"{value:.0f}" if whole else f"{value:#.{digits}g}".rstrip("."))
+
+
+def quantity(value: float | None, of: str, digits: int = _DIGITS) -> Html:
+    """A number with its unit; angles in degrees."""
+    if value is None:
+        return number(None)
+    shown, name = for_people(value, of)
+    return join(number(shown, digits), Html("&nbsp;"), unit(name)) if name else number(shown, digits)
 
 
 def percent(value: float | None) -> Html:
@@ -31,7 +62,7 @@ def percent(value: float | None) -> Html:
 
 
 def prose(content: Any) -> Html:
-    """Plain text with formulas and symbols typeset, powers of units raised (m/s^2) and `code` set as code."""
+    """Plain text with formulas and symbols typeset, powers of ten and of units raised, and `code` set as code."""
     return (
         content
         if isinstance(content, Html)
@@ -39,9 +70,23 @@ def prose(content: Any) -> Html:
     )
 
 
-def _typeset(plain: str) -> Html:
-    marked = re.sub(r"\^(-?\d)", r"<sup>\1</sup>", with_symbols(plain))
+def _typeset(words: str) -> Html:
+    marked = _TINY.sub(lambda found: _scientific(len(found[1]), found[2]), with_symbols(words))
+    marked = _POWER.sub(lambda found: _with_power(found[1], f"{found[2]}{found[3]}".lstrip("+")), marked)
+    marked = re.sub(r"\^(-?\d)", lambda found: f"<sup>{_minus(found[1])}</sup>", marked)
+    marked = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", marked))
+    for sign, entity in _SIGNS.items():
+        marked = marked.replace(sign, entity)
     return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked))
+
+
+def _scientific(zeros: int, digits: str) -> Html:
+    """0.000ddd with some more zeros, as d.dd times a power of ten."""
+    return _with_power(digits[0] + (f".{digits[1:]}" if digits[1:] else ""), str(-4 - zeros))
+
+
+def _with_power(mantissa: str, exponent: str) -> Html:
+    return join(mantissa, Html("&thinsp;&times;&thinsp;10"), tag("sup", _minus(exponent)))
 
 
 def unit(value: str) -> Html:
@@ -65,6 +110,37 @@ def chip(verdict: str) -> Html:
 def condition(verdict: str) -> str:
     """The condition of a verdict: the text after `holds if`."""
     return verdict.removeprefix("holds if").strip() if kind(verdict) == "partly" else ""
+
+
+_CLASSES = {True: "holds", False: "partly", None: "open"}
+
+_WITHIN = " and ".join(
+    f"{'{:.3g} {}'.format(*for_people(most, of))} in {name}"
+    for most, of, name in ((DEFAULT["position_rms"], "m", "position"), (DEFAULT["attitude_rms"], "rad", "attitude"))
+)
+
+# What the colours of `outcome` mean, where runs are judged by the default criterion.
+CRITERION = (
+    f"Green: the run completed with an rms error below {_WITHIN} over the stated window. Amber: it completed with a "
+    "larger error. Red: it ended early."
+)
+
+
+def within(steady: Mapping[str, Any] | None) -> bool | None:
+    """Whether the metrics of a steady window keep to the default criterion; None without any, as in a failed run."""
+    verdict = judged(DEFAULT, steady) if steady else None
+    return verdict and verdict.within
+
+
+def outcome(words: str, completed: bool, within: bool | None) -> Html:
+    """How a run ended, coloured by whether control succeeded; completing alone is no success.
+
+    Args:
+        words: what is said.
+        completed: whether the run reached its end.
+        within: whether it kept to the criterion; None where it has none.
+    """
+    return tag("span", words, class_=f"chip {_CLASSES[within] if completed else 'fails'}")
 
 
 def ending(entry: Mapping[str, Any]) -> str:

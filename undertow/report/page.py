@@ -1,4 +1,4 @@
-"""One self-contained HTML page: no script, nothing loaded from anywhere, readable on a phone and on paper."""
+"""One self-contained HTML page: nothing loaded from anywhere, readable on a phone and on paper."""
 
 import base64
 import html
@@ -58,16 +58,23 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
         first = tag("th", row[0], scope="row", **style(0))
         body.append(tag("tr", first, *(tag("td", cell, **style(i)) for i, cell in enumerate(row[1:], 1))))
     whole = tag("table", *head_rows, tag("tbody", *body), class_="wide" if wide else "fit")
-    return tag("div", whole, class_="scroll", tabindex="0")
+    return tag("div", whole, class_="scroll wide" if wide else "scroll", tabindex="0")
 
 
-def figure(svg: str, name: str, alternative: str, caption: Any) -> Html:
-    """A figure with its caption, embedded in the page."""
-    data = base64.b64encode(svg.encode()).decode()
-    image = Html(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(alternative)}">')
-    return tag(
-        "figure", tag("div", image, class_="scroll", tabindex="0"), tag("figcaption", caption), id=f"figure-{name}"
-    )
+def figure(picture: str | bytes, name: str, alternative: str, caption: Any) -> Html:
+    """A figure with its caption, embedded in the page; it scrolls inside its own box where the screen is narrow.
+
+    Args:
+        picture: SVG (text) or PNG (bytes).
+        name: of the figure, for links.
+        alternative: what it shows, for those who cannot see it.
+        caption: below it.
+    """
+    kind, content = ("svg+xml", picture.encode()) if isinstance(picture, str) else ("png", picture)
+    data = base64.b64encode(content).decode()
+    image = Html(f'<img src="data:image/{kind};base64,{data}" alt="{html.escape(alternative)}">')
+    box = tag("div", image, class_="scroll wide", tabindex="0")
+    return tag("figure", box, tag("figcaption", caption), id=f"figure-{name}")
 
 
 def section(identity: str, title: str, *content: Any) -> Html:
@@ -75,9 +82,9 @@ def section(identity: str, title: str, *content: Any) -> Html:
     return tag("section", tag("h2", title), *content, id=identity)
 
 
-def document(title: str, *content: Any) -> str:
-    """The whole page as text."""
-    looks = files("undertow.report").joinpath("page.css").read_text(encoding="utf-8")
+def document(title: str, *content: Any, looks: str = "") -> str:
+    """The whole page as text; `looks` are style sheets of its own."""
+    looks = files("undertow.report").joinpath("page.css").read_text(encoding="utf-8") + looks
     head = (
         f'<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{html.escape(title)}</title><style>{looks}</style>"

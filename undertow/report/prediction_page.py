@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.analysis.metrics import for_people
+from undertow.loop.dataset import input_names
 from undertow.prediction.predict import Prediction
-from undertow.report.figures.prediction import prediction_plots
+from undertow.report.figures.prediction import force_label, prediction_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import bullets, document, figure, section, table, tag
@@ -31,13 +32,15 @@ _CAPTIONS = {
 }
 
 
-def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path) -> list[str]:
-    """Write `prediction.html`, and every figure as SVG and PNG into `figures/`; return sentences on failures.
+def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path, pdf: str | None = None) -> list[str]:
+    """Write `prediction.html`, and every figure into `figures/`; return sentences on failures.
+
+    `pdf` is the width of PDF files; None for none.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    saved = save_all(lambda: prediction_plots(prediction), folder / "figures")
+    saved = save_all(lambda: prediction_plots(prediction), folder / "figures", pdf)
     figures = [tag("p", prose(sentence)) for sentence in saved.failures]
     for name, vector in saved.vectors.items():
         caption = _CAPTIONS[name]
@@ -79,8 +82,8 @@ def tables(prediction: Prediction) -> list[Rows]:
 def _points(prediction: Prediction) -> Rows:
     rows = [
         (
-            f"{point.share:.0%}",
-            f"{point.used:.0%}" if point.used else "-",
+            _percent(point.share),
+            _percent(point.used) if point.used else "-",
             _pole(point.poles[0]) if len(point.poles) else "-",
             f"{point.radius:.6f}",
             ("stable" if point.radius < 1 else "unstable") if point.found else "no equilibrium",
@@ -122,12 +125,15 @@ def _estimators(prediction: Prediction) -> Rows:
     )
 
 
+_SHOWN = (0.1, 1.0, 10.0)  # rad/s
+
+
 def _errors(prediction: Prediction) -> Rows:
     frequency, names = prediction.frequency, prediction.operating_point.built.closed_loop.plant.outputs
     rows = []
     for i, name in enumerate(names):
         error, missed = prediction.error[:, i], prediction.estimation[:, i]
-        at = [_number(float(np.interp(w, frequency, error))) for w in (0.1, 1.0, 10.0)]
+        at = [_number(float(np.interp(w, frequency, error))) for w in _SHOWN]
         worse = frequency[missed > 1]
         rows.append(
             (
@@ -139,7 +145,7 @@ def _errors(prediction: Prediction) -> Rows:
         )
     return Rows(
         "Error per unit of disturbance",
-        ("axis", "at 0.1 rad/s, s^2", "at 1 rad/s", "at 10 rad/s", "maximum", "estimate increases the error above"),
+        ("axis", *(f"at {w:g} rad/s, s^2" for w in _SHOWN), "maximum, s^2", "estimate increases the error above"),
         rows,
         "|e| per |d|, m per m/s^2 or rad per rad/s^2, under the mean load.",
     )
@@ -173,14 +179,15 @@ def _closed_forms(prediction: Prediction) -> Rows:
 
 
 def _authority(prediction: Prediction) -> Rows:
-    authority = prediction.authority
+    authority, plant = prediction.authority, prediction.operating_point.built.closed_loop.plant
+    force, most = force_label(plant).replace("force", "", 1), int(authority.demand.argmax())
     finite = np.isfinite(authority.high).any()
     rows = [
-        ("share of the time in which the demand is met", f"{authority.held:.0%}"),
-        ("smallest share of a demand that is met", f"{authority.share.min():.0%}"),
-        ("largest force demanded from one actuator", _number(float(authority.demand.max()))),
+        ("share of the time in which the demand is met", _percent(authority.held)),
+        ("smallest share of a demand that is met", _percent(authority.share.min())),
+        (f"largest force demanded, from {input_names(plant)[most]}{force}", _number(float(authority.demand[most]))),
         (
-            "largest force available, forward / reverse",
+            f"largest force available, forward / reverse{force}",
             f"{_number(authority.high.min())} / {_number(-authority.low.max())}" if finite else "-",
         ),
     ]
@@ -224,4 +231,8 @@ def _time(value: float) -> str:
 
 
 def _number(value: float) -> str:
-    return "any" if np.isinf(value) else f"{value:.3g}"
+    return "any" if np.isinf(value) else f"{value:.0f}" if 1e3 <= abs(value) < 1e5 else f"{value:.3g}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"

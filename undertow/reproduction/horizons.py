@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from undertow.analysis.success import DEFAULT, judged
 from undertow.reproduction.running import BatchResult
 from undertow.reproduction.setup import FIDELITIES, RAFC, RCAFC, equal_gain, scenario
 
@@ -59,11 +60,14 @@ def described(name: str, facts: dict[str, Any], run: BatchResult) -> dict[str, A
     over = lambda metric: [None if found is None else found[metric] for found in run.windows]
     peaks = run.series["weights_peak"]
     kept = np.unique(np.geomspace(1, max(len(peaks) - 1, 1), _KEPT).round().astype(int)) if len(peaks) > 1 else [0]
+    reached = [found for found in run.windows if found is not None]
+    success = judged(DEFAULT, reached[-1]) if run.lasted and reached else None
     return facts | {
         "scenario": f"scenarios/{name}.yaml",
         "status": run.status.word,
         "ended": run.ended,
         "lasted": run.lasted,
+        "within": success is not None and success.within,  # over the last window that it reached
         "tracking_rms": over("tracking_rms"),
         "estimation_rms": over("estimation_rms"),
         "input_variation": over("input_variation"),

@@ -17,10 +17,12 @@ from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.observer import Navigation
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import check_fit, check_start, check_times, check_window, rounded_times
 from undertow.scenario.part_cache import PartCache
+from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
 from undertow.scenario.step_size import step_advice
@@ -65,7 +67,10 @@ class Built(NamedTuple):
         if self.scenario.precision == "float32" and loop.method != "adaptive" and steps > _EXACT_INTEGERS:
             limit = f"{_EXACT_INTEGERS} steps, {_EXACT_INTEGERS * loop.dt:.6g} s"
             times += (f"float32 cannot distinguish instants beyond {limit}",)
-        return plant.advice() + fast + times + ((late,) if start >= end else ())
+        navigation = self.closed_loop.navigation
+        unseen = navigation.advice(end) if isinstance(navigation, Navigation) else ()
+        unmeant = plausibility(self.closed_loop, end, self.scenario.initial.position)
+        return plant.advice() + fast + times + ((late,) if start >= end else ()) + unseen + unmeant
 
     def known_metrics(self) -> dict[str, Metric]:
         """Metrics that its runs may have, by name, with their units."""

@@ -41,7 +41,10 @@ def check_times(loop: Loop) -> None:
             must = f"be at least {loop.duration / most:g} s, so that the run has at most {most} {what}"
             raise BadInput(key, must, f"{step:g} s")
     if stepped and not whole_steps(loop.record, loop.dt):
-        raise BadInput("record", f"be a whole number of steps ({loop.dt:g} s)", f"{loop.record:g} s")
+        below = math.floor(loop.record / loop.dt)
+        near = " or ".join(f"{steps * loop.dt:g}" for steps in (below, below + 1) if steps)
+        must = f"be a whole number of steps of `loop.dt` ({loop.dt:g} s)"
+        raise BadInput("record", must, f"{loop.record:g} s", hint=f"Take {near} s")
 
 
 def check_window(window: Window, duration: float) -> None:
@@ -85,7 +88,7 @@ def check_start(loop: ClosedLoop, start: Initial) -> None:
     """
     for key, value in start:
         if value is not None:
-            checks.length(key, value, len(loop.plant.outputs), "one per output of the plant")
+            checks.length(key, value, len(loop.plant.outputs), ", ".join(loop.plant.outputs))
             checks.finite(key, value)
 
 
@@ -99,8 +102,8 @@ def check_fit(loop: ClosedLoop) -> None:
     with within("reference"):
         target = _traced(loop.reference.at, zero)
         if target.position.shape != (axes,):
-            must, got = f"have {axes} entries, one per output of the plant", f"of shape {target.position.shape}"
-            raise BadInput("position", must, got)
+            got = f"{len(target.position)} long" if target.position.ndim == 1 else f"of shape {target.position.shape}"
+            raise BadInput("position", f"have {axes} entries ({', '.join(loop.plant.outputs)})", got)
     with within("disturbance"):
         realization = _traced(loop.realize, jax.random.PRNGKey(0))
     with within("navigation"):

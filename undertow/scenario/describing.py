@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import numpy as np
 
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
@@ -90,10 +91,15 @@ def _describe(kind: str, name: str, part: Any, description: Any = None) -> Descr
         name=name,
         summary=_prose(part),
         options=options_of(kind, part),
-        parameters=tuple(parameters(shown)) if described else (),
+        parameters=tuple(map(_depending, parameters(shown))) if described else (),
         advice=advise(),
         signals=_signals(kind, description or name, instance),
     )
+
+
+def _depending(parameter: Parameter) -> Parameter:
+    """A parameter of a class, which a part computes from its options."""
+    return parameter._replace(value="by the options") if parameter.value == "required" else parameter
 
 
 def _instance(kind: str, name: Any, part: Any) -> Any:
@@ -144,3 +150,23 @@ def _meanings(text: str) -> dict[str, str]:
         for name in names:
             found[name] = f"{found.get(name, '')} {more}".strip()
     return found
+
+
+def text_of(value: Any) -> str:
+    """A short text for the value of an option, a parameter or a key; a diagonal matrix is shown as its diagonal."""
+    if isinstance(value, str) or value is None or (isinstance(value, list | dict) and not value):
+        return value if isinstance(value, str) else "none"
+    if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
+        return str(value).lower()
+    if isinstance(value, list | tuple) and any(isinstance(entry, str) for entry in value):
+        return ", ".join(value)
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 0:
+        return f"{array:.6g}"
+    if array.ndim == 2 and array.shape[0] == array.shape[1] and not np.any(array - np.diag(np.diag(array))):
+        return f"diag{_row(np.diag(array))}"
+    return "\n".join(map(_row, np.atleast_2d(array)))
+
+
+def _row(entries: np.ndarray) -> str:
+    return f"({', '.join(f'{entry:.6g}' for entry in entries)})"

@@ -90,7 +90,7 @@ def make(
     if table:
         del resolved["samples"]
     part = adjust(part, changes, tuple(own)) if changes else part
-    return part, {"kind": _portable(name, folder), **preset, **resolved, **changes, **table}
+    return part, {"kind": portable_name(name, folder), **preset, **resolved, **changes, **table}
 
 
 def presets_of(function: Callable[..., Any]) -> Mapping[str, Callable[..., Any]]:
@@ -123,7 +123,7 @@ def call(
         elif parameter.default is inspect.Parameter.empty:
             raise BadInput(name, "be given")
         else:
-            arguments[name], resolved[name] = parameter.default, _listed(parameter.default)
+            arguments[name], resolved[name] = parameter.default, listed(parameter.default)
     return _made(lambda: function(*given, **arguments)), resolved
 
 
@@ -262,11 +262,13 @@ def _samples(options: dict[str, Any], folder: Path) -> dict[str, Any]:
     return {"csv": text}
 
 
-def _listed(value: Any) -> Any:
-    return [_listed(entry) for entry in value] if isinstance(value, tuple) else value
+def listed(value: Any) -> Any:
+    """A value as a scenario has it: tuples as lists."""
+    return [listed(entry) for entry in value] if isinstance(value, tuple) else value
 
 
-def _portable(name: str, folder: Path) -> str:
+def portable_name(name: str, folder: Path) -> str:
+    """A part by a name that is the same in every folder: one of a file gets its whole path."""
     if ".py:" not in name:
         return name
     path, attribute = name.rsplit(":", 1)

@@ -64,9 +64,11 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
     counted = {} if rules(loop) is None else {"rules": rules(loop)}
     covered = status is Status.OK and how.window[0] < ended
     dataset = to_dataset(outcome, loop)
-    over = lambda start, stop: (
-        measure(outcome, loop.plant, start, stop, how.own) | closure(dataset, start, stop) | counted
-    )
+
+    def over(start: float, stop: float) -> dict[str, Any]:
+        residuals = closure(dataset, start, stop)
+        return measure(outcome, loop.plant, start, stop, how.own) | residuals | counted
+
     # A run ended by an invalid command has no input at that instant.
     last = ended - how.dt / 2 if status is Status.COMMAND_NOT_FINITE else ended
     steady, whole = over(*how.window) if covered else None, over(0.0, last)
@@ -112,6 +114,14 @@ def metrics_of(dataset: xr.Dataset) -> dict[str, Metric]:
 def certificate_of(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Certificate of a run from its attributes; None for a controller without one, and in older files."""
     return json.loads(dataset.attrs["certificate"]) if "certificate" in dataset.attrs else None
+
+
+def window_of(dataset: xr.Dataset) -> tuple[float, float] | None:
+    """Start and stop of the steady window of a run, s, from its scenario; None for a run that was made from objects."""
+    if not dataset.attrs.get("scenario"):
+        return None
+    steady = parse(dataset.attrs["scenario"], "scenario", Path(), "scenario").data["steady"]
+    return steady["start"], steady["stop"]
 
 
 def to_json(value: Any, indent: int | None = None) -> str:

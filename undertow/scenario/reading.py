@@ -8,12 +8,15 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, nearest
 from undertow.core.user_code import python_says
 from undertow.scenario.foreign_code import check_allowed
 from undertow.scenario.provenance import checksum
 
 Path_ = tuple[str | int, ...]
+
+_YAML, _RESULT = (".yaml", ".yml"), ".nc"
+_LISTED = 6  # files of a folder that a message names
 
 
 class Text(NamedTuple):
@@ -59,16 +62,40 @@ def read(path: Path, what: str = "SCENARIO", allow_code: bool = False) -> Text:
         BadInput: missing, unreadable, malformed or damaged file, or one that names code that may not run.
     """
     if not path.is_file():
-        raise BadInput(what, "be an existing file", str(path))
-    if path.suffix == ".nc":
+        raise no_file(path, what)
+    if path.suffix == _RESULT:
         return _from_result(path, what, allow_code)
+    if path.suffix not in _YAML:
+        hint = f"If it holds YAML, rename it to {path.stem}.yaml"
+        raise BadInput(what, "be a .yaml file, or the run.nc of an earlier run", path.name, hint=hint)
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise BadInput(what, "be a text file", path.name) from None
+        raise BadInput(what, "be a text file in UTF-8", path.name, hint="Save it with this encoding") from None
     except OSError as error:
         raise BadInput(what, "be a file that can be read", f"{path}: {error.strerror}") from None
     return parse(text, path.name, path.resolve().parent, what)
+
+
+def no_file(path: Path, what: str, must: str = "be an existing file") -> BadInput:
+    """The error for a path that is a folder, or nothing; it names the files that may be meant.
+
+    Args:
+        path: that is no file.
+        what: the argument or key that names it.
+        must: what that must be.
+    """
+    if path.is_dir():
+        inside = sorted(one.name for one in path.iterdir() if one.suffix in (*_YAML, _RESULT))
+        more = ", ..." if len(inside) > _LISTED else ""
+        hint = f"Name one of the files in it: {', '.join(inside[:_LISTED])}{more}" if inside else ""
+        return BadInput(what, must, f"{path}, a folder", hint=hint)
+    folder = path.parent
+    if not folder.is_dir():
+        return BadInput(what, must, str(path), hint=f"The folder {folder} does not exist")
+    files = [one for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)]
+    known = [one.name for one in files if nearest(path.stem, [one.stem])]  # not alike by their ending alone
+    return BadInput(what, must, str(path), hint=nearest(path.name, known))
 
 
 def dump(data: Mapping[str, Any]) -> str:
@@ -119,7 +146,8 @@ def parse(text: str, name: str, folder: Path, what: str) -> Text:
     data, lines = load(text, name, what)
     if not isinstance(data, dict):
         got = "empty" if data is None else "a list" if isinstance(data, list) else f"a single {type(data).__name__}"
-        raise BadInput(what, "be a mapping of keys to values", got, where=name)
+        hint = "Write `key: value` lines; `undertow describe scenario` shows the keys"
+        raise BadInput(what, "be a mapping of keys to values", got, where=name, hint=hint)
     return Text(data, name, folder, lines)
 
 

@@ -2,13 +2,15 @@
 
 import re
 import typing
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario.reading import Text
+from undertow.scenario.values import remedy_of
+from undertow.scenario.vehicle_schema import KEYS as VEHICLE_KEYS
 
 
 def _named(default: str | None = None) -> BeforeValidator:
@@ -73,8 +75,8 @@ class Loop(Strict):
 class Initial(Strict):
     """State at t = 0; zero by default."""
 
-    position: Numbers | None = Field(None, description="one entry per output, m and rad")
-    velocity: Numbers | None = Field(None, description="one entry per output, m/s and rad/s")
+    position: Numbers | None = Field(None, description="one entry per output, m and rad; default: zero")
+    velocity: Numbers | None = Field(None, description="one entry per output, m/s and rad/s; default: zero")
 
 
 class Window(Strict):
@@ -136,7 +138,7 @@ class Tune(Strict):
     train: TrainingRuns = Field(default_factory=TrainingRuns, description="training runs")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     held_out: TrainingRuns = Field(
         default_factory=lambda: TrainingRuns.model_validate({"seeds": 4}),
-        description="held-out runs for the final evaluation; default: 4 seeds",
+        description="held-out runs for the final evaluation",
     )
     weights: Weights = Field(default_factory=Weights, description="weights of the cost")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
 
@@ -146,7 +148,8 @@ class Scenario(Strict):
 
     description: str = Field("", description="free text")
     plant: Annotated[Part, _named("hybrid_vehicle")] = Field(
-        Part(kind="hybrid_vehicle"), description="the system that is controlled"
+        Part(kind="hybrid_vehicle"),
+        description="the system that is controlled: for a vehicle with the options vehicle and thruster",
     )
     model: dict[str, Any] = Field(
         default_factory=dict, description="options of the nominal model, which the controller uses; default: the plant"
@@ -165,12 +168,26 @@ class Scenario(Strict):
     )
     success: dict[str, float] | None = Field(
         None,
-        description="metric -> what it must stay below in the steady window; position_rms 0.05 m and attitude_rms "
-        "0.05 rad unless given",
+        description="metric -> what it must stay below in the steady window; default: position_rms 0.05 m and "
+        "attitude_rms 0.05 rad",
     )
     tune: Tune = Field(default_factory=Tune, description="settings of `undertow tune`")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all random numbers")
     precision: Literal["float64", "float32"] = Field("float64", description="precision of all arithmetic")
+
+
+_REMEDIES = {
+    "campaign": "Run it: undertow campaign {name}",
+    "vehicle file": "Name it in a scenario, as `plant: {{vehicle: {name}}}`; to check it alone: undertow check {name}",
+}
+
+
+def kind_of(data: Mapping[str, Any]) -> str:
+    """What a file is by its keys: `campaign`, `vehicle file` or `scenario`; "" where it has no key of any."""
+    if "scenario" in data:
+        return "campaign"
+    vehicle, scenario = (sum(key in known for key in data) for known in (VEHICLE_KEYS, Scenario.model_fields))
+    return "vehicle file" if vehicle > scenario else "scenario" if scenario else ""
 
 
 def validate(text: Text) -> Scenario:
@@ -179,9 +196,10 @@ def validate(text: Text) -> Scenario:
     Raises:
         BadInput: unknown key, wrong type, value out of range; the error names key, location and nearest known word.
     """
-    if "scenario" in text.data:
-        hint = "Run a campaign with `undertow campaign`"
-        raise BadInput("scenario", "be a key of campaigns only", hint=hint, where=text.location("scenario"))
+    if (kind := kind_of(text.data)) in _REMEDIES:
+        name = text.name or "NAME.yaml"
+        hint = _REMEDIES[kind].format(name=name)
+        raise BadInput("SCENARIO", "be a scenario", f"{name}, a {kind}", hint=hint)
     try:
         return Scenario.model_validate(text.data)
     except ValidationError as errors:
@@ -197,12 +215,12 @@ def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scen
     name = " ".join(name.split())
     where = text.where(path)
     if error["type"] == "extra_forbidden":
-        hint = did_you_mean(str(path[-1]), _keys_beside(path, model))
+        hint = _section_of(path, model) or did_you_mean(str(path[-1]), _keys_beside(path, model))
         return BadInput(name, f"be a key of the {what}", "unknown", hint=hint, where=where)
     if error["type"] == "missing":
         return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to the {what}", where=where)
     got = error["input"]
-    return BadInput(name, _must(error), "empty" if got is None else repr(got), where=where)
+    return BadInput(name, _must(error), "empty" if got is None else repr(got), hint=_remedy(error), where=where)
 
 
 def _must(error: Any) -> str:
@@ -212,6 +230,27 @@ def _must(error: Any) -> str:
     message = re.sub(r"\w+ should have at (\w+) (\d+) items?.*", r"have at \1 \2 entries", message)
     message = re.sub(r" or instance of \w+", "", message)
     return message.replace("be a integer", "be an integer").replace("a dictionary", "a mapping of keys to values")
+
+
+def _remedy(error: Any) -> str:
+    """How to write what was meant, where a number, or true or false, is missing."""
+    kind = error["type"]
+    return remedy_of(error["input"], kind == "bool_type") if kind in ("float_type", "int_type", "bool_type") else ""
+
+
+# Sections of parts whose names newcomers write at the top.
+_INSIDE = {"vehicle": "plant", "thruster": "plant", "battery": "plant", "esc": "plant", "sensors": "navigation"}
+
+
+def _section_of(path: tuple, model: type[BaseModel]) -> str:
+    """Where a key at the top of a scenario belongs; "" for a key that no section has."""
+    if model is not Scenario or len(path) != 1:
+        return ""
+    sections = [key.path.split(".") for key in keys()]
+    inside = [steps[0] for steps in sections if len(steps) == 2 and steps[1] == path[0] != "kind"]
+    section = next(iter(inside), _INSIDE.get(path[0]))
+    kind = "kind: observer, " if section == "navigation" else ""
+    return f"It belongs to `{section}`: write `{section}: {{{kind}{path[0]}: ...}}`" if section else ""
 
 
 def _keys_beside(path: tuple, model: Any) -> list[str]:
@@ -226,8 +265,9 @@ def _keys_beside(path: tuple, model: Any) -> list[str]:
 
 def _beside_none(annotation: Any) -> Any:
     """The type of an optional value without None."""
-    members = [one for one in typing.get_args(annotation) if one is not type(None)]
-    return members[0] if len(members) == 1 else annotation
+    members = typing.get_args(annotation)
+    others = [one for one in members if one is not type(None)]
+    return others[0] if len(others) == 1 < len(members) else annotation
 
 
 class Key(NamedTuple):
@@ -239,18 +279,24 @@ class Key(NamedTuple):
     meaning: str
 
 
-def keys(model: type[BaseModel] = Scenario, prefix: str = "") -> Iterator[Key]:
-    """Every key a scenario may have, nested ones included."""
+def keys(model: type[BaseModel] = Scenario, prefix: str = "", defaults: BaseModel | None = None) -> Iterator[Key]:
+    """Every key a scenario may have, nested ones included.
+
+    Args:
+        model: with the keys.
+        prefix: goes before them.
+        defaults: a section with default values, where these are not those of its class.
+    """
     for name, field in model.model_fields.items():
         inner = field.annotation if isinstance(field.annotation, type) else None
-        meaning = field.description or ""
+        meaning, _, said = (field.description or "").partition("; default: ")
+        default = getattr(defaults, name) if defaults else field.get_default(call_default_factory=True)
         if inner is not None and issubclass(inner, Strict):
             yield Key(f"{prefix}{name}", "mapping", "see below", meaning)
-            yield from keys(inner, f"{prefix}{name}.")
+            yield from keys(inner, f"{prefix}{name}.", default)
         else:
-            default = field.get_default(call_default_factory=True)
             shown = default.kind if isinstance(default, Part) else "required" if field.is_required() else default
-            yield Key(f"{prefix}{name}", _type_name(field.annotation), shown, meaning)
+            yield Key(f"{prefix}{name}", _type_name(field.annotation), said or shown, meaning)
 
 
 def _type_name(annotation: Any) -> str:
@@ -258,16 +304,19 @@ def _type_name(annotation: Any) -> str:
         return "part"
     if typing.get_origin(annotation) is Literal:
         return " or ".join(typing.get_args(annotation))
+    annotation = _beside_none(annotation)
+    if typing.get_origin(annotation) is Annotated:
+        annotation = typing.get_args(annotation)[0]
     words = {
         float: "number",
         bool: "true or false",
         int: "integer",
         str: "text",
         Numbers: "list of numbers",
-        Numbers | None: "list of numbers",
-        float | None: "number",
-        list[str] | None: "list of names",
+        list[str]: "list of names",
+        list[Any]: "list of values",
         list[NamedPart]: "list of parts",
         typing.get_args(OneOrMore)[0]: "part or list of parts",
+        str | dict[str, Any]: "name of a file, or mapping",
     }
     return words.get(annotation, "mapping")

@@ -1,6 +1,7 @@
 """Check the value of an option against its annotation."""
 
 import math
+import re
 import typing
 from typing import Any
 
@@ -11,6 +12,9 @@ from undertow.core.errors import BadInput
 _WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "text", type(None): "null"}
 # Integers are sizes and counts that compiled code is unrolled over.
 _LARGEST_COUNT = 100
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_PI = re.compile(r"([-+]?)(?:(\d+\.?\d*)\*?)?pi(?:/(\d+\.?\d*))?")
 
 
 def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
@@ -31,7 +35,7 @@ def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
     plain = all(kind in _WORDS for kind in kinds)
     if not (any(_is(value, kind) for kind in kinds) if plain else _numbers(value)):
         must = " or ".join(_WORDS[kind] for kind in kinds) if plain else "a number or a list of numbers"
-        raise BadInput(name, f"be {must}", repr(value))
+        raise BadInput(name, f"be {must}", repr(value), hint=remedy_of(value, bool in kinds))
     if int in kinds and value is not None and abs(value) > _LARGEST_COUNT:
         raise BadInput(name, f"be at most {_LARGEST_COUNT}", value)
     if not isinstance(value, str):
@@ -43,6 +47,25 @@ def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
         if np.isnan(numbers).any() or (np.isinf(numbers).any() and not endless):
             raise BadInput(name, "be finite", value)
     return value
+
+
+def remedy_of(value: Any, yes_or_no: bool = False) -> str:
+    """How to write what was meant as a number, or as true or false; "" where that is unknown."""
+    if isinstance(value, list):
+        return next(filter(None, map(remedy_of, value)), "")
+    if not isinstance(value, str) or yes_or_no:
+        return "Write it without quotes" if yes_or_no and str(value).lower() in ("true", "false") else ""
+    text = value.strip()
+    if _NUMBER.fullmatch(text):
+        return f"Write it without quotes: {text}"
+    if _NUMBER.fullmatch(text.replace(",", ".", 1)):
+        return f"Write a decimal point: {text.replace(',', '.')}"
+    if turn := _PI.fullmatch(text.replace(" ", "")):
+        size = float(turn[2] or 1) * math.pi / float(turn[3] or 1)
+        return f"Write the number: {turn[1]}{size:.6g}"
+    if _NUMBER.match(text):
+        return "Write the number alone, without a unit"
+    return ""
 
 
 def _is(value: Any, kind: type) -> bool:

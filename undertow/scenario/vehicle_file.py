@@ -1,4 +1,4 @@
-"""A vehicle from a YAML file. See docs/your-own-vehicle.md."""
+"""A vehicle from a YAML file. See docs/how-to/your-own-vehicle.md."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from undertow.core.errors import BadInput, within
 from undertow.core.runtime import double_outside_runs
 from undertow.scenario.reading import Text, from_data, key_path, read
+from undertow.scenario.schema import kind_of
 from undertow.scenario.vehicle_schema import INSTEAD, VehicleData, parse
 from undertow.vehicles.vehicle import Vehicle
 
@@ -52,6 +53,9 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
     if kept is not None and not isinstance(kept, Mapping):
         raise BadInput("contents", "be a mapping, as in a vehicle file", kept)
     text = read(path, what) if kept is None else from_data(kept)
+    if kept is None and (kind := kind_of(text.data)) in ("scenario", "campaign"):
+        hint = "A vehicle file has the keys mass, inertia, thrusters, ..., as in examples/my_rov.yaml"
+        raise BadInput(what, "be a vehicle file", f"{path.name}, a {kind}", hint=hint)
     forgotten = {other for key in changes for other in INSTEAD.get(key, ())} - set(changes)
     contents = {"name": path.stem, **text.data, **changes}
     contents = {key: value for key, value in contents.items() if key not in forgotten}

@@ -142,6 +142,16 @@ def _pose(name: str, entry: Any) -> tuple[NDArray, NDArray]:
     return _vector(name, entry, "position"), _vector(name, entry, "direction")
 
 
+def angles_of(entries: list[dict[str, Any]]) -> dict[str, float]:
+    """Angles of thrusters as given, degrees, by key."""
+    return {
+        f"thrusters[{j}].{key}": float(entry[key])
+        for j, entry in enumerate(entries)
+        for key in ("azimuth", "elevation")
+        if key in entry
+    }
+
+
 def _vector(name: str, entry: Mapping[str, Any], key: str) -> NDArray:
     if key not in entry:
         hint = "" if key == "position" else "Or give `azimuth` and `elevation` in degrees"
@@ -177,6 +187,7 @@ class VehicleData(NamedTuple):
     size: NDArray | None  # m
     printed_matrix: NDArray | None  # 6 x N
     water_density: float | None  # kg/m^3
+    angles: dict[str, float]  # degrees, as given, by key
 
     def vehicle(self) -> Vehicle:
         """The vehicle.
@@ -208,6 +219,7 @@ class VehicleData(NamedTuple):
             size=self.size,
             printed_matrix=self.printed_matrix,
             water_density=self.water_density,
+            angles=self.angles,
             **numbers,
         )
 
@@ -250,4 +262,5 @@ def parse(contents: Mapping[str, Any]) -> VehicleData:
         size=vectors.get("size"),
         printed_matrix=printed_matrix(contents, len(positions)),
         water_density=numbers.get("water_density"),
+        angles=angles_of(contents["thrusters"]),
     )

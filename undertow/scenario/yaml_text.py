@@ -21,6 +21,7 @@ from ruamel.yaml.events import (
 from ruamel.yaml.nodes import ScalarNode
 
 from undertow.core.errors import BadInput
+from undertow.scenario.yaml_mistakes import mistake_of
 
 Path_ = tuple[str | int, ...]
 
@@ -100,8 +101,7 @@ class _Composer:
         try:
             yield from self._yaml.parse(text)
         except MarkedYAMLError as error:
-            mark = error.problem_mark or error.context_mark
-            raise _invalid(error.problem or "malformed", mark.line + 1 if mark else None) from None
+            raise _invalid(*mistake_of(error, text)) from None
         except (YAMLError, ValueError) as error:
             raise _invalid(str(error), None) from None
 
@@ -159,8 +159,8 @@ class _Composer:
                 merged = {**_mergeable(node, line), **merged}
                 continue
             if key in own:
-                found = f'found duplicate key "{key}" with value "{node.value}" (original value: "{own[key].value}")'
-                raise _invalid(found, line)
+                says = f"the key `{key}` is given twice, first in line {lines[key]}"
+                raise _invalid(says, line, "Remove one of them")
             own[key], lines[key] = node, line
         return {**own, **{key: node for key, node in merged.items() if key not in own}}, lines
 
@@ -201,5 +201,5 @@ def _mergeable(node: _Node, line: int) -> dict[str, _Node]:
     return {key: value for one in reversed(several) for key, value in one.value.items()}
 
 
-def _invalid(problem: str, line: int | None) -> Malformed:
-    return Malformed("be valid YAML", f"not: {' '.join(problem.split())}", line)
+def _invalid(problem: str, line: int | None, hint: str = "") -> Malformed:
+    return Malformed("be valid YAML", f"not: {' '.join(problem.split())}", line, hint)

@@ -10,6 +10,8 @@ from undertow.sensors.sensor import AbstractSensor
 class Compass(AbstractSensor):
     """Yaw, rad."""
 
+    fixes = ("yaw",)
+
     def reading(self, motion: Motion):
         return motion.angles[2:]
 

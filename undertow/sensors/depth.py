@@ -10,6 +10,8 @@ _DOWN = slice(2, 3)
 class Depth(AbstractSensor):
     """Down, m. The sensor is at the body origin, and the pressure of waves is neglected."""
 
+    fixes = ("down",)
+
     def reading(self, motion: Motion):
         return motion.position[_DOWN]
 

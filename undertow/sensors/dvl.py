@@ -11,6 +11,8 @@ from undertow.sensors.sensor import AbstractVelocitySensor
 class DVL(AbstractVelocitySensor):
     """u, v, w over the ground, m/s."""
 
+    fixes = ()
+
     def reading(self, motion: Motion):
         return matvec(motion.rotation.T, motion.velocity)
 

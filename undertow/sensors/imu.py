@@ -12,6 +12,8 @@ from undertow.sensors.sensor import AbstractVelocitySensor
 class IMU(AbstractVelocitySensor):
     """Roll, pitch (rad), p, q, r (rad/s), specific force (m/s^2, body axes, the mean since the last step)."""
 
+    fixes = ("roll", "pitch")
+
     def reading(self, motion: Motion):
         return jnp.concatenate([motion.angles[:2], motion.rates, motion.specific_force])
 

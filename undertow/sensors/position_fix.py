@@ -10,6 +10,8 @@ _LEVEL = slice(0, 2)
 class PositionFix(AbstractSensor):
     """North and east, m."""
 
+    fixes = ("north", "east")
+
     def reading(self, motion: Motion):
         return motion.position[_LEVEL]
 

@@ -13,6 +13,8 @@ class PropellerSpeed(AbstractSensor):
         BadInput: the thrusters have no speed that could be measured.
     """
 
+    fixes = ()
+
     def reading(self, motion: Motion):
         if motion.actuator is None:
             hint = "Take fidelity: shaft or electromechanical, on which it is reported, or leave propeller_speed out"

@@ -1,6 +1,7 @@
 """The contract of a sensor."""
 
 import abc
+from typing import ClassVar
 
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -21,6 +22,8 @@ class AbstractSensor(eqx.Module):
 
     sampling: Sampling
     blend: Float[Param, ""] = param("", "share of each new reading in the estimate")
+    # Outputs (north, east, down, roll, pitch, yaw) that it keeps from drifting; None where it does not say.
+    fixes: ClassVar[tuple[str, ...] | None] = None
 
     def __check_init__(self):
         checks.positive("blend", self.blend)

@@ -1,5 +1,7 @@
 """A vehicle for the linter: the numbers as given, before they are validated."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +32,7 @@ class Facts(NamedTuple):
     size: Float[np.ndarray, "3"] | None = None  # m; length, width, height
     printed_matrix: Float[np.ndarray, "6 N"] | None = None  # as in the vehicle's source
     water_density: float | None = None  # kg/m^3
+    angles: Mapping[str, float] = MappingProxyType({})  # degrees; key of a thruster's angle -> value as given
 
     @property
     def displaced_mass(self) -> float:

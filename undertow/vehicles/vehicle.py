@@ -13,6 +13,9 @@ from undertow.core.param import Param, Sources, param, sources_field
 from undertow.core.runtime import double_outside_runs
 from undertow.vehicles.body import Body, rigid_body_mass
 
+_NEAR = 0.1  # share of the largest lever within which a thruster is in the middle
+_UPRIGHT = 0.9  # vertical part of the direction of a thruster that is called vertical
+
 
 class Vehicle(eqx.Module):
     """Hull and thruster layout. Body axes forward, starboard, down; matrices positive.
@@ -70,6 +73,17 @@ class Vehicle(eqx.Module):
     def thrusters(self) -> int:
         """Number N of thrusters."""
         return self.thruster_positions.shape[0]
+
+    def thruster_names(self) -> tuple[str, ...]:
+        """T1, T2, ... with what the pose tells: `T5 vertical bow port` pushes along z, ahead of the origin, to port."""
+        positions, directions = np.asarray(self.thruster_positions), np.asarray(self.thruster_directions)
+        near = _NEAR * max(np.abs(positions).max(), 1e-9)
+        found = []
+        for number, ((x, y, _), direction) in enumerate(zip(positions, directions, strict=True), 1):
+            words = ["vertical"] if abs(direction[2]) > _UPRIGHT else []
+            words += [word for at, word in ((x, "bow"), (-x, "stern"), (-y, "port"), (y, "starboard")) if at > near]
+            found.append(" ".join([f"T{number}", *words]))
+        return tuple(found)
 
     @double_outside_runs
     def mass_matrix(self) -> Float[Array, "6 6"]:

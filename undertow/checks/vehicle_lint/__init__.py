@@ -8,6 +8,7 @@ mirrored (tests/physics/test_mirror.py), creation of energy (tests/physics/test_
 leaks between runs (tests/loop/test_sampled_to_continuous.py: run twice, same bits).
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ import numpy as np
 from undertow.checks.finding import Finding
 from undertow.checks.vehicle_lint import hydrodynamics, layout, mass, statics, transcription
 from undertow.checks.vehicle_lint.layout import scaled
-from undertow.scenario.build import Built
+from undertow.core.contracts import AbstractPlant
+from undertow.scenario.vehicle_schema import angles_of
 from undertow.vehicles.facts import Facts as Facts
 from undertow.vehicles.facts import facts_of as facts_of
 from undertow.vehicles.vehicle import Vehicle
@@ -24,7 +26,9 @@ _RULES = (*mass.RULES, *statics.RULES, *hydrodynamics.RULES, *layout.RULES, *tra
 
 
 def lint(facts: Facts) -> tuple[Finding, ...]:
-    """All errors and advice on a vehicle, errors first."""
+    """All errors and advice on a vehicle, errors first; angles in radians alone, because they cause others."""
+    if units := tuple(layout.degrees(facts)):
+        return units
     findings = [finding for rule in _RULES for finding in rule(facts)]
     return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
 
@@ -56,36 +60,41 @@ def _row(values) -> str:
     return ", ".join(f"{value:.4g}" for value in values)
 
 
-def vehicle_facts(built: Built) -> Facts | None:
-    """Facts of the vehicle of a scenario, with the thrusters that it runs with; None where its plant is no vehicle."""
-    vehicle = getattr(built.closed_loop.plant, "vehicle", None)
+def vehicle_facts(plant: AbstractPlant, description: Mapping[str, Any]) -> Facts | None:
+    """Facts of the vehicle of a plant, with the thrusters that it runs with; None for a plant that is no vehicle.
+
+    Args:
+        plant: of a scenario, as built.
+        description: key `plant` of the scenario with all defaults filled in.
+    """
+    vehicle = getattr(plant, "vehicle", None)
     if not isinstance(vehicle, Vehicle):
         return None
-    plant = built.resolved["plant"]
-    file = plant.get("vehicle", {}).get("contents", {})
+    file = description.get("vehicle", {}).get("contents", {})
     known: dict[str, Any] = {
         key: np.asarray(file[key], dtype=float) for key in ("size", "water_density") if key in file
     }
+    if file:
+        known["angles"] = angles_of(file["thrusters"])
     if "thruster_matrix" in file:
-        running = [number - 1 for number in plant.get("thrusters") or range(1, vehicle.thrusters + 1)]
+        running = [number - 1 for number in description.get("thrusters") or range(1, vehicle.thrusters + 1)]
         known["printed_matrix"] = np.asarray(file["thruster_matrix"], dtype=float)[:, running]
     return facts_of(vehicle)._replace(**known)
 
 
-def vehicle_warnings(built: Built) -> tuple[str, ...]:
-    """A sentence for each impossible property, and for a weight that is not that of the mass.
+_SHOWN = ("gravity", "degrees")  # advice that matters before a run
 
-    The latter results from changing the mass only, in a scenario or from trial to trial.
+
+def vehicle_warnings(plant: AbstractPlant, description: Mapping[str, Any]) -> tuple[str, ...]:
+    """A sentence for each impossible property, for a weight that is not that of the mass, and for angles in radians.
+
+    A weight differs where only the mass is changed, in a scenario or from trial to trial. Arguments as `vehicle_facts`.
     """
-    facts = vehicle_facts(built)
+    facts = vehicle_facts(plant, description)
     findings = () if facts is None else lint(facts)
-    shown = [finding for finding in findings if finding.level == "error" or finding.rule == "gravity"]
-    if _mass_alone(built):
+    shown = [finding for finding in findings if finding.level == "error" or finding.rule in _SHOWN]
+    given = description.get("vehicle", {})
+    if "mass" in given and "weight" not in given:
         stays = "With `mass` alone changed, weight and buoyancy stay: give `weight` and `buoyancy`, too"
         shown = [finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in shown]
     return tuple(f"{finding.says}. {finding.hint}".rstrip(". ") for finding in shown)
-
-
-def _mass_alone(built: Built) -> bool:
-    description = built.resolved["plant"].get("vehicle", {})
-    return "mass" in description and "weight" not in description

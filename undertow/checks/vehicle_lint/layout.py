@@ -9,6 +9,7 @@ from undertow.plants.reachability import open_loop_advice
 from undertow.vehicles.facts import DOF_NAMES, FRESH_WATER, Facts
 
 _ROUNDING = 5e-3
+_STEP = np.pi / 12  # rad; angles of thrusters are multiples of it
 _WORST_CONDITION = 10.0
 _FARTHEST = 5.0  # thruster arm per cube root of the volume; torpedoes have 2
 
@@ -19,6 +20,18 @@ def unit_directions(facts: Facts) -> Iterator[Finding]:
         if not abs(length - 1) < _ROUNDING:
             key = f"thrusters[{j}].direction"
             yield error("direction", key, "have length 1", f"{length:.4g} long", "Divide it by its length")
+
+
+def degrees(facts: Facts) -> Iterator[Finding]:
+    """Angles are in degrees: not all of them are those of a protractor, in radians with three digits."""
+    given = {key: value for key, value in facts.angles.items() if value}
+    steps = {key: value / _STEP for key, value in given.items() if abs(value) <= 2 * np.pi and (2 * value) % 1}
+    if given and len(steps) == len(given) and all(abs(n - round(n)) * _STEP < _ROUNDING for n in steps.values()):
+        key, value = next(iter(given.items()))
+        angle = f"{np.degrees(_STEP) * round(steps[key]):g}"
+        yield advice(
+            "degrees", key, "be in degrees", f"{value:g}, which is {angle} degrees in radians", f"Write {angle}"
+        )
 
 
 def arms(facts: Facts) -> Iterator[Finding]:

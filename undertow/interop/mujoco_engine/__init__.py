@@ -2,13 +2,15 @@
 
 What is MuJoCo's own: the rigid body (mass matrix, Coriolis and centripetal forces), weight, buoyancy, thruster
 geometry, kinematics, integration. What it has not, added mass and damping, is computed here in plain NumPy and applied
-as a force. Nothing of the plant that it is compared with is called. docs/independent-physics.md says what agrees.
+as a force. Nothing of the plant that it is compared with is called. docs/how-to/independent-physics.md says what
+agrees.
 """
 
 import importlib.util
 
 if importlib.util.find_spec("mujoco") is None:
-    raise ModuleNotFoundError("MuJoCo is not installed: pip install 'undertow[mujoco]'", name="mujoco")
+    remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[mujoco]'"
+    raise ModuleNotFoundError(f"MuJoCo is not installed. {remedy}", name="mujoco")
 
 from undertow.interop.mujoco_engine.hydrodynamics import Water as Water
 from undertow.interop.mujoco_engine.mjcf import mjcf as mjcf

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from undertow.report.figures import style
+from undertow.reproduction.ablations.study import unit_of
 
 _COLUMNS, _ROW, _ABOVE, _BELOW = 3, 0.135, 0.3, 0.24  # in
 _WIDTH, _LABELS, _PANEL = 3.16, 1.38, 1.62  # in
@@ -79,7 +80,8 @@ def _panel(panel: Axes, one: Ablation) -> None:
     panel.set_yticks(range(len(names)), names, fontsize=style.TINY - 1)
     panel.set_ylim(len(names) - 0.5, -0.5)
     panel.tick_params(axis="x", labelsize=style.TINY)
-    panel.set_title(f"{one['id']}  {metric.replace('_', ' ')}", fontsize=style.TINY + 0.5, loc="left", y=1, pad=2)
+    title = f"{one['id']}  {metric.replace('_', ' ')}, {style.power(unit_of(metric))}".removesuffix(", ")
+    panel.set_title(title, fontsize=style.TINY + 0.5, loc="left", y=1, pad=2)
 
 
 def _finite(value: float, instead: float) -> float:

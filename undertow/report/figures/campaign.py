@@ -1,7 +1,6 @@
 """Figures of a campaign: empirical distribution functions of the metrics, and rank correlations."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -21,7 +20,7 @@ _SHOWN = (
     "input_variation",
     "saturated_fraction",
 )
-_LOOKS = (
+LOOKS = (
     style.SOLID,
     style.DASHED,
     style.Look("#00785a", "-", 1.7, 4),
@@ -34,6 +33,9 @@ _LOOKS = (
 _COLUMNS = 3
 _WIDE = 100.0  # ratio of largest and smallest from which on an axis is logarithmic
 _DARK = 0.6  # correlations above this have a dark background
+_MOST_INPUTS = 24  # of the matrix of correlations
+_LETTER = 0.058  # in, mean width of a letter in its names
+_HUNDREDTH = 0.005  # what rounds to less is zero
 
 
 def distributions_figure(
@@ -49,7 +51,7 @@ def distributions_figure(
     shown = [name for name in _SHOWN if name in values]
     rows = -(-len(shown) // _COLUMNS)
     names = list(dict.fromkeys(name for each in values.values() for name in each))
-    looks = dict(zip(names, _LOOKS, strict=False))
+    looks = dict(zip(names, LOOKS, strict=False))
     beside = max(1, int(9.4 / (0.8 + 0.065 * max(map(len, looks)))))  # entries of the key in a line
     key = 0.2 * -(-len(looks) // beside) if len(looks) > 1 else 0.0
     figure = style.blank(9.6, 0.35 + key + 2.25 * rows)
@@ -69,29 +71,43 @@ def distributions_figure(
             panel.xaxis.set_minor_formatter(NullFormatter())  # their numbers would run into one another
         panel.set_ylim(0, 1)
         said = [style.power(unit) for unit in units[metric].split(", ") if unit]
-        style.label(panel, ", ".join([metric.replace("_", " "), *said]))
-        panel.xaxis.set_label_coords(0.5, -0.19)  # clear of powers of ten
+        words = ", ".join([metric.replace("_", " "), *said])
+        style.label(panel, words, "" if column else "share of the trials", below=0.27)  # clear of powers of ten
     return figure
 
 
-def sensitivity_figure(found: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Rank correlation of each metric with each parameter, as a matrix.
+def shown_inputs(found: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """Inputs that the figure of the sensitivities shows: the first ones, which are those of `vary`."""
+    return list(found)[:_MOST_INPUTS]
+
+
+def sensitivity_figure(found: Mapping[str, Mapping[str, float]], varied: int) -> Figure:
+    """Rank correlation of each metric (columns) with each input (rows), as a matrix.
 
     Args:
-        found: parameter -> metric -> correlation.
+        found: input -> metric -> correlation.
+        varied: how many of the inputs are keys of `vary`; a line separates them from the rest.
     """
-    metrics = list(dict.fromkeys(metric for each in found.values() for metric in each))
-    lines = 1 + max(key.count(".") for key in found)
-    figure = style.blank(9.6, 0.85 + 0.15 * lines + 0.3 * len(metrics))
-    style.head(figure, "Rank correlation with the varied parameters", {})
-    panel = style.place(figure, 2.2, 0.6, 7.0, 0.3 * len(metrics))
-    field = np.array([[each.get(metric, np.nan) for each in found.values()] for metric in metrics])
+    inputs = shown_inputs(found)
+    metrics = list(dict.fromkeys(metric for name in inputs for metric in found[name]))
+    longest = lambda names: _LETTER * max(map(len, names))
+    left, above = longest(inputs) + 0.2, 0.35 + 0.9 * longest(metrics)
+    wide, tall = max(0.36 * len(metrics), 2.0), 0.24 * len(inputs)
+    figure = style.blank(max(left + wide + 0.6, 6.0), above + tall + 0.15)
+    style.head(figure, "Rank correlation of metrics with inputs", {})
+    panel = style.place(figure, left, above, wide, tall)
+    field = np.array([[found[name].get(metric, np.nan) for metric in metrics] for name in inputs])
     panel.imshow(field, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
     for row, column in np.ndindex(*field.shape):
-        number = field[row, column]
-        ink = "white" if abs(number) > _DARK else "black"
-        panel.text(column, row, f"{number:+.2f}", ha="center", va="center", fontsize=style.SMALL, color=ink)
-    panel.set_xticks(range(len(found)), [key.replace(".", ".\n") for key in found], fontsize=style.SMALL)
-    panel.set_yticks(range(len(metrics)), [metric.replace("_", " ") for metric in metrics], fontsize=style.SMALL)
+        if np.isfinite(number := field[row, column]):
+            ink = "white" if abs(number) > _DARK else "black"
+            said = f"{number:+.2f}".replace("-", "\u2212") if abs(number) >= _HUNDREDTH else "0.00"
+            panel.text(column, row, said, ha="center", va="center", fontsize=style.TINY, color=ink)
+    if 0 < varied < len(inputs):
+        panel.axhline(varied - 0.5, color=style.INK, linewidth=1.2)
+    panel.xaxis.tick_top()
+    words = [metric.replace("_", " ") for metric in metrics]
+    panel.set_xticks(range(len(metrics)), words, fontsize=style.SMALL, rotation=60, ha="left", rotation_mode="anchor")
+    panel.set_yticks(range(len(inputs)), inputs, fontsize=style.SMALL)
     panel.grid(visible=False)
     return figure

@@ -34,7 +34,7 @@ def horizons_figure(rows: Rows, duration: float) -> Figure:
     levels = list(dict.fromkeys(row["level"] for row in rows))
     figure = style.blank(9.6, 4.4)
     style.head(
-        figure, f"{duration:,.0f} s of suite U2 at 1 kHz", dict(_LOOKS.values()) | {"weights within 20": _BOUNDED}
+        figure, f"{duration:.0f} s of suite U2 at 1 kHz", dict(_LOOKS.values()) | {"weights within 20": _BOUNDED}
     )
     for number, level in enumerate(levels):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.62, 1.75, 1.35)
@@ -63,7 +63,7 @@ def _growth(panel: Axes, rows: Rows) -> None:
         if not row["lasted"]:
             at = max(row["ended"], time[-1]), min(peak[-1], _TOP)
             panel.plot(*at, "X", color=look.colour, markersize=6, zorder=5, clip_on=False)
-    panel.set_ylim(1.0, _TOP)
+    panel.set_ylim(1.0, 3 * _TOP)  # room for the crosses
 
 
 def _survival(panel: Axes, rows: Rows, duration: float) -> None:

@@ -7,6 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator
 
 from undertow.report.figures import style
+from undertow.report.formats import plain
+
+_SMALL, _LARGE = 1e-2, 1e5  # outside of these tick labels are long
 
 Named = Sequence[tuple[str, np.ndarray, np.ndarray]]  # name, time, values
 
@@ -20,14 +23,26 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
     margin = 0.08 * (high - low) or 0.08 * max(abs(high), 1e-12)
     low, high = low - margin, high + margin
     panel.set_ylim(low, high)
+    _shorten(panel)
     beyond = []
     for name, _, values in series:
         outside = np.where(np.isfinite(values), np.maximum(values - high, low - values), -np.inf)
         if outside.size and outside.max() > 0:
-            beyond.append(f"{name} to {values[outside.argmax()]:.3g}")
+            beyond.append(f"{name} to {plain(values[outside.argmax()])}")
     if beyond:
         said = f"first {start:.2g} s: {', '.join(beyond)}"
         style.note(panel, said, (1, 1), (0, 2), color=style.INK, ha="right", va="bottom")
+
+
+def _shorten(panel: Axes) -> None:
+    """Powers of ten of tick labels that would reach into the label of the axis become part of its unit."""
+    size = max(map(abs, panel.get_ylim()))
+    if _SMALL <= size < _LARGE:
+        return
+    power = 3 * int(np.floor(np.log10(size) / 3))
+    quantity, _, unit = panel.get_ylabel().rpartition(", ")
+    panel.set_ylabel(f"{quantity}, $10^{{{power}}}$ {unit}")
+    panel.yaxis.set_major_formatter(lambda value, _: f"{value / 10.0**power:.4g}".replace("-", "\u2212"))
 
 
 def fit_log(panel: Axes, series: Named, start: float) -> None:

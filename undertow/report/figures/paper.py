@@ -104,7 +104,7 @@ def effort(title: str, runs: Controllers) -> Figure:
     labels = recorded.per_input(first, "voltage")
     return small_multiples(
         title,
-        [f"thruster {number}" for number in first["actuator"].values],
+        recorded.input_names(first),
         [
             Block(curves, labels, height=0.95, window=(0.0, start), titled=True),
             Block(curves, labels, height=0.95, width=2.1, window=(start, end)),

@@ -7,11 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from undertow.core.contracts import AbstractPlant
+from undertow.loop.dataset import input_names
 from undertow.prediction.predict import Prediction
 from undertow.report.figures import style
 
 _MARKS = ("o", "s", "^")
 _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#7a5c00")
+_FORWARD, _REVERSE = style.Look(style.INK, "-", 1.4, 3), style.Look(style.INK, (0, (4, 1.6)), 1.4, 3)
 _DASHES = ("-", (0, (4, 1.6)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (2, 1)), (0, (8, 2)))
 
 
@@ -29,7 +32,7 @@ def _poles(prediction: Prediction) -> Figure:
     panel = style.place(figure, 0.75, 0.55, 8.6, 3.1)
     for point, mark, colour in zip(prediction.points, _MARKS, _COLOURS, strict=False):
         marked: Any = {"color": colour, "markerfacecolor": "none", "markersize": 5.5}
-        words = f"{point.share:.0%} quantile of the load"
+        words = f"{100 * point.share:.0f} % quantile of the load"
         panel.plot(np.real(point.poles), np.imag(point.poles), mark, **marked, label=words)
     panel.set_xscale("symlog", linthresh=1.0, linscale=0.5)
     panel.set_yscale("symlog", linthresh=1.0, linscale=0.5)
@@ -37,23 +40,22 @@ def _poles(prediction: Prediction) -> Figure:
     panel.set_xlim(right=1.3 * right)
     panel.axvspan(0, 1.3 * right, color="#fbe3df", zorder=0)
     style.note(panel, "unstable", (1.0, 1.0), (-3, -3), ha="right", va="top", fontsize=style.SMALL)
-    panel.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
+    panel.legend(fontsize=style.SMALL, loc="best", framealpha=1.0)
     style.label(panel, "real part, 1/s", "imaginary part, rad/s")
     return figure
 
 
 def _frequency(prediction: Prediction) -> Figure:
     figure = style.blank(9.6, 3.7)
-    style.head(figure, "Frequency response to a disturbance", {})
+    names = prediction.operating_point.built.closed_loop.plant.outputs
+    looks = {name: style.Look(_COLOURS[i % 6], _DASHES[i % 6], 1.2, 3) for i, name in enumerate(names)}
+    style.head(figure, "Frequency response to a disturbance", looks)
     error = _log(figure, 0.75)
     missed = _log(figure, 5.55)
-    names = prediction.operating_point.built.closed_loop.plant.outputs
-    for i, name in enumerate(names):
-        look = {"color": _COLOURS[i % 6], "linestyle": _DASHES[i % 6], "linewidth": 1.2, "label": name}
-        error.plot(prediction.frequency, np.maximum(prediction.error[:, i], 1e-12), **look)
-        missed.plot(prediction.frequency, np.maximum(prediction.estimation[:, i], 1e-12), **look)
+    for i, look in enumerate(looks.values()):
+        error.plot(prediction.frequency, np.maximum(prediction.error[:, i], 1e-12), **look.line)
+        missed.plot(prediction.frequency, np.maximum(prediction.estimation[:, i], 1e-12), **look.line)
     missed.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
-    error.legend(fontsize=style.SMALL, frameon=False, ncols=2, loc="lower center")
     style.label(error, "frequency of d, rad/s", "|e| / |d|, s$^2$", "tracking error")
     style.label(
         missed,
@@ -65,22 +67,29 @@ def _frequency(prediction: Prediction) -> Figure:
 
 
 def _actuators(prediction: Prediction) -> Figure:
-    authority = prediction.authority
+    authority, plant = prediction.authority, prediction.operating_point.built.closed_loop.plant
+    looks = {"largest demand": style.SOLID, "forward limit": _FORWARD, "reverse limit": _REVERSE}
     figure = style.blank(9.6, 2.9)
-    style.head(figure, "Largest force demanded from each actuator, and its limits", {})
+    style.head(figure, "Largest force demanded from each actuator, and its limits", looks)
     panel = style.place(figure, 0.75, 0.55, 8.6, 1.85)
     number = np.arange(1, len(authority.demand) + 1)
-    panel.bar(number, authority.demand, width=0.5, color=style.SOLID.colour, label="largest demand")
-    for side, dashes, what in (
-        (authority.high, "-", "forward limit"),
-        (-authority.low, (0, (4, 1.6)), "reverse limit"),
-    ):
-        panel.hlines(side, number - 0.38, number + 0.38, color=style.INK, linestyle=dashes, linewidth=1.4, label=what)
-    panel.set_xticks(number)
-    panel.set_ylim(0, 1.25 * max(authority.demand.max(), np.max(authority.high[np.isfinite(authority.high)])))
-    panel.legend(fontsize=style.SMALL, frameon=False, ncols=3, loc="upper center")
-    style.label(panel, "actuator", "force")
+    panel.bar(number, authority.demand, width=0.5, color=style.SOLID.colour)
+    for side, look in ((authority.high, _FORWARD), (-authority.low, _REVERSE)):
+        panel.hlines(side, number - 0.38, number + 0.38, color=look.colour, linestyle=look.dashes, linewidth=1.4)
+    panel.set_xticks(number, [_stacked(name) for name in input_names(plant)])
+    panel.set_ylim(0, 1.1 * max(authority.demand.max(), np.max(authority.high[np.isfinite(authority.high)])))
+    style.label(panel, "", force_label(plant))
     return figure
+
+
+def force_label(plant: AbstractPlant) -> str:
+    """`force`, with its unit where it is that of thrusters."""
+    return "force, N" if hasattr(plant, "vehicle") else "force"
+
+
+def _stacked(name: str) -> str:
+    """A name in lines: number, `vertical`, place."""
+    return name.replace(" ", "\n", 2 if "vertical" in name else 1)
 
 
 def _log(figure: Figure, left: float) -> Axes:

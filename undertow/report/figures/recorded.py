@@ -12,6 +12,12 @@ def axis_names(run: xr.Dataset) -> list[str]:
     return [str(name) for name in run["axis"].values]
 
 
+def input_names(run: xr.Dataset) -> list[str]:
+    """Names of the inputs: T1 bow port, ...; numbers in the results of earlier versions."""
+    names = run["actuator"].attrs.get("names")
+    return names.split(", ") if names else [f"input {number}" for number in run["actuator"].values]
+
+
 def places(run: xr.Dataset) -> list[str]:
     """Label of the position on each axis: a position or an angle."""
     return [label.replace("position, rad", "angle, rad") for label in per_axis(run, "position")]

@@ -27,7 +27,7 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
 def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a run, by name."""
     outputs = recorded.axis_names(run)
-    inputs = [f"input {number}" for number in run["actuator"].values]
+    inputs = recorded.input_names(run)
     desired = recorded.curve(run, "desired $x_d$", "reference", style.TRUTH)
     actual = recorded.curve(run, "actual $x$", "position", style.SOLID)
     error = recorded.magnitude(recorded.curve(run, "|$x_d - x$|", "error", style.SOLID))

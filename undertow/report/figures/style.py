@@ -3,6 +3,7 @@
 Only matplotlib's objects are used, never pyplot, and no setting of matplotlib is changed: two threads may plot at once.
 """
 
+import re
 from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
@@ -14,7 +15,7 @@ from matplotlib.transforms import ScaledTranslation, Transform
 
 TEXT, SMALL, TINY = 8.0, 7.0, 6.2  # pt
 INK, FAINT = "#222222", "#d9d9d9"
-_STEPS = (1, 2, 2.5, 5, 10)  # between ticks
+STEPS = (1, 2, 2.5, 5, 10)  # between ticks
 
 
 class Look(NamedTuple):
@@ -52,8 +53,8 @@ def place(figure: Figure, left: float, top: float, width: float, height: float) 
     panel.tick_params(which="both", left=False, bottom=False, labelsize=SMALL, labelcolor=INK, pad=3)
     panel.grid(True, color=FAINT, linewidth=0.5)
     panel.set_axisbelow(True)
-    panel.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 0.4)), steps=_STEPS))
-    panel.yaxis.set_major_locator(MaxNLocator(4, steps=_STEPS))
+    panel.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 0.4)), steps=STEPS))
+    panel.yaxis.set_major_locator(MaxNLocator(4, steps=STEPS))
     for side, spine in panel.spines.items():
         spine.set_visible(side in ("left", "bottom"))
         spine.set_linewidth(0.6)
@@ -67,12 +68,15 @@ def few_log_ticks(*axes: Axis, most: int = 5) -> None:
         axis.set_minor_locator(NullLocator())
 
 
-def label(panel: Axes, x: str = "", y: str = "", title: str = "", size: float = TEXT) -> None:
-    """Axis labels, with units, and a title at the upper left of a panel, at fixed distances from it."""
+def label(panel: Axes, x: str = "", y: str = "", title: str = "", size: float = TEXT, below: float = 0.2) -> None:
+    """Axis labels, with units, and a title at the upper left of a panel, at fixed distances from it.
+
+    `below` is that of the x label, in.
+    """
     panel.set_xlabel(x, fontsize=SMALL, color=INK)
     panel.set_ylabel(y, fontsize=SMALL, color=INK)
     # Without coordinates of their own the labels would be moved clear of the tick labels: most of the plotting time.
-    panel.xaxis.set_label_coords(0.5, 0, transform=_shifted(panel, 0, -0.2))
+    panel.xaxis.set_label_coords(0.5, 0, transform=_shifted(panel, 0, -below))
     panel.yaxis.set_label_coords(0, 0.5, transform=_shifted(panel, -0.42, 0))
     panel.set_title(title, fontsize=size, color=INK, loc="left", fontweight="bold", y=1, pad=3)
 
@@ -119,6 +123,5 @@ def note(panel: Axes, text: str, at: tuple[float, float], shift: tuple[float, fl
 
 
 def power(unit: str) -> str:
-    """A unit as matplotlib typesets it: m/s^2 with a raised 2."""
-    base, _, exponent = unit.partition("^")
-    return f"{base}$^{exponent}$" if exponent else unit
+    """A unit, or several, as matplotlib typesets it: m/s^2 with a raised 2."""
+    return re.sub(r"\^(\d)", r"$^\1$", unit)

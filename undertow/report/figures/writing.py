@@ -1,4 +1,4 @@
-"""Writes figures as SVG and PNG files, with the same bytes for the same figure."""
+"""Writes figures as SVG, PNG and PDF files, with the same bytes for the same figure."""
 
 import io
 import re
@@ -9,21 +9,25 @@ from typing import NamedTuple
 
 import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from undertow.core.user_code import python_says
+from undertow.report.figures.one_column import one_column
 
 DOTS_PER_INCH = 150
 
 # By default matplotlib salts names inside an SVG at random. Only settings that are read while writing may be set here:
 # another thread may be making a figure at the same time.
-_SETTINGS = {"svg.hashsalt": "undertow", "svg.fonttype": "path"}
+_SETTINGS = {"svg.hashsalt": "undertow", "svg.fonttype": "path", "pdf.fonttype": 42}
 _WRITING = threading.Lock()
 
 _PATH = re.compile(r'( d=")([^"]+)(")')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
 
+
+PDF_WIDTHS = ("wide", "one-column")  # as on the page, or rearranged for one column of a printed page
 
 Plots = Mapping[str, Callable[[], Figure]]  # functions that make the figures, by name
 
@@ -56,8 +60,18 @@ def png(figure: Figure) -> bytes:
     return data.getvalue()
 
 
-def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
-    """Write `name.svg` and `name.png` into a folder, which is made if need be.
+def pdf(figure: Figure) -> bytes:
+    """The figure as PDF, without date, with text as TrueType fonts."""
+    data = io.BytesIO()
+    with _WRITING, matplotlib.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType] - keys of Matplotlib
+        FigureCanvasPdf(figure).print_pdf(data, metadata={"CreationDate": None, "Creator": "undertow"})
+    return data.getvalue()
+
+
+def save(figure: Figure, folder: Path, name: str, width: str | None = None) -> tuple[Path, Path]:
+    """Write `name.svg` and `name.png` into a folder, which is made if need be; and `name.pdf` where a width is given.
+
+    A PDF of one column rearranges the figure itself.
 
     Raises:
         OSError: the folder cannot be written.
@@ -66,15 +80,18 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     vector, raster = folder / f"{name}.svg", folder / f"{name}.png"
     vector.write_text(svg(figure), encoding="utf-8")
     raster.write_bytes(png(figure))
+    if width is not None:
+        (folder / f"{name}.pdf").write_bytes(pdf(one_column(figure) if width == "one-column" else figure))
     return vector, raster
 
 
-def save_all(plots: Callable[[], Plots], folder: Path) -> Saved:
+def save_all(plots: Callable[[], Plots], folder: Path, width: str | None = None) -> Saved:
     """Make and write figures. A failed figure affects neither the others nor the results.
 
     Args:
         plots: gives the functions that make the figures, by name.
         folder: created if missing.
+        width: of PDF files; None for none.
     """
     saved = Saved({}, [])
     try:
@@ -84,7 +101,7 @@ def save_all(plots: Callable[[], Plots], folder: Path) -> Saved:
         return saved
     for name, make in makers.items():
         try:
-            saved.vectors[name], _ = save(make(), folder, name)
+            saved.vectors[name], _ = save(make(), folder, name, width)
         except Exception as error:
             saved.failures.append(f"figure `{name}` could not be made ({python_says(error)}); the results are complete")
     return saved

@@ -2,9 +2,10 @@
 
 from typing import Any
 
-from undertow.report.formats import number
+from undertow.report.formats import number, prose
 from undertow.report.mathml import mathml
 from undertow.report.page import Html, join
+from undertow.reproduction.all_outputs import unit_of
 
 
 def captions(results: dict[str, Any]) -> dict[str, Html]:
@@ -43,8 +44,8 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
             "The left panels show the first second, the right panels the rest, on separate scales. The start demands "
             "voltages that no supply gives. After it both controllers need the same voltage, because they counteract "
             "the same disturbance.",
-            _pair(one, "input_peak", "Largest voltage, V", "whole"),
-            _pair(one, "input_variation", "Variation after 10 s, V/s"),
+            _pair(one, "input_peak", "Largest voltage", "whole"),
+            _pair(one, "input_variation", "Variation after 10 s"),
         ),
         "fig10": join(
             "Without speed sensors, with a motor in its steady state at every instant, RCAFC tracks nearly as in "
@@ -64,7 +65,7 @@ def captions(results: dict[str, Any]) -> dict[str, Html]:
             _single(two, "estimation_rms", "Rms error of the estimate"),
         ),
         "fig13": join(
-            "As Fig. 9, for RCAFC without speed sensors.", _single(two, "input_peak", "Largest voltage, V", "whole")
+            "As Fig. 9, for RCAFC without speed sensors.", _single(two, "input_peak", "Largest voltage", "whole")
         ),
         "fidelity": join(
             "The controllers of Table 1 on four fidelity levels of the same thruster. A cross marks a run that ended "
@@ -82,12 +83,16 @@ def _pair(example: dict[str, Any], metric: str, what: str, window: str = "steady
     rcafc, rafc = (_metric(example, key, metric, window) for key in ("rcafc", "rafc"))
     if rcafc is None or rafc is None:
         return Html("")
-    return join(f" {what}: RCAFC ", number(rcafc), ", RAFC ", number(rafc), ".")
+    return join(f" {what}: RCAFC ", number(rcafc), ", RAFC ", _with_unit(rafc, metric), ".")
 
 
 def _single(example: dict[str, Any], metric: str, what: str, window: str = "steady") -> Html:
     rcafc = _metric(example, "rcafc", metric, window)
-    return Html("") if rcafc is None else join(f" {what}: ", number(rcafc), ".")
+    return Html("") if rcafc is None else join(f" {what}: ", _with_unit(rcafc, metric), ".")
+
+
+def _with_unit(value: float, metric: str) -> Html:
+    return join(number(value), Html("&nbsp;"), prose(unit_of(metric).replace(", ", " and ")))
 
 
 def _metric(example: dict[str, Any], key: str, metric: str, window: str) -> float | None:

@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from undertow.report.formats import number, prose, round_time
+from undertow.report.formats import CRITERION, number, outcome, prose, round_time, unit
 from undertow.report.page import Html, join, table, tag
+from undertow.reproduction.all_outputs import unit_of
 
 CAPTIONS = {
     "horizons": prose(
@@ -49,12 +50,13 @@ def horizon_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> 
 
 def _horizons(found: Mapping[str, Any]) -> list[Html]:
     text = (
-        f"The same fidelity levels for {found['duration']:,.0f} s of suite U2, which repeats U1 every 20 s (U1 itself "
+        f"The same fidelity levels for {found['duration']:.0f} s of suite U2, which repeats U1 every 20 s (U1 itself "
         "cannot be continued, because its chirp keeps rising), sampled at 1 kHz. Each controller runs with free "
         "weights and with weights bounded by 20 m/s^2 or rad/s^2. Metrics are computed over three windows, chattering "
         "from every sample."
     )
-    return [tag("h3", f"Long runs: {found['duration']:,.0f} s"), tag("p", prose(text))]
+    colours = f"{CRITERION} The window is the last one that the run reached."
+    return [tag("h3", f"Long runs: {found['duration']:.0f} s"), tag("p", prose(text)), tag("p", prose(colours))]
 
 
 def _table(found: Mapping[str, Any]) -> Html:
@@ -72,12 +74,12 @@ def _lags(rows: Sequence[Mapping[str, Any]], windows: Sequence[Sequence[float]])
     """One row per run of the map, with the prediction for drifted weights beside five sets."""
     shown = []
     for row in rows:
-        unit = "ms" if row["kind"] == "lag" else "mH"
-        behind = f"{'lag' if row['kind'] == 'lag' else 'winding'} {1e3 * row['value']:g} {unit}"
+        size = f"{1e3 * row['value']:g}"
+        behind = f"lag {size} ms" if row["kind"] == "lag" else f"winding {size} mH"
         between = row["damping"]
         theory = "" if row["law"] != "five" else "never" if between is None else _between(between)
-        shown.append((behind, row["words"], theory, _ended(row), *_by_window(row, windows)))
-    return _wide(("behind", "controller", "stable for c, 1/s", "status"), windows, shown)
+        shown.append((prose(behind), row["words"], theory, _ended(row), *_by_window(row, windows)))
+    return _wide(("behind", "controller", join("stable for c, ", unit("1/s")), "status"), windows, shown)
 
 
 def _between(gains: Sequence[float]) -> str:
@@ -88,7 +90,7 @@ def _between(gains: Sequence[float]) -> str:
 def _ended(row: Mapping[str, Any]) -> Html:
     word = str(row["status"]).replace("_", " ")
     text = f"lasts {row['ended']:g} s" if row["lasted"] else f"{word} at {round_time(row['ended'])} s"
-    return tag("span", text, class_=f"chip {'holds' if row['lasted'] else 'fails'}")
+    return outcome(text, row["lasted"], row["within"])
 
 
 def _by_window(row: Mapping[str, Any], windows: Sequence[Sequence[float]]) -> list[Html]:
@@ -97,6 +99,7 @@ def _by_window(row: Mapping[str, Any], windows: Sequence[Sequence[float]]) -> li
 
 
 def _wide(head: Sequence[str], windows: Sequence[Sequence[float]], rows: Sequence[Sequence[Any]]) -> Html:
-    names = ("tracking rms", "variation, V/s", "largest weight")
-    titles = [join(name, tag("div", f"{a:g} to {b:g} s", class_="small")) for name in names for a, b in windows]
+    names = {"tracking rms": "tracking_rms", "variation": "input_variation", "largest weight": "weights_peak"}
+    over = [tag("div", Html(f"{a:g} to {b:g}&nbsp;s"), class_="small") for a, b in windows]
+    titles = [join(name, " ", unit(unit_of(metric)), when) for name, metric in names.items() for when in over]
     return table((*head, *titles), rows, numeric=range(len(head), len(head) + len(titles)), wide=True)

@@ -1,4 +1,4 @@
-"""The report of `undertow reproduce`: one self-contained page, and the figures as files."""
+"""The report of `undertow reproduce`: two self-contained pages, and the figures as files."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +12,9 @@ from undertow.report.figures.fidelity import fidelity_figure, robust_fidelity_fi
 from undertow.report.figures.horizons import horizons_figure
 from undertow.report.figures.lags import drifting_figure, lags_figure
 from undertow.report.figures.writing import save
-from undertow.report.formats import prose
+from undertow.report.formats import CRITERION, prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
-from undertow.report.reproduction import horizon_section, tables
+from undertow.report.reproduction import ablations_page, horizon_section, tables
 from undertow.report.reproduction.background import ASSUMED, INTRODUCTION, LEFT_OPEN
 from undertow.report.reproduction.captions import captions
 from undertow.report.reproduction.robust_section import CAPTIONS, TITLE, robust_section
@@ -26,28 +26,36 @@ _TITLE = "Reproduction of the paper and check of its claims"
 _ELSEWHERE = ("fidelity", "sweep", *horizon_section.CAPTIONS, *CAPTIONS)
 
 
-def write_report(results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path) -> Path:
-    """Write `report.html`, and every figure as SVG and PNG into `figures/`.
+def write_report(
+    results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path, pdf: str | None = None
+) -> Path:
+    """Write `report.html`, `ablations.html` if they were run, and every figure into `figures/`.
 
     Args:
         results: contents of results.json; missing parts are left out of the page.
         figures: by name: fig02, fig06, ..., fig13, fidelity, sweep; others are shown after the paper's.
         folder: where to write, created if missing.
+        pdf: width of PDF files; None for none.
 
     Returns:
-        The page.
+        The first page.
 
     Raises:
         OSError: the folder cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     texts = captions(dict(results)) | horizon_section.CAPTIONS | CAPTIONS
+    texts |= {"ablations": ablations_page.CAPTION}
     shown = {}
     for name, one in figures.items():
-        vector, _ = save(one, folder / "figures", name)
-        shown[name] = figure(vector.read_text(encoding="utf-8"), name, _alternative(one, name), texts.get(name, name))
-    page = folder / "report.html"
+        alternative = _alternative(one, name)
+        vector, _ = save(one, folder / "figures", name, pdf)
+        shown[name] = figure(vector.read_text(encoding="utf-8"), name, alternative, texts.get(name, name))
+    page, overview = folder / "report.html", shown.pop("ablations", Html(""))
     page.write_text(document(_TITLE, *_content(results, shown)), encoding="utf-8")
+    if robust := results.get("robust_variant"):
+        second = ablations_page.ablations_page(robust, overview, page.name)
+        (folder / ablations_page.NAME).write_text(second, encoding="utf-8")
     return page
 
 
@@ -63,8 +71,10 @@ def _content(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Ht
         "provenance": ("Provenance", _provenance(results)),
     }
     shown = {name: (title, content) for name, (title, content) in parts.items() if content}
-    links = tag("nav", *(tag("a", title, href=f"#{name}") for name, (title, _) in shown.items()))
-    first = [tag("h1", _TITLE), tag("p", INTRODUCTION, class_="lead"), links]
+    links = [tag("a", title, href=f"#{name}") for name, (title, _) in shown.items()]
+    if "robust_variant" in shown:
+        links.insert(-2, tag("a", "Ablations", href=ablations_page.NAME))
+    first = [tag("h1", _TITLE), tag("p", INTRODUCTION, class_="lead"), tag("nav", *links)]
     verdicts = tag("div", tag("h3", "Summary of the verdicts"), tables.glance(claims)) if claims else Html("")
     assumed = tag("div", tag("h3", "Assumptions"), bullets(ASSUMED), class_="assumed")
     first.append(tag("div", verdicts, assumed, class_="first"))
@@ -104,12 +114,12 @@ def _fidelity(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[H
         return []
     text = (
         "Both controllers, with the gains of Table 1, control the same vehicle under the same disturbance on four "
-        "fidelity levels of the thruster model. First, 20 s of U1 as one differential equation, with tracking rms in m "
-        "and rad and estimation rms in m/s^2 and rad/s^2 from 10 s to 20 s. A run that completes 20 s can still "
-        "diverge later."
+        "fidelity levels of the thruster model. First, 20 s of U1 as one differential equation, with metrics from 10 s "
+        "to 20 s. A run that completes 20 s can still diverge later."
     )
     return [
         tag("p", prose(text)),
+        tag("p", prose(CRITERION)),
         figures.get("fidelity", Html("")),
         tables.fidelity_levels(results["fidelity"]),
         *horizon_section.horizon_section(results, figures),
@@ -123,7 +133,7 @@ def _audit(claims: list[dict[str, Any]], figures: Mapping[str, Html]) -> list[Ht
         "Each verdict names the run behind it, with the fidelity levels and the simulated time. It does not extend "
         "beyond these. Run the commands in the folder of this page."
     )
-    return [tag("p", prose(text)), tables.audit(claims), figures.get("sweep", Html(""))]
+    return [tag("p", prose(text)), tag("p", tables.COLOURS), tables.audit(claims), figures.get("sweep", Html(""))]
 
 
 def _left_open() -> list[Html]:
@@ -141,13 +151,13 @@ def _alternative(one: Figure, name: str) -> str:
     return one.texts[0].get_text() if one.texts else name
 
 
-def write(found: Reproduction, folder: Path) -> Path:
-    """Write `report.html` and `figures/`; returns the page.
+def write(found: Reproduction, folder: Path, pdf: str | None = None) -> Path:
+    """Write the pages and `figures/`; returns the first page.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    return write_report(found.results, make_figures(found), folder)
+    return write_report(found.results, make_figures(found), folder, pdf)
 
 
 def make_figures(found: Reproduction) -> dict[str, Figure]:

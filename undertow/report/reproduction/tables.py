@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from undertow.report.formats import chip, condition, ending, number, percent, prose, unit
+from undertow.report.formats import chip, condition, ending, number, outcome, percent, prose, unit, within
 from undertow.report.page import Html, join, table, tag
 from undertow.reproduction.all_outputs import unit_of
 
@@ -11,6 +11,11 @@ REFERENCE = {
     "rcafc": {"tracking_rms": 1.6e-4, "estimation_rms": 0.201, "uncertainty_rms": 3.224, "robust_rms": 0.144},
     "rafc": {"tracking_rms": 7.22e-3, "estimation_rms": 1.607, "uncertainty_rms": 3.224, "robust_rms": 1.579},
 }
+
+COLOURS = (
+    "Green: the claim holds in the runs named with it. Amber: it holds under the stated condition only. Red: it fails. "
+    "Grey: these runs do not decide it."
+)
 
 NAMES = {"rcafc": "RCAFC", "rafc": "RAFC"}
 
@@ -80,10 +85,11 @@ def fidelity_levels(results: dict[str, Any]) -> Html:
             figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "input_variation")]
             lasted = entry["status"] == "completed"
             words = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
-            ended = tag("span", words, class_=f"chip {'holds' if lasted else 'fails'}")
+            ended = outcome(words, lasted, within(entry["steady"]))
             place = join(tag("b", fidelity), tag("span", _LEVELS.get(fidelity, ""), class_="said"))
             rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
-    head = ("fidelity", "controller", "status", "tracking rms", "estimation rms", "voltage variation, V/s", "reason")
+    metrics = map(_named, ("tracking_rms", "estimation_rms", "input_variation"))
+    head = ("fidelity", "controller", "status", *metrics, "reason")
     return table(head, rows, numeric=(3, 4, 5), wide=True)
 
 
@@ -108,7 +114,7 @@ def glance(claims: list[dict[str, Any]]) -> Html:
         simulated = tag("span", prose(f"Simulated: {claim['simulated']}."), class_="said")
         words = join(prose(claim["claim"]), _condition(claim["verdict"]), simulated)
         items.append(tag("li", link, tag("span", chip(claim["verdict"])), tag("span", words)))
-    return tag("ul", *items, class_="verdicts")
+    return join(tag("p", COLOURS, class_="small"), tag("ul", *items, class_="verdicts"))
 
 
 def provenance(results: dict[str, Any]) -> Html:

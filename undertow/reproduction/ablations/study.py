@@ -13,8 +13,8 @@ from undertow.campaign.campaign_summary import median_interval, quantiles
 from undertow.campaign.labels import words
 from undertow.campaign.trials import trials
 from undertow.core.status import Status
+from undertow.reproduction import all_outputs
 from undertow.reproduction.ablations.verdicts import Ablation
-from undertow.reproduction.all_outputs import of_columns
 from undertow.scenario.part_cache import PartCache
 
 QUICK_SEEDS = 8
@@ -57,6 +57,7 @@ def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str
         "agrees": verdict.agrees,
         "answer": verdict.text,
         "left_out": ablation.left_out,
+        "campaigns": list(ablation.campaigns),
         "variants": [{"name": name, **one._asdict()} for name, one in found.items()],
     }
 
@@ -80,12 +81,17 @@ def variants(
     for i, name in enumerate(names):
         own = {key: values[i :: len(names)] for key, values in columns.items()}
         lasted = own["status"] == int(Status.OK)
-        own |= of_columns(own)
+        own |= all_outputs.of_columns(own)
         own["share"] = own["estimation_rms"] / np.where(own["uncertainty_rms"] > 0, own["uncertainty_rms"], np.nan)
         defined = [metric for metric in metrics if not np.isnan(own[metric][lasted]).all() or not lasted.any()]
         kept = {metric: spread(np.where(lasted, own[metric], np.inf)) for metric in defined}
         settings = ", ".join(f"{key}: {words(value)}" for key, value in several.values(i).items())
         yield ", ".join(name), Variant(settings or "Table 1", lasted.size, int((~lasted).sum()), kept)
+
+
+def unit_of(metric: str) -> str:
+    """Unit of a metric of an ablation; `share`, of the uncertainty that the estimate misses, has none."""
+    return "" if metric == "share" else all_outputs.unit_of(metric)
 
 
 def spread(values: np.ndarray) -> dict[str, float]:

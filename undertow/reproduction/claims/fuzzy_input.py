@@ -82,4 +82,4 @@ def _shown(run: BatchResult) -> str:
     found = _metrics(run)
     if found is None:
         return f"ends at {run.ended:.2g} s"
-    return f"{found['estimation_rms']:.3g} ({found['input_variation']:.0f} V/s)"
+    return f"{found['estimation_rms']:.3g} ({found['input_variation']:.3g} V/s)"

@@ -52,7 +52,11 @@ def gain_matrices(runs: Runs, long: Long) -> Finding:
         plant = plant_of(run)
         count, rank = plant.inputs(), plant.rank()
         numbers[key] = error = tracking_error(run)
-        shown = f"ends at {float(run.outcome.ended):.1f} s ({run.status.word})" if error is None else f"{error:.2g}"
+        shown = (
+            f"ends at {float(run.outcome.ended):.1f} s ({run.status.word.replace('_', ' ')})"
+            if error is None
+            else f"{error:.2g}"
+        )
         parts.append(f"{count} thrusters, rank {rank}: {shown}")
         if error is None or error > 10 * everything:
             failed.append((count, rank))

@@ -95,4 +95,8 @@ def _lag(run: Executed) -> float:
 
 def _shown(run: Executed, unit: str) -> str:
     error = tracking_error(run)
-    return f"ends at {float(run.outcome.ended):.2f} s ({run.status.word})" if error is None else f"{error:.2g} {unit}"
+    return (
+        f"ends at {float(run.outcome.ended):.2f} s ({run.status.word.replace('_', ' ')})"
+        if error is None
+        else f"{error:.2g} {unit}"
+    )

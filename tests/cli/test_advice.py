@@ -1,0 +1,111 @@
+"""Advice is true, and the shipped scenarios, which mean what they say, get none of it."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_plausible_mistakes import EXAMPLES, PARTS
+
+import undertow as ut
+from undertow.campaign.campaign_schema import read_campaign
+from undertow.campaign.trials import trials
+from undertow.core.measurement import measurement_of_outputs
+from undertow.navigation.drift import OUTPUTS, drift_advice, drifts
+from undertow.navigation.observer import observer
+from undertow.reproduction import ablations
+from undertow.scenario.build import build
+from undertow.scenario.plausibility import plausibility, top_speed
+from undertow.scenario.reading import read
+from undertow.sensors import compass, depth, dvl, imu, position_fix
+from undertow.thrusters import commanded_thrust, t200
+
+SCENARIOS = [path for path in sorted(EXAMPLES.glob("*.yaml")) if path.stem != "my_rov"]
+ABLATIONS = sorted(next(iter(map(type(EXAMPLES), ablations.__path__))).glob("a*_*.yaml"))
+QUICK = {"controller": {"kind": "pid", "frequency": 1.0}, "navigation": "perfect", "model": {}}
+
+
+def said_of(text):
+    """What is said of the plant, the reference and the disturbance of a scenario, whatever its controller is."""
+    loop = {key: value for key, value in text.data.get("loop", {}).items() if key != "kind"}
+    built = build(text._replace(data=text.data | QUICK | {"loop": loop}), PARTS)
+    return plausibility(built.closed_loop, built.scenario.loop.duration, built.scenario.initial.position)
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_examples_get_no_advice(path):
+    assert said_of(read(path)) == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", ABLATIONS, ids=lambda path: path.stem)
+def test_scenarios_of_the_reproduction_get_no_advice(path):
+    several = trials(*read_campaign(path))
+    for combination in range(len(several.combinations)):
+        assert said_of(several.scenario._replace(data=several.data(combination))) == ()
+
+
+def test_top_speed_of_one_thruster_is_where_its_force_balances_linear_drag():
+    odin = ut.vehicles.odin()
+    plain = eqx.tree_at(lambda v: (v.quadratic_damping, v.buoyancy), odin, (np.zeros((6, 6)), odin.weight))
+    plain = eqx.tree_at(lambda v: v.linear_damping, plain, 20.0 * np.eye(6))
+    plant = ut.HybridVehicle(
+        plain.with_thrusters([1]), commanded_thrust(thrust_forward_max=30.0, thrust_reverse_max=20.0)
+    )
+    assert top_speed(plant) == pytest.approx(30.0 / 20.0, rel=2e-3)
+    heavier = eqx.tree_at(lambda p: p.body.weight, plant, plant.body.weight + 5.0)  # it may also sink
+    assert 30.0 / 20.0 < top_speed(heavier) <= 35.0 / 20.0 * (1 + 1e-9)
+
+
+def test_top_speed_is_unknown_without_limits():
+    assert top_speed(ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3())) == np.inf
+    assert np.isfinite(top_speed(ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), t200())))
+
+
+def test_drift_of_a_heading_is_that_of_the_integrated_rate():
+    sensors = [imu(rate_noise=2e-3, rate_bias=1e-4, period=0.01), dvl(), depth(), position_fix()]
+    expected = np.hypot(2e-3 * np.sqrt(0.01 * 100.0), 1e-4 * 100.0)
+    assert drifts(sensors, 100.0) == {"yaw": pytest.approx(expected)}
+    assert not drifts([*sensors, compass()], 100.0) and not drift_advice([*sensors, compass()], 100.0)
+
+
+def test_drift_of_a_position_without_any_velocity_is_that_of_the_twice_integrated_acceleration():
+    sensors = [imu(angle_noise=0.0, force_noise=0.02, force_bias=1e-3), depth(), compass()]
+    expected = np.hypot(0.02 * np.sqrt(0.01 * 60.0**3 / 3), 1e-3 * 60.0**2 / 2)
+    assert drifts(sensors, 60.0) == {"north and east": pytest.approx(expected)}
+
+
+def test_nothing_is_said_of_sensors_that_do_not_say_what_they_measure():
+    class Unsaid(type(compass())):
+        fixes = None
+
+    assert not drifts([imu(), Unsaid(compass().sampling, 0.05)], 60.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "sensors",
+    [
+        [imu(), dvl(resolution=0.0), depth(), compass()],
+        [imu(), depth(), compass()],
+        [imu(), position_fix(), compass()],
+        [imu(), dvl(), depth(), position_fix()],
+        [imu(angle_bias=2e-3), dvl(bias=2e-3, resolution=0.0), depth(), compass()],
+    ],
+    ids=["dead reckoning", "inertial", "inertial depth", "heading", "biases"],
+)
+def test_drift_is_that_of_the_observer(sensors):
+    """After 60 s of rest, over 64 seeds, whose standard deviation is known to 9 %; without a bias to 3 sigma."""
+    navigation, truth = observer(sensors), measurement_of_outputs(jnp.zeros(6), jnp.zeros(6), None)
+
+    def error(key):
+        path = navigation.realize(key)
+        step = lambda state, k: (navigation.measure(path, state, 0.01 * k, truth)[1], None)
+        last = jax.lax.scan(step, navigation.init(path, truth), jnp.arange(6000.0))[0]
+        return navigation.measure(path, last, jnp.asarray(60.0), truth)[0].position
+
+    errors = np.asarray(jax.jit(jax.vmap(error))(jax.random.split(jax.random.PRNGKey(0), 64)))
+    rms = dict(zip(OUTPUTS, np.sqrt((errors**2).mean(axis=0)), strict=True))
+    for what, drift in drifts(sensors, 60.0).items():
+        for output in what.split(" and "):
+            assert rms[output] == pytest.approx(drift, rel=0.27)

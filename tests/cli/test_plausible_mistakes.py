@@ -1,0 +1,158 @@
+"""Mistakes of a first hour: each is one line that names the place and the remedy, or advice before the run."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from undertow.cli import simulate
+from undertow.core.errors import BadInput
+from undertow.scenario.build import build
+from undertow.scenario.part_cache import PartCache
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+SCENARIO = """\
+plant:
+  vehicle: my_rov.yaml
+  thruster: {kind: t200, fidelity: static, supply: 16}
+controller: {kind: pid, frequency: 1}
+reference: {kind: setpoint, position: [2, 0, 1, 0, 0, 0.5]}
+disturbance:
+  - {kind: current, velocity: [0.3, 0, 0]}
+loop:
+  duration: 20
+  dt: 0.01
+  record: 0.05
+"""
+LAW = """\
+import undertow as ut
+
+
+def my_law(model):
+    return ut.controllers.pid(model, frequency=1.0)
+"""
+CAMPAIGN = "scenario: s.yaml\ntrials: 2\n"
+
+SIMULATE, CHECK = ("simulate", "s.yaml", "--out", "out"), ("check", "my_rov.yaml")
+CONTROLLER = "controller: {kind: pid, frequency: 1}"
+
+# The mistake: what is typed, in which file what is replaced by what, and what the line must have.
+ERRORS = {
+    "tab": (SIMULATE, "s.yaml", "  dt: 0.01", "\tdt: 0.01", ["s.yaml, line 10", "tab", "Indent with spaces"]),
+    "indented too far": (SIMULATE, "s.yaml", "  dt: 0.01", "   dt: 0.01", ["s.yaml, line 10", "same column"]),
+    "indented too little": (SIMULATE, "s.yaml", "  dt: 0.01", " dt: 0.01", ["s.yaml, line 10", "same column"]),
+    "no colon": (SIMULATE, "s.yaml", "  dt: 0.01", "  dt 0.01", ["s.yaml, line 10", "`key: value`"]),
+    "no space after the colon": (SIMULATE, "s.yaml", "  dt: 0.01", "  dt:0.01", ["s.yaml, line 10", "space"]),
+    "bracket": (SIMULATE, "s.yaml", "0, 0.5]}", "0, 0.5}", ["s.yaml, line 5", "`[` is not closed", "Add `]`"]),
+    "same key twice": (SIMULATE, "s.yaml", "  dt: 0.01", "  duration: 5", ["s.yaml, line 10", "`duration`", "line 9"]),
+    "vehicle file to simulate": (("simulate", "my_rov.yaml"), "", "", "", ["my_rov.yaml", "`plant: {vehicle: my_rov.yaml}`"]),
+    "campaign to simulate": (("simulate", "c.yaml"), "", "", "", ["c.yaml, a campaign", "undertow campaign c.yaml"]),
+    "scenario to campaign": (("campaign", "s.yaml"), "", "", "", ["s.yaml, a scenario", "undertow simulate s.yaml"]),
+    "vehicle file to campaign": (("campaign", "my_rov.yaml"), "", "", "", ["my_rov.yaml, a vehicle file"]),
+    "scenario as the vehicle": (SIMULATE, "s.yaml", "vehicle: my_rov.yaml", "vehicle: other.yaml", ["s.yaml, line 2", "other.yaml, a scenario"]),
+    "text file": (("simulate", "notes.txt"), "", "", "", ["notes.txt", "notes.yaml"]),
+    "folder": (("check", "."), "", "", "", [".", "a folder", "my_rov.yaml", "s.yaml"]),
+    "folder to simulate": (("simulate", "."), "", "", "", [".", "a folder", "my_rov.yaml", "s.yaml"]),
+    "missing file": (("simulate", "my_rv.yaml"), "", "", "", ["my_rv.yaml", "`my_rov.yaml`"]),
+    "ending left out": (("simulate", "my_rov"), "", "", "", ["my_rov", "`my_rov.yaml`"]),
+    "missing folder": (("simulate", "there/s.yaml"), "", "", "", ["there/s.yaml", "folder there does not exist"]),
+    "empty file": (("simulate", "empty.yaml"), "", "", "", ["empty.yaml", "empty", "`undertow describe scenario`"]),
+    "binary file": (("simulate", "binary.yaml"), "", "", "", ["binary.yaml", "UTF-8"]),
+    "misspelt command": (("simulte", "s.yaml"), "", "", "", ["simulte", "Did you mean 'simulate'?"]),
+    "misspelt option": (("simulate", "s.yaml", "--overwite"), "", "", "", ["--overwite", "--overwrite"]),
+    "misspelt key": (SIMULATE, "s.yaml", "controller:", "contoller:", ["`contoller`", "s.yaml, line 4", "`controller`"]),
+    "key in no section": (SIMULATE, "s.yaml", "  record: 0.05", "record: 0.05", ["`record`", "s.yaml, line 11", "`loop: {record: ...}`"]),
+    "vehicle in no section": (SIMULATE, "s.yaml", CONTROLLER, "vehicle: odin", ["`vehicle`", "s.yaml, line 4", "`plant`"]),
+    "capital letters": (SIMULATE, "s.yaml", "kind: t200", "kind: T200", ["`plant.thruster.kind`", "s.yaml, line 3", "`t200`"]),
+    "capital letters of a vehicle": (SIMULATE, "s.yaml", "my_rov.yaml", "BlueROV2", ["s.yaml, line 2", "`bluerov2`"]),
+    "unknown preset": (SIMULATE, "s.yaml", CONTROLLER, "controller: {kind: rcaf, preset: fast}", ["`controller.preset`", "s.yaml, line 4", "paper, robust"]),
+    "disturbance in a list": (SIMULATE, "s.yaml", "kind: current", "kind: curent", ["`disturbance[0].kind`", "s.yaml, line 7", "`current`"]),
+    "unit in a number": (SIMULATE, "s.yaml", "duration: 20", "duration: 20s", ["`loop.duration`", "s.yaml, line 9", "number alone"]),
+    "decimal comma": (SIMULATE, "s.yaml", "dt: 0.01", "dt: 0,01", ["`loop.dt`", "s.yaml, line 10", "decimal point: 0.01"]),
+    "number as text": (SIMULATE, "s.yaml", "dt: 0.01", "dt: '0.01'", ["`loop.dt`", "s.yaml, line 10", "without quotes: 0.01"]),
+    "fraction of pi": (SIMULATE, "s.yaml", "0, 0.5]", "0, pi/2]", ["`reference.position`", "s.yaml, line 5", "1.5708"]),
+    "negative mass": (CHECK, "my_rov.yaml", "mass: 13.5", "mass: -13.5", ["`mass`", "positive", "-13.5 kg", "my_rov.yaml, line 7"]),
+    "six outputs": (SIMULATE, "s.yaml", "[2, 0, 1, 0, 0, 0.5]", "[2, 0, 1, 0.5]", ["`reference.position`", "s.yaml, line 5", "north, east, down, roll, pitch, yaw"]),
+    "three forces for six": (SIMULATE, "s.yaml", "{kind: current, velocity: [0.3, 0, 0]}", "{kind: wrench, value: [1, 0, 0]}", ["`disturbance[0].value`", "s.yaml, line 7", "surge, sway, heave, roll, pitch, yaw"]),
+    "record no multiple": (SIMULATE, "s.yaml", "record: 0.05", "record: 0.025", ["`loop.record`", "s.yaml, line 11", "0.02 or 0.03 s"]),
+    "controller for another plant": (SIMULATE, "s.yaml", CONTROLLER, "controller: {kind: pid, frequency: [1, 2]}", ["`controller.frequency`", "s.yaml, line 4", "6"]),
+    "file without its function": (SIMULATE, "s.yaml", CONTROLLER, "controller: ./mine.py", ["s.yaml, line 4", "./mine.py:my_law"]),
+    "function of another name": (SIMULATE, "s.yaml", CONTROLLER, "controller: ./mine.py:my_lw", ["s.yaml, line 4", "`my_law`"]),
+    "syntax error": (("check", "./mine.py:my_law"), "mine.py", "(model)", "(model", ["mine.py", "line 4", "SyntaxError"]),
+    "module that is missing": (("check", "./mine.py:my_law"), "mine.py", "import undertow", "import pandsa", ["mine.py, line 1", "Install `pandsa`"]),
+    "sensor without the observer": (SIMULATE, "s.yaml", "loop:", "navigation: dvl\nloop:", ["`navigation.kind`", "s.yaml, line 8", "`navigation.sensors`"]),
+    "sensors at the top": (SIMULATE, "s.yaml", "loop:", "sensors: [imu, dvl]\nloop:", ["`sensors`", "s.yaml, line 8", "`navigation: {kind: observer, sensors: ...}`"]),
+    "observer without an IMU": (SIMULATE, "s.yaml", "loop:", "navigation: {kind: observer, sensors: [dvl]}\nloop:", ["`navigation.sensors`", "s.yaml, line 8", "Add `imu`"]),
+    "file for --out": (("simulate", "s.yaml", "--out", "notes.txt"), "", "", "", ["`--out`", "notes.txt, a file", "another name"]),
+    "results that exist": (("simulate", "s.yaml", "--out", "old"), "", "", "", ["`--out`", "old, which has run.nc", "--overwrite"]),
+    "nowhere to write": (("simulate", "s.yaml", "--out", "/proc/out"), "", "", "", ["`--out`", "/proc/out", "Choose"]),
+}  # fmt: skip
+
+
+PARTS = PartCache()  # of the scenario above, made once for all tests
+
+
+def prepare(folder, monkeypatch, file, old, new):
+    if file != "my_rov.yaml":
+        monkeypatch.setattr(simulate, "build", lambda text: build(text, PARTS))
+    shutil.copy(EXAMPLES / "my_rov.yaml", folder)
+    texts = {"s.yaml": SCENARIO, "other.yaml": SCENARIO, "c.yaml": CAMPAIGN, "mine.py": LAW, "notes.txt": SCENARIO}
+    for name, text in (texts | {"empty.yaml": "# later\n"}).items():
+        (folder / name).write_text(text)
+    (folder / "binary.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\xff")
+    (folder / "old").mkdir()
+    (folder / "old" / "run.nc").touch()
+    for one, other in zip([old] if isinstance(old, str) else old, [new] if isinstance(new, str) else new, strict=True):
+        text = (folder / (file or "s.yaml")).read_text()
+        assert one in text
+        (folder / (file or "s.yaml")).write_text(text.replace(one, other, 1))
+
+
+@pytest.mark.parametrize("mistake", ERRORS)
+def test_mistake_names_place_and_remedy(refused, tmp_path, monkeypatch, mistake):
+    arguments, file, old, new, named = ERRORS[mistake]
+    prepare(tmp_path, monkeypatch, file, old, new)
+    said = refused(*arguments)
+    assert [one for one in named if one not in said] == [], said
+
+
+WAYPOINTS = "{kind: waypoints, points: [[0, 0, 0], [20, 0, 0], [20, 20, 0]], speed: 0.5}"
+SETPOINT = "{kind: setpoint, position: [2, 0, 1, 0, 0, 0.5]}"
+OBSERVER = "navigation: {kind: observer, sensors: [%s]}\nloop:"
+
+# The mistake in s.yaml (or the vehicle file), and what the advice must have: the two numbers, and the remedy.
+ADVICE = {
+    "heading in degrees": ("s.yaml", "0, 0.5]", "0, 45]", ["`reference`", "yaw at 45 rad", "7.16 turns", "0.7854 rad"]),
+    "start in degrees": ("s.yaml", "loop:", "initial: {position: [0, 0, 0, 0, 0, 90]}\nloop:", ["`initial.position`", "90 rad", "1.571 rad"]),
+    "pitch in degrees": ("s.yaml", "0, 0.5]", "5, 0]", ["pitch", "5 rad (286.5 degrees)", "in radians"]),
+    "height for depth": ("s.yaml", "[2, 0, 1,", "[2, 0, -5,", ["down = -5 m", "5 m above the start", "positive downward"]),
+    "above the surface": ("s.yaml", "[0.3, 0, 0]}", "[0.3, 0, 0]}\n  - {kind: waves, depth: 0.5}\ninitial: {position: [0, 0, -2, 0, 0, 0]}", ["down = -2 m", "down = -0.5 m", "positive downward"]),
+    "current": ("s.yaml", "[0.3, 0, 0]", "[4, 3, 0]", ["current is 5 m/s", "at most 1.32", "drifts away"]),
+    "too far": ("s.yaml", "[2, 0, 1,", "[300, 0, 1,", ["300 m from the start", "at most 1.32", "`loop.duration` more than 20 s"]),
+    "step": ("s.yaml", "[2, 0, 1,", "[25, 0, 1,", ["25.02 m from the vehicle", "at most 1.32", "`settling`"]),
+    "too fast": ("s.yaml", SETPOINT, "{kind: circle, radius: 20, period: 20}", ["6.28 m/s", "at most 1.32"]),
+    "waypoints in time": ("s.yaml", SETPOINT, WAYPOINTS, ["ends at 20 s", "at 80 s", "`loop.duration`"]),
+    "no compass, no position": ("s.yaml", "loop:", OBSERVER % "imu, dvl, depth", ["0.013 m (north and east) and 0.051 degrees (yaw) in 20 s", "`position_fix` and `compass`"]),
+    "long steps": ("s.yaml", "static", "electromechanical", ["0.437 ms", "10 ms", "loop.substeps: 9"]),
+    "radians of a thruster": ("my_rov.yaml", (": -45}", ": 45}", ": -135}", ": 135}"), (": -0.785}", ": 0.785}", ": -2.356}", ": 2.356}"), ["`thrusters[0].azimuth`", "-0.785", "-45 degrees in radians", "Write -45"]),
+}  # fmt: skip
+
+
+class _Stop(BadInput):
+    """Ends a command where it would compile and run."""
+
+
+@pytest.mark.parametrize(
+    "mistake", [pytest.param(one, marks=pytest.mark.slow) if "compass" in one else one for one in ADVICE]
+)
+def test_advice_names_its_numbers_and_the_remedy(undertow, tmp_path, monkeypatch, mistake):
+    def stop(*arguments):
+        raise _Stop("", "", "stopped")
+
+    monkeypatch.setattr(simulate, "with_prediction", stop)
+    file, old, new, named = ADVICE[mistake]
+    prepare(tmp_path, monkeypatch, file, old, new)
+    *advice, last = undertow(*SIMULATE).err.splitlines()
+    assert last == "Error: Stopped" and len(advice) == 1 and advice[0].startswith("Advice: "), advice
+    assert [one for one in named if one not in advice[0]] == [], advice

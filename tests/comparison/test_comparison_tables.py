@@ -1,0 +1,120 @@
+"""Tables of a comparison in three styles, and its sentences."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from undertow.comparison.findings import find
+from undertow.comparison.sentences import digits, sentences
+from undertow.comparison.tables import medians, table
+
+TRIALS = 10
+
+
+@pytest.fixture
+def findings():
+    """Ten trials of three: `b_1` has smaller errors than `a` in all of them; `c` failed in two, at 3 s and 5 s."""
+    numbers = np.arange(TRIALS)
+    status = np.zeros((3, TRIALS), dtype=np.int8)
+    status[2, :2] = 1
+    error = np.stack([1 + 0.01 * numbers, 0.5 + 0.02 * numbers, 1 + 0.01 * numbers])
+    angle = np.radians(np.stack([numbers + 1.0] * 3))
+    ended = np.full((3, TRIALS), 8.0)
+    ended[2, :2] = 3.0, 5.0
+    along = ("controller", "sample")
+    return find(
+        xr.Dataset(
+            {
+                "position_rms": (along, error, {"units": "m"}),
+                "attitude_rms": (along, angle, {"units": "rad"}),
+                "input_variation": (along, 1e-5 * error, {"units": "m/s^2/s"}),
+                "saturated_fraction": (along, 0 * error, {"units": "1"}),
+                "status": (along, status),
+                "ended": (along, ended),
+                "success": (along, np.where(status == 0, 1, -1)),
+            },
+            {"controller": ["a", "b_1", "c"]},
+        ),
+        "controller",
+        ["position_rms", "attitude_rms", "input_variation", "saturated_fraction"],
+        dict.fromkeys(["a", "b_1", "c"], "by hand"),
+        {},
+    )
+
+
+def test_medians(findings):
+    """Of 10 values, the 2nd and 9th enclose the median in at least 95 %: P(B(10, 1/2) <= 1) = 1.07 %."""
+    rows = {row[0]: row[1:] for row in medians(findings).rows}
+    assert rows["completed trials"] == ("10 of 10", "10 of 10", "8 of 10")
+    assert rows["within the criterion of success"] == ("10 of 10", "10 of 10", "8 of 8")
+    assert rows["position rms (m)"][:2] == ("1.04 [1.01, 1.08]", "0.59 [0.52, 0.66]*")
+    assert rows["attitude rms (deg)"][0] == "5.5 [2, 9]"
+    assert rows["saturated fraction"] == ("0 [0, 0]",) * 3
+
+
+def test_sentences(findings):
+    said = sentences(findings)
+    assert said[0] == "c did not complete 2 of 10 trials (diverged 2, median time 4 s)."
+    assert said[1].startswith("c completed 0 trials that a did not, and a 2 that c did not; this difference is not")
+    assert "b_1 against a (10 pairs): smaller position rms (-43.5 %, in 10 of 10)" in said[3]
+    assert said[3].endswith("no difference is established in attitude rms, saturated fraction.")
+    assert said[4] == "c against a (8 pairs): all differences are zero."
+    assert "c against b_1 (8 pairs): larger position rms" in said[5]
+
+
+def test_too_few_pairs_for_the_correction(findings):
+    """With four tests, 4 x 2^(1 - n) is below 5 % from n = 8 on: 3.1 %."""
+    assert sum(bool(one.smaller or one.larger) for one in findings.differences) == 4
+    few = findings._replace(differences=tuple(one._replace(pairs=7) for one in findings.differences))
+    assert "b_1 against a (7 pairs): too few to establish a difference; at least 8 pairs are needed." in sentences(few)
+
+
+def test_latex(findings):
+    text = table(findings, "latex")
+    assert text.startswith(
+        "% Needs \\usepackage{booktabs}.\n\\begin{tabular}{lrrr}\n\\toprule\nmetric & a & b\\_1 & c \\\\"
+    )
+    assert "position rms (m) & 1.04 [1.01, 1.08] & 0.59 [0.52, 0.66]$^{*}$ & " in text
+    assert "input variation (m/s$^{2}$/s) & $1.04 \\times 10^{-5}$ [" in text
+    assert "b\\_1 $-$ a & position rms (m) & $-$0.455 [" in text and "$-$43.5 \\%" in text
+    for line in text.splitlines():
+        if "&" in line:
+            assert line.count(" & ") in (3, 6) and line.endswith(" \\\\")
+    assert text.count("\\begin{tabular}") == text.count("\\end{tabular}") == text.count("\\bottomrule") == 2
+
+
+def test_markdown(findings):
+    lines = table(findings, "markdown").splitlines()
+    assert lines[:3] == [
+        "| metric | a | b_1 | c |",
+        "|---|---|---|---|",
+        "| completed trials | 10 of 10 | 10 of 10 | 8 of 10 |",
+    ]
+    assert {line.count("|") for line in lines if line.startswith("|")} == {5, 8}
+
+
+def test_csv(findings):
+    rows = list(csv.DictReader(io.StringIO(table(findings, "csv"))))
+    assert len(rows) == 3 * 4
+    assert rows[0]["metric"] == "position_rms" and (rows[0]["contestant"], rows[0]["baseline"]) == ("b_1", "a")
+    assert float(rows[0]["contestant_median"]) - float(rows[0]["baseline_median"]) == pytest.approx(-0.455)
+    assert float(rows[0]["median"]) == pytest.approx(-0.455) and rows[0]["established"] == "True"
+    assert rows[1]["unit"] == "rad"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (12.345, "12.3"),
+        (2026.1, "2026"),
+        (-1.234e-5, "-1.23e-05"),
+        (1.5e6, "1.50e+06"),
+        (float("inf"), "inf"),
+    ],
+)
+def test_digits(value, text):
+    assert digits(value) == text

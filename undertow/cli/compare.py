@@ -1,0 +1,130 @@
+"""`undertow compare`: compare controllers on one scenario, or several scenarios, trial by trial."""
+
+import os
+import re
+import shlex
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+from rich.console import Console
+
+from undertow.campaign.executors import chosen
+from undertow.campaign.run_campaign import STORE, run_campaign
+from undertow.campaign.store_results import load
+from undertow.campaign.task import build_trial
+from undertow.cli.campaign import check_folder, clear_folder, live, trial_text
+from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
+from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
+from undertow.cli.results_folder import output_folder
+from undertow.cli.stages import stage
+from undertow.cli.tables import numbers, titled, wide_console
+from undertow.comparison.comparison import Comparison, read_comparison
+from undertow.comparison.contest import Contest, contest
+from undertow.comparison.sentences import sentences
+from undertow.comparison.tables import NOTE, medians
+from undertow.core import checks
+from undertow.core.status import Status
+from undertow.report.comparison_page import write_comparison
+from undertow.scenario.finished_run import to_json
+from undertow.scenario.part_cache import PartCache
+
+# File of each style of table.
+_TABLES = {"markdown": "comparison.md", "latex": "comparison.tex", "csv": "comparison.csv"}
+_WRITTEN = (STORE, "comparison.html", "comparison.json", *_TABLES.values(), "figures", "scenarios")
+
+
+def compare(
+    paths: Sequence[Path],
+    entries: str | None,
+    trials: int | None,
+    out: Path | None,
+    resume: bool,
+    workers: int | None,
+    overwrite: bool,
+    allow_code: bool,
+    pdf: str | None,
+) -> int:
+    """Run a comparison and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
+    count = os.cpu_count() or 1 if workers is None else workers
+    checks.positive("--workers", count)
+    if trials is not None:
+        checks.positive("--trials", trials)
+    several = None if entries is None else [one for one in map(str.strip, entries.split(",")) if one]
+    first = Path("runs") / f"{paths[0].stem}-comparison"
+    with output_folder(out or (first if resume else None), first) as folder:
+        check_folder(folder, _WRITTEN, resume, overwrite)
+        console = wide_console()
+        with stage(console, "building first trials"):
+            ready = interruptible(lambda: contest(paths, several, trials, allow_code))
+        for sentence in ready.advice:
+            typer.echo(f"Advice: {sentence}", err=True)
+        if not resume:
+            clear_folder(folder, _WRITTEN)
+        with chosen(None, count) as executor, live(console) as watch:
+            try:
+                interruptible(lambda: run_campaign(ready.prepared, folder, executor, watch))
+            except (KeyboardInterrupt, OSError):
+                if (folder / STORE).is_dir():
+                    again = ["undertow", "compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
+                    again += ["--trials", str(trials)] if trials is not None else []
+                    typer.echo(
+                        f"Stopped. To resume: {shlex.join([*again, '--out', str(folder), '--resume'])}", err=True
+                    )
+                raise
+        return _conclude(console, ready, folder, pdf)
+
+
+def _conclude(console: Console, ready: Contest, folder: Path, pdf: str | None) -> int:
+    """Write page, tables and scenarios; print the findings."""
+    with stage(console, "statistics and page"):
+        results = load(folder)
+        comparison = read_comparison(folder, results, ready)
+        found = comparison.findings
+        files = _write_scenarios(ready, comparison, folder / "scenarios")
+        for style, name in _TABLES.items():
+            (folder / name).write_text(comparison.table(style), encoding="utf-8")
+        (folder / "comparison.json").write_text(to_json(found.data(), indent=1) + "\n", encoding="utf-8")
+        page, failures = write_comparison(comparison, results, ready.subject, folder, pdf)
+    warn_of(failures)
+    rows = medians(found)
+    table = titled(f"Median of {found.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))
+    for row in rows.rows:
+        table.add_row(*row)
+    console.print(table)
+    for sentence in (NOTE, *sentences(found)):
+        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+    for name, note in found.tuning.items():
+        console.print(f"{name}: {note}.", markup=False, highlight=False, soft_wrap=True)
+    for name, note in zip(ready.names, ready.notes, strict=True):
+        if not note.tuned and name in files:
+            said = f"To tune {name}: undertow tune {files[name]}; then compare its tuned.yaml"
+            console.print(said, markup=False, highlight=False, soft_wrap=True)
+    console.print(f"Page: {page}", highlight=False, soft_wrap=True)
+    return DONE if all(found.completed(name) == found.trials for name in found.names) else RUN_FAILED
+
+
+def _write_scenarios(ready: Contest, comparison: Comparison, folder: Path) -> dict[str, Path]:
+    """Write the scenario of the first trial of each contestant, and of its first failed one; the former by name.
+
+    `undertow simulate` repeats such a trial; `undertow tune` tunes its controller.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    files, part_cache = {}, PartCache()
+    for i, (name, first) in enumerate(zip(ready.names, ready.built, strict=True)):
+        file = folder / f"{i + 1}-{re.sub(r'[^a-zA-Z0-9_-]+', '-', name).strip('-')}.yaml"
+        files[name] = file
+        file.write_text(
+            trial_text(first, f"{name}, in one trial: {comparison.findings.tuning[name]}."), encoding="utf-8"
+        )
+        rows = comparison.dataset.isel({ready.dimension: i})
+        for trial in rows["trial"].values[rows["status"].values > int(Status.OK)][:1].tolist():
+            text = trial_text(
+                build_trial(ready.prepared.trials, part_cache, trial), f"{name}, trial {trial}: it failed."
+            )
+            file.with_stem(f"{file.stem}-failed").write_text(text, encoding="utf-8")
+    return files

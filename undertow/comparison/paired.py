@@ -1,0 +1,156 @@
+"""Paired statistics: differences of metrics between contestants that ran the same samples with the same seeds."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.stats import binomtest, bootstrap, wilcoxon
+
+LEVEL = 0.05  # of significance; the intervals hold 95 %
+
+# Fewer values have no 95 % interval of the median: all of them are on one side of it once in 2^(n - 1) times.
+FEWEST = 6
+
+_RESAMPLES, _SEED = 2000, 0
+_AT_ONCE = 1_000_000  # numbers that the bootstrap keeps in memory
+
+
+class Difference(NamedTuple):
+    """One metric of a contestant less that of another, over the trials that both completed.
+
+    Attributes:
+        metric: name of the metric.
+        contestant, baseline: whose values are compared: differences are contestant minus baseline.
+        pairs: trials that both completed and where the metric is defined for both.
+        left_out: the other trials.
+        median: of the differences, in the unit of the metric; NaN without pairs.
+        low, high: 95 % bootstrap interval of the median (percentiles); NaN with fewer than six pairs.
+        relative: median of the differences as shares of the baseline's values; NaN unless all of these are
+            positive.
+        smaller, larger: pairs in which the contestant's value is smaller, or larger, than the baseline's.
+        p: of the Wilcoxon signed-rank test, two-sided; NaN where all differences are zero, or with fewer
+            than six pairs, which can establish nothing.
+        p_holm: the same with Holm's correction for all tests of the comparison.
+    """
+
+    metric: str
+    contestant: str
+    baseline: str
+    pairs: int
+    left_out: int
+    median: float
+    low: float
+    high: float
+    relative: float
+    smaller: int
+    larger: int
+    p: float
+    p_holm: float
+
+    @property
+    def established(self) -> bool:
+        """Whether the test is below 5 % after correction and the interval excludes zero."""
+        return self.p_holm < LEVEL and (self.low > 0 or self.high < 0)
+
+
+class Completion(NamedTuple):
+    """Which of two contestants completed trials that the other did not.
+
+    Attributes:
+        contestant, baseline: the two.
+        only_contestant, only_baseline: trials that one of them alone completed.
+        p: of McNemar's exact test, two-sided; NaN where there are none.
+        p_holm: the same with Holm's correction for every two contestants.
+    """
+
+    contestant: str
+    baseline: str
+    only_contestant: int
+    only_baseline: int
+    p: float
+    p_holm: float
+
+
+def completions(completed: Mapping[str, np.ndarray]) -> list[Completion]:
+    """How the completed trials of every two contestants differ; one entry per sample, in the same order."""
+    found = []
+    for baseline, contestant in itertools.combinations(completed, 2):
+        alone = int((completed[contestant] & ~completed[baseline]).sum())
+        other = int((completed[baseline] & ~completed[contestant]).sum())
+        p = float(binomtest(alone, alone + other).pvalue) if alone + other else math.nan
+        found.append(Completion(contestant, baseline, alone, other, p, math.nan))
+    return [one._replace(p_holm=p) for one, p in zip(found, holm([one.p for one in found]), strict=True)]
+
+
+def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[Difference]:
+    """Differences of every metric between every two contestants.
+
+    Args:
+        values: metric -> contestant -> value of each sample, the same samples in the same order; NaN where the trial
+            failed or has no such metric.
+    """
+    names = dict.fromkeys(name for each in values.values() for name in each)
+    found = [
+        _difference(metric, contestant, baseline, by_name[contestant], by_name[baseline])
+        for baseline, contestant in itertools.combinations(names, 2)
+        for metric, by_name in values.items()
+    ]
+    corrected = holm([one.p for one in found])
+    return [one._replace(p_holm=p) for one, p in zip(found, corrected, strict=True)]
+
+
+def _difference(metric: str, contestant: str, baseline: str, first: np.ndarray, second: np.ndarray) -> Difference:
+    both = np.isfinite(first) & np.isfinite(second)
+    first, second = first[both], second[both]
+    apart = first - second
+    low, high = median_interval(apart)
+    return Difference(
+        metric=metric,
+        contestant=contestant,
+        baseline=baseline,
+        pairs=int(both.sum()),
+        left_out=int((~both).sum()),
+        median=float(np.median(apart)) if apart.size else math.nan,
+        low=low,
+        high=high,
+        relative=float(np.median(apart / second)) if apart.size and (second > 0).all() else math.nan,
+        smaller=int((apart < 0).sum()),
+        larger=int((apart > 0).sum()),
+        p=rank_test(apart),
+        p_holm=math.nan,
+    )
+
+
+def median_interval(values: np.ndarray) -> tuple[float, float]:
+    """95 % bootstrap interval of the median (percentiles of 2000 resamples); NaN for fewer than six values."""
+    if values.size < FEWEST:
+        return math.nan, math.nan
+    found: Any = bootstrap(
+        (values,),
+        np.median,
+        n_resamples=_RESAMPLES,
+        batch=max(1, _AT_ONCE // values.size),
+        confidence_level=1 - LEVEL,
+        method="percentile",
+        rng=np.random.default_rng(_SEED),
+    )
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def rank_test(apart: np.ndarray) -> float:
+    """Two-sided p of the Wilcoxon signed-rank test (1945); NaN where all are zero, and for fewer than six values."""
+    if apart.size < FEWEST or not apart.any():
+        return math.nan
+    return float(wilcoxon(apart).pvalue)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def holm(several: Sequence[float]) -> list[float]:
+    """p values with the step-down correction of Holm (1979) for all tests that were made; NaN stands for none."""
+    known = [i for i, p in enumerate(several) if not math.isnan(p)]
+    corrected, largest = list(several), 0.0
+    for rank, i in enumerate(sorted(known, key=lambda i: several[i])):
+        largest = max(largest, min(1.0, (len(known) - rank) * several[i]))
+        corrected[i] = largest
+    return corrected

@@ -1,0 +1,148 @@
+"""The tables of a comparison as Markdown, LaTeX (booktabs) and CSV."""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+
+from undertow.analysis.metrics import for_people
+from undertow.comparison.findings import Findings, Median
+from undertow.comparison.paired import Difference
+from undertow.comparison.sentences import digits, metric_name, relative
+
+NOTE = (
+    "Median over completed trials [95 % interval of the median]; metrics of the steady window. "
+    "* marks an established difference from the first column (Wilcoxon signed-rank test with Holm's correction)."
+)
+_NOTHING = "-"
+
+
+class Rows(NamedTuple):
+    """A table of text: column titles and rows, of which the first entry names the row."""
+
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+def medians(found: Findings) -> Rows:
+    """Metrics by contestant, below the number of completed trials."""
+    first = found.names[0]
+    rows = [("completed trials", *(f"{found.completed(name)} of {found.trials}" for name in found.names))]
+    if any(judged for _, judged in found.successes.values()):
+        kept = (found.successes[name] for name in found.names)
+        rows.append(("within the criterion of success", *(f"{within} of {judged}" for within, judged in kept)))
+    for metric, by_name in found.medians.items():
+        marked = {one.contestant for one in found.differences if one.baseline == first and _is(one, metric)}
+        cells = (f"{median(by_name[name], found.units[metric])}{'*' * (name in marked)}" for name in found.names)
+        rows.append((titled(found, metric), *cells))
+    return Rows(("metric", *found.names), rows)
+
+
+def paired(found: Findings) -> Rows:
+    """Differences of every two contestants in every metric."""
+    rows = []
+    for one in found.differences:
+        unit = found.units[one.metric]
+        of = lambda number, one=one: f"{number} of {one.pairs}"
+        rows.append(
+            (
+                f"{one.contestant} - {one.baseline}",
+                titled(found, one.metric),
+                median(Median(one.median, one.low, one.high, one.pairs), unit),
+                _NOTHING if math.isnan(one.relative) else relative(one, unit),
+                of(one.smaller),
+                _NOTHING if math.isnan(one.p_holm) else digits(one.p_holm),
+                "yes" if one.established else "no",
+            )
+        )
+    head = ("pair", "metric", "median difference", "relative", "smaller in", "p (Holm)", "established")
+    return Rows(head, rows)
+
+
+def median(one: Median, unit: str) -> str:
+    """A median with its interval, in the unit of tables for people."""
+    if math.isnan(one.value):
+        return _NOTHING
+    value, low, high = (digits(for_people(number, unit)[0]) for number in one[:3])
+    return value if math.isnan(one.low) else f"{value} [{low}, {high}]"
+
+
+def titled(found: Findings, metric: str) -> str:
+    """A metric with its unit."""
+    unit = for_people(0.0, found.units[metric])[1]
+    return f"{metric_name(metric)} ({unit})" if unit else metric_name(metric)
+
+
+def _is(one: Difference, metric: str) -> bool:
+    return one.metric == metric and one.established
+
+
+def table(found: Findings, style: str) -> str:
+    """Both tables in one of `STYLES`."""
+    return STYLES[style](found)
+
+
+def _markdown(found: Findings) -> str:
+    parts = [_markdown_rows(medians(found)), f"{NOTE}\n", _markdown_rows(paired(found))]
+    return "\n".join(parts)
+
+
+def _markdown_rows(rows: Rows) -> str:
+    line = lambda cells: f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |\n"
+    ruler = f"|{'---|' * len(rows.head)}\n"
+    return "".join([line(rows.head), ruler, *map(line, rows.rows)])
+
+
+def _latex(found: Findings) -> str:
+    lines = ["% Needs \\usepackage{booktabs}.", *_tabular(medians(found)), f"% {NOTE}", "", *_tabular(paired(found))]
+    return "\n".join(lines) + "\n"
+
+
+def _tabular(rows: Rows) -> list[str]:
+    line = lambda cells: f"{' & '.join(map(_escaped, cells))} \\\\"
+    columns = "l" + "r" * (len(rows.head) - 1)
+    body = ["\\toprule", line(rows.head), "\\midrule", *map(line, rows.rows), "\\bottomrule"]
+    return [f"\\begin{{tabular}}{{{columns}}}", *body, "\\end{tabular}"]
+
+
+_LATEX = re.compile(
+    r"(?<![\w.])(?P<sign>-?)(?P<mantissa>\d+(?:\.\d+)?)e(?P<power>[+-]\d+)|(?P<minus>(?<![\w.])-(?=[\d. ]))"
+    r"|\^(?P<exponent>-?\d+)|(?P<infinite>\binf\b)|(?P<special>[\\~^*&%$#_{}])"
+)
+_SPECIAL = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "*": r"$^{*}$"}
+
+
+def _escaped(cell: str) -> str:
+    """A cell as LaTeX: minus signs, powers of ten, exponents of units and special characters."""
+
+    def written(found: re.Match) -> str:
+        if found["mantissa"]:
+            return rf"${found['sign']}{found['mantissa']} \times 10^{{{int(found['power'])}}}$"
+        if found["minus"]:
+            return "$-$"
+        if found["infinite"]:
+            return r"$\infty$"
+        if found["exponent"]:
+            return f"$^{{{found['exponent']}}}$"
+        return _SPECIAL.get(found["special"], f"\\{found['special']}")
+
+    return _LATEX.sub(written, cell)
+
+
+def _csv(found: Findings) -> str:
+    stream = io.StringIO()
+    fields = [name for name in Difference._fields if name != "metric"]
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["metric", "unit", "contestant_median", "baseline_median", *fields, "established"])
+    for one in found.differences:
+        by_name = found.medians[one.metric]
+        values = [by_name[one.contestant].value, by_name[one.baseline].value]
+        writer.writerow(
+            [one.metric, found.units[one.metric], *values, *(getattr(one, name) for name in fields), one.established]
+        )
+    return stream.getvalue()
+
+
+STYLES: dict[str, Callable[[Findings], str]] = {"markdown": _markdown, "latex": _latex, "csv": _csv}

@@ -1,0 +1,92 @@
+"""How the gains of a controller came about, in a sentence: a comparison with an untuned rival is no fair one."""
+
+import inspect
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.campaign.labels import words
+from undertow.core import catalogue
+from undertow.core.contracts import AbstractController
+from undertow.scenario import factory
+from undertow.tuning.tunable_parameters import law_of
+
+# Controllers whose gains follow from a rule unless this option, or another one instead of it, is given.
+_BY_RULE = {("pid", None): "frequency", ("rcaf", "robust"): "bandwidth"}
+_RULE = "gains from the rule of `controllers/bandwidths.py`"
+_TABLE_1 = ("rcaf", "paper")
+_NO_GAINS = ("kind", "preset", "sampling_time", "velocity_noise")  # the last two follow from the rest of a scenario
+
+
+class TuningNote(NamedTuple):
+    """How the gains of a controller came about."""
+
+    sentence: str
+    tuned: bool  # by `undertow tune`, or by a rule for this plant
+
+
+def tuning_note(
+    part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path, source: Path | None
+) -> TuningNote:
+    """How the gains of a controller came about.
+
+    Args:
+        part: the controller as its scenario has it: kind, preset and options.
+        law: the controller itself.
+        dt: its sampling time, s.
+        folder: where relative file names of the scenario start.
+        source: the scenario file that the gains come from, if any.
+    """
+    searched = _searched(part, source)
+    if searched is not None:
+        return searched
+    kind, preset, given = _given(part, law, dt, folder)
+    short, where = kind.rpartition("/")[2], f" in {source}" if source else ""
+    options = ", ".join(f"{name} {words(value)}" for name, value in given.items())
+    main = _BY_RULE.get((kind, preset))
+    if main is not None:
+        instead = {main, *law_of(kind, preset, law).instead.get(main, ())}
+        if not instead & set(given):
+            return TuningNote(f"{_RULE}{f', with {options} given{where}' if given else ''}", True)
+    if given:
+        return TuningNote(f"gains given{where} ({options}), not tuned by `undertow tune`", False)
+    if (kind, preset) == _TABLE_1:
+        return TuningNote("gains of Table 1 of the paper, not tuned for this scenario", False)
+    return TuningNote(f"default gains of `{short}`, not tuned", False)
+
+
+def _given(
+    part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path
+) -> tuple[str, str | None, dict[str, Any]]:
+    """Kind, preset and the gains that do not have their default value."""
+    kind = part["kind"]
+    function = catalogue.find("controllers", kind, folder)
+    presets = factory.presets_of(function)
+    preset = part.get("preset", next(iter(presets))) if presets else None
+    defaults = inspect.signature(presets[preset] if preset else function).parameters
+    known = law_of(kind, preset, law)
+    names = {name.partition("[")[0] for name in known.ranges(dt)}
+    names |= {other for several in known.instead.values() for other in several}
+    gains = [name for name in part if name in names or (not names and name not in _NO_GAINS)]
+    changed = lambda name: name not in defaults or factory.listed(defaults[name].default) != part[name]
+    return kind, preset, {name: part[name] for name in gains if part[name] is not None and changed(name)}
+
+
+def _searched(part: Mapping[str, Any], source: Path | None) -> TuningNote | None:
+    """What tuning.json beside a scenario says, if its gains are those of the controller; None otherwise."""
+    try:
+        found = json.loads((source or Path()).with_name("tuning.json").read_text(encoding="utf-8"))
+        given, tuned = found["gains"]["given"], found["gains"]["tuned"]
+        if any(part.get(name) != value for name, value in tuned["options"].items()):
+            return None
+        ratio = given["held_out_cost"] / tuned["held_out_cost"]
+        said = f"{found['evaluations']} evaluations in {found['elapsed']:.0f} s"
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError):
+        return None  # of another program, or none
+    ending = "" if found.get("finished") else ", stopped by its time budget"
+    return TuningNote(
+        f"tuned by `undertow tune` ({found['method']}, {said}{ending}; held-out cost {tuned['held_out_cost']:.3g}, "
+        f"{ratio:.3g} times smaller than with the gains before)",
+        True,
+    )

@@ -1,0 +1,110 @@
+"""A figure in the width of one printed column: panels below each other, the key above them, no title."""
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation
+from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import ScaledTranslation
+
+from undertow.report.figures import style
+
+WIDTH = 3.5  # in
+_TALLEST = 9.0  # in, of a page without margins
+_LOWEST, _NARROWEST = 0.5, 1.0  # in, of a panel
+_GAP = 0.06  # in
+_LINE = 0.15  # in, height of a title
+_FEW = 8  # panels; more of them stand in two columns
+
+
+def one_column(figure: Figure) -> Figure:
+    """Rearrange a figure in place; a caption takes the place of its title.
+
+    Panels keep their order, their height where the page is tall enough, and the size of their text. A panel with long
+    names beside it, or a matrix, may need more than the width of a column.
+    """
+    canvas = FigureCanvasAgg(figure)
+    for title in list(figure.texts):
+        title.remove()
+    panels, across = figure.axes, 2 if len(figure.axes) > _FEW else 1
+    _label_last(panels, across)
+    for panel in panels:
+        _raise_notes(panel)
+    around = [_around(panel, canvas) for panel in panels]
+    left, right = (max(sides) for sides in zip(*((one[0], one[1]) for one in around), strict=True))
+    own = [panel.get_position().width * figure.get_size_inches()[0] if panel.images else 0.0 for panel in panels]
+    wide = max((WIDTH - (across - 1) * _GAP) / across - left - right, _NARROWEST, *own)
+    rows = [range(first, min(first + across, len(panels))) for first in range(0, len(panels), across)]
+    above, below = ([max(around[i][side] for i in row) for row in rows] for side in (2, 3))
+    heights = [max(panels[i].get_position().height for i in row) * figure.get_size_inches()[1] for row in rows]
+    figure.set_size_inches(across * (left + wide + right) + (across - 1) * _GAP, _TALLEST)
+    key = _key(figure, canvas)
+    room = _TALLEST - key - sum(above) - sum(below) - _GAP * len(rows)
+    heights = [max(min(1.0, room / sum(heights)) * height, min(height, _LOWEST)) for height in heights]
+    figure.set_size_inches(figure.get_size_inches()[0], key + sum(above) + sum(below) + sum(heights) + _GAP * len(rows))
+    top = key
+    for row, over, tall, under in zip(rows, above, heights, below, strict=True):
+        for column, i in enumerate(row):
+            _move(panels[i], column * (left + wide + right + _GAP) + left, top + over, wide, tall)
+        top += over + tall + under + _GAP
+    _key(figure, canvas)
+    return figure
+
+
+def _label_last(panels: list[Axes], across: int) -> None:
+    """Leave an x label that several panels share to the lowest of them in each column."""
+    seen: set[tuple[int, str]] = set()
+    for i, panel in reversed(list(enumerate(panels))):
+        if (i % across, panel.get_xlabel()) in seen:
+            panel.set_xlabel("")
+        seen.add((i % across, panel.get_xlabel()))
+
+
+def _raise_notes(panel: Axes) -> None:
+    """Lift what stands above a panel beside its title above the title, for which the panel is too narrow."""
+    if not panel.get_title(loc="left"):
+        return
+    for note in panel.texts:
+        if isinstance(note, Annotation) and note.xycoords == "axes fraction" and note.xy[1] == 1 and note.xyann[1] > 0:
+            note.xyann = (note.xyann[0], note.xyann[1] + 72 * _LINE)
+    key = panel.get_legend()
+    if key is not None and key.get_window_extent().y0 >= panel.get_window_extent().y1 - 1:
+        lifted = panel.transAxes + ScaledTranslation(0, _LINE, panel.figure.dpi_scale_trans)
+        key.set_bbox_to_anchor((1.0, 1.0), transform=lifted)
+
+
+def _around(panel: Axes, canvas: FigureCanvasAgg) -> tuple[float, float, float, float]:
+    """Space that labels take at the left, at the right, above and below, in."""
+    whole, inner = panel.get_tightbbox(canvas.get_renderer()), panel.get_window_extent()
+    if whole is None:
+        return 0.0, 0.0, 0.0, 0.0
+    sides = inner.x0 - whole.x0 + 2, whole.x1 - inner.x1, whole.y1 - inner.y1, inner.y0 - whole.y0
+    return tuple(max(side, 0.0) / panel.figure.dpi for side in sides)  # pyright: ignore[reportReturnType]
+
+
+def _key(figure: Figure, canvas: FigureCanvasAgg) -> float:
+    """Place the keys above the panels, in as many lines as they need; their height, in."""
+    wide, tall = figure.get_size_inches()
+    top = 0.0
+    for old in list(figure.legends):
+        handles, words = old.legend_handles, [text.get_text() for text in old.get_texts()]
+        old.remove()
+        for columns in range(len(words), 0, -1):
+            new = figure.legend(
+                handles=handles, labels=words, ncols=columns, fontsize=style.SMALL, frameon=False, loc="upper left",
+                bbox_to_anchor=(0.0, 1.0 - top / tall), handlelength=2.4, columnspacing=1.0, borderaxespad=0.2,
+            )  # fmt: skip
+            box = new.get_window_extent(canvas.get_renderer())
+            if box.width <= wide * figure.dpi or columns == 1:
+                top += box.height / figure.dpi
+                break
+            new.remove()
+    return top
+
+
+def _move(panel: Axes, left: float, top: float, width: float, height: float) -> None:
+    page_width, page_height = panel.figure.get_size_inches()  # pyright: ignore[reportAttributeAccessIssue]
+    share = (left / page_width, 1 - (top + height) / page_height, width / page_width, height / page_height)
+    panel.set_position(share)
+    if isinstance(panel.xaxis.get_major_locator(), MaxNLocator):
+        panel.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 0.4)), steps=style.STEPS))

@@ -1,0 +1,59 @@
+"""The replay as a part of a page: data, three.js and the script inside the page, nothing loaded from anywhere."""
+
+from collections.abc import Sequence
+from importlib.resources import files
+
+from undertow.report.formats import prose
+from undertow.report.page import Html, section, tag
+from undertow.report.replay.replay_data import Replay, page_data
+
+_THREE_JS = ("jupyter_threejs_sage", "static/r130/three.min.js")
+_SCRIPTS = ("unpack.js", "scene.js", "panels.js", "replay.js")  # one after the other they are one script
+_MISSING = (
+    "There is no replay: the package jupyter_threejs_sage, which holds three.js, is not installed. Run: pip install "
+    "jupyter-threejs-sage==130"
+)
+_KEYS = (
+    "Drag to turn the view, drag with two fingers or the right button to move it; click it before you zoom with the "
+    "wheel. Space plays and pauses, the arrow keys step by 1 s (with Shift by 10 s). Add `#t=12` to the address of the "
+    "page to open it at 12 s. Arrows at the thrusters show the force on the vehicle, computed from the recorded input "
+    "with the model of the thruster."
+)
+
+
+def replay_section(replays: Sequence[Replay]) -> Html:
+    """A section with the replay of one run, or of several in one scene; of each, label and colour differ.
+
+    Without the package that holds three.js, a sentence that says how to install it.
+    """
+    three = three_js()
+    if three is None:
+        return section("replay", "Replay", tag("p", _MISSING))
+    script = "\n".join(_text(name) for name in _SCRIPTS)
+    return section(
+        "replay",
+        "Replay",
+        Html('<div class="replay" data-source="replay-data"><p>The replay needs JavaScript.</p></div>'),
+        tag("p", prose(_KEYS), class_="small"),
+        Html(f'<script type="application/json" id="replay-data">{page_data(replays)}</script>'),
+        Html(f"<script>{three}</script>"),
+        Html(f'<script>"use strict";\n(() => {{\n{script}}})();\n</script>'),
+    )
+
+
+def replay_looks() -> str:
+    """Style sheet of the replay."""
+    return _text("replay.css")
+
+
+def three_js() -> str | None:
+    """The text of three.js, with its licence; None where the package that holds it is missing."""
+    package, name = _THREE_JS
+    try:
+        return files(package).joinpath(name).read_text(encoding="utf-8")
+    except (ModuleNotFoundError, FileNotFoundError):
+        return None
+
+
+def _text(name: str) -> str:
+    return files("undertow.report.replay").joinpath(name).read_text(encoding="utf-8")

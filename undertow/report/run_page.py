@@ -1,0 +1,150 @@
+"""The page of one run: status, replay, metrics, certificate, figures and scenario, in one file that opens anywhere."""
+
+import io
+import json
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import xarray as xr
+from PIL import Image
+
+from undertow.analysis.success import Success
+from undertow.core.user_code import python_says
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.report.figures.run import run_plots
+from undertow.report.figures.writing import Saved, save_all
+from undertow.report.formats import number, prose
+from undertow.report.page import Html, document, figure, section, table, tag
+from undertow.report.replay.replay_data import Replay, replay_of
+from undertow.report.replay.replay_section import replay_looks, replay_section
+from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
+from undertow.scenario.finished_run import certificate_of, metrics_of, window_of
+
+# Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
+_LARGE, _COLOURS = 80_000, 48
+_DIGITS = 4
+
+_CAPTIONS = {
+    "tracking": "Desired and actual outputs.",
+    "error": "Size of the tracking error on a logarithmic scale; for attitude, of the difference of the angles.",
+    "estimate": "Lumped uncertainty, measured from the true acceleration, and the controller's estimate of it.",
+    "effort": "Commanded input, and the input that was applied within the limits.",
+    "certificate": "Lyapunov function of the stability proof and its rate along the run, and the fuzzy weights.",
+    "measurement": "What the controller received less the true outputs and rates.",
+}
+
+
+class Shown(NamedTuple):
+    """What a run looks like: figures by name, the replay (None for a plant that is no vehicle), and failures."""
+
+    figures: Mapping[str, str | bytes]
+    replay: Replay | None
+    failures: list[str]  # a sentence for each part that could not be made
+
+
+def shown(run: xr.Dataset, loop: ClosedLoop, saved: Saved | None = None) -> Shown:
+    """What the page and the video of a run show. A failed part affects neither the others nor the results.
+
+    Args:
+        run: dataset of the run.
+        loop: the closed loop that was run.
+        saved: the figures of the run, where they have been written; None to make them here.
+    """
+    if saved is None:
+        with tempfile.TemporaryDirectory() as folder:
+            return shown(run, loop, save_all(lambda: run_plots(run), Path(folder)))
+    figures = {name: _picture(vector) for name, vector in saved.vectors.items()}
+    failures = list(saved.failures)
+    try:
+        replay = replay_of(run, loop)
+    except Exception as error:  # a user's part may run and yet not be differentiable
+        replay = None
+        failures.append(f"the replay could not be made ({python_says(error)}); the results are complete")
+    return Shown(figures, replay, failures)
+
+
+def _picture(vector: Path) -> str | bytes:
+    """A figure for the page: the SVG, or the PNG beside it in few colours where the SVG is large."""
+    if vector.stat().st_size <= _LARGE:
+        return vector.read_text(encoding="utf-8")
+    data = io.BytesIO()
+    with Image.open(vector.with_suffix(".png")) as image:
+        few = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        few.save(data, "PNG", optimize=True)
+    return data.getvalue()
+
+
+def write_run_page(path: Path, run: xr.Dataset, shown: Shown, predicted: Mapping[str, float] | None = None) -> None:
+    """Write the page of a run.
+
+    Args:
+        path: of the page.
+        run: dataset of the run.
+        shown: what it looks like.
+        predicted: predicted metrics of the steady window, where there are any.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    replay = Html("") if shown.replay is None else replay_section([shown.replay])
+    path.write_text(_page(run, shown.figures, replay, predicted), encoding="utf-8")
+
+
+def _page(
+    run: xr.Dataset, figures: Mapping[str, str | bytes], replay: Html, predicted: Mapping[str, float] | None
+) -> str:
+    title, window = str(run.attrs.get("title", "a closed loop")), window_of(run)
+    metrics = json.loads(run.attrs["metrics"])
+    measured = metrics_rows(metrics["steady"], metrics["whole"], window, metrics_of(run), predicted)
+    certificate = certificate_of(run)
+    sections = [replay, section("metrics", measured.title, _table(measured))]
+    if certificate is not None:
+        hypotheses = certificate_rows(certificate, window)
+        below = [tag("p", prose(one)) for one in hypotheses.sentences]
+        sections.append(section("certificate", hypotheses.title, _table(hypotheses), *below))
+    plotted = [
+        figure(picture, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
+        for name, picture in figures.items()
+    ]
+    if plotted:
+        sections.append(section("figures", "Figures", *plotted))
+    return document(
+        title,
+        tag("h1", prose(title)),
+        tag("p", prose(_status(run)), class_="lead"),
+        *sections,
+        section("configuration", "Configuration", *_configuration(run)),
+        looks=replay_looks() if replay else "",
+    )
+
+
+def _table(rows: RunTable) -> Html:
+    numeric = [place for place, title in enumerate(rows.head) if place and title != "unit"]
+    shown = lambda cell: prose(cell) if isinstance(cell, str) else number(cell, _DIGITS)
+    cells = [[shown(cell) for cell in row] for row in rows.rows]
+    return table([prose(title) for title in rows.head], cells, numeric=numeric)
+
+
+def _status(run: xr.Dataset) -> str:
+    """How the run ended, and whether control succeeded."""
+    word, ended = str(run.attrs["status"]).replace("_", " "), float(run.attrs["ended"])
+    said = f"Status: {word} at {ended:.4g} s. {run.attrs['status_sentence']}"
+    judged = json.loads(run.attrs.get("success", "null"))
+    if judged is None:
+        return said
+    verdict = Success(**judged).sentence(metrics_of(run))
+    return f"{said} {verdict[:1].upper()}{verdict[1:]}."
+
+
+def _configuration(run: xr.Dataset) -> Sequence[Html]:
+    """Versions and seed, and the scenario where there is one."""
+    versions = [
+        f"{key.removeprefix('version_')} {value}" for key, value in run.attrs.items() if key.startswith("version_")
+    ]
+    facts = f"seed {run.attrs.get('seed')}; {', '.join(versions)}; {run.attrs.get('machine', '')}"
+    if not run.attrs.get("scenario"):
+        return [tag("p", facts, class_="small")]
+    scenario = tag("details", tag("summary", "The complete scenario"), tag("pre", run.attrs["scenario"]))
+    return [tag("p", facts, class_="small"), scenario]

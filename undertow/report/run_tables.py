@@ -1,0 +1,96 @@
+"""Tables of one run, as rows of text: for the terminal and for the page."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from undertow.analysis.metrics import for_people
+from undertow.core.metric import Metric
+
+
+class RunTable(NamedTuple):
+    """A table: title, column titles, rows of words and of numbers to be formatted, and sentences below it."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: list[tuple[str | float, ...]]
+    sentences: tuple[str, ...] = ()
+
+
+def metrics_rows(
+    steady: Mapping[str, Any] | None,
+    whole: Mapping[str, Any],
+    window: tuple[float, float] | None,
+    known: Mapping[str, Metric],
+    predicted: Mapping[str, float] | None = None,
+) -> RunTable:
+    """Predicted and measured metrics of the steady window, and the metrics of the whole run."""
+    rows = []
+    for name, metric in known.items():
+        if name in whole:
+            said = lambda values, name=name, metric=metric: _defined(for_people(values[name], metric.unit)[0])
+            shown = [said(predicted) if name in predicted else ""] if predicted else []
+            late = said(steady) if steady and name in steady else "-"
+            rows.append((name, *shown, late, said(whole), for_people(0.0, metric.unit)[1]))
+    head = ("metric", *(("predicted",) if predicted else ()), _span(window), "whole run", "unit")
+    return RunTable("Metrics", head, rows)
+
+
+def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float] | None) -> RunTable:
+    """The share of the time for which each hypothesis of the stability proof held, and its first failure."""
+    rows = []
+    for one in certificate["hypotheses"]:
+        if one["whole"] is None:
+            rows.append((one["sentence"], "-", "-", one["unknown"]))
+            continue
+        first = "never" if one["first_failure"] is None else f"{one['first_failure']:.4g} s"
+        rows.append((one["sentence"], _share(one["steady"]), _share(one["whole"]), first))
+    head = ("hypothesis", _span(window), "whole run", "first fails at")
+    return RunTable("Certificate: hypotheses of the stability proof", head, rows, _consequences(certificate))
+
+
+def _span(window: tuple[float, float] | None) -> str:
+    return "steady window" if window is None else f"{window[0]:g} to {window[1]:g} s"
+
+
+def _consequences(certificate: Mapping[str, Any]) -> tuple[str, ...]:
+    """The quantities of the proof, as sentences."""
+    rising = certificate["rising"]
+    sentences = [
+        f"{certificate['function']}: {_number(certificate['start'])} at the start, {_number(certificate['end'])} at "
+        f"the end; rises at {_share(rising['whole'])} of the steps, {_share(rising['steady'])} of the steady ones."
+    ]
+    if certificate.get("decay") is not None:
+        sentences.append(
+            f"Mean of 1/2 E^T Q E over the steady window: {_number(certificate['decay'])}; with tanh for sign (Remark "
+            f"5) the proof allows a residual of {_number(certificate['residual'])}."
+        )
+    if "estimation_within" in certificate:
+        kept, allowed = certificate["estimation_within"], certificate["estimation_bound"]
+        sentences.append(
+            f"|d_hat - d| is within the bound that follows from the largest recorded |d_dot| (up to "
+            f"{_number(None if None in allowed else max(allowed))}) for {_share(kept['steady'])} of the steady window."
+        )
+    return tuple(sentences)
+
+
+def _share(value: float | None) -> str:
+    """A share in percent; 100 and 0 only where they are exact."""
+    if value is None:
+        return "-"
+    if 0 < value < 1:
+        return f"{min(max(100 * value, 0.1), 99.9):.1f} %"
+    return f"{100 * value:.0f} %"
+
+
+def _defined(value: float | None) -> str | float:
+    """A number, or the word for one that is not: null in JSON, which stands for an infinite value, is `-`."""
+    return "-" if value is None else "never" if value == float("inf") else value
+
+
+def plain(value: str | float) -> str:
+    """A cell as plain text: numbers in four digits."""
+    return value if isinstance(value, str) else f"{value:.4g}"
+
+
+def _number(value: float | None) -> str:
+    return plain(_defined(value))

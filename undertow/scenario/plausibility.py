@@ -1,0 +1,195 @@
+"""Advice on what a scenario can run but surely does not mean; each sentence names the numbers that caused it.
+
+Only what holds whatever the controller does is said: speeds are compared with one that no direction exceeds.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from undertow.core.contracts import AbstractReference
+from undertow.disturbances.adding import Together
+from undertow.disturbances.current import Current
+from undertow.disturbances.gauss_markov_current import GaussMarkovCurrent
+from undertow.disturbances.waves import Waves
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.plants.hybrid_vehicle import HybridVehicle
+
+_SAMPLES = 201  # instants at which a reference is looked at
+_LONG = 1e6  # s, by when a reference that ends has ended
+_FULL_TURN = 2 * np.pi
+_RISES = 0.2  # m above the start; less is no mistake of sign
+_SPARE = 1.05  # a speed is too large from this multiple of the top speed on
+_FAR = 10.0  # s at top speed; a longer step saturates the thrusters for long
+_DIRECTIONS = 2000
+
+
+class Motion(NamedTuple):
+    """A reference at instants, and where the plant starts."""
+
+    time: Float[np.ndarray, " k"]  # s
+    position: Float[np.ndarray, "k n"]  # m, rad
+    velocity: Float[np.ndarray, "k n"]  # m/s, rad/s
+    start: Float[np.ndarray, " n"]  # position of the plant at t = 0
+
+
+def plausibility(loop: ClosedLoop, duration: float, start: list[float] | None) -> tuple[str, ...]:
+    """One sentence for each thing that is surely not meant.
+
+    Args:
+        loop: of the scenario.
+        duration: of the run, s.
+        start: initial position, one entry per output, m and rad; None for zero.
+    """
+    at_start, _ = loop.outputs_at_start(start, None)
+    desired = _sampled(loop.reference, np.linspace(0.0, duration, _SAMPLES), np.asarray(at_start, dtype=float))
+    said = [*_angles(loop, desired), *_unfinished(loop.reference, desired)]
+    if isinstance(loop.plant, HybridVehicle):
+        said += [*_above(loop, desired), *_too_fast(loop, loop.plant, desired)]
+    return tuple(said)
+
+
+def top_speed(plant: HybridVehicle) -> float:
+    """Speed through the water, m/s, that the thrusters exceed in no direction; infinite where they have no limit.
+
+    In a direction the force is at most the sum of what each thruster gives, and the surplus of weight or buoyancy,
+    although these also turn the vehicle and push it sideways. Drag balances that force at the speed.
+    """
+    actuators = plant.thruster.actuator_model(plant.inputs(), False)
+    if actuators.time_constant() is None:  # the steady force is unknown, too
+        return np.inf
+    held = actuators.quasi_static()
+    low, high = (np.asarray(limit, dtype=float) for limit in held.range(held.init(), jnp.ones(())))
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        return np.inf
+    along = _sphere(_DIRECTIONS)
+    shares = along @ np.asarray(plant.thruster_matrix, dtype=float)[:3]
+    body = plant.body
+    surplus = abs(float(body.weight) - float(body.buoyancy))
+    force = np.maximum(low * shares, high * shares).sum(axis=1) + surplus
+    linear, quadratic = (np.asarray(one, dtype=float)[:3, :3] for one in (body.linear_damping, body.quadratic_damping))
+    a = np.einsum("ki,ij,kj->k", along, linear, along)
+    b = np.einsum("ki,ij,kj->k", along, quadratic, along * np.abs(along))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        speed = 2 * force / (a + np.sqrt(a**2 + 4 * b * force))  # a v + b v^2 = force
+    return float(np.where(np.isnan(speed), np.inf, speed).max())
+
+
+def _angles(loop: ClosedLoop, desired: Motion):
+    """Degrees where radians are due: whole numbers beyond a turn. A pitch beyond 90 degrees."""
+    plant = loop.plant
+    places = {"reference": [desired.position[-1], desired.position[0]], "initial.position": [desired.start]}
+    for name, positions in places.items():
+        for axis in np.flatnonzero(loop.controller.model.coordinates.angles):
+            values = [float(row[axis]) for row in positions]
+            whole = [value for value in values if abs(value) > _FULL_TURN and value % 1 == 0]
+            if whole:
+                output, value = plant.outputs[axis], whole[0]
+                yield (
+                    f"`{name}` has {output} at {value:g} rad, which is {abs(value) / _FULL_TURN:.3g} turns: angles are "
+                    f"in radians, and {value:g} degrees are {np.radians(value):.4g} rad"
+                )
+    if isinstance(plant, HybridVehicle):
+        steepest = float(np.abs(desired.position[:, 4]).max())
+        if np.pi / 2 < steepest < _FULL_TURN:
+            yield (
+                f"`reference` has a pitch of up to {steepest:.4g} rad ({np.degrees(steepest):.4g} degrees), beyond 90 "
+                "degrees, where roll and yaw turn over: angles are in radians"
+            )
+
+
+def _unfinished(reference: AbstractReference, desired: Motion):
+    """A reference that comes to rest after the end of the run."""
+    duration = float(desired.time[-1])
+    late = _sampled(reference, np.geomspace(duration, max(_LONG, 2 * duration), _SAMPLES), desired.start)
+    if not np.isfinite(late.position).all():
+        return
+    goal, size = late.position[-1], 1e-9 * np.ptp(late.position, axis=0).max()
+    there = np.abs(late.position - goal).max(axis=1) <= size
+    if there.all() or not there[-2:].all() or late.velocity[-2:].any() or size == 0:
+        return
+    last = int(np.flatnonzero(~there)[-1])
+    between = _sampled(reference, np.linspace(late.time[last], late.time[last + 1], _SAMPLES), desired.start)
+    ends = between.time[np.abs(between.position - goal).max(axis=1) <= size][0]
+    yield (
+        f"the run ends at {duration:g} s, before the reference reaches its end at {ends:.3g} s: give `loop.duration` "
+        f"at least {ends:.3g} s, unless a part is enough"
+    )
+
+
+def _above(loop: ClosedLoop, desired: Motion):
+    """Positions above the surface, or above the start where a depth was meant."""
+    down, start = desired.position[:, 2], float(desired.start[2])
+    highest = float(down.min())
+    for waves in _members(loop, Waves):
+        surface = -float(waves.depth)
+        for name, value in (("reference", highest), ("initial.position", start)):
+            if value < surface:
+                yield (
+                    f"`{name}` is at down = {value:.4g} m, above the surface at down = {surface:.4g} m (`depth` of the "
+                    "waves): down is positive downward, from the world's origin"
+                )
+        return
+    if highest < -_RISES and down.max() <= 0 <= start:
+        yield (
+            f"`reference` leads to down = {highest:.4g} m, {start - highest:.4g} m above the start at down = "
+            f"{start:.4g} m: down is positive downward, and a depth of {-highest:.4g} m is {-highest:.4g}"
+        )
+
+
+def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
+    """Speeds and distances beyond the thrusters."""
+    top = top_speed(plant)
+    if not np.isfinite(top):
+        return
+    flows = [one.velocity for one in _members(loop, Current)] + [one.mean for one in _members(loop, GaussMarkovCurrent)]
+    flow = float(np.linalg.norm(np.sum([np.asarray(one, dtype=float) for one in flows], axis=0))) if flows else 0.0
+    most = f"the thrusters give the vehicle at most {top:.3g} m/s through the water"
+    if flow > _SPARE * top:
+        yield f"the current is {flow:.3g} m/s, but {most}: it drifts away. 1 knot is 0.514 m/s"
+        return
+    speed = float(np.linalg.norm(desired.velocity[:, :3], axis=1).max())
+    duration, way = float(desired.time[-1]), desired.position[:, :3] - desired.start[:3]
+    far = float(np.linalg.norm(way[-1]))
+    step = float(np.linalg.norm(way[0]))
+    if speed > _SPARE * (top + flow):
+        yield f"`reference` moves at up to {speed:.3g} m/s, but {most}: make it slower"
+    elif far > _SPARE * (top + flow) * duration:
+        yield (
+            f"`reference` is {far:.4g} m from the start at the end of the run, but {most}, which takes "
+            f"{far / top:.3g} s: give `loop.duration` more than {duration:g} s"
+        )
+    elif step > _FAR * top:
+        yield (
+            f"`reference` begins {step:.4g} m from the vehicle, but {most}: the thrusters are at their limits for "
+            f"{step / top:.3g} s or more. Set `initial.position`, or approach smoothly (`settling` of a setpoint)"
+        )
+
+
+def _members(loop: ClosedLoop, kind: type) -> list:
+    """The disturbances of a kind."""
+    every = loop.disturbance.members if isinstance(loop.disturbance, Together) else (loop.disturbance,)
+    return [one for one in every if isinstance(one, kind)]
+
+
+def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) -> Motion:
+    at = _targets(reference, jnp.asarray(time))
+    return Motion(time, np.asarray(at.position, dtype=float), np.asarray(at.velocity, dtype=float), start)
+
+
+@eqx.filter_jit
+def _targets(reference: AbstractReference, times):
+    return jax.lax.map(reference.at, times)
+
+
+def _sphere(count: int) -> Float[np.ndarray, "count 3"]:
+    """Unit vectors, evenly over the sphere (Fibonacci lattice), and the axes."""
+    k = np.arange(count) + 0.5
+    z, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    ring = np.sqrt(1 - z**2)
+    spiral = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
+    return np.concatenate([spiral, np.eye(3), -np.eye(3)])

@@ -1,0 +1,52 @@
+"""Complaints of the YAML parser in words that say what to change, with the line where the mistake was made."""
+
+import re
+from typing import NamedTuple
+
+from ruamel.yaml.error import MarkedYAMLError
+
+_ALIGN = "Start all keys of a section in the same column, and what belongs to them further right"
+
+
+class Mistake(NamedTuple):
+    """What is wrong, its line, from 1 (None where unknown), and the remedy, "" where none is known."""
+
+    says: str
+    line: int | None
+    hint: str
+
+
+def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
+    """The mistake behind an error of the parser in a text."""
+    problem = " ".join((error.problem or "malformed").split())
+    found, begun = _line(error.problem_mark), _line(error.context_mark)
+    line = found or begun
+    if r"character '\t'" in problem:
+        return Mistake("it has a tab", line, "Indent with spaces")
+    if "character" in problem and "cannot start any token" in problem:
+        return Mistake(problem.replace(" that cannot start any token", ""), line, "Put text that starts so in quotes")
+    if "mapping values are not allowed" in problem:
+        if line and len(re.findall(r":(?=\s|$)", _uncommented(text.splitlines()[line - 1]))) > 1:
+            return Mistake("there are two colons in one line", line, "Put text with a colon in quotes")
+        return Mistake("the indentation does not fit the line above", line, _ALIGN)
+    if "expected <block end>" in problem or "entries are not allowed" in problem:
+        return Mistake("the indentation does not fit the lines above", line, _ALIGN)
+    if "could not find expected ':'" in problem:
+        return Mistake("a key has no colon", begun or line, "Write `key: value`, with a space after the colon")
+    if opened := re.match(r"expected ',' or '([\]}])'", problem):
+        closing = opened[1]
+        says = f"a `{'[' if closing == ']' else '{'}` is not closed, or lacks a comma"
+        return Mistake(says, begun or line, f"Add `{closing}`, and commas between the entries")
+    if "quoted scalar" in str(error.context) and "escape" not in problem:
+        return Mistake("a quotation mark is not closed", begun or line, "Close it in the same line")
+    if "escape" in problem:
+        return Mistake(problem, line, "Put text with a backslash in single quotes")
+    return Mistake(problem, line, "")
+
+
+def _line(mark) -> int | None:
+    return None if mark is None else mark.line + 1
+
+
+def _uncommented(line: str) -> str:
+    return re.sub(r"(^|\s)#.*", "", line)
