@@ -80,7 +80,7 @@ NUMBER = r"([-+\d.e]+)"
 # claims in its text, or near a value known otherwise.
 PRINTED = {
     "plot_certificate": [(rf"rank.*: held {NUMBER}%", 100, 100), (rf"d is constant.*: held {NUMBER}%", 0, 0)],
-    "plot_controllers": [(rf"{law}: {NUMBER} mm", 0.1, 50) for law in ("PID", "ADRC", "INDI", "robust")],
+    "plot_controllers": [(rf"{law}: {NUMBER} mm", 1, 60) for law in ("PID", "ADRC", "INDI", "robust")],
     "plot_currents": [(rf"seed 0: mean {NUMBER} m/s", 0.1, 0.5), (rf"deviation {NUMBER} m/s", 0.05, 0.2)],
     "plot_delay_margin": [
         (rf"margin: {NUMBER} ms", 300, 350),
