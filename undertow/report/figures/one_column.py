@@ -1,11 +1,13 @@
 """A figure in the width of one printed column: panels below each other, the key above them, no title."""
 
+import textwrap
+
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.text import Annotation
+from matplotlib.text import Annotation, Text
 from matplotlib.ticker import MaxNLocator
-from matplotlib.transforms import ScaledTranslation
+from matplotlib.transforms import ScaledTranslation, Transform
 
 from undertow.report.figures import style
 
@@ -14,6 +16,10 @@ _TALLEST = 9.0  # in, of a page without margins
 _LOWEST, _NARROWEST = 0.5, 1.0  # in, of a panel
 _GAP = 0.06  # in
 _LINE = 0.15  # in, height of a title
+_LONG = 1.2  # in, names beside a panel that are longer do not move the others
+_WIDER = 1.04  # letters of a PDF are that much wider than those that are measured
+_LETTERS = 46  # of a title in the width of a column
+_OVER = 0.1  # share of a panel by which the last tick label may stand out
 _FEW = 8  # panels; more of them stand in two columns
 
 
@@ -29,11 +35,20 @@ def one_column(figure: Figure) -> Figure:
     panels, across = figure.axes, 2 if len(figure.axes) > _FEW else 1
     _label_last(panels, across)
     for panel in panels:
+        for title in panel.findobj(Text):
+            if title.get_text() == panel.get_title(loc="left"):
+                title.set_text("\n".join(textwrap.wrap(title.get_text(), _LETTERS)))
         _raise_notes(panel)
     around = [_around(panel, canvas) for panel in panels]
-    left, right = (max(sides) for sides in zip(*((one[0], one[1]) for one in around), strict=True))
+    # Panels with long names beside them begin further to the right than the others, but end with them.
+    left, right = max((one[0] for one in around if one[0] < _LONG), default=0.4), max(one[1] for one in around)
+    more = [max(one[0] - left, 0.0) for one in around]
     own = [panel.get_position().width * figure.get_size_inches()[0] if panel.images else 0.0 for panel in panels]
-    wide = max((WIDTH - (across - 1) * _GAP) / across - left - right, _NARROWEST, *own)
+    wide = max(
+        (WIDTH - (across - 1) * _GAP) / across - left - right,
+        _NARROWEST + max(more),
+        *map(sum, zip(own, more, strict=True)),
+    )
     rows = [range(first, min(first + across, len(panels))) for first in range(0, len(panels), across)]
     above, below = ([max(around[i][side] for i in row) for row in rows] for side in (2, 3))
     heights = [max(panels[i].get_position().height for i in row) * figure.get_size_inches()[1] for row in rows]
@@ -45,7 +60,10 @@ def one_column(figure: Figure) -> Figure:
     top = key
     for row, over, tall, under in zip(rows, above, heights, below, strict=True):
         for column, i in enumerate(row):
-            _move(panels[i], column * (left + wide + right + _GAP) + left, top + over, wide, tall)
+            _move(panels[i], column * (left + wide + right + _GAP) + left + more[i], top + over, wide - more[i], tall)
+            if more[i]:
+                panels[i].xaxis.label.set_horizontalalignment("right")
+                panels[i].xaxis.set_label_coords(1.0, 0.0, transform=_lifted(panels[i], -0.2))
         top += over + tall + under + _GAP
     _key(figure, canvas)
     return figure
@@ -69,16 +87,23 @@ def _raise_notes(panel: Axes) -> None:
             note.xyann = (note.xyann[0], note.xyann[1] + 72 * _LINE)
     key = panel.get_legend()
     if key is not None and key.get_window_extent().y0 >= panel.get_window_extent().y1 - 1:
-        lifted = panel.transAxes + ScaledTranslation(0, _LINE, panel.figure.dpi_scale_trans)
-        key.set_bbox_to_anchor((1.0, 1.0), transform=lifted)
+        key.set_bbox_to_anchor((1.0, 1.0), transform=_lifted(panel, _LINE))
+
+
+def _lifted(panel: Axes, up: float) -> Transform:
+    """Fractions of a panel, moved up by inches."""
+    return panel.transAxes + ScaledTranslation(0, up, panel.figure.dpi_scale_trans)
 
 
 def _around(panel: Axes, canvas: FigureCanvasAgg) -> tuple[float, float, float, float]:
     """Space that labels take at the left, at the right, above and below, in."""
-    whole, inner = panel.get_tightbbox(canvas.get_renderer()), panel.get_window_extent()
+    renderer, inner = canvas.get_renderer(), panel.get_window_extent()
+    whole, beside = panel.get_tightbbox(renderer), panel.yaxis.get_tightbbox(renderer)
+    ticks = [label.get_window_extent(renderer).x1 for label in panel.get_xticklabels() if label.get_visible()]
     if whole is None:
         return 0.0, 0.0, 0.0, 0.0
-    sides = inner.x0 - whole.x0 + 2, whole.x1 - inner.x1, whole.y1 - inner.y1, inner.y0 - whole.y0
+    left, right = inner.x0 - beside.x0 if beside else 0.0, min(max(ticks, default=0.0) - inner.x1, _OVER * inner.width)
+    sides = _WIDER * left, right, whole.y1 - inner.y1, inner.y0 - whole.y0
     return tuple(max(side, 0.0) / panel.figure.dpi for side in sides)  # pyright: ignore[reportReturnType]
 
 
