@@ -23,7 +23,7 @@ WILD = {"kind": "pid", "frequency": 500.0}
 
 @pytest.fixture
 def own_law(scenario):
-    """The controller of docs/your-own-controller.md in the current folder."""
+    """The controller of docs/how-to/your-own-controller.md in the current folder."""
     page = ROOT / "docs" / "how-to" / "your-own-controller.md"
     (code,) = [block.code for block in blocks(page) if (at := FILE.match(block.code)) and at["name"].endswith(".py")]
     Path("mine.py").write_text(code.replace("def my_controller(", "def smc("))
