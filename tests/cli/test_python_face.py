@@ -18,6 +18,7 @@ def test_run_has_series_metrics_figures_and_a_page(parts, tmp_path, monkeypatch)
     run = ut.simulate(*parts, duration=0.1, seed=7)
     assert isinstance(run, ut.Run) and run.status == 0
     assert run.dataset["position"].shape == (11, 6) and run.dataset.attrs["seed"] == 7
+    assert "controller_axes" not in run.dataset["axis"].attrs  # the paper's law: those of the outputs
     assert run.metrics["whole"]["position_max"] == pytest.approx(4.0)
     assert run.metrics["steady"]["position_max"] < 4.0
     assert "position_rms" in repr(run) and "completed at 0.1 s" in repr(run)
@@ -41,6 +42,7 @@ def test_python_and_scenario_agree_bit_for_bit(parts, tmp_path):
 def test_scenario_as_data():
     run = ut.simulate_scenario({"reference": {"kind": "setpoint", "position": [1] * 6}, "loop": {"duration": 0.02}})
     assert run.status == 0 and run.metrics["steady"]["position_max"] <= run.metrics["whole"]["position_max"]
+    assert run.dataset["axis"].attrs["controller_axes"] == "surge, sway, heave, roll, pitch, yaw"  # of the default, PID
 
 
 @pytest.mark.parametrize(

@@ -230,6 +230,15 @@ def test_thrusters_are_named_by_where_they_stand():
     assert vehicles.remus100().thruster_names() == ("T1 stern",)
 
 
+def test_signals_of_a_law_in_body_axes_have_their_names(make_run):
+    """Its estimate is along surge, sway, ..., while position and error are north, east, ..."""
+    run = make_run()
+    run["axis"].attrs["controller_axes"] = "surge, sway, heave, roll, pitch, yaw"
+    figures = run_figures(run)
+    shown = lambda name: [at for panel in figures[name].axes if (at := panel.get_title(loc="left"))]
+    assert shown("estimate")[:3] == ["surge", "sway", "heave"] and shown("tracking")[:3] == ["north", "east", "down"]
+
+
 def test_results_without_names_have_numbers(make_run):
     run = make_run(axes=1, inputs=2)
     del run["actuator"].attrs["names"]

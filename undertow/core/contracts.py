@@ -135,6 +135,7 @@ class AbstractCoordinates(eqx.Module):
 
     angles: eqx.AbstractVar[tuple[bool, ...]]  # which outputs are angles, compared modulo 2 pi
     tolerated_status: eqx.AbstractVar[tuple[Status, ...]]  # of the plant, with which a run continues
+    axes: eqx.AbstractVar[tuple[str, ...]]  # names of the axes of errors and velocity; () where they are the outputs
 
     @abc.abstractmethod
     def measurement(self, position: Outputs, velocity: Outputs, actuator: Any = None) -> Measurement:

@@ -29,6 +29,7 @@ class OutputCoordinates(AbstractOutputCoordinates):
 
     angles: tuple[bool, ...] = eqx.field(static=True)
     tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=())
+    axes: tuple[str, ...] = eqx.field(static=True, default=())
 
     def measurement(self, position: Outputs, velocity: Outputs, actuator: Any = None) -> Measurement:
         return Measurement(position, velocity, actuator)

@@ -13,7 +13,8 @@ from undertow.loop.outcome import Outcome
 def to_dataset(outcome: Outcome, loop: ClosedLoop) -> xr.Dataset:
     """Recorded series with coordinates `time` (s), `axis` (names of the outputs) and `actuator` (numbers from 1).
 
-    Attribute `names` of `actuator` names the inputs.
+    Attribute `names` of `actuator` names the inputs. Attribute `controller_axes` of `axis` names the axes of the
+    uncertainty and of the controller's signals where these are not the outputs: surge, sway, ... of a law in body axes.
     """
     variables = {
         name: series(dimensions(signal), np.asarray(outcome.signals[name]), *meaning(signal, loop.plant))
@@ -22,6 +23,8 @@ def to_dataset(outcome: Outcome, loop: ClosedLoop) -> xr.Dataset:
     status = Status(int(outcome.status))
     found = coordinates(np.asarray(outcome.time), loop.plant)
     found["actuator"].attrs["names"] = ", ".join(input_names(loop.plant))
+    if loop.controller.model.coordinates.axes:
+        found["axis"].attrs["controller_axes"] = ", ".join(loop.controller.model.coordinates.axes)
     return xr.Dataset(
         variables,
         coords=found,

@@ -44,6 +44,7 @@ class BodyCoordinates(AbstractCoordinates):
 
     angles: tuple[bool, ...] = eqx.field(static=True, default=EULER_ANGLES)
     tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=(Status.PITCH_SINGULAR,))
+    axes: tuple[str, ...] = eqx.field(static=True, default=("surge", "sway", "heave", "roll", "pitch", "yaw"))
 
     def measurement(self, position: Vector6, velocity: Vector6, actuator: Any = None) -> Measurement:
         return measurement_of_outputs(position, velocity, actuator)
@@ -128,6 +129,7 @@ class EulerCoordinates(AbstractOutputCoordinates):
 
     angles: tuple[bool, ...] = eqx.field(static=True, default=EULER_ANGLES)
     tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=())
+    axes: tuple[str, ...] = eqx.field(static=True, default=())
 
     def measurement(self, position, velocity, actuator: Any = None) -> Measurement:
         return measurement_of_outputs(position, velocity, actuator)

@@ -48,7 +48,9 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
         "tracking": plot("Tracking", outputs, lambda: [_block(run, [desired, actual], places, 0.0)]),
         "error": plot("Tracking error", outputs, lambda: [Block([error], errors, 1.4, scale="log", titled=True)]),
         "estimate": plot(
-            "Lumped uncertainty and its estimate", outputs, lambda: [_block(run, curves, rates, settled(run))]
+            "Lumped uncertainty and its estimate",
+            recorded.controller_axis_names(run),
+            lambda: [_block(run, curves, rates, settled(run))],
         ),
         "effort": plot("Inputs", inputs, lambda: [_block(run, [commanded, applied], levels, settled(run))]),
     }

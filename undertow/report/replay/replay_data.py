@@ -19,7 +19,6 @@ from undertow.core import runtime
 from undertow.core.contracts import AbstractPlant
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
-from undertow.plants.hybrid_model import BodyCoordinates
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.report.replay.recomputed import environment, firing_along, thrust_along, thrust_limits
 from undertow.scenario.reading import parse
@@ -147,7 +146,7 @@ def _replay_of(run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, label: s
         size=hull_size(vehicle, run),
         thrusters=Thrusters(vehicle.thruster_names(), positions, np.asarray(vehicle.thruster_directions), limits),
         limited=limited,
-        body_axes=isinstance(loop.controller.model.coordinates, BodyCoordinates),
+        body_axes=bool(loop.controller.model.coordinates.axes),
         series=series,
     )
 
