@@ -40,9 +40,10 @@ def test_python_and_scenario_agree_bit_for_bit(parts, tmp_path):
 
 
 def test_scenario_as_data():
-    run = ut.simulate_scenario({"reference": {"kind": "setpoint", "position": [1] * 6}, "loop": {"duration": 0.02}})
+    reference = {"kind": "setpoint", "position": [1] * 6}
+    run = ut.simulate_scenario({"controller": "pid", "reference": reference, "loop": {"duration": 0.02}})
     assert run.status == 0 and run.metrics["steady"]["position_max"] <= run.metrics["whole"]["position_max"]
-    assert run.dataset["axis"].attrs["controller_axes"] == "surge, sway, heave, roll, pitch, yaw"  # of the default, PID
+    assert run.dataset["axis"].attrs["controller_axes"] == "surge, sway, heave, roll, pitch, yaw"
 
 
 @pytest.mark.parametrize(
