@@ -4,15 +4,14 @@ Blocks of one page run in order, in one folder, with one namespace. A block that
 an output) is not marked python or bash, or stands after a line `<!-- not run -->`. A block of Python or YAML whose
 first line is `# my_part.py` is that file: it is written into the folder.
 
-A block of text on a page of docs/tutorials is what the command before it prints: each of its lines must occur in the
-output, in this order; `...` stands for anything. Where it shows an error, the command must fail with exit code 2.
+Blocks of text on a page of docs/tutorials are what the command before them prints: each of their lines must occur in the
+output, in this order; `...` stands for anything. Where they show an error, the command must fail with exit code 2.
 
 By default a run is not put beside its prediction or, on most pages, its scenario is checked only; blank figures and
 no replay are written, and PID stands for the preset `robust`: most of the time of a short run. Of a tutorial, only
 `undertow init` runs, and the scenarios are validated. Slow tests run everything as it stands.
 """
 
-import itertools
 import re
 import shlex
 from pathlib import Path
@@ -126,8 +125,11 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}
     several = blocks(page)
-    tutorial, pairs = page.parent.name == "tutorials", itertools.pairwise(several)
-    shown = {one.line: two.code for one, two in pairs if two.language == "text" and tutorial}
+    tutorial, shown, before = page.parent.name == "tutorials", {}, 0
+    for block in several:
+        if block.language == "text" and tutorial:
+            shown[before] = shown.get(before, "") + block.code
+        before = before if block.language == "text" else block.line
     for block in several:
         if file := FILE.match(block.code):
             code = block.code if whole or not file["name"].endswith(".yaml") else block.code.replace(ROBUST, QUICKER)

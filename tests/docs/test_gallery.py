@@ -80,7 +80,7 @@ NUMBER = r"([-+\d.e]+)"
 # claims in its text, or near a value known otherwise.
 PRINTED = {
     "plot_certificate": [(rf"rank.*: held {NUMBER}%", 100, 100), (rf"d is constant.*: held {NUMBER}%", 0, 0)],
-    "plot_controllers": [(rf"{law}: {NUMBER} mm", 1, 60) for law in ("PID", "ADRC", "INDI", "robust")],
+    "plot_controllers": [(rf"{law}: {NUMBER} mm", 10, 100) for law in ("PID", "ADRC", "INDI", "robust")],
     "plot_currents": [(rf"seed 0: mean {NUMBER} m/s", 0.1, 0.5), (rf"deviation {NUMBER} m/s", 0.05, 0.2)],
     "plot_delay_margin": [
         (rf"margin: {NUMBER} ms", 300, 350),
@@ -100,7 +100,7 @@ PRINTED = {
     "plot_navigation": [(rf"north: {NUMBER} mm", 5, 200), (rf"down: {NUMBER} mm", 0, 50)],
     "plot_own_controller": [(rf"1 rad/s: {NUMBER} mm", 71, 73), (rf"4 rad/s: {NUMBER} mm", 4.5, 4.8)],
     "plot_poles": [(rf"10 rad/s: .* margin {NUMBER} ms", 50, 110), (rf"40 rad/s: .* margin {NUMBER} ms", 10, 30)],
-    "plot_precision": [(rf"difference: {NUMBER}", 0.01, 1000)],
+    "plot_precision": [(rf"at most {NUMBER}", 0.01, 1000)],
     "plot_references": [
         (rf"lawn_mower: at most {NUMBER} m/s", 0.5, 0.5),
         (rf"helix: .* and {NUMBER} m/s", 0.049, 0.0495),
