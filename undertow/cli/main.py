@@ -88,7 +88,7 @@ def init(
         str | None, typer.Option(metavar="NAME", help="Vehicle: bluerov2, bluerov2_heavy (default), odin or rexrov.")
     ] = None,
     own_vehicle: Annotated[
-        bool, typer.Option("--own-vehicle", help="Also write my_rov.yaml, a vehicle to put your numbers in.")
+        bool, typer.Option("--own-vehicle", help="Also write my_rov.yaml, a vehicle file for your numbers.")
     ] = False,
     own_controller: Annotated[
         bool, typer.Option("--own-controller", help="Also write my_controller.py, a sliding-mode law to change.")
@@ -182,7 +182,7 @@ def tune(
 
     The command simulates the closed loop with many candidate gains on a training set of seeds, disturbance sizes and
     published parameter sets, and evaluates the best on held-out runs. It accepts only gains with a certificate of
-    stability. It writes tuned.yaml, a scenario with the gains, tuning.json and figures/. The section `tune` of the
+    stability. It writes tuned.yaml (a scenario with the gains), tuning.json and figures/. The section `tune` of the
     scenario has the options.
     """
     from undertow.cli.tune import tune_scenario
@@ -289,9 +289,9 @@ def compare(
 ) -> int:
     """Compare controllers on one scenario, or several scenarios, on the same seeds.
 
-    The command runs the same samples and seeds for each, and writes the medians, the paired differences with confidence
-    intervals and a rank test, and the failures: comparison.html, .json, .csv, .tex and .md, figures/, trials.zarr, and
-    the scenario of each contestant.
+    The command runs each of them on the same samples and seeds, and writes the medians, the paired differences with
+    confidence intervals and a rank test, and the failures: comparison.html, .json, .csv, .tex and .md, figures/,
+    trials.zarr, and scenarios/ with the scenario of each controller.
     """
     from undertow.cli.compare import compare
 
