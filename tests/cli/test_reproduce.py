@@ -17,7 +17,7 @@ def short_study(monkeypatch):
         claims = [{"id": "C1", "claim": "It converges.", "verdict": f"holds, quick {quick}"}]
         (folder / "results.json").write_text(json.dumps({"claims": claims}))
 
-    def write(found, folder):
+    def write(found, folder, pdf):
         (folder / "report.html").write_text("page")
         return folder / "report.html"
 
@@ -50,7 +50,7 @@ def test_impossible_folder_is_refused_first(refused, tmp_path):
 
 
 def test_a_report_that_cannot_be_written_costs_no_results(undertow, tmp_path, short_study, monkeypatch):
-    def fail(found, folder):
+    def fail(found, folder, pdf):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(command, "write", fail)

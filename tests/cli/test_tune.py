@@ -110,7 +110,7 @@ def test_an_interrupt_before_the_first_answer_promises_nothing(undertow, tmp_pat
     (tmp_path / "s.yaml").write_text(SCENARIO)
     monkeypatch.setattr("undertow.tuning.evaluator.Evaluation.costs", interrupted)
     said = undertow("tune", "s.yaml", "--out", "out")
-    assert said.code == 130 and said.err == ""
+    assert said.code == 130 and said.err == "No results were written to out.\n"
     assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
 
 
