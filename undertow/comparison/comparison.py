@@ -6,22 +6,21 @@ import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from undertow.analysis.metrics import MEANINGS
-from undertow.campaign.columns import DONE
-from undertow.campaign.executors import chosen
-from undertow.campaign.run_campaign import STORE, run_campaign
-from undertow.campaign.store_results import Results, load
-from undertow.comparison.contest import Contest, contest
-from undertow.comparison.findings import Findings, find
-from undertow.comparison.paired import Difference
-from undertow.comparison.sentences import sentences
-from undertow.comparison.tables import STYLES, table
 from undertow.core import checks
+
+# What a campaign needs is imported where it is used: SciPy and zarr add filters of warnings to the process, and to look
+# at a name of undertow changes nothing.
+if TYPE_CHECKING:
+    from undertow.campaign.store_results import Results
+    from undertow.comparison.contest import Contest
+    from undertow.comparison.findings import Findings
+    from undertow.comparison.paired import Difference
 
 # Metrics that are compared, where they are defined: those that mean the same for every law. Smaller is better.
 _COMPARED = (
@@ -47,10 +46,10 @@ class Comparison:
     """
 
     dataset: xr.Dataset
-    findings: Findings
+    findings: "Findings"
 
     @property
-    def differences(self) -> tuple[Difference, ...]:
+    def differences(self) -> "tuple[Difference, ...]":
         """Every two contestants in every metric."""
         return self.findings.differences
 
@@ -63,16 +62,24 @@ class Comparison:
         Raises:
             BadInput: another style.
         """
+        from undertow.comparison.tables import STYLES, table
+
         checks.choice("style", style, tuple(STYLES))
         return table(self.findings, style)
 
     def __repr__(self) -> str:
+        from undertow.comparison.sentences import sentences
+
         names = ", ".join(self.findings.names)
         return "\n".join([f"Comparison of {names}, {self.findings.trials} trials each.", *sentences(self.findings)])
 
 
-def read_comparison(folder: Path, results: Results, ready: Contest) -> Comparison:
+def read_comparison(folder: Path, results: "Results", ready: "Contest") -> Comparison:
     """The result of a comparison whose campaign has run in a folder and was read from there."""
+    from undertow.campaign.columns import DONE
+    from undertow.campaign.run_campaign import STORE
+    from undertow.comparison.findings import find
+
     with xr.open_zarr(folder / STORE, consolidated=False) as opened:
         dataset = opened.drop_vars(DONE).load()
     (axis,) = results.campaign.axes
@@ -107,6 +114,11 @@ def compare(
     Raises:
         BadInput: anything wrong with the scenario, the controllers or the number of trials.
     """
+    from undertow.campaign.executors import chosen
+    from undertow.campaign.run_campaign import run_campaign
+    from undertow.campaign.store_results import load
+    from undertow.comparison.contest import contest
+
     given: Any = scenario
     if isinstance(scenario, str | Path):
         given = [Path(scenario)]
