@@ -60,7 +60,7 @@ def test_earlier_result_is_kept_unless_told(tmp_path):
 
 def test_what_undertow_did_not_write_is_never_replaced(tmp_path):
     (tmp_path / "figures").mkdir()
-    with pytest.raises(BadInput, match="without files of these names"):
+    with pytest.raises(BadInput, match="without files of the names of results"):
         with results_folder(tmp_path, NAMES, "run.nc", overwrite=True):
             pass
 

@@ -161,5 +161,5 @@ def test_currents_add_and_each_member_has_its_own_randomness():
 
 
 def test_water_needs_a_body():
-    with pytest.raises(BadInput, match="`disturbance` must act on a body in water"):
+    with pytest.raises(BadInput, match="`kind` must act on a body in water"):
         current().at((), 0.0, None, CALM)

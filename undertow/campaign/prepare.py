@@ -18,6 +18,7 @@ from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.finished_run import rules
 from undertow.scenario.reading import Text
+from undertow.scenario.schema import check_kind
 
 
 class Prepared(NamedTuple):
@@ -49,6 +50,7 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
         BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
     """
     several = trials(campaign, source, allow_code)
+    check_kind(several.scenario, "scenario", source.where(("scenario",)))
     text, folder = whole(campaign, several.scenario.data), several.scenario.folder
     here = tasks.site(text, str(folder))
     firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]

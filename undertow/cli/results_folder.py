@@ -124,7 +124,8 @@ def check_folder(
     if not taken:
         return
     if not (folder / marker).exists():
-        raise BadInput("--out", "be a folder without files of these names", f"{folder}, which has {taken[0]}")
+        got, move = f"{folder}, which has {taken[0]}", f"Choose another folder, or move {taken[0]} out of this one"
+        raise BadInput("--out", "be a folder without files of the names of results", got, hint=move)
     if not overwrite:
         raise BadInput("--out", "be a folder without an earlier result", f"{folder}, which has {marker}", hint=hint)
 

@@ -108,7 +108,10 @@ def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: 
     dimension, path = "controller", None
     if not isinstance(given, Mapping) and len(given) > 1:
         if entries is not None:
+            strays = [str(path) for path in given[1:] if not path.suffix and not path.exists()]
             hint = "Compare several controllers on one scenario, or several scenarios as they are"
+            if strays:
+                hint = f"Separate the controllers by commas: --controllers {','.join([*map(str, entries), *strays])}"
             raise BadInput("--controllers", "be given with one scenario only", f"{len(given)} scenarios", hint=hint)
         text, found, differing = scenarios(given, allow_code)
         dimension = "scenario"

@@ -104,6 +104,8 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
         hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
         other = next((one for one in KINDS if one != kind and name in names(one)), None) if parts else None
         hint = f"`{name}` is one of the {other}: give it at `{KEY_OF[other]}`" if other else hint
+        if kind == "plants" and name.endswith((".yaml", ".yml")):
+            hint = f"A vehicle file is named as `plant: {{vehicle: {name}}}`"
         raise BadInput(what, f"be a part in {kind}", name, hint=hint)
     return parts[name]
 

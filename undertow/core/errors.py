@@ -72,9 +72,15 @@ class BadInput(ValueError):
         return f"`{_one_line(self.name)}` must {self.must}{got}{where}{hint}"
 
 
+def known_key(key: str, known: Iterable[str]) -> str:
+    """As `did_you_mean`, for a key; digits are what follows the decimal comma of `{supply: 16,5}`."""
+    comma = "Write a decimal point: in braces, a comma starts a new key"
+    return comma if key.isdecimal() else did_you_mean(key, known)
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Sentence naming the nearest known word, or all of them when none is near."""
-    known = sorted(known)
+    known = sorted(set(known))
     return nearest(word, known) or f"Known: {', '.join(known)}"
 
 

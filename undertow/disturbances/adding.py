@@ -50,7 +50,7 @@ def body_of(pose: Pose | None) -> Pose:
         BadInput: the plant is not one.
     """
     if pose is None:
-        raise BadInput("disturbance", "act on a body in water", "used with another plant", hint="Use kind: sinusoid")
+        raise BadInput("kind", "act on a body in water", "used with another plant", hint="Use kind: sinusoid")
     return pose
 
 

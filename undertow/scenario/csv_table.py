@@ -49,7 +49,8 @@ def samples_of(text: str, name: str) -> list[list[float]]:
         raise BadInput("file", "have a header and at least two rows", f"{name}, which is empty")
     header = numbered[0][1]
     if len(header) < 2 or header != ["t", *(f"d{i}" for i in range(1, len(header)))]:
-        raise BadInput("file", "have the columns t, d1, d2, ...", f"{name} with columns {', '.join(header)}")
+        hint = "Separate the columns with commas, and write decimal points" if len(header) < 2 else ""
+        raise BadInput("file", "have the columns t, d1, d2, ...", f"{name} with columns {', '.join(header)}", hint=hint)
     if len(numbered) < 3:
         raise BadInput("file", "have at least two rows of samples", f"{name} with {len(numbered) - 1}")
     samples = [_numbers(name, line, row, len(header)) for line, row in numbered[1:]]

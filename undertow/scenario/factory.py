@@ -11,7 +11,7 @@ import equinox as eqx
 import numpy as np
 
 from undertow.core import catalogue, checks, contracts
-from undertow.core.errors import BadInput, did_you_mean, within
+from undertow.core.errors import BadInput, known_key, within
 from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import fault_of
 from undertow.power import ESC, Battery
@@ -86,7 +86,9 @@ def make(
         table = _samples(options, folder)
     part, resolved = call(function, options, given, folder)
     if not isinstance(part, _CONTRACTS[kind]):
-        raise BadInput("kind", f"name a function that returns {_title(_CONTRACTS[kind])}", f"{name}: {part!r}")
+        hint = "Does the function lack a `return`?" if part is None else ""
+        must = f"name a function that returns {_title(_CONTRACTS[kind])}"
+        raise BadInput("kind", must, f"{name}: {part!r}", hint=hint)
     if table:
         del resolved["samples"]
     part = adjust(part, changes, tuple(own)) if changes else part
@@ -111,7 +113,8 @@ def call(
     known = {name: option for name, option in signature[len(given) :] if option.kind not in _VARIABLE}
     for key in options:
         if key not in known:
-            raise BadInput(key, "be an option here", "unknown", hint=did_you_mean(key, known) if known else "")
+            hint = known_key(str(key), known) if known else "There are none: remove it"
+            raise BadInput(key, "be an option here", "unknown", hint=hint)
     arguments, resolved = {}, {}
     for name, parameter in known.items():
         if name in INNER:
@@ -144,7 +147,7 @@ def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -
     for key, change in changes.items():
         if key not in adjustable:
             raise BadInput(
-                key, "be an option or parameter here", "unknown", hint=did_you_mean(key, [*options, *adjustable])
+                key, "be an option or parameter here", "unknown", hint=known_key(str(key), [*options, *adjustable])
             )
         if isinstance(values[key], eqx.Module):
             if not isinstance(change, Mapping):

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
 
-from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.errors import BadInput, known_key
 from undertow.scenario.reading import Text
 from undertow.scenario.values import remedy_of
 from undertow.scenario.vehicle_schema import KEYS as VEHICLE_KEYS
@@ -196,14 +196,23 @@ def validate(text: Text) -> Scenario:
     Raises:
         BadInput: unknown key, wrong type, value out of range; the error names key, location and nearest known word.
     """
-    if (kind := kind_of(text.data)) in _REMEDIES:
-        name = text.name or "NAME.yaml"
-        hint = _REMEDIES[kind].format(name=name)
-        raise BadInput("SCENARIO", "be a scenario", f"{name}, a {kind}", hint=hint)
+    check_kind(text)
     try:
         return Scenario.model_validate(text.data)
     except ValidationError as errors:
         raise complaint(errors, text) from None
+
+
+def check_kind(text: Text, key: str = "SCENARIO", where: str = "") -> None:
+    """Check that a text is not another kind of file; `key` and `where` are the place that named it.
+
+    Raises:
+        BadInput: it is.
+    """
+    if (kind := kind_of(text.data)) in _REMEDIES:
+        name = text.name or "NAME.yaml"
+        hint = _REMEDIES[kind].format(name=name)
+        raise BadInput(key, "be a scenario", f"{name}, a {kind}", hint=hint, where=where)
 
 
 def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scenario) -> BadInput:
@@ -215,10 +224,11 @@ def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scen
     name = " ".join(name.split())
     where = text.where(path)
     if error["type"] == "extra_forbidden":
-        hint = _section_of(path, model) or did_you_mean(str(path[-1]), _keys_beside(path, model))
+        hint = _section_of(path, model) or known_key(str(path[-1]), _keys_beside(path, model))
         return BadInput(name, f"be a key of the {what}", "unknown", hint=hint, where=where)
     if error["type"] == "missing":
-        return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to the {what}", where=where)
+        section = f"`{name.rpartition('.')[0]}`" if len(path) > 1 else f"the {what}"
+        return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to {section}", where=where)
     got = error["input"]
     return BadInput(name, _must(error), "empty" if got is None else repr(got), hint=_remedy(error), where=where)
 
@@ -233,9 +243,11 @@ def _must(error: Any) -> str:
 
 
 def _remedy(error: Any) -> str:
-    """How to write what was meant, where a number, or true or false, is missing."""
-    kind = error["type"]
-    return remedy_of(error["input"], kind == "bool_type") if kind in ("float_type", "int_type", "bool_type") else ""
+    """How to write what was meant, where a number, true or false, or the space of `key: value` is missing."""
+    kind, got = error["type"], error["input"]
+    if "mapping" in _must(error) and isinstance(got, str) and re.fullmatch(r"[\w-]+:\S+", got):
+        return "Write a space after the colon"
+    return remedy_of(got, kind == "bool_type") if kind in ("float_type", "int_type", "bool_type") else ""
 
 
 # Sections of parts whose names newcomers write at the top.

@@ -35,7 +35,8 @@ def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
     plain = all(kind in _WORDS for kind in kinds)
     if not (any(_is(value, kind) for kind in kinds) if plain else _numbers(value)):
         must = " or ".join(_WORDS[kind] for kind in kinds) if plain else "a number or a list of numbers"
-        raise BadInput(name, f"be {must}", repr(value), hint=remedy_of(value, bool in kinds))
+        remedy = ("" if plain else _listed(value)) or remedy_of(value, bool in kinds)
+        raise BadInput(name, f"be {must}", repr(value), hint=remedy)
     if int in kinds and value is not None and abs(value) > _LARGEST_COUNT:
         raise BadInput(name, f"be at most {_LARGEST_COUNT}", value)
     if not isinstance(value, str):
@@ -66,6 +67,15 @@ def remedy_of(value: Any, yes_or_no: bool = False) -> str:
     if _NUMBER.match(text):
         return "Write the number alone, without a unit"
     return ""
+
+
+def _listed(value: Any) -> str:
+    """How to write a list that lacks its square brackets; "" where it is none."""
+    inner = value.strip().strip("()") if isinstance(value, str) else ""
+    entries = re.split(r",\s*|\s+", inner)
+    several = len(entries) > 2 or (len(entries) == 2 and (" " in inner or inner != value.strip()))
+    whole = several and all(map(_NUMBER.fullmatch, entries))
+    return f"Write it in square brackets, with commas: [{', '.join(entries)}]" if whole else ""
 
 
 def _is(value: Any, kind: type) -> bool:

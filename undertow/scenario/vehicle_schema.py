@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from undertow.core import checks
-from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.errors import BadInput, did_you_mean, known_key
 from undertow.scenario.values import checked
 from undertow.vehicles.facts import Facts
 from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
@@ -131,7 +131,9 @@ def _pose(name: str, entry: Any) -> tuple[NDArray, NDArray]:
         raise BadInput(name, "be a mapping of `position` and `direction`", entry)
     for key in entry:
         if key not in _THRUSTER_KEYS:
-            raise BadInput(f"{name}.{key}", "be a key of a thruster", "unknown", hint=did_you_mean(key, _THRUSTER_KEYS))
+            raise BadInput(
+                f"{name}.{key}", "be a key of a thruster", "unknown", hint=known_key(str(key), _THRUSTER_KEYS)
+            )
     angles = [key for key in ("azimuth", "elevation") if key in entry]
     if "direction" in entry and angles:
         raise BadInput(f"{name}.{angles[0]}", "be left out when there is a `direction`", entry[angles[0]])

@@ -20,14 +20,17 @@ def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
     """The mistake behind an error of the parser in a text."""
     problem = " ".join((error.problem or "malformed").split())
     found, begun = _line(error.problem_mark), _line(error.context_mark)
-    line = found or begun
+    line, lines = found or begun, text.splitlines()
     if r"character '\t'" in problem:
         return Mistake("it has a tab", line, "Indent with spaces")
     if "character" in problem and "cannot start any token" in problem:
         return Mistake(problem.replace(" that cannot start any token", ""), line, "Put text that starts so in quotes")
     if "mapping values are not allowed" in problem:
-        if line and len(re.findall(r":(?=\s|$)", _uncommented(text.splitlines()[line - 1]))) > 1:
+        if line and len(re.findall(r":(?=\s|$)", _uncommented(lines[line - 1]))) > 1:
             return Mistake("there are two colons in one line", line, "Put text with a colon in quotes")
+        above = _last(lines[: line - 1]) if line else 0
+        if above and re.fullmatch(r"[\w-]+:[^\s:]+", _uncommented(lines[above - 1]).strip()):
+            return Mistake("a colon has no space after it", above, "Write `key: value`, with a space after the colon")
         return Mistake("the indentation does not fit the line above", line, _ALIGN)
     if "expected <block end>" in problem or "entries are not allowed" in problem:
         return Mistake("the indentation does not fit the lines above", line, _ALIGN)
@@ -46,6 +49,11 @@ def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
 
 def _line(mark) -> int | None:
     return None if mark is None else mark.line + 1
+
+
+def _last(lines: list[str]) -> int:
+    """Number of the last line with more than a comment; 0 where there is none."""
+    return max((number for number, each in enumerate(lines, start=1) if _uncommented(each).strip()), default=0)
 
 
 def _uncommented(line: str) -> str:

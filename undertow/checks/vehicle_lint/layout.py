@@ -29,8 +29,9 @@ def degrees(facts: Facts) -> Iterator[Finding]:
     if given and len(steps) == len(given) and all(abs(n - round(n)) * _STEP < _ROUNDING for n in steps.values()):
         key, value = next(iter(given.items()))
         angle = f"{np.degrees(_STEP) * round(steps[key]):g}"
+        others = ", and the other angles in degrees as well" if len(given) > 1 else ""
         yield advice(
-            "degrees", key, "be in degrees", f"{value:g}, which is {angle} degrees in radians", f"Write {angle}"
+            "degrees", key, "be in degrees", f"{value:g}, which is {angle} degrees in radians", f"Write {angle}{others}"
         )
 
 
