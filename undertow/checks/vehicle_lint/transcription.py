@@ -25,7 +25,10 @@ def printed_matrix(facts: Facts) -> Iterator[Finding]:
             j = int(off[np.argmax(np.abs(printed - computed)[off])])
             must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {DOF_NAMES[row]}"
             got = f"{printed[j]:.4g}{_others(off)}"
-            yield error("printed_matrix", f"thruster_matrix[{row}]", must, got, _likely(printed[off], computed[off]))
+            hint = (
+                f"{_likely(printed[off], computed[off])} If you moved a thruster, delete `thruster_matrix` or update it"
+            )
+            yield error("printed_matrix", f"thruster_matrix[{row}]", must, got, hint)
 
 
 def _others(off: np.ndarray) -> str:
@@ -35,14 +38,14 @@ def _others(off: np.ndarray) -> str:
 def _likely(printed: np.ndarray, computed: np.ndarray) -> str:
     """Likely mistake."""
     if np.allclose(printed, -computed, rtol=_ROUNDING):
-        return "Opposite sign" if len(printed) == 1 else "They have the opposite sign: another frame, or a wrong one"
+        return "Opposite sign." if len(printed) == 1 else "They have the opposite sign: another frame, or a wrong one."
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(printed / computed)
     if np.all(np.abs(ratio - np.sqrt(2)) < 0.05 * np.sqrt(2)):
-        return "The arm was not multiplied by sin 45 degrees"
+        return "The arm was not multiplied by sin 45 degrees."
     if np.all(np.isfinite(ratio)) and np.ptp(ratio) < 0.02 * ratio.max():
         size, excess = max(ratio[0], 1 / ratio[0]), "long" if ratio[0] > 1 else "short"
-        return f"The matrix's arms are {size:.3g} times too {excess} for the poses: another vehicle's, or another unit"
+        return f"The matrix's arms are {size:.3g} times too {excess} for the poses: another vehicle's, or another unit."
     return "Is it the matrix of another layout, order or frame?"
 
 
