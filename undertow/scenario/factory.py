@@ -124,9 +124,7 @@ def call(
         elif name in options:
             arguments[name] = resolved[name] = checked(name, options[name], hints.get(name), parameter.default)
         elif parameter.default is inspect.Parameter.empty:
-            first = not given and name == next(iter(signature))[0]
-            hint = f"If this is a controller, call its first argument `model`, not `{name}`" if first else ""
-            raise BadInput(name, "be given", hint=hint)
+            raise BadInput(name, "be given")
         else:
             arguments[name], resolved[name] = parameter.default, listed(parameter.default)
     return _made(lambda: function(*given, **arguments)), resolved

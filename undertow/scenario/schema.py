@@ -227,8 +227,9 @@ def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scen
         hint = _section_of(path, model) or known_key(str(path[-1]), _keys_beside(path, model))
         return BadInput(name, f"be a key of the {what}", "unknown", hint=hint, where=where)
     if error["type"] == "missing":
-        section = f"`{name.rpartition('.')[0]}`" if len(path) > 1 else f"the {what}"
-        return BadInput(name, "be given", hint=f"Add `{path[-1]}:` to {section}", where=where)
+        section, _, key = name.rpartition(".")
+        place = f"`{section}`" if section else f"the {what}"
+        return BadInput(name, "be given", hint=f"Add `{key}:` to {place}", where=where)
     got = error["input"]
     return BadInput(name, _must(error), "empty" if got is None else repr(got), hint=_remedy(error), where=where)
 
