@@ -182,7 +182,7 @@ MISTAKES = {
     "matrix of another layout": (
         "  - [-0.1888, 0.1888, 0.1888, -0.1888, 0, 0, 0, 0]\n",
         "",
-        "`thruster_matrix` must have 6 rows (surge, sway, heave, roll, pitch, yaw) with one entry for each of the 8 thrusters, but is of shape (5, 8) (my_rov.yaml, line 35)",
+        "`thruster_matrix` must have 6 rows (surge, sway, heave, roll, pitch, yaw) with one entry for each of the 8 thrusters, but is of shape (5, 8) (my_rov.yaml, line 36)",
     ),
     "not YAML": ("r_g: [0, 0, 0] ", "r_g: [0, 0, 0 ", None),
     "direction of a corner": (
