@@ -1,39 +1,29 @@
 """`undertow campaign`: run a Monte Carlo study or a parameter sweep, and summarise it."""
 
-import contextlib
-import os
 import shutil
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-import typer
 from rich.console import Console
 from rich.table import Table
 
 from undertow.analysis.metrics import for_people
 from undertow.campaign.campaign_summary import endings, summary
-from undertow.campaign.executors import check_cluster, chosen
+from undertow.campaign.executors import check_cluster
 from undertow.campaign.prepare import Prepared, prepare
-from undertow.campaign.run_campaign import STORE, Tally, Watch, run_campaign
+from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store_results import Results, load
 from undertow.campaign.task import build_trial
-from undertow.cli import results_folder
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
-from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
-from undertow.cli.results_folder import output_folder
-from undertow.cli.stages import shares, stage
+from undertow.cli.stages import stage
 from undertow.cli.tables import titled, wide_console
-from undertow.core import checks
-from undertow.core.disk import alone
+from undertow.cli.trials import built_with_advice, run_trials, trial_text, trials_folder, worker_count
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import by_xla, write_campaign
-from undertow.scenario.build import Built
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.part_cache import PartCache
-from undertow.scenario.reading import dump
 
 
 def campaign(
@@ -48,27 +38,13 @@ def campaign(
 ) -> int:
     """Run a campaign and write the results to `out`, or to a free folder under runs/; return the exit code."""
     check_pdf(pdf)
-    count = os.cpu_count() or 1 if workers is None else workers
-    checks.positive("--workers", count)
+    count = worker_count(workers)
     if where is not None:
         check_cluster(where)
-    first = Path("runs") / path.stem
-    with output_folder(out or (first if resume else None), first) as folder:
-        check_folder(folder, _WRITTEN, resume, overwrite)
+    with trials_folder(out, path.stem, _WRITTEN, resume, overwrite) as folder:
         console = wide_console()
-        with stage(console, "building first trials"):
-            prepared = interruptible(lambda: prepare(path, allow_code))
-        for sentence in prepared.advice:
-            typer.echo(f"Advice: {sentence}", err=True)
-        if not resume:
-            clear_folder(folder, _WRITTEN)
-        with chosen(where, count) as executor, live(console) as watch:
-            try:
-                interruptible(lambda: run_campaign(prepared, folder, executor, watch))
-            except (KeyboardInterrupt, OSError):
-                if (folder / STORE).is_dir():
-                    typer.echo(f"Stopped. To resume: undertow campaign {path} --out {folder} --resume", err=True)
-                raise
+        prepared = built_with_advice(console, lambda: prepare(path, allow_code))
+        run_trials(console, prepared, folder, None if resume else _WRITTEN, where, count, ["campaign", str(path)])
         return _conclude(console, prepared, folder, pdf)
 
 
@@ -112,24 +88,6 @@ def status(folder: Path, options: Sequence[str]) -> int:
     return DONE
 
 
-@contextlib.contextmanager
-def live(console: Console) -> Iterator[Watch]:
-    """Show the number of finished trials, their rate and the remaining time."""
-    begun, first = time.perf_counter(), None
-    with shares(console, remaining=True) as progress:
-
-        def watch(tally: Tally) -> None:
-            nonlocal first
-            first = tally.done if first is None else first
-            rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
-            invalid = f", {tally.invalid} invalid" if tally.invalid else ""
-            waiting = "compiling" if tally.done < tally.trials else "all trials are done"
-            text = f"{rate:.3g} per second, {tally.failed} failed{invalid}" if tally.done > first else waiting
-            progress(f"{tally.done} of {tally.trials} trials, {text}", tally.done / tally.trials)
-
-        yield watch
-
-
 def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
@@ -139,42 +97,7 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
 
 
-def trial_text(built: Built, sentence: str) -> str:
-    """The scenario of a trial, which `undertow simulate` repeats, with a sentence above it."""
-    data = built.resolved | {"steady": built.resolved["steady"] | {"every_step": True}}  # with contents of named files
-    return f"# {sentence}\n{dump(data)}"
-
-
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
-
-
-def check_folder(folder: Path, names: Sequence[str], resume: bool, overwrite: bool) -> None:
-    """Check that a campaign may be written to a folder; `names` are the files and folders that it writes.
-
-    Raises:
-        BadInput: the folder cannot be used.
-    """
-    if resume and overwrite:
-        hint = "--resume continues the campaign, --overwrite replaces it"
-        raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
-    if not resume:
-        hint = "Add --resume to continue it, or --overwrite to replace it"
-        results_folder.check_folder(folder, names, STORE, overwrite, hint)
-    elif not (folder / STORE).exists():
-        raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
-
-
-def clear_folder(folder: Path, names: Sequence[str]) -> None:
-    """Remove all files of a campaign that is replaced, by their names.
-
-    Raises:
-        BadInput: another process is running it.
-    """
-    if not folder.exists():
-        return
-    with alone(folder / STORE):
-        for name in names:
-            results_folder.remove(folder / name)
 
 
 def table(results: Results, found: dict) -> Table:

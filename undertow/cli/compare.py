@@ -1,26 +1,20 @@
 """`undertow compare`: compare controllers on one scenario, or several scenarios, trial by trial."""
 
-import os
 import re
-import shlex
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-import typer
 from rich.console import Console
 
-from undertow.campaign.executors import chosen
-from undertow.campaign.run_campaign import STORE, run_campaign
+from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store_results import load
 from undertow.campaign.task import build_trial
-from undertow.cli.campaign import check_folder, clear_folder, live, trial_text
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
-from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
-from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.trials import built_with_advice, run_trials, trial_text, trials_folder, worker_count
 from undertow.comparison.comparison import Comparison, read_comparison
 from undertow.comparison.contest import Contest, contest
 from undertow.comparison.sentences import sentences
@@ -49,32 +43,16 @@ def compare(
 ) -> int:
     """Run a comparison and write the results to `out`, or to a free folder under runs/; return the exit code."""
     check_pdf(pdf)
-    count = os.cpu_count() or 1 if workers is None else workers
-    checks.positive("--workers", count)
+    count = worker_count(workers)
     if trials is not None:
         checks.positive("--trials", trials)
     several = None if entries is None else [one for one in map(str.strip, entries.split(",")) if one]
-    first = Path("runs") / f"{paths[0].stem}-comparison"
-    with output_folder(out or (first if resume else None), first) as folder:
-        check_folder(folder, _WRITTEN, resume, overwrite)
+    again = ["compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
+    again += ["--trials", str(trials)] if trials is not None else []
+    with trials_folder(out, f"{paths[0].stem}-comparison", _WRITTEN, resume, overwrite) as folder:
         console = wide_console()
-        with stage(console, "building first trials"):
-            ready = interruptible(lambda: contest(paths, several, trials, allow_code))
-        for sentence in ready.advice:
-            typer.echo(f"Advice: {sentence}", err=True)
-        if not resume:
-            clear_folder(folder, _WRITTEN)
-        with chosen(None, count) as executor, live(console) as watch:
-            try:
-                interruptible(lambda: run_campaign(ready.prepared, folder, executor, watch))
-            except (KeyboardInterrupt, OSError):
-                if (folder / STORE).is_dir():
-                    again = ["undertow", "compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
-                    again += ["--trials", str(trials)] if trials is not None else []
-                    typer.echo(
-                        f"Stopped. To resume: {shlex.join([*again, '--out', str(folder), '--resume'])}", err=True
-                    )
-                raise
+        ready = built_with_advice(console, lambda: contest(paths, several, trials, allow_code))
+        run_trials(console, ready.prepared, folder, None if resume else _WRITTEN, None, count, again)
         return _conclude(console, ready, folder, pdf)
 
 

@@ -1,0 +1,149 @@
+"""Trials of a campaign or a comparison in a results folder: checked, run with progress, and resumed after a stop."""
+
+import contextlib
+import os
+import shlex
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+import typer
+from rich.console import Console
+
+from undertow.campaign.executors import chosen
+from undertow.campaign.prepare import Prepared
+from undertow.campaign.run_campaign import STORE, Tally, Watch, run_campaign
+from undertow.cli import results_folder
+from undertow.cli.interruptible import interruptible
+from undertow.cli.results_folder import output_folder
+from undertow.cli.stages import shares, stage
+from undertow.core import checks
+from undertow.core.disk import alone
+from undertow.core.errors import BadInput
+from undertow.scenario.build import Built
+from undertow.scenario.reading import dump
+
+
+class _Advised(Protocol):
+    @property
+    def advice(self) -> Sequence[str]: ...
+
+
+T = TypeVar("T", bound=_Advised)
+
+
+def worker_count(workers: int | None) -> int:
+    """Number of worker processes: as given, or one for each processor core.
+
+    Raises:
+        BadInput: it is not positive.
+    """
+    count = os.cpu_count() or 1 if workers is None else workers
+    checks.positive("--workers", count)
+    return count
+
+
+@contextlib.contextmanager
+def trials_folder(out: Path | None, name: str, written: Sequence[str], resume: bool, overwrite: bool) -> Iterator[Path]:
+    """The folder of a campaign, locked while it runs: `out`, or a free folder of that name under runs/.
+
+    Args:
+        out: the folder given by the user.
+        name: without it; where a campaign is resumed, exactly this one.
+        written: the files and folders that the command writes.
+        resume: whether the campaign in the folder is continued.
+        overwrite: whether it is replaced.
+
+    Raises:
+        BadInput: the folder cannot be used.
+    """
+    first = Path("runs") / name
+    with output_folder(out or (first if resume else None), first) as folder:
+        if resume and overwrite:
+            hint = "--resume continues the campaign, --overwrite replaces it"
+            raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
+        if not resume:
+            hint = "Add --resume to continue it, or --overwrite to replace it"
+            results_folder.check_folder(folder, written, STORE, overwrite, hint)
+        elif not (folder / STORE).exists():
+            raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
+        yield folder
+
+
+def built_with_advice(console: Console, build: Callable[[], T]) -> T:
+    """Build the first trials and print the advice on them."""
+    with stage(console, "building first trials"):
+        built = interruptible(build)
+    for sentence in built.advice:
+        typer.echo(f"Advice: {sentence}", err=True)
+    return built
+
+
+def run_trials(
+    console: Console,
+    prepared: Prepared,
+    folder: Path,
+    replaced: Sequence[str] | None,
+    where: str | None,
+    workers: int,
+    command: Sequence[str],
+) -> None:
+    """Run all trials that are not in the folder yet; where it is stopped, print the command that continues.
+
+    Args:
+        console: for the progress.
+        prepared: the campaign.
+        folder: that of the results.
+        replaced: files and folders of an earlier campaign there, to be removed first; None to continue it.
+        where: cluster, or None for this machine.
+        workers: number of worker processes.
+        command: words after `undertow` of the command to repeat, without `--out` and `--resume`.
+    """
+    if replaced is not None:
+        _clear(folder, replaced)
+    with chosen(where, workers) as executor, _live(console) as watch:
+        try:
+            interruptible(lambda: run_campaign(prepared, folder, executor, watch))
+        except (KeyboardInterrupt, OSError):
+            if (folder / STORE).is_dir():
+                again = shlex.join(["undertow", *command, "--out", str(folder), "--resume"])
+                typer.echo(f"Stopped. To resume: {again}", err=True)
+            raise
+
+
+def _clear(folder: Path, names: Sequence[str]) -> None:
+    """Remove all files of a campaign that is replaced, by their names.
+
+    Raises:
+        BadInput: another process is running it.
+    """
+    if not folder.exists():
+        return
+    with alone(folder / STORE):
+        for name in names:
+            results_folder.remove(folder / name)
+
+
+@contextlib.contextmanager
+def _live(console: Console) -> Iterator[Watch]:
+    """Show the number of finished trials, their rate and the remaining time."""
+    begun, first = time.perf_counter(), None
+    with shares(console, remaining=True) as progress:
+
+        def watch(tally: Tally) -> None:
+            nonlocal first
+            first = tally.done if first is None else first
+            rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
+            invalid = f", {tally.invalid} invalid" if tally.invalid else ""
+            waiting = "compiling" if tally.done < tally.trials else "all trials are done"
+            text = f"{rate:.3g} per second, {tally.failed} failed{invalid}" if tally.done > first else waiting
+            progress(f"{tally.done} of {tally.trials} trials, {text}", tally.done / tally.trials)
+
+        yield watch
+
+
+def trial_text(built: Built, sentence: str) -> str:
+    """The scenario of a trial, which `undertow simulate` repeats, with a sentence above it."""
+    data = built.resolved | {"steady": built.resolved["steady"] | {"every_step": True}}  # with contents of named files
+    return f"# {sentence}\n{dump(data)}"
