@@ -288,9 +288,9 @@ def test_a_share_that_so_few_trials_cannot_show_is_told(campaign_file, tmp_path,
     for trials in (35, 36):
         out = tmp_path / str(trials)
         assert run(["campaign", str(campaign_file(trials=trials, requirements=required)), "--out", str(out)]) == 0
-        told = (
+        advised = (
             "which takes at least 36 trials without a failure to demonstrate; `trials` is 35" in capsys.readouterr().err
         )
         combination = json.loads((out / "summary.json").read_text())["combinations"][0]
-        verdicts.append((combination["requirements"][0]["verdict"], told))
+        verdicts.append((combination["requirements"][0]["verdict"], advised))
     assert verdicts == [("open", True), ("holds", False)]

@@ -91,14 +91,14 @@ def test_many_runs_at_once_have_the_same_times():
         (double_integrator(), "m/s^2"),
     ],
 )
-def test_inputs_are_told_in_their_own_unit(plant, unit):
+def test_inputs_are_in_their_own_unit(plant, unit):
     assert plant.input_unit == unit
     loop = ClosedLoop(
         plant, pid(plant.model(), frequency=2.0), setpoint(np.zeros(len(plant.outputs))), none(), perfect()
     )
-    told = {name: metric.unit for name, metric in meanings(loop).items()}
-    assert told["input_rms"] == told["input_peak"] == unit and told["input_variation"] == f"{unit}/s"
-    assert not any("[" in one for one in told.values())
+    units = {name: metric.unit for name, metric in meanings(loop).items()}
+    assert units["input_rms"] == units["input_peak"] == unit and units["input_variation"] == f"{unit}/s"
+    assert not any("[" in one for one in units.values())
     assert not any("voltage" in name or "V" in one.unit or "volt" in one.meaning for name, one in MEANINGS.items())
 
 

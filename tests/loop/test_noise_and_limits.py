@@ -24,8 +24,8 @@ def measured(key, samples, truth=0.0, dt=1e-3):
     path, still = sensor.realize(key), Measurement(jnp.full(3, truth), jnp.full(3, truth))
 
     def step(state, t):
-        told, state = sensor.measure(path, state, t, still)
-        return state, told
+        measured, state = sensor.measure(path, state, t, still)
+        return state, measured
 
     return jax.lax.scan(step, sensor.init(path, still), dt * jnp.arange(samples, dtype=float))[1]
 
@@ -85,9 +85,9 @@ def test_law_is_advanced_with_what_was_applied(limited):
     law, samples = limited
     eps, now = samples["modelling_error"], samples["predicted_velocity"]
     own = -150.0 * eps + samples["estimate"] - 0.1 * np.tanh(eps / 0.5)
-    told = {name: now + DT * (own + samples[name]) for name in ("input", "commanded_input")}
-    np.testing.assert_allclose(told["input"][:-1], now[1:], atol=1e-12)
-    assert np.abs(told["commanded_input"][:-1] - now[1:]).max() > 1e-3
+    expected = {name: now + DT * (own + samples[name]) for name in ("input", "commanded_input")}
+    np.testing.assert_allclose(expected["input"][:-1], now[1:], atol=1e-12)
+    assert np.abs(expected["commanded_input"][:-1] - now[1:]).max() > 1e-3
     xi_sum = samples["weights"].shape[-1]
     assert xi_sum == law.fuzzy.rules
 

@@ -15,13 +15,13 @@ def heavy(parameters):
 
 
 def test_model_of_another_parameter_set():
-    told = heavy("ng2024").model(vehicle=ut.vehicles.bluerov2_heavy("vonbenzon2022"), rate_term=True)
+    given = heavy("ng2024").model(vehicle=ut.vehicles.bluerov2_heavy("vonbenzon2022"), rate_term=True)
     own = heavy("vonbenzon2022").model(rate_term=True)
     demand = jnp.linspace(-1.0, 1.0, 6)
-    assert np.array_equal(told.dynamics.drift(Y), own.dynamics.drift(Y))
-    assert np.array_equal(told.dynamics.gain(Y), own.dynamics.gain(Y))
-    assert np.array_equal(told.dynamics.invert(Y, demand), own.dynamics.invert(Y, demand))
-    assert np.abs(told.dynamics.drift(Y) - heavy("ng2024").model(rate_term=True).dynamics.drift(Y)).max() > 0.1
+    assert np.array_equal(given.dynamics.drift(Y), own.dynamics.drift(Y))
+    assert np.array_equal(given.dynamics.gain(Y), own.dynamics.gain(Y))
+    assert np.array_equal(given.dynamics.invert(Y, demand), own.dynamics.invert(Y, demand))
+    assert np.abs(given.dynamics.drift(Y) - heavy("ng2024").model(rate_term=True).dynamics.drift(Y)).max() > 0.1
 
 
 def test_vehicle_with_other_thrusters_is_refused():

@@ -42,7 +42,7 @@ def ablation(identity, medians, failures=0):
         }
         for name, m in medians.items()
     ]
-    told = {
+    entries = {
         "campaigns": [f"a{int(identity[1:]):02d}_made_up"],
         "question": "What?",
         "prediction": "This.",
@@ -50,7 +50,7 @@ def ablation(identity, medians, failures=0):
         "answer": "So.",
         "left_out": "all else",
     }
-    return {"id": identity, **told, "variants": variants}
+    return {"id": identity, **entries, "variants": variants}
 
 
 def row(place, law, tracking=None, ended=None):
