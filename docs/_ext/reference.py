@@ -1,5 +1,6 @@
 """Directives that make the reference from the code: parts, keys of files, metrics, signals, exit codes and commands."""
 
+import abc
 from typing import Any
 
 import typer
@@ -22,16 +23,16 @@ from undertow.scenario.schema import Scenario, keys
 _PARAMETERS = ("parameter", "value", "unit", "symbol", "meaning", "source")
 
 
-class FromCode(SphinxDirective):
+class FromCode(SphinxDirective, abc.ABC):
     """What is made from the code; its page is read again in every build."""
 
     def run(self) -> list[nodes.Node]:
         self.env.note_reread()
         return self.contents()
 
+    @abc.abstractmethod
     def contents(self) -> list[nodes.Node]:
         """The nodes that stand in the place of the directive."""
-        raise NotImplementedError
 
 
 class Parts(FromCode):

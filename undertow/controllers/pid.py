@@ -165,9 +165,13 @@ def pid(
         if frequency is None:
             axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
             frequency = alike([pid_frequency(axis) for axis in axes])
-        for name, value in (("frequency", frequency), ("damping", damping), ("integral_share", integral_share)):
+        for name, value, check in (
+            ("frequency", frequency, checks.positive),
+            ("damping", damping, checks.positive),
+            ("integral_share", integral_share, checks.not_negative),
+        ):
             checks.per_axis(name, value, len(model.coordinates.angles))
-            checks.not_negative(name, value) if name == "integral_share" else checks.positive(name, value)
+            check(name, value)
         w, zeta, share = (jnp.asarray(value, dtype=float) for value in (frequency, damping, integral_share))
         proportional, integral, derivative = w**2, share * w**3, 2 * zeta * w
     else:
