@@ -10,8 +10,8 @@ from test_plausible_mistakes import EXAMPLES, PARTS
 import undertow as ut
 from undertow.campaign.campaign_schema import read_campaign
 from undertow.campaign.trials import trials
-from undertow.core.measurement import measurement_of_outputs
-from undertow.navigation.drift import OUTPUTS, drift_advice, drifts
+from undertow.core.measurement import BODY_OUTPUTS, measurement_of_outputs
+from undertow.navigation.drift import drift_advice, drifts
 from undertow.navigation.observer import observer
 from undertow.reproduction import ablations
 from undertow.scenario.build import build
@@ -105,7 +105,7 @@ def test_drift_is_that_of_the_observer(sensors):
         return navigation.measure(path, last, jnp.asarray(60.0), truth)[0].position
 
     errors = np.asarray(jax.jit(jax.vmap(error))(jax.random.split(jax.random.PRNGKey(0), 64)))
-    rms = dict(zip(OUTPUTS, np.sqrt((errors**2).mean(axis=0)), strict=True))
+    rms = dict(zip(BODY_OUTPUTS, np.sqrt((errors**2).mean(axis=0)), strict=True))
     for what, drift in drifts(sensors, 60.0).items():
         for output in what.split(" and "):
             assert rms[output] == pytest.approx(drift, rel=0.27)

@@ -11,6 +11,9 @@ from undertow.numerics.rotations import Kinematics, euler_from_rotation, quatern
 
 Vector6 = Float[Array, "6"]
 
+BODY_OUTPUTS = ("north", "east", "down", "roll", "pitch", "yaw")
+BODY_AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+
 
 def measurement_of_pose(
     position: Float[Array, "3"], attitude: Float[Array, "4"], nu: Vector6, actuator: Any = None

@@ -6,6 +6,7 @@ from jaxtyping import Float
 from undertow.core import checks
 from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
+from undertow.core.measurement import BODY_AXES
 from undertow.core.param import Param, param
 from undertow.disturbances.adding import AbstractSmoothDisturbance
 
@@ -21,7 +22,7 @@ class ConstantWrench(AbstractSmoothDisturbance):
     def at(self, realization, t, pose, load: Load) -> Load:
         if np.shape(self.value) != load.wrench.shape:
             entries = f"have {load.wrench.shape[0]} entries"
-            must = f"{entries} (surge, sway, heave, roll, pitch, yaw)" if pose is not None else entries
+            must = f"{entries} ({', '.join(BODY_AXES)})" if pose is not None else entries
             raise BadInput("value", must, f"of shape {np.shape(self.value)}")
         return load._replace(wrench=load.wrench + self.value)
 

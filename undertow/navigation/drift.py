@@ -14,7 +14,6 @@ from undertow.sensors.estimate import gravity
 from undertow.sensors.imu import IMU
 from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor
 
-OUTPUTS = ("north", "east", "down", "roll", "pitch", "yaw")
 _REMEDIES = {"north and east": "position_fix", "down": "depth", "yaw": "compass"}
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractCoordinates, AbstractDynamics, Measurement, Model, Target, TrackingError
 from undertow.core.coordinates import AbstractOutputCoordinates
-from undertow.core.measurement import body_of, measurement_of_outputs
+from undertow.core.measurement import BODY_AXES, body_of, measurement_of_outputs
 from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec, partial_inverse, pseudo_inverse, regularised_sharp
 from undertow.numerics.rotations import Kinematics, attitude_error, cross, rotation_from_quaternion, turning_from_euler
@@ -44,7 +44,7 @@ class BodyCoordinates(AbstractCoordinates):
 
     angles: tuple[bool, ...] = eqx.field(static=True, default=EULER_ANGLES)
     tolerated_status: tuple[Status, ...] = eqx.field(static=True, default=(Status.PITCH_SINGULAR,))
-    axes: tuple[str, ...] = eqx.field(static=True, default=("surge", "sway", "heave", "roll", "pitch", "yaw"))
+    axes: tuple[str, ...] = eqx.field(static=True, default=BODY_AXES)
 
     def measurement(self, position: Vector6, velocity: Vector6, actuator: Any = None) -> Measurement:
         return measurement_of_outputs(position, velocity, actuator)

@@ -13,7 +13,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Model, Pose
 from undertow.core.errors import BadInput
-from undertow.core.measurement import measurement_of_pose
+from undertow.core.measurement import BODY_AXES, BODY_OUTPUTS, measurement_of_pose
 from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec
@@ -39,9 +39,6 @@ class VehicleState(NamedTuple):
     nu: Float[Array, "6"]  # m/s, rad/s, body
     thrusters: Any
     power: PowerState = PowerState()  # battery and ledger
-
-
-_DOF_NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 class HybridVehicle(AbstractPlant):
@@ -75,7 +72,7 @@ class HybridVehicle(AbstractPlant):
         self.vehicle, self.thruster, self.power = vehicle, thruster, HybridPower(battery, esc, kept)
         self.power.check(thruster)
         self.body, self.thruster_matrix = vehicle.body(), vehicle.thruster_matrix()
-        self.outputs = ("north", "east", "down", "roll", "pitch", "yaw")
+        self.outputs = BODY_OUTPUTS
         self.output_units = ("m", "m", "m", "rad", "rad", "rad")
         self.input_unit = thruster.input_unit
 
@@ -150,7 +147,7 @@ class HybridVehicle(AbstractPlant):
         return jnp.where(far, int(Status.DIVERGED), code)
 
     def advice(self) -> tuple[str, ...]:
-        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, _DOF_NAMES)
+        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, BODY_AXES)
 
     def rank(self) -> int:
         """Rank of the thruster matrix, which is that of G where J is regular."""

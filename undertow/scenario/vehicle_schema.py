@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean, known_key
+from undertow.core.measurement import BODY_AXES
 from undertow.scenario.values import checked
 from undertow.vehicles.facts import Facts
 from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
 from undertow.vehicles.vehicle import Vehicle
 
-_AXES, _SIX = "forward, starboard, down", "surge, sway, heave, roll, pitch, yaw"
+_AXES, _SIX = "forward, starboard, down", ", ".join(BODY_AXES)
 SCALARS = {"mass": "kg", "weight": "N", "gravity": "m/s^2", "buoyancy": "N", "volume": "m^3", "water_density": "kg/m^3"}
 VECTORS = {"r_g": _AXES, "r_b": _AXES, "size": "length, width, height"}
 MATRICES = {"inertia": (3, "about forward, starboard, down")} | {

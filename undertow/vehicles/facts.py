@@ -10,7 +10,6 @@ from jaxtyping import Float
 from undertow.vehicles.published import inertia_about_origin
 from undertow.vehicles.vehicle import Vehicle
 
-DOF_NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 FRESH_WATER = 1000.0  # kg/m^3
 
 

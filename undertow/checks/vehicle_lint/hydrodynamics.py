@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
-from undertow.vehicles.facts import DOF_NAMES, FRESH_WATER, Facts
+from undertow.core.measurement import BODY_AXES
+from undertow.vehicles.facts import FRESH_WATER, Facts
 
 _SAMPLES = 4000
 _SPHERE = 0.5  # added mass of a sphere per displaced mass
@@ -95,11 +96,11 @@ def _sphere(facts: Facts) -> Iterator[Finding]:
 def _shown(values: np.ndarray, which: np.ndarray) -> str:
     if not np.any(values[which]):
         return f"zero in {_names(which)}"
-    return ", ".join(f"{values[i]:.4g} in {DOF_NAMES[i]}" for i in np.flatnonzero(which))
+    return ", ".join(f"{values[i]:.4g} in {BODY_AXES[i]}" for i in np.flatnonzero(which))
 
 
 def _names(which: np.ndarray) -> str:
-    return ", ".join(DOF_NAMES[i] for i in np.flatnonzero(which))
+    return ", ".join(BODY_AXES[i] for i in np.flatnonzero(which))
 
 
 RULES = (added_mass, damping_sign, dissipation, undamped)

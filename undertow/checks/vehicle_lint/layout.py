@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
+from undertow.core.measurement import BODY_AXES
 from undertow.plants.reachability import open_loop_advice
-from undertow.vehicles.facts import DOF_NAMES, FRESH_WATER, Facts
+from undertow.vehicles.facts import FRESH_WATER, Facts
 
 _ROUNDING = 5e-3
 _STEP = np.pi / 12  # rad; angles of thrusters are multiples of it
@@ -59,12 +60,12 @@ def arms(facts: Facts) -> Iterator[Finding]:
 
 def rank(facts: Facts) -> Iterator[Finding]:
     """Directions without thrust, and the condition of the others; moments per longest arm."""
-    for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, DOF_NAMES):
+    for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, BODY_AXES):
         yield Finding("advice", "rank", "thrusters", sentence)
         return
     left, sizes, _ = np.linalg.svd(scaled(facts.thruster_matrix))
     if sizes[0] > _WORST_CONDITION * sizes[5]:
-        weakest = DOF_NAMES[int(np.argmax(np.abs(left[:, 5])))]
+        weakest = BODY_AXES[int(np.argmax(np.abs(left[:, 5])))]
         got = f"such that the best is pushed {sizes[0] / sizes[5]:.3g} times harder than the worst, {weakest}"
         yield advice("condition", "thrusters", "push all directions alike", got)
 

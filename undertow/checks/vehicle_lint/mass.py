@@ -5,9 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
+from undertow.core.measurement import BODY_AXES
 from undertow.vehicles.facts import Facts
 
-_AXES = ("roll", "pitch", "yaw")
+_AXES = BODY_AXES[3:]
 # A uniform box has a radius of gyration of 0.58 of one with all its mass in the corners.
 _USUAL = (0.25, 0.8)
 # Without a size: of the longest thruster arm or the cube root of the volume, whichever is larger.

@@ -7,7 +7,8 @@ import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
 from undertow.core import catalogue
-from undertow.vehicles.facts import DOF_NAMES, Facts, facts_of
+from undertow.core.measurement import BODY_AXES
+from undertow.vehicles.facts import Facts, facts_of
 from undertow.vehicles.published import inertia_about_origin
 
 _ROUNDING = 0.02  # of the largest entry of a row: printed matrices have two or three digits
@@ -23,7 +24,7 @@ def printed_matrix(facts: Facts) -> Iterator[Finding]:
         off = np.flatnonzero(np.abs(printed - computed) > _ROUNDING * largest)
         if len(off):
             j = int(off[np.argmax(np.abs(printed - computed)[off])])
-            must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {DOF_NAMES[row]}"
+            must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {BODY_AXES[row]}"
             got = f"{printed[j]:.4g}{_others(off)}"
             hint = (
                 f"{_likely(printed[off], computed[off])} If you moved a thruster, delete `thruster_matrix` or update it"

@@ -17,6 +17,7 @@ import xarray as xr
 
 from undertow.core import runtime
 from undertow.core.contracts import AbstractPlant
+from undertow.core.measurement import BODY_AXES, BODY_OUTPUTS
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.plants.hybrid_vehicle import HybridVehicle
@@ -232,6 +233,7 @@ def _described(replay: Replay, colour: str) -> dict[str, Any]:
             for name, position, direction, limit in zip(names, positions, directions, limits, strict=True)
         ],
         "limited": replay.limited,
+        "axes": BODY_AXES if replay.body_axes else BODY_OUTPUTS,
         "body_axes": replay.body_axes,
         "series": {name: packed(_thinned(values), SERIES[name][0]) for name, values in replay.series.items()},
     }

@@ -1,8 +1,5 @@
 // What `replay_data.py` has packed, unpacked: runs with series whose values can be asked for at any time.
 
-const OUTPUT_AXES = ["north", "east", "down", "roll", "pitch", "yaw"];
-const BODY_AXES = ["surge", "sway", "heave", "roll", "pitch", "yaw"];
-
 function unpackSeries(packed) {
   const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
   const whole = packed.bytes === 1 ? bytes : new Uint16Array(bytes.buffer);
@@ -18,10 +15,9 @@ function unpackSeries(packed) {
 function unpackRun(run) {
   const series = {};
   for (const name of Object.keys(run.series)) series[name] = unpackSeries(run.series[name]);
-  const axes = run.body_axes ? BODY_AXES : OUTPUT_AXES;
-  const rules = series.weights ? series.weights.width / axes.length : 0;
+  const rules = series.weights ? series.weights.width / run.axes.length : 0;
   const longest = Math.max(...run.size);
-  const named = { ...run, series, axes, rules, longest };
+  const named = { ...run, series, rules, longest };
   return { ...named, scale: { uncertainty: scalesOf(named), water: usualSize(named, "water", 0, 3) } };
 }
 
