@@ -256,7 +256,7 @@ class Section:
         inner._values |= zip(region.inputs, given, strict=True)
         before = self._emitter.block
         self._emitter.fork(inner.value(region.test), f"{name}b", f"{name}x", f"{name}any")
-        inner.do(_needed(graph, region.results), number)
+        inner.do(graph.needed_inside(number, region.results), number)
         done = [inner.value(result) for result in region.results]
         self._emitter.enter(f"{name}e")
         self._emitter.enter(f"{name}x")
@@ -273,19 +273,15 @@ class Section:
         for entry, value, result in zip(names, given, region.results, strict=True):
             emitter.joined(graph.types[result], {before: value, f"{name}e": f"{entry}n"}, entry)
         inner._values |= zip(region.inputs, names, strict=True)
-        tested = _needed(graph, [region.test])
+        tested = graph.needed_inside(number, [region.test])
         inner.do(tested, number)
         test = inner.value(region.test)
         emitter.fork(test, f"{name}b", f"{name}x", f"{name}any")
         known = set(tested)
-        inner.do([node for node in _needed(graph, region.results) if node not in known], number)
+        inner.do([node for node in graph.needed_inside(number, region.results) if node not in known], number)
         for entry, result in zip(names, region.results, strict=True):
             emitter.choice(test, inner.value(result), entry, graph.types[result], f"{entry}n")
         emitter.enter(f"{name}e")
         emitter.lines.append(f"  br label %{name}h")
         emitter.label(f"{name}x")
         return names
-
-
-def _needed(graph, wanted: Sequence[Node]) -> list[Node]:
-    return [node for node, needed in enumerate(graph.needed(wanted)) if needed]

@@ -163,6 +163,16 @@ class Graph:
                     needed[operand] = True
         return needed
 
+    def needed_inside(self, region: int, wanted: Iterable[Node]) -> list[Node]:
+        """The nodes of a region that the wanted ones are made from, in order; without a look at the rest of the graph."""
+        found, stack = set(), list(wanted)
+        while stack:
+            node = stack.pop()
+            if node not in found and self.inside(node, region):
+                found.add(node)
+                stack += self.uses(node)
+        return sorted(found)
+
     def uses(self, node: Node) -> tuple[Node, ...]:
         """What a node is made from, and what a region does inside."""
         name, operands, detail = self.operations[node]
