@@ -164,7 +164,7 @@ class Graph:
         return needed
 
     def needed_inside(self, region: int, wanted: Iterable[Node]) -> list[Node]:
-        """The nodes of a region that the wanted ones are made from, in order; without a look at the rest of the graph."""
+        """The nodes of a region that the wanted ones are made from, in order; with no look at the rest of the graph."""
         found, stack = set(), list(wanted)
         while stack:
             node = stack.pop()

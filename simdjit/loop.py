@@ -1,8 +1,10 @@
 """A loop over steps, written for one run and compiled for any number of them at once."""
 
+import json
+import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -10,9 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from simdjit import nvidia
-from simdjit.codegen import STEP, Sections, assembly, operations
+from simdjit.cache import cached
+from simdjit.codegen import STEP, VECTORS, Head, Sections, assembly, operations
 from simdjit.cpu import Code, simd_width
 from simdjit.cuda import Driver
+from simdjit.fingerprint import fingerprint
 from simdjit.graph import I64, Unsupported, flat
 from simdjit.layout import Layout
 from simdjit.lowering import evaluate
@@ -56,32 +60,26 @@ class Loop:
     ):
         prepared = Traced(prepare, numbers)
         constant = [False] * len(jax.tree.leaves(numbers)) if constant is None else constant
-        self._prologue = Prologue(prepared, numbers, constant)
-        graph, known = self._prologue.graph, self._prologue.nodes
         of_arrays = lambda function: lambda arrays, *rest: function(eqx.combine(arrays, prepared.still), *rest)
         begun = Traced(of_arrays(start), prepared.shapes)
-        first = evaluate(graph, begun.closed, known, _MOST)
-
         number = jax.ShapeDtypeStruct((), jnp.asarray(0).dtype)
-        k = graph.input(STEP, I64)
-        k = k if number.dtype == I64 else graph.apply("convert", k, dtype=str(number.dtype))
-        given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
         carried = lambda function: lambda known, carry, k: function(known, eqx.combine(carry, begun.still), k)
         self._step, self._record = (
             Traced(of_arrays(carried(function)), prepared.shapes, begun.shapes, number) for function in (step, record)
         )
         if self._step.types != begun.types:
             raise Unsupported("a carry that changes its type")
-        stepped, recorded = (evaluate(graph, traced.closed, given, _MOST) for traced in (self._step, self._record))
-
-        sections = Sections(*map(flat, (first, stepped, recorded)))
-        self.operations = operations(graph, sections)
-        if driver is None:
-            lanes = lanes or simd_width(8 * np.dtype(number.dtype).itemsize)
-            self._code = Code(assembly(graph, sections, lanes), cache)
-        else:
-            lanes = nvidia.LANES
-            self._code = nvidia.Kernel(assembly(graph, sections, lanes, nvidia.THREADS), driver, cache)
+        self._prologue = Prologue(prepared, numbers, constant)
+        lanes = nvidia.LANES if driver else lanes or simd_width(8 * np.dtype(number.dtype).itemsize)
+        head = nvidia.THREADS if driver else VECTORS
+        traced = (prepared, begun, self._step, self._record)
+        made = lambda: _lowered(self._prologue, traced, number.dtype, lanes, head)
+        name = fingerprint([one.closed for one in traced], self._prologue.constants, lanes, bool(driver))
+        program = Program.read(cached(name, ".ll", lambda: made().written(), cache)) if name else made()
+        if program.prologue_lacks and not self._prologue.lacking:
+            self._prologue.leave_to_xla(program.prologue_lacks)
+        self.operations = program.operations
+        self._code = nvidia.Kernel(program.assembly, driver, cache) if driver else Code(program.assembly, cache)
         several = (self._prologue.inputs, begun.leaves, self._record.leaves)
         self._numbers_layout, self._carry_layout, self._record_layout = (Layout(leaves, lanes) for leaves in several)
 
@@ -104,3 +102,41 @@ class Loop:
         self._code.run(given, carry, series, steps, every)
         final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
         return self._step.whole(final), self._record.whole(self._record_layout.unpacked(series, runs))
+
+
+class Program(NamedTuple):
+    """What is kept of a program, so that nobody needs to lower it again.
+
+    Attributes:
+        assembly: LLVM's.
+        operations: arithmetic ones of one step.
+        prologue_lacks: why XLA computes the prologue; empty where the program does.
+    """
+
+    assembly: str
+    operations: int
+    prologue_lacks: str
+
+    def written(self) -> bytes:
+        """For a file."""
+        return zlib.compress(json.dumps(self).encode(), level=1)
+
+    @classmethod
+    def read(cls, written: bytes) -> "Program":
+        """From a file."""
+        return cls(*json.loads(zlib.decompress(written)))
+
+
+def _lowered(
+    prologue: Prologue, traced: tuple[Traced, Traced, Traced, Traced], number: Any, lanes: int, head: Head
+) -> Program:
+    """The program of traced functions: prepare, start, step and record."""
+    _, begun, step, record = traced
+    graph, known = prologue.lowered()
+    first = evaluate(graph, begun.closed, known, _MOST)
+    k = graph.input(STEP, I64)
+    k = k if number == I64 else graph.apply("convert", k, dtype=str(number))
+    given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
+    stepped, recorded = (evaluate(graph, one.closed, given, _MOST) for one in (step, record))
+    sections = Sections(*map(flat, (first, stepped, recorded)))
+    return Program(assembly(graph, sections, lanes, head), operations(graph, sections), prologue.lacking)

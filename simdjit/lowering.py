@@ -6,6 +6,7 @@ from math import inf
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import ClosedJaxpr, Literal
 
@@ -19,7 +20,7 @@ RULES_OF = (control_flow, elementwise, indexing, linear_algebra, reductions, sha
 
 def nodes_of(graph: Graph, values: Any) -> Nodes:
     """Constants."""
-    if isinstance(getattr(values, "dtype", None), jax.dtypes.extended):
+    if hasattr(values, "dtype") and jnp.issubdtype(values.dtype, jax.dtypes.extended):
         raise Unsupported(f"a constant of type {values.dtype}")
     values = np.asarray(values)
     return filled(values.shape, [graph.constant(value, str(values.dtype)) for value in values.ravel()])

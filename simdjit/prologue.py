@@ -50,34 +50,50 @@ class Prologue:
         constant: which of its leaves are the same in every run.
 
     Attributes:
-        graph: with what is computed in the program.
-        nodes: of its results.
+        lacking: why XLA computes it; empty where the program does.
+        constants: the numbers that are the same in every run.
         inputs: shapes and types of what every lane brings along, in the order of its slots.
-
-    Raises:
-        Unsupported: neither the program nor XLA can do it for many runs at once.
     """
 
     def __init__(self, prepare: Traced, numbers: Any, constant: Sequence[bool]):
         given = zip(jax.tree.leaves(numbers), prepare.closed.in_avals, strict=True)
         leaves = [np.asarray(leaf, dtype=kind.dtype) for leaf, kind in given]  # as JAX takes them, doubles or not
+        self._prepare, self._numbers, self._leaves = prepare, numbers, leaves
         self._varying = [i for i, same in enumerate(constant) if not same]
         self._before: Callable[[Any], list[np.ndarray]] | None = None
+        self.lacking = ""
+        self.constants = [leaf if same else None for leaf, same in zip(leaves, constant, strict=True)]
         self.inputs = [leaves[i] for i in self._varying]
+
+    def leave_to_xla(self, lacking: str) -> None:
+        """Compute it by XLA, because the program cannot.
+
+        Raises:
+            Unsupported: XLA cannot do it for many runs at once either.
+        """
+        made = [place is None for place in self._prepare.passed_on()]
         try:
-            self.graph, given = self._given(leaves)
-            self.nodes = evaluate(self.graph, prepare.closed, given, _MOST)
-        except Unsupported as lacking:
-            passed_on = prepare.passed_on()
-            made = [place is None for place in passed_on]
-            self.inputs += [leaf for leaf, new in zip(prepare.leaves, made, strict=True) if new]
+            self._before = _by_vmap(self._prepare.only(made), self._numbers)
+        except Exception as error:  # whatever JAX raises for what it cannot do for several at once
+            raise Unsupported(f"{lacking}; nor can JAX compute it for several runs ({error})") from error
+        self.inputs += [leaf for leaf, new in zip(self._prepare.leaves, made, strict=True) if new]
+        self.lacking = lacking
+
+    def lowered(self) -> tuple[Graph, list[Nodes]]:
+        """A graph with what is computed in the program, and the nodes of the results.
+
+        Raises:
+            Unsupported: neither the program nor XLA can do it for many runs at once.
+        """
+        if not self.lacking:
             try:
-                self._before = _by_vmap(prepare.only(made), numbers)
-            except Exception as error:  # whatever JAX raises for what it cannot do for several at once
-                raise Unsupported(f"{lacking}; nor can JAX compute it for several runs ({error})") from error
-            self.graph, given = self._given(leaves)
-            further = iter(given[len(leaves) :])
-            self.nodes = [next(further) if place is None else given[place] for place in passed_on]
+                graph, given = self._given()
+                return graph, evaluate(graph, self._prepare.closed, given, _MOST)
+            except Unsupported as lacking:
+                self.leave_to_xla(str(lacking))
+        graph, given = self._given()
+        further = iter(given[len(self._leaves) :])
+        return graph, [next(further) if place is None else given[place] for place in self._prepare.passed_on()]
 
     def packed(self, numbers: Any) -> list[np.ndarray]:
         """Arrays of `inputs`, with a leading axis over runs, from those of `numbers`."""
@@ -85,13 +101,13 @@ class Prologue:
         before = self._before(numbers) if self._before else []
         return [*(leaves[i] for i in self._varying), *before]
 
-    def _given(self, leaves: list[Any]) -> tuple[Graph, list[Nodes]]:
+    def _given(self) -> tuple[Graph, list[Nodes]]:
         """A new graph, and nodes of all numbers and then of what is made before."""
         graph = Graph()
         made = inputs(graph, "number", self.inputs)
-        nodes = [np.zeros(0, dtype=np.int64)] * len(leaves)
-        for i, leaf in enumerate(leaves):
-            if i not in self._varying:
+        nodes = [np.zeros(0, dtype=np.int64)] * len(self._leaves)
+        for i, leaf in enumerate(self.constants):
+            if leaf is not None:
                 nodes[i] = nodes_of(graph, leaf)
         for i, several in zip(self._varying, made, strict=False):
             nodes[i] = several

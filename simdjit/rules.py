@@ -44,7 +44,8 @@ class Equation(NamedTuple):
 
 class _Rule(NamedTuple):
     make: Callable[..., Nodes | list[Nodes]]
-    known: frozenset[str]
+    read: frozenset[str]
+    idle: frozenset[str]
 
 
 _RULES: dict[str, _Rule] = {}
@@ -62,10 +63,15 @@ def rule(*names: str, reads: str = "", idle: str = "") -> Callable:
     def registered(make: Callable) -> Callable:
         for name in names:
             assert name not in _RULES, name
-            _RULES[name] = _Rule(make, frozenset(reads.split() + idle.split()))
+            _RULES[name] = _Rule(make, frozenset(reads.split()), frozenset(idle.split()))
         return make
 
     return registered
+
+
+def parameters_read(name: str) -> frozenset[str] | None:
+    """Parameters of a primitive that its results depend on; None where there is no rule for it."""
+    return _RULES[name].read if name in _RULES else None
 
 
 def results(name: str, equation: Equation, given: Sequence[Nodes]) -> list[Nodes]:
@@ -79,7 +85,7 @@ def results(name: str, equation: Equation, given: Sequence[Nodes]) -> list[Nodes
     kinds = [_kind(out) for out in equation.outs]
     found = _RULES[name]
     for key, value in equation.params.items():
-        if key not in found.known and value is not None:  # None is: nothing is asked
+        if key not in found.read | found.idle and value is not None:  # None is: nothing is asked
             raise Unsupported(f"no rule for `{name}` with {key} {value}")
     try:
         made = found.make(equation, *given)
