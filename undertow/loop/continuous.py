@@ -3,7 +3,6 @@
 import math
 from typing import Any, cast
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -138,6 +137,8 @@ _FIRST_STEP = 1e-4  # s; the integrator adapts it
 @eqx.filter_jit
 def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
     """Integrate from `start` to `until` (s) with records at `times` (s); arguments as in `continuous.simulate`."""
+    import diffrax  # half a second, which no other run needs to wait for
+
     realization = loop.realize(key)
     # One flat vector, so that the integrator's arithmetic is compiled once, not once per leaf of the state.
     flat, unravel = ravel_pytree(realization.start(*start))

@@ -2,8 +2,10 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import numpy as np
 from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, PRNGKeyArray
 
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile, disturbance_profile
@@ -12,7 +14,8 @@ from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.linearization.response import from_start, metrics_of, signals_within
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
-from undertow.core.contracts import AbstractController
+from undertow.core.contracts import AbstractController, AbstractReference, Outputs, Time
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
 
@@ -37,7 +40,7 @@ def operating_point(built: Built) -> OperatingPoint:
     """
     loop, settings = built.closed_loop, built.scenario.loop
     start, stop = built.window()
-    position = np.asarray(loop.reference.at(as_array((start + min(stop, settings.duration)) / 2)).position)
+    position = np.asarray(_desired(loop.reference, as_array((start + min(stop, settings.duration)) / 2)))
     unloaded = equilibrium(loop, settings.dt, position, np.zeros(len(position)))
     steps = min(round(settings.duration / settings.dt) + 1, _MAX_STEPS)
     around = disturbance_profile(loop, unloaded, key_of_seed(built.scenario.seed), steps, settings.dt)
@@ -46,6 +49,11 @@ def operating_point(built: Built) -> OperatingPoint:
     mean = equilibrium(loop, settings.dt, position, load)
     linear = margins.closed(mean, settings.dt, settings.kind)
     return OperatingPoint(built, around, mean, linear, margins.spectral_radius(linear))
+
+
+@eqx.filter_jit
+def _desired(reference: AbstractReference, t: Time) -> Outputs:
+    return reference.at(t).position
 
 
 def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
@@ -107,5 +115,9 @@ def _start(known: OperatingPoint) -> list[np.ndarray]:
     """States of plant and controller at t = 0 as vectors."""
     loop, initial = known.built.closed_loop, known.built.scenario.initial
     outputs = loop.outputs_at_start(initial.position, initial.velocity)
-    realization = loop.realize(key_of_seed(known.built.scenario.seed))
-    return [np.asarray(ravel_pytree(state)[0]) for state in realization.start(*outputs)]
+    return [np.asarray(state) for state in _states_at_start(loop, key_of_seed(known.built.scenario.seed), *outputs)]
+
+
+@eqx.filter_jit
+def _states_at_start(loop: ClosedLoop, key: PRNGKeyArray, position: Outputs, velocity: Outputs) -> list[Array]:
+    return [ravel_pytree(state)[0] for state in loop.realize(key).start(position, velocity)]

@@ -86,13 +86,18 @@ def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.nda
     position = jnp.asarray(position, dtype=float)
     still = jnp.zeros_like(position)
     target = Target(position, still, still)
-    x = loop.plant.initial_state(position, still)
-    z = loop.controller.init(loop.plant.output(jnp.zeros(()), x), target)
+    x, z = _at_rest(loop, target)
     flat_x, plant_state = ravel_pytree(x)
     flat_z, law_state = ravel_pytree(z)
     axes, inputs = position.shape[0], loop.plant.inputs()
     sizes = (flat_x.size, flat_z.size, inputs, axes, 2 * axes)
     return Parts(loop, target, plant_state, law_state, sizes), {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
+
+
+@eqx.filter_jit
+def _at_rest(loop: ClosedLoop, target: Target) -> tuple[PyTree, PyTree]:
+    x = loop.plant.initial_state(target.position, target.velocity)
+    return x, loop.controller.init(loop.plant.output(jnp.zeros(()), x), target)
 
 
 def without(loop: ClosedLoop, parameters: tuple[str, ...]) -> ClosedLoop:

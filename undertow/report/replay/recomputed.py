@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array
+from jaxtyping import Array, PRNGKeyArray
 
 from undertow.core.contracts import AbstractController, Pose
-from undertow.loop.closed_loop import ClosedLoop, Realization
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.random_keys import key_of_seed
 from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.thrusters.thruster import AbstractThruster
@@ -98,16 +98,15 @@ def environment(loop: ClosedLoop, seed: int, time: Series, position: Series, vel
         position: outputs, shape (records, 6).
         velocity: their rates, shape (records, 6).
     """
-    along = map(jnp.asarray, (time, position, velocity))
-    found = _environment(loop.realize(key_of_seed(seed)), *along)
+    found = _environment(loop, key_of_seed(seed), *map(jnp.asarray, (time, position, velocity)))
     return Environment(*(None if series is None else np.asarray(series) for series in found))
 
 
 @eqx.filter_jit
 def _environment(
-    realization: Realization, time: Array, position: Array, velocity: Array
+    loop: ClosedLoop, key: PRNGKeyArray, time: Array, position: Array, velocity: Array
 ) -> tuple[Array | None, Array | None]:
-    loop = realization.loop
+    realization = loop.realize(key)
 
     def at(t, outputs, rates):
         pose = Pose(outputs[:3], rotation_from_quaternion(quaternion_from_euler(outputs[3:])), rates[:3])
