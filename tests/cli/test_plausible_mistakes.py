@@ -150,7 +150,7 @@ def test_advice_names_its_numbers_and_the_remedy(undertow, tmp_path, monkeypatch
     def stop(*arguments):
         raise _Stop("", "", "stopped")
 
-    monkeypatch.setattr(simulate, "with_prediction", stop)
+    monkeypatch.setattr(simulate, "execute", stop)
     file, old, new, named = ADVICE[mistake]
     prepare(tmp_path, monkeypatch, file, old, new)
     *advice, last = undertow(*SIMULATE).err.splitlines()

@@ -24,9 +24,9 @@ from undertow.report.figures import run_plots, save_all
 from undertow.report.replay.replay_data import can_be_shown
 from undertow.report.replay.video import check_video, write_video
 from undertow.report.run_page import shown, write_run_page
-from undertow.report.run_tables import certificate_rows, metrics_rows
+from undertow.report.run_tables import certificate_rows, metrics_rows, prediction_rows
 from undertow.scenario.build import Built, build, in_its_precision
-from undertow.scenario.execute import Executed, execute, write
+from undertow.scenario.execute import Executed, execute, write, write_metrics
 from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of
 from undertow.scenario.reading import read
 
@@ -58,39 +58,32 @@ def simulate(
     ):
         if video is not None:
             check_video(video, folder, overwrite)
-        executed, predicted = _run(scenario, console, prediction, allow_code, video is not None)
-        known, certificate = metrics_of(executed.dataset), certificate_of(executed.dataset)
-        expected = predicted.metrics if predicted else None
-        with stage(console, "files, figures and page"):
-            write(executed, draft.path, in_results(predicted))
-            repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
-            draft.publish()  # before the figures, which may fail
-            saved = save_all(lambda: run_plots(executed.dataset), draft.path / "figures", pdf)
+        executed = _run(scenario, console, allow_code, video is not None)
+        write(executed, draft.path, {})
+        repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
+        draft.publish()  # the results first: prediction, figures and page take longer, and may fail
+        _print_results(executed, folder, console)
+        code = max(_ending_code(executed), _repetition_code(repetition, console) if repetition else DONE)
+        with stage(console, "prediction, figures, page" if prediction else "figures and page"):
+            saved, predicted = with_prediction(
+                lambda: save_all(lambda: run_plots(executed.dataset), draft.path / "figures", pdf),
+                executed.built,
+                prediction,
+            )
             looks = shown(executed.dataset, executed.built.closed_loop, saved)
             warn_of(looks.failures)
-            write_run_page(draft.path / "run.html", executed.dataset, looks, expected)
+            write_metrics(executed, draft.path, in_results(predicted))
+            write_run_page(draft.path / "run.html", executed.dataset, looks, predicted.metrics if predicted else None)
+    if predicted:
+        _print_prediction(predicted, executed, console)
     if video is not None and looks.replay is not None:
         with shares(console) as progress:
             write_video(looks.replay, video, progress)
-    if "left_to_xla" in executed.dataset.attrs:
-        why = executed.dataset.attrs["left_to_xla"]
-        slower = "the run used backend xla, which is slower than simd (docs/explanation/simd.md)"
-        typer.echo(f"Advice: {slower}: {why}.", err=True)
-    window = executed.built.window()
-    console.print(terminal_table(metrics_rows(executed.steady, executed.whole, window, known, expected)))
-    if predicted:
-        console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)
-    if certificate is not None:
-        console.print(terminal_table(certificate_rows(certificate, window)))
-    verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
-    console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
-    codes = [_ending_code(executed)] + ([_repetition_code(repetition, console)] if repetition else [])
-    return max(codes)
+    console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
+    return code
 
 
-def _run(
-    path: Path, console: Console, prediction: bool, allow_code: bool, video: bool
-) -> tuple[Executed, PredictedMetrics | None]:
+def _run(path: Path, console: Console, allow_code: bool, video: bool) -> Executed:
     with stage(console, "reading"):
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
@@ -99,8 +92,31 @@ def _run(
         raise BadInput("--video", "be left out for a plant that is no vehicle with thrusters", "given")
     for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
         typer.echo(f"Advice: {sentence}", err=True)
-    with stage(console, "compiling, running and predicting" if prediction else "compiling and running"):
-        return interruptible(lambda: with_prediction(lambda: execute(built), built, prediction))
+    with stage(console, "compiling and running"):
+        return interruptible(lambda: execute(built))
+
+
+def _print_results(executed: Executed, folder: Path, console: Console) -> None:
+    """Print metrics, certificate and how the run ended."""
+    if "left_to_xla" in executed.dataset.attrs:
+        why = executed.dataset.attrs["left_to_xla"]
+        slower = "the run used backend xla, which is slower than simd (docs/explanation/simd.md)"
+        typer.echo(f"Advice: {slower}: {why}.", err=True)
+    known, window = metrics_of(executed.dataset), executed.built.window()
+    certificate = certificate_of(executed.dataset)
+    console.print(terminal_table(metrics_rows(executed.steady, executed.whole, window, known)))
+    if certificate is not None:
+        console.print(terminal_table(certificate_rows(certificate, window)))
+    verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
+    console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
+
+
+def _print_prediction(predicted: PredictedMetrics, executed: Executed, console: Console) -> None:
+    if predicted.metrics and executed.steady:
+        known = metrics_of(executed.dataset)
+        compared = [one for one in compare_metrics(predicted.metrics, executed.steady) if one.name in known]
+        console.print(terminal_table(prediction_rows(compared, executed.built.window(), known)))
+    console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)
 
 
 def _ending_code(executed: Executed) -> int:

@@ -1,8 +1,10 @@
 """Tables of one run, as rows of text: for the terminal and for the page."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import isinf
 from typing import Any, NamedTuple
 
+from undertow.analysis.linearization.response import Comparison
 from undertow.analysis.metrics import for_people
 from undertow.core.metric import Metric
 
@@ -33,6 +35,25 @@ def metrics_rows(
             rows.append((name, *shown, late, said(whole), for_people(0.0, metric.unit)[1]))
     head = ("metric", *(("predicted",) if predicted else ()), _span(window), "whole run", "unit")
     return RunTable("Metrics", head, rows)
+
+
+def prediction_rows(
+    compared: Sequence[Comparison], window: tuple[float, float] | None, known: Mapping[str, Metric]
+) -> RunTable:
+    """Predicted and measured metrics of the steady window, and by how much they differ."""
+    rows = []
+    for one in compared:
+        unit = known[one.name].unit
+        shown = (_defined(for_people(value, unit)[0]) for value in (one.predicted, one.measured))
+        rows.append(
+            (
+                one.name,
+                *shown,
+                "-" if isinf(one.departure) else f"{100 * one.departure:.0f} %",
+                for_people(0.0, unit)[1],
+            )
+        )
+    return RunTable("Prediction", ("metric", "predicted", _span(window), "departs by", "unit"), rows)
 
 
 def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float] | None) -> RunTable:

@@ -117,8 +117,17 @@ def write(executed: Executed, folder: Path, further: Mapping[str, Any]) -> None:
         OSError: the folder cannot be written.
     """
     save(executed.dataset, folder / "run.nc")
-    (folder / "metrics.json").write_text(metrics_text(executed.dataset, further), encoding="utf-8")
+    write_metrics(executed, folder, further)
     (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
+
+
+def write_metrics(executed: Executed, folder: Path, further: Mapping[str, Any]) -> None:
+    """Write metrics.json with further entries to a folder.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    (folder / "metrics.json").write_text(metrics_text(executed.dataset, further), encoding="utf-8")
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

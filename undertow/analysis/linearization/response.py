@@ -26,8 +26,10 @@ class Comparison(NamedTuple):
 
     @property
     def departure(self) -> float:
-        """Of the measured from the predicted, as a share of the predicted."""
-        return abs(self.measured - self.predicted) / self.predicted if self.predicted else float("inf")
+        """Of the measured from the predicted, as a share of the predicted; zero where both are, infinite from zero."""
+        if self.predicted == 0:
+            return 0.0 if self.measured == 0 else float("inf")
+        return abs(self.measured - self.predicted) / self.predicted
 
 
 def signals_within(
