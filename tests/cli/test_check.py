@@ -88,7 +88,7 @@ def test_vehicle_of_a_scenario(undertow, tmp_path):
     said = undertow("check", "s.yaml")
     assert said.code == 2
     assert said.out.startswith(
-        "Error: `inertia` must give a radius of gyration below 0.261 m in pitch, but is one of 1.31 m (s.yaml, line 2)"
+        "Error: `inertia` must give a radius of gyration below 0.261 m in pitch, but is one of 1.31 m (my_rov.yaml, line 14)"
     )
 
 

@@ -123,19 +123,21 @@ OBSERVER = "navigation: {kind: observer, sensors: [%s]}\nloop:"
 
 # The mistake in s.yaml (or the vehicle file), and what the advice must have: the two numbers, and the remedy.
 ADVICE = {
-    "heading in degrees": ("s.yaml", "0, 0.5]", "0, 45]", ["`reference`", "yaw at 45 rad", "7.16 turns", "0.7854 rad"]),
-    "start in degrees": ("s.yaml", "loop:", "initial: {position: [0, 0, 0, 0, 0, 90]}\nloop:", ["`initial.position`", "90 rad", "1.571 rad"]),
+    "heading in degrees": ("s.yaml", "0, 0.5]", "0, 45]", ["`reference`", "(s.yaml, line 5)", "yaw at 45 rad", "7.16 turns", "0.7854 rad"]),
+    "start in degrees": ("s.yaml", "loop:", "initial: {position: [0, 0, 0, 0, 0, 90]}\nloop:", ["`initial.position`", "(s.yaml, line 8)", "90 rad", "1.571 rad"]),
     "pitch in degrees": ("s.yaml", "0, 0.5]", "5, 0]", ["pitch", "5 rad (286.5 degrees)", "in radians"]),
     "height for depth": ("s.yaml", "[2, 0, 1,", "[2, 0, -5,", ["down = -5 m", "5 m above the start", "positive downward"]),
     "above the surface": ("s.yaml", "[0.3, 0, 0]}", "[0.3, 0, 0]}\n  - {kind: waves, depth: 0.5}\ninitial: {position: [0, 0, -2, 0, 0, 0]}", ["down = -2 m", "down = -0.5 m", "positive downward"]),
-    "current": ("s.yaml", "[0.3, 0, 0]", "[4, 3, 0]", ["current is 5 m/s", "at most 1.32", "drifts away"]),
-    "too far": ("s.yaml", "[2, 0, 1,", "[300, 0, 1,", ["300 m from the start", "at most 1.32", "`loop.duration` more than 20 s"]),
+    "current": ("s.yaml", "[0.3, 0, 0]", "[4, 3, 0]", ["current is 5 m/s", "(s.yaml, line 6)", "at most 1.32", "drifts away"]),
+    "too far": ("s.yaml", "[2, 0, 1,", "[300, 0, 1,", ["300 m from the start", "(s.yaml, line 5)", "at most 1.32", "`loop.duration` more than 20 s"]),
     "step": ("s.yaml", "[2, 0, 1,", "[25, 0, 1,", ["25.02 m from the vehicle", "at most 1.32", "`settling`"]),
     "too fast": ("s.yaml", SETPOINT, "{kind: circle, radius: 20, period: 20}", ["6.28 m/s", "at most 1.32"]),
-    "waypoints in time": ("s.yaml", SETPOINT, WAYPOINTS, ["ends at 20 s", "at 80 s", "`loop.duration`"]),
-    "no compass, no position": ("s.yaml", "loop:", OBSERVER % "imu, dvl, depth", ["0.013 m (north and east) and 0.051 degrees (yaw) in 20 s", "`position_fix` and `compass`"]),
-    "long steps": ("s.yaml", "static", "electromechanical", ["0.437 ms", "10 ms", "loop.substeps: 9"]),
-    "radians of a thruster": ("my_rov.yaml", (": -45}", ": 45}", ": -135}", ": 135}"), (": -0.785}", ": 0.785}", ": -2.356}", ": 2.356}"), ["`thrusters[0].azimuth`", "-0.785", "-45 degrees in radians", "Write -45"]),
+    "waypoints in time": ("s.yaml", SETPOINT, WAYPOINTS, ["ends at 20 s", "(s.yaml, line 9)", "at 80 s", "`loop.duration`"]),
+    "no compass, no position": ("s.yaml", "loop:", OBSERVER % "imu, dvl, depth", ["(s.yaml, line 8)", "0.013 m (north and east) and 0.051 degrees (yaw) in 20 s", "`position_fix` and `compass`"]),
+    "long steps": ("s.yaml", "static", "electromechanical", ["0.437 ms", "10 ms", "(s.yaml, line 10)", "loop.substeps: 9"]),
+    "radians of a thruster": ("my_rov.yaml", (": -45}", ": 45}", ": -135}", ": 135}"), (": -0.785}", ": 0.785}", ": -2.356}", ": 2.356}"), ["`thrusters[0].azimuth`", "-0.785", "-45 degrees in radians", "`thruster_matrix` contradicts", "(my_rov.yaml, line 25)", "Write -45"]),
+    "supply beyond the table": ("s.yaml", "supply: 16", "supply: 160", ["`supply` is 160 V", "end at 20 V", "(s.yaml, line 3)"]),
+    "size in mm": ("my_rov.yaml", "size: [0.457, 0.575, 0.254]", "size: [457, 575, 254]", ["`size`", "Is `size` in metres?", "(my_rov.yaml, line 6)"]),
 }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.reading import Text, no_file, read
 from undertow.scenario.schema import Scenario, kind_of
-from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
+from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle, vehicle_location
 from undertow.scenario.vehicle_schema import KEYS
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
@@ -101,7 +101,7 @@ def _of_part(name: str, part: Any) -> Report:
     if isinstance(part, Vehicle):
         return _of_vehicle(facts_of(part))
     if isinstance(part, AbstractThruster):
-        return _of_thruster(part, f"{name} (thruster)")
+        return _of_thruster(part, f"{name} (thruster)", partial(_place, part))
     found = check_contract(part)
     where = partial(_place, part)
     said = () if found else getattr(part, "advice", tuple)()
@@ -127,10 +127,10 @@ def _place(part: Any, key: str) -> str:
     return place_of(part, method) if method else ""
 
 
-def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
+def _of_thruster(thruster: AbstractThruster, title: str, where: Callable[[str], str]) -> Report:
     findings = check_contract(thruster)
     broken = any(finding.level == "error" for finding in findings)
-    return _report(findings, partial(_place, thruster), title, () if broken else derived_of_thruster(thruster))
+    return _report(findings, where, title, () if broken else derived_of_thruster(thruster))
 
 
 @in_its_precision
@@ -138,12 +138,13 @@ def _of_scenario(text: Text) -> list[Report]:
     """Reports on the scenario itself, its vehicle and thruster, and its plant and other parts."""
     built = build(text)
     loop = built.closed_loop
-    said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
-    reports = [_report(said, title="scenario")]
+    said = [(Finding("advice", "scenario", "", one.says, one.hint), one.where) for one in built.advice()]
+    reports = [Report(tuple(said), ())]
     if (facts := vehicle_facts(loop.plant, built.resolved["plant"])) is not None:
-        reports.append(_of_vehicle(facts, lambda key: text.location("plant.vehicle")))
+        reports.append(_of_vehicle(facts, vehicle_location(text)))
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
-        reports.append(_of_thruster(thruster, "thruster"))
+        in_scenario = text.location("plant.thruster")
+        reports.append(_of_thruster(thruster, "thruster", lambda key: _place(thruster, key) or in_scenario))
     if any(report.errors for report in reports):
         return reports  # their errors would cause others in what contains them
     reports.append(_report(check_contract(loop.plant), partial(_place, loop.plant)))

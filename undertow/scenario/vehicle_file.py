@@ -64,6 +64,19 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
         return VehicleFile(parse(contents), contents, text, changed)
 
 
+def vehicle_location(scenario: Text) -> Callable[[str], str]:
+    """Location of a key of a scenario's vehicle: a line of the vehicle file, or of the scenario where that sets it."""
+    plant = scenario.data.get("plant")
+    given = plant.get("vehicle") if isinstance(plant, Mapping) else None
+    options = {"kind": given} if isinstance(given, str) else dict(given or {})
+    name = options.pop("kind", "")
+    in_scenario = lambda key: scenario.location(f"plant.vehicle.{key}")
+    if not is_vehicle_file(name) or "contents" in options or not (scenario.folder / name).is_file():
+        return in_scenario
+    in_file = _location(read(scenario.folder / name), frozenset(options))
+    return lambda key: in_file(key) or in_scenario(key)
+
+
 def _location(text: Text, changed: frozenset[str]) -> Callable[[str], str]:
     """Location of a key in the file; none where the key has been changed."""
     return lambda name: "" if set(key_path(name)[:1]) & changed else text.location(name)
