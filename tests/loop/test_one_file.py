@@ -190,8 +190,16 @@ def test_what_a_law_lacks_is_not_there(folder):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"surface": s, ', "", "`surface` must be given by Sliding, whose `signals` declares it"),
-        ('"surface": s', '"surf": s', "`surf` must be declared by `signals` of Sliding"),
+        (
+            '"surface": s, ',
+            "",
+            r"`Sliding.signals` declares a signal `surface`, which `Sliding.command` does not give \(sliding.py, line ",
+        ),
+        (
+            '"surface": s',
+            '"surf": s',
+            "`Sliding.command` gives a signal `surf`, which `Sliding.signals` does not declare",
+        ),
         ('"surface"', '"error"', "`controller.signals.error` must be the name of one signal only"),
     ],
 )

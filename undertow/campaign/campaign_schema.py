@@ -29,6 +29,14 @@ class Distribution(Strict):
     normal: Pair | None = Field(None, description="mean, standard deviation")
     choice: list[Any] | None = Field(None, min_length=1, description="one of these values, equally likely")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _by_its_name(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or {"distribution", "kind", "type"} & set(given):
+            low, high = given if isinstance(given, list) and len(given) == 2 else ("low", "high")
+            raise ValueError(f"be a distribution with its numbers, such as {{uniform: [{low}, {high}]}}")
+        return given
+
     @model_validator(mode="after")
     def _one(self) -> "Distribution":
         given = [name for name in type(self).model_fields if getattr(self, name) is not None]

@@ -162,6 +162,7 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
     if ".py:" in thing or thing.endswith(".py"):
         function = catalogue.find("", thing, what="THING")
         make = lambda *given: factory.call(function, options, given, Path())[0]
+        _check_model_comes_first(function, options)
         part, name = make(*_leading(function)), thing.rpartition(":")[2]
         if not factory.is_part(part):
             raise _no_part(name, part)
@@ -191,9 +192,27 @@ def _no_part(name: str, thing: Any) -> BadInput:
     return BadInput("", "", f"`{name}` returns a `{kind}`, which is not a part", hint=hint, where=place)
 
 
+def _check_model_comes_first(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
+    """Check the first argument of a function in a file that defines a controller.
+
+    Raises:
+        BadInput: it is required, and not called `model`.
+    """
+    first = next(iter(inspect.signature(function).parameters.values()), None)
+    if first is None or first.name == "model" or first.name in options or first.default is not first.empty:
+        return
+    classes = [one for one in getattr(function, "__globals__", {}).values() if inspect.isclass(one) and place_of(one)]
+    if any(issubclass(one, AbstractController) for one in classes):
+        says = (
+            f"the first argument of a controller must be `model`, but that of `{function.__name__}` is `{first.name}`"
+        )
+        hint = "Call it `model`: undertow gives the nominal model of the plant there"
+        raise BadInput("", "", says, hint=hint, where=place_of(function))
+
+
 def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:
     """First argument of a controller: the model of the default vehicle."""
-    if next(iter(inspect.signature(function).parameters), "") != "model":
+    if not factory.takes_model(function):
         return ()
     return (factory.make("plants", "hybrid_vehicle", Path())[0].model(),)
 

@@ -108,6 +108,11 @@ def known_key(key: str, known: Iterable[str]) -> str:
     return comma if key.isdecimal() else did_you_mean(key, known)
 
 
+def joined(*hints: str) -> str:
+    """Hints one behind the other, without those that are empty; each is a sentence without full stop."""
+    return ". ".join(filter(None, hints)).replace("?. ", "? ")
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Sentence naming the nearest known word, or all of them when none is near."""
     known = sorted(set(known))

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from undertow.core import checks
 from undertow.core.contracts import Load
 from undertow.core.errors import Advice, BadInput, advice, within
+from undertow.core.signals import check_declared
 from undertow.core.user_code import python_says
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.schema import Initial, Loop, Window
@@ -120,7 +121,7 @@ def check_fit(loop: ClosedLoop) -> None:
         _traced(lambda realization, x: loop.plant.dynamics(zero, x, rest, realization.load(zero, x)), realization, x)
     with within("controller"):
         decided = lambda realization, x, z: realization.decide(zero, x, z, realization.initial_measuring(x))
-        _traced(decided, realization, x, z)
+        check_declared(loop.controller, _traced(decided, realization, x, z).signals, "command")
 
 
 def _traced(function: Callable[..., Any], *arguments: Any) -> Any:
