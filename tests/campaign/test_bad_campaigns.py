@@ -69,7 +69,7 @@ from undertow.scenario.reading import dump
         ),
         (
             {"vary": {}, "scenario": {"reference": "setpont"}},
-            r"`reference.kind` .* \(small.yaml, line 1, trial 0\). Did you mean `setpoint`",
+            r"`reference` .* \(small.yaml, line 1, trial 0\). Did you mean `setpoint`",
         ),
         (
             {

@@ -200,7 +200,7 @@ def test_mistake_is_one_exact_line_in_a_scenario(rov, refused, tmp_path, mistake
     (tmp_path / "s.yaml").write_text(FLIES)
     complaint = refused("simulate", "s.yaml")
     if said is None:
-        assert complaint.startswith("`plant.vehicle.kind` must be valid YAML, but is not: ")
+        assert complaint.startswith("`plant.vehicle` must be valid YAML, but is not: ")
         assert "(my_rov.yaml, line " in complaint
     else:
         assert complaint == f"`plant.vehicle.{said[1:]}"
@@ -216,7 +216,7 @@ def test_mistake_is_one_exact_line_in_a_check(rov, refused, mistake):
 
 def test_missing_file(refused, tmp_path):
     (tmp_path / "s.yaml").write_text(FLIES)
-    said = f"`plant.vehicle.kind` must be an existing file, but is {tmp_path / 'my_rov.yaml'} (s.yaml, line 2)"
+    said = f"`plant.vehicle` must be an existing file, but is {tmp_path / 'my_rov.yaml'} (s.yaml, line 2)"
     assert refused("simulate", "s.yaml") == said
     assert refused("check", "my_rov.yaml") == "`THING` must be an existing file, but is my_rov.yaml"
 

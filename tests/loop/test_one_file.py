@@ -214,7 +214,7 @@ def test_declared_and_given_must_agree(folder, old, new, said):
     [
         ({"success": {"overshot": 0.2}}, r"`success.overshot` must be a metric.*Did you mean `overshoot`\?"),
         ({"success": {"attitude_rms": 0.2}}, "`success.attitude_rms` must be a metric of this plant"),
-        ({"metrics": ["overshoot"]}, r"`metrics\[0\].kind` must be .*\./file.py:function"),
+        ({"metrics": ["overshoot"]}, r"`metrics\[0\]` must be .*\./file.py:function"),
         ({"metrics": ["./sliding.py:sliding"]}, r"`metrics\[0\]"),
         ({"metrics": ["./overshoot.py:overshoot"] * 2}, "second `overshoot`"),
     ],

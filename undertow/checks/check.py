@@ -87,7 +87,7 @@ def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Rep
 
 def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
     found = read_vehicle(path, options, "THING")
-    report = _of_vehicle(found.data.facts(), found.text.location)
+    report = _of_vehicle(found.data.facts(), found.location)
     if not report.errors:
         found.vehicle()  # raises errors that no rule covers
     return report

@@ -24,21 +24,28 @@ class _Place(NamedTuple):
     key: str
     location: Callable[[str], str]  # file and line of a key path that starts here; "" where unknown
     note: str
+    written: Callable[[str], str]
 
 
 _PLACES: ContextVar[tuple[_Place, ...]] = ContextVar("places", default=())
 
 
 @contextlib.contextmanager
-def within(key: str = "", location: Callable[[str], str] = lambda name: "", note: str = "") -> Iterator[None]:
+def within(
+    key: str = "",
+    location: Callable[[str], str] = lambda name: "",
+    note: str = "",
+    written: Callable[[str], str] = lambda name: name,
+) -> Iterator[None]:
     """Errors that arise inside are about what stands at a key; may be nested, and used as a decorator.
 
     Args:
         key: key path of what is read or made inside; goes before the names that errors give.
         location: file and line of a key path; the innermost that knows it is asked.
         note: follows the location.
+        written: a key path that starts here as the user wrote it, where there is a short form.
     """
-    token = _PLACES.set((*_PLACES.get(), _Place(key, location, note)))
+    token = _PLACES.set((*_PLACES.get(), _Place(key, location, note, written)))
     try:
         yield
     finally:
@@ -50,7 +57,7 @@ def _placed(name: str, where: str) -> tuple[str, str]:
     for place in reversed(_PLACES.get()):
         where = where or place.location(name)
         where = ", ".join(filter(None, (where, place.note)))
-        name = ".".join(filter(None, (place.key, name))).replace(".[", "[")
+        name = ".".join(filter(None, (place.key, place.written(name)))).replace(".[", "[")
     return name, where
 
 

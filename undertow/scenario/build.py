@@ -109,7 +109,7 @@ def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None)
     """
     text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
-    with runtime.on_processor(), within(location=text.location):
+    with runtime.on_processor(), within(location=text.location, written=text.as_written):
         with runtime.in_precision("float64"):
             built = _build(text, scenario, part_cache or PartCache())
         with runtime.in_precision(scenario.precision):
