@@ -60,7 +60,9 @@ def describe(name: str) -> tuple[Description, ...]:
     found = tuple(one for kind, part in named for one in _presets(kind, short, part))
     if not found:
         every = {part for parts_of_kind in known.values() for part in parts_of_kind}
-        raise BadInput("NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "metrics", "signals"}))
+        raise BadInput(
+            "NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "campaign", "metrics", "signals"})
+        )
     return found
 
 

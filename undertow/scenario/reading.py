@@ -157,7 +157,8 @@ def parse(text: str, name: str, folder: Path, what: str) -> Text:
     data, lines = load(text, name, what)
     if not isinstance(data, dict):
         got = "empty" if data is None else "a list" if isinstance(data, list) else f"a single {type(data).__name__}"
-        hint = "Write `key: value` lines; `undertow describe scenario` shows the keys"
+        file = "campaign" if what == "CAMPAIGN" else "scenario"
+        hint = f"Write `key: value` lines; `undertow describe {file}` shows the keys"
         raise BadInput(what, "be a mapping of keys to values", got, where=name, hint=hint)
     return Text(data, name, folder, lines)
 
