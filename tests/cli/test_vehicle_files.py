@@ -184,6 +184,11 @@ MISTAKES = {
         "",
         "`thruster_matrix` must have 6 rows (surge, sway, heave, roll, pitch, yaw) with one entry for each of the 8 thrusters, but is of shape (5, 8) (my_rov.yaml, line 36)",
     ),
+    "signs of the added mass": (
+        "[6.36, 7.12, 18.68,",
+        "[6.36, 7.12, -18.68,",
+        "`added_mass` must leave M = M_RB + M_A positive definite, but is such that its smallest eigenvalue is -5.18 (my_rov.yaml, line 18). With mass and inertia alone it would be: check the signs of the added mass",
+    ),
     "not YAML": ("r_g: [0, 0, 0] ", "r_g: [0, 0, 0 ", None),
     "direction of a corner": (
         "azimuth: -45}",
@@ -206,7 +211,7 @@ def test_mistake_is_one_exact_line_in_a_scenario(rov, refused, tmp_path, mistake
         assert complaint == f"`plant.vehicle.{said[1:]}"
 
 
-@pytest.mark.parametrize("mistake", sorted(set(MISTAKES) - {"direction of a corner"}))
+@pytest.mark.parametrize("mistake", sorted(set(MISTAKES) - {"direction of a corner", "signs of the added mass"}))
 def test_mistake_is_one_exact_line_in_a_check(rov, refused, mistake):
     old, new, said = MISTAKES[mistake]
     rov(old, new)

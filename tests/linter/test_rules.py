@@ -55,6 +55,7 @@ SPOILT = {
         {"TRIANGLE"},
         "principal inertia -0.0",
     ),
+    "negative inertia": ({"inertia": np.diag([-0.46, 0.23, 0.37])}, {"TRIANGLE"}, "principal inertia -0.46"),
     "inertia not symmetric": ({"inertia": coupled(SOUND.inertia, 0, 1, 0.01)}, {"SYMMETRY"}, "off by 0.01"),
     "inertia of a point": ({"inertia": SOUND.inertia / 40}, {"gyration"}, "Is the mass in grams?"),
     "added mass in g": (
