@@ -1,6 +1,7 @@
 """The words that stand for keys: each of the table leads to a key that exists, and is none itself."""
 
 from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement
+from undertow.scenario import vehicle_schema
 from undertow.scenario.schema import keys
 from undertow.scenario.synonyms import WORDS, hint_for
 
@@ -8,7 +9,7 @@ _CAMPAIGN = {*Campaign.model_fields}
 _CAMPAIGN |= {f"vary.*.{name}" for name in Distribution.model_fields}
 _CAMPAIGN |= {f"requirements.*.{name}" for name in Requirement.model_fields}
 _OPTIONS = {"plant.vehicle", "plant.thruster", "controller.gains", "navigation.sensors"}  # of parts
-KEYS = {"scenario": {key.path for key in keys()}, "campaign": _CAMPAIGN}
+KEYS = {"scenario": {key.path for key in keys()}, "campaign": _CAMPAIGN, "vehicle file": {*vehicle_schema.KEYS}}
 
 
 def test_every_word_stands_for_a_key_and_is_none():

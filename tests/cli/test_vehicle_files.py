@@ -131,6 +131,11 @@ MISTAKES = {
         "aded_mass:",
         "`aded_mass` must be a key of a vehicle file, but is unknown (my_rov.yaml, line 18). Did you mean `added_mass`?",
     ),
+    "two keys of other programs": (
+        "r_g: [0, 0, 0]                       # m, centre of gravity\nr_b",
+        "COG: [0, 0, 0]\nCOB",
+        "`COG` must be a key of a vehicle file, but is unknown (my_rov.yaml, line 11). Did you mean `r_g`? Also unknown: `COB`",
+    ),
     "misspelt key of a thruster": (
         "azimuth: 45}",
         "asimuth: 45}",

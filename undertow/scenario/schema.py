@@ -2,7 +2,7 @@
 
 import re
 import typing
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
@@ -244,9 +244,10 @@ def _name_of(error: Any) -> str:
     return " ".join(name.split())
 
 
-def _also(first: Any, others: Iterable[Any], text: Text) -> str:
+def _also(first: Any, others: Sequence[Any], text: Text) -> str:
     """Sentence with the other keys that are wrong; without those that a misspelt key leaves missing."""
-    others = [one for one in others if not one["type"] == "missing" or first["type"] == "missing"]
+    misspelt = {_path_of(one)[:-1] for one in (first, *others) if one["type"] == "extra_forbidden"}
+    others = [one for one in others if one["type"] != "missing" or _path_of(one)[:-1] not in misspelt]
     lines = {_name_of(one): text.lines.get(_path_of(one)) for one in others}
     named = [f"`{name}`{f' (line {line})' if line else ''}" for name, line in lines.items() if name != _name_of(first)]
     more = f" and {len(named) - _LISTED} more" if len(named) > _LISTED else ""

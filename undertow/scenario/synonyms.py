@@ -1,4 +1,4 @@
-"""Words that other programs have for the keys of scenario and campaign files, for hints on unknown keys."""
+"""Words that other programs have for the keys of scenario, campaign and vehicle files, for hints on unknown keys."""
 
 from undertow.core import catalogue
 
@@ -13,7 +13,7 @@ WORDS: dict[str, dict[str, str]] = {
         "reference": "trajectory target desired goal path ref guidance",
         "disturbance": "environment wind ocean sea water loads",
         "navigation": "measurement measurements estimator filter state_estimator",
-        "navigation.sensors": "sensor instruments",
+        "navigation.sensors": "sensor",
         "loop": "simulation sim simulator timing",
         "loop.dt": "time_step timestep step step_size sampling_time sample_time sampling_period ts h",
         "loop.duration": "t tend t_end tf tfinal t_final tmax t_max end_time final_time stop_time total_time "
@@ -44,6 +44,20 @@ WORDS: dict[str, dict[str, str]] = {
         "seed": "random_seed rng_seed rng",
         "chunk": "chunk_size batch batch_size",
     },
+    "vehicle file": {
+        "size": "dimensions hull_size length",
+        "gravity": "g",
+        "volume": "displacement displaced_volume",
+        "water_density": "density rho",
+        "r_g": "cg cog com center_of_gravity center_of_mass centre_of_gravity centre_of_mass",
+        "r_b": "cb cob center_of_buoyancy centre_of_buoyancy",
+        "inertia": "moments_of_inertia moment_of_inertia inertia_matrix inertia_tensor i_g i_o",
+        "added_mass": "ma m_a hydrodynamic_mass added_inertia",
+        "linear_damping": "damping linear_drag d_l",
+        "quadratic_damping": "drag quadratic_drag d_q nonlinear_damping",
+        "thrusters": "thruster motors propellers actuators",
+        "thruster_matrix": "allocation allocation_matrix tam thruster_configuration_matrix b_matrix",
+    },
 }
 
 
@@ -52,7 +66,7 @@ def hint_for(path: tuple[str | int, ...], file: str) -> str:
 
     Args:
         path: of the unknown key.
-        file: `scenario` or `campaign`.
+        file: `scenario`, `campaign` or `vehicle file`.
     """
     word, beside = str(path[-1]).lower().replace("-", "_"), path[:-1]
     for key, words in WORDS.get(file, {}).items():

@@ -63,9 +63,9 @@ class Vehicle(eqx.Module):
         if isinstance(whole, Tracer):
             return
         rigid = np.asarray(whole) - np.asarray(self.added_mass)
-        sound = np.abs(rigid - rigid.T).max() <= 1e-9 * np.abs(rigid).max() and np.linalg.eigvalsh(rigid).min() > 0
+        definite = np.abs(rigid - rigid.T).max() <= 1e-9 * np.abs(rigid).max() and np.linalg.eigvalsh(rigid).min() > 0
         name, hint = "inertia", "That of the rigid body, M_RB, is not by itself"
-        if sound:
+        if definite:
             name, hint = "added_mass", "With mass and inertia alone it would be: check the signs of the added mass"
         checks.positive_definite(name, whole, whole="M = M_RB + M_A", hint=hint)
 
