@@ -59,6 +59,9 @@ def test_part_of_a_file(undertow, tmp_path):
     )
     out = undertow("describe", "./mine.py:part").out
     assert "Mine." in out and "size" in out
+    (tmp_path / "law.py").write_text("def law(model, stiffness: float = 2.0):\n    return model\n")
+    out = undertow("describe", "./law.py:law").out
+    assert "stiffness" in out and "model" not in out  # which undertow gives
 
 
 def test_scenario_keys(undertow):
