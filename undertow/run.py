@@ -172,8 +172,8 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
     check_times(settings)
     check_start(closed_loop, start)
     check_fit(closed_loop)
-    for sentence in rounded_times(settings):
-        warnings.warn(sentence, stacklevel=3)
+    for one in rounded_times(settings):
+        warnings.warn(one.sentence, stacklevel=3)
     outcome, left_to_xla = execute.run_loop(closed_loop, settings, start, seed)
     attributes: dict[str, Any] = left_to_xla | {"title": "a closed loop run by undertow", "seed": seed}
     if why := step_failure(closed_loop, settings, outcome):

@@ -10,7 +10,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
-from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
+from undertow.campaign.campaign_schema import SECTIONS, Campaign
 from undertow.cli.exit_codes import MEANINGS as EXIT_CODES
 from undertow.cli.main import app as command_line
 from undertow.core import catalogue
@@ -71,8 +71,7 @@ class Keys(FromCode):
     def contents(self) -> list[nodes.Node]:
         if self.arguments == ["scenario"]:
             return [_keys(Scenario)]
-        entries = {"each distribution in `vary`": Distribution, "each requirement": Requirement, "`series`": Series}
-        each = [section(f"Keys of {name}", f"keys of {name}", _keys(model)) for name, model in entries.items()]
+        each = [section(f"Keys of {name}", f"keys of {name}", _keys(model)) for name, model in SECTIONS.items()]
         return [_keys(Campaign), *each]
 
 

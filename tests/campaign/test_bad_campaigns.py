@@ -69,7 +69,7 @@ from undertow.scenario.reading import dump
         ),
         (
             {"vary": {}, "scenario": {"reference": "setpont"}},
-            r"`reference.kind` .* \(small.yaml, line 1, trial 0\). Did you mean `setpoint`",
+            r"`reference` .* \(small.yaml, line 1, trial 0\). Did you mean `setpoint`",
         ),
         (
             {
@@ -199,6 +199,7 @@ def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
     assert run(["campaign", "status", str(out)]) == 0
     assert capsys.readouterr().out == "4 of 8 trials done\n  completed: 4\n"
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
+    assert "continuing: 4 of 8 trials kept; chunks that were not finished run again" in capsys.readouterr().out
     assert contents(out) == before
 
 

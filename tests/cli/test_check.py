@@ -43,6 +43,12 @@ def test_vehicle_file_with_another_value(undertow):
     assert last.endswith(": 1 error, 1 piece of advice")
 
 
+def test_buoyancy_that_follows_from_the_volume_has_its_line(undertow):
+    said = undertow("check", str(EXAMPLES / "my_rov.yaml"), "--option", "volume=13.4")
+    assert said.out.startswith("Error: `buoyancy` must be of the order of the weight, but is 1.3159e+05 N")
+    assert "(my_rov.yaml, line 9)" in said.out.splitlines()[0]
+
+
 def test_variant_of_a_catalogue_vehicle(undertow):
     said = undertow("check", "bluerov2_heavy", "--option", "parameters=ng2024")
     assert said.code == 0
@@ -88,7 +94,7 @@ def test_vehicle_of_a_scenario(undertow, tmp_path):
     said = undertow("check", "s.yaml")
     assert said.code == 2
     assert said.out.startswith(
-        "Error: `inertia` must give a radius of gyration below 0.261 m in pitch, but is one of 1.31 m (s.yaml, line 2)"
+        "Error: `inertia` must give a radius of gyration below 0.261 m in pitch, but is one of 1.31 m (my_rov.yaml, line 14)"
     )
 
 

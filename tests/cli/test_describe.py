@@ -1,8 +1,12 @@
 """What is there, with units and sources."""
 
+import json
+
+import jsonschema
 import pytest
 
 from undertow.analysis.metrics import MEANINGS
+from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
 from undertow.core import catalogue
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
@@ -55,12 +59,28 @@ def test_part_of_a_file(undertow, tmp_path):
     )
     out = undertow("describe", "./mine.py:part").out
     assert "Mine." in out and "size" in out
+    (tmp_path / "law.py").write_text("def law(model, stiffness: float = 2.0):\n    return model\n")
+    out = undertow("describe", "./law.py:law").out
+    assert "stiffness" in out and "model" not in out  # which undertow gives
 
 
 def test_scenario_keys(undertow):
     out = undertow("describe", "scenario").out
     assert all(key.path in out and key.meaning for key in keys())
     assert "loop.duration" in out and "required" in out
+
+
+def test_campaign_keys(undertow):
+    out = undertow("describe", "campaign").out
+    models = (Campaign, Distribution, Requirement, Series)
+    assert all(key.path in out and key.meaning for model in models for key in keys(model))
+    schema = json.loads(undertow("describe", "campaign", "--json-schema").out)
+    assert set(schema["properties"]) == set(Campaign.model_fields)
+    scenario = {"plant": "double_integrator", "reference": {"kind": "setpoint", "position": [1]}}
+    good = {"scenario": scenario, "vary": {"a": {"uniform": [1, 2]}}, "cross": {"b": [1, 2], "c": {"low": 1}}}
+    wrong = lambda data: [one.json_path for one in jsonschema.Draft7Validator(schema).iter_errors(data)]
+    assert wrong(good) == wrong({"scenario": "s.yaml"}) == []
+    assert wrong(good | {"grid": {}}) and wrong({"scenario": {"plan": "odin"}}) == ["$.scenario"]
 
 
 def test_metrics(undertow):

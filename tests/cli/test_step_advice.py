@@ -33,12 +33,13 @@ def test_decay_of_the_winding_is_that_of_its_time_constant():
 
 def test_advice_says_how_many_substeps_are_enough():
     said = step_advice(t200(fidelity="electromechanical"), Loop(dt=0.01))
-    assert len(said) == 1 and "Use loop.substeps: 9 or more" in said[0]
+    assert len(said) == 1 and "Use loop.substeps: 9 or more" in said[0].hint
     assert not step_advice(t200(fidelity="electromechanical"), Loop(dt=0.01, substeps=9))
     assert not step_advice(t200(), Loop(dt=0.01))
     assert not step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01, method="adaptive"))
     assert (
-        "a loop.dt of at most" in step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01))[0]
+        "a loop.dt of at most"
+        in step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01))[0].hint
     )
 
 
@@ -129,7 +130,7 @@ def test_a_law_too_stiff_for_one_ode():
 def test_times_that_are_no_multiples_are_told(loop, said):
     """And what is said of them is what a run does."""
     given = rounded_times(Loop(**loop))
-    assert len(given) == len(said) and all(one.startswith(words) for one, words in zip(given, said, strict=True))
+    assert len(given) == len(said) and all(one.says.startswith(words) for one, words in zip(given, said, strict=True))
     if loop.get("kind") != "continuous":
         built = build(BASE | {"plant": plant_of(1.0), "loop": loop})
         assert set(given) <= set(built.advice())
@@ -137,7 +138,7 @@ def test_times_that_are_no_multiples_are_told(loop, said):
         end = round(loop["duration"] / loop["dt"]) * loop["dt"]
         assert float(found.outcome.ended) == pytest.approx(end, rel=1e-12)
         left = end - float(found.dataset["time"][-1])
-        assert (left > 1e-9) == any("last record" in one for one in given)
+        assert (left > 1e-9) == any("last record" in one.says for one in given)
 
 
 def test_python_warns_of_them_too():
@@ -150,5 +151,5 @@ def test_python_warns_of_them_too():
 def test_single_precision_says_when_its_clock_stops():
     long = {"duration": 2e5, "dt": 0.01, "record": 1.0}
     said = build(BASE | {"plant": plant_of(1.0), "precision": "float32", "loop": long}).advice()
-    assert any("float32 cannot distinguish instants beyond 16777216 steps, 167772 s" in one for one in said)
-    assert not any("float32" in one for one in build(BASE | {"plant": plant_of(1.0), "loop": long}).advice())
+    assert any("float32 cannot distinguish instants beyond 16777216 steps, 167772 s" in one.says for one in said)
+    assert not any("float32" in one.says for one in build(BASE | {"plant": plant_of(1.0), "loop": long}).advice())

@@ -131,6 +131,11 @@ MISTAKES = {
         "aded_mass:",
         "`aded_mass` must be a key of a vehicle file, but is unknown (my_rov.yaml, line 18). Did you mean `added_mass`?",
     ),
+    "two keys of other programs": (
+        "r_g: [0, 0, 0]                       # m, centre of gravity\nr_b",
+        "COG: [0, 0, 0]\nCOB",
+        "`COG` must be a key of a vehicle file, but is unknown (my_rov.yaml, line 11). Did you mean `r_g`? Also unknown: `COB`",
+    ),
     "misspelt key of a thruster": (
         "azimuth: 45}",
         "asimuth: 45}",
@@ -184,6 +189,11 @@ MISTAKES = {
         "",
         "`thruster_matrix` must have 6 rows (surge, sway, heave, roll, pitch, yaw) with one entry for each of the 8 thrusters, but is of shape (5, 8) (my_rov.yaml, line 36)",
     ),
+    "signs of the added mass": (
+        "[6.36, 7.12, 18.68,",
+        "[6.36, 7.12, -18.68,",
+        "`added_mass` must leave M = M_RB + M_A positive definite, but is such that its smallest eigenvalue is -5.18 (my_rov.yaml, line 18). With mass and inertia alone it would be: check the signs of the added mass",
+    ),
     "not YAML": ("r_g: [0, 0, 0] ", "r_g: [0, 0, 0 ", None),
     "direction of a corner": (
         "azimuth: -45}",
@@ -200,13 +210,13 @@ def test_mistake_is_one_exact_line_in_a_scenario(rov, refused, tmp_path, mistake
     (tmp_path / "s.yaml").write_text(FLIES)
     complaint = refused("simulate", "s.yaml")
     if said is None:
-        assert complaint.startswith("`plant.vehicle.kind` must be valid YAML, but is not: ")
+        assert complaint.startswith("`plant.vehicle` must be valid YAML, but is not: ")
         assert "(my_rov.yaml, line " in complaint
     else:
         assert complaint == f"`plant.vehicle.{said[1:]}"
 
 
-@pytest.mark.parametrize("mistake", sorted(set(MISTAKES) - {"direction of a corner"}))
+@pytest.mark.parametrize("mistake", sorted(set(MISTAKES) - {"direction of a corner", "signs of the added mass"}))
 def test_mistake_is_one_exact_line_in_a_check(rov, refused, mistake):
     old, new, said = MISTAKES[mistake]
     rov(old, new)
@@ -216,7 +226,7 @@ def test_mistake_is_one_exact_line_in_a_check(rov, refused, mistake):
 
 def test_missing_file(refused, tmp_path):
     (tmp_path / "s.yaml").write_text(FLIES)
-    said = f"`plant.vehicle.kind` must be an existing file, but is {tmp_path / 'my_rov.yaml'} (s.yaml, line 2)"
+    said = f"`plant.vehicle` must be an existing file, but is {tmp_path / 'my_rov.yaml'} (s.yaml, line 2)"
     assert refused("simulate", "s.yaml") == said
     assert refused("check", "my_rov.yaml") == "`THING` must be an existing file, but is my_rov.yaml"
 

@@ -55,6 +55,7 @@ SPOILT = {
         {"TRIANGLE"},
         "principal inertia -0.0",
     ),
+    "negative inertia": ({"inertia": np.diag([-0.46, 0.23, 0.37])}, {"TRIANGLE"}, "principal inertia -0.46"),
     "inertia not symmetric": ({"inertia": coupled(SOUND.inertia, 0, 1, 0.01)}, {"SYMMETRY"}, "off by 0.01"),
     "inertia of a point": ({"inertia": SOUND.inertia / 40}, {"gyration"}, "Is the mass in grams?"),
     "added mass in g": (
@@ -70,6 +71,21 @@ SPOILT = {
     "nothing slows roll": ({"quadratic_damping": without(SOUND.quadratic_damping, 3)}, {"undamped"}, "in roll"),
     "direction as corners": ({"directions": 1.41421356 * SOUND.directions}, {"DIRECTION"}, "1.414 long. Divide"),
     "positions in mm": ({"positions": 1e3 * SOUND.positions, "printed_matrix": None}, {"ARM"}, "another unit?"),
+    "one thruster at 3 m": (
+        {"positions": SOUND.positions + 3.0 * np.eye(8, 3), "size": None, "printed_matrix": None},
+        None,
+        "13.3 times the side of a cube of the volume",
+    ),
+    "angles in radians, and r_b with the wrong sign": (
+        {"angles": {"thrusters[0].azimuth": -0.785}, "r_b": np.array([0, 0, 0.01]), "printed_matrix": None},
+        {"degrees", "UPRIGHT"},
+        "Write -45",
+    ),
+    "angles in radians against the matrix": (
+        {"angles": {"thrusters[0].azimuth": -0.785}, "printed_matrix": -SOUND.printed_matrix},
+        {"DEGREES"},
+        "`thruster_matrix` contradicts it",
+    ),
     "size in mm": ({"size": 1e3 * SOUND.size}, {"VOLUME", "gyration"}, "Is `size` in metres?"),
     "size in km": ({"size": 1e-3 * SOUND.size}, None, "Is `size` in metres?"),
     "four thrusters": (

@@ -190,8 +190,16 @@ def test_what_a_law_lacks_is_not_there(folder):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"surface": s, ', "", "`surface` must be given by Sliding, whose `signals` declares it"),
-        ('"surface": s', '"surf": s', "`surf` must be declared by `signals` of Sliding"),
+        (
+            '"surface": s, ',
+            "",
+            r"`Sliding.signals` declares a signal `surface`, which `Sliding.command` does not give \(sliding.py, line ",
+        ),
+        (
+            '"surface": s',
+            '"surf": s',
+            "`Sliding.command` gives a signal `surf`, which `Sliding.signals` does not declare",
+        ),
         ('"surface"', '"error"', "`controller.signals.error` must be the name of one signal only"),
     ],
 )
@@ -206,7 +214,7 @@ def test_declared_and_given_must_agree(folder, old, new, said):
     [
         ({"success": {"overshot": 0.2}}, r"`success.overshot` must be a metric.*Did you mean `overshoot`\?"),
         ({"success": {"attitude_rms": 0.2}}, "`success.attitude_rms` must be a metric of this plant"),
-        ({"metrics": ["overshoot"]}, r"`metrics\[0\].kind` must be .*\./file.py:function"),
+        ({"metrics": ["overshoot"]}, r"`metrics\[0\]` must be .*\./file.py:function"),
         ({"metrics": ["./sliding.py:sliding"]}, r"`metrics\[0\]"),
         ({"metrics": ["./overshoot.py:overshoot"] * 2}, "second `overshoot`"),
     ],

@@ -127,7 +127,10 @@ def test_journal_of_something_else(tmp_path):
 
 
 def test_where_nothing_is_certified_the_worst_variant_is_named():
-    said = str(no_certificate(Certificate((0.9, 1.25, 0.8), ("wu2018", "px4", "px4")), 12))
-    assert "none of 12 points is certified" in said
-    assert "spectral radius of 1.25 on the plant variant px4" in said
-    assert "variant" not in str(no_certificate(Certificate((1.1,), ("",)), 12))
+    given = Certificate((0.9, 1.25, 0.8), ("wu2018", "px4", "px4"))
+    tried = {f"frequency {radius}": Certificate((radius,), ("wu2018",)) for radius in (1.07, 1.02, 1.05)}
+    said = str(no_certificate(given, tried, 12))
+    assert "none of 12 points is certified" in said and "1.25 on the plant variant px4" in said
+    assert "the nearest point has 1.02, with frequency 1.02. Widen the ranges beyond this point" in said
+    assert "variant wu2018 (3 of 4 times the least stable one)" in said
+    assert "variant" not in str(no_certificate(Certificate((1.1,), ("",)), {}, 12))

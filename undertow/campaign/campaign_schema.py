@@ -9,6 +9,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from undertow.campaign.labels import by_name, words
 from undertow.core.errors import BadInput
+from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.reading import Text, dump, parse, read
 from undertow.scenario.schema import Scenario, Strict, complaint, kind_of
 
@@ -28,6 +29,14 @@ class Distribution(Strict):
     log_uniform: Pair | None = Field(None, description="low, high, both positive")
     normal: Pair | None = Field(None, description="mean, standard deviation")
     choice: list[Any] | None = Field(None, min_length=1, description="one of these values, equally likely")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_its_name(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or {"distribution", "kind", "type"} & set(given):
+            low, high = given if isinstance(given, list) and len(given) == 2 else ("low", "high")
+            raise ValueError(f"be a distribution with its numbers, such as {{uniform: [{low}, {high}]}}")
+        return given
 
     @model_validator(mode="after")
     def _one(self) -> "Distribution":
@@ -130,6 +139,20 @@ class Campaign(Strict):
     def number(self) -> int:
         """Number of trials: the samples, for every combination of `cross` and `variants`."""
         return math.prod(len(entries) for entries in self.axes.values()) * self.trials
+
+
+# Keys of the sections that a campaign has several times, or not at all by default.
+SECTIONS = {"each distribution in `vary`": Distribution, "each requirement": Requirement, "`series`": Series}
+
+
+def campaign_json_schema() -> dict[str, Any]:
+    """JSON schema (draft 7) of a campaign file, for editors."""
+    scenario, schema = scenario_schema(), Campaign.model_json_schema()
+    definitions = {**scenario.pop("$defs"), **schema["$defs"], "Scenario": scenario}
+    named = {"anyOf": [{"type": "string"}, {"$ref": "#/$defs/Scenario"}]}
+    schema["properties"]["scenario"] |= named
+    schema["properties"]["cross"]["additionalProperties"] = {"anyOf": [{"type": "array"}, {"type": "object"}]}
+    return {**schema, "$schema": scenario.pop("$schema"), "$defs": definitions}
 
 
 _SHARED = set(Scenario.model_fields) & set(Campaign.model_fields)

@@ -9,9 +9,9 @@ from undertow.campaign.campaign_schema import Campaign, read_campaign, whole
 from undertow.campaign.requirements import too_few
 from undertow.campaign.task import reasons
 from undertow.campaign.trials import Trials, trials
-from undertow.checks.vehicle_lint import vehicle_warnings
+from undertow.checks.vehicle_lint import vehicle_advice
 from undertow.core import checks
-from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.errors import BadInput, did_you_mean, within
 from undertow.core.metric import Metric
 from undertow.loop.simd_batch import unavailable
 from undertow.scenario.build import Built
@@ -59,8 +59,10 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
     advice: dict[str, str] = {}
     for row, built in firsts:
         _check(campaign, built, metrics)
-        for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
-            advice.setdefault(sentence, f"trial {row}: {sentence}")
+        with within(location=several.location):
+            found = (*built.advice(), *vehicle_advice(built))
+        for one in found:
+            advice.setdefault(one.sentence, f"trial {row}: {one.sentence}")
     by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
     why = unavailable() if by_simd else ""
     slower = (f"trials are computed by backend xla, which is slower: {why}",) if why else ()

@@ -22,7 +22,7 @@ from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.reading import Text, no_file, read
 from undertow.scenario.schema import Scenario, kind_of
-from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
+from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle, vehicle_location
 from undertow.scenario.vehicle_schema import KEYS
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
@@ -87,7 +87,7 @@ def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Rep
 
 def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
     found = read_vehicle(path, options, "THING")
-    report = _of_vehicle(found.data.facts(), found.text.location)
+    report = _of_vehicle(found.data.facts(), found.location)
     if not report.errors:
         found.vehicle()  # raises errors that no rule covers
     return report
@@ -101,7 +101,7 @@ def _of_part(name: str, part: Any) -> Report:
     if isinstance(part, Vehicle):
         return _of_vehicle(facts_of(part))
     if isinstance(part, AbstractThruster):
-        return _of_thruster(part, f"{name} (thruster)")
+        return _of_thruster(part, f"{name} (thruster)", partial(_place, part))
     found = check_contract(part)
     where = partial(_place, part)
     said = () if found else getattr(part, "advice", tuple)()
@@ -127,10 +127,10 @@ def _place(part: Any, key: str) -> str:
     return place_of(part, method) if method else ""
 
 
-def _of_thruster(thruster: AbstractThruster, title: str) -> Report:
+def _of_thruster(thruster: AbstractThruster, title: str, where: Callable[[str], str]) -> Report:
     findings = check_contract(thruster)
     broken = any(finding.level == "error" for finding in findings)
-    return _report(findings, partial(_place, thruster), title, () if broken else derived_of_thruster(thruster))
+    return _report(findings, where, title, () if broken else derived_of_thruster(thruster))
 
 
 @in_its_precision
@@ -138,12 +138,13 @@ def _of_scenario(text: Text) -> list[Report]:
     """Reports on the scenario itself, its vehicle and thruster, and its plant and other parts."""
     built = build(text)
     loop = built.closed_loop
-    said = [Finding("advice", "scenario", "", sentence.rstrip(".")) for sentence in built.advice()]
-    reports = [_report(said, title="scenario")]
+    said = [(Finding("advice", "scenario", "", one.says, one.hint), one.where) for one in built.advice()]
+    reports = [Report(tuple(said), ())]
     if (facts := vehicle_facts(loop.plant, built.resolved["plant"])) is not None:
-        reports.append(_of_vehicle(facts, lambda key: text.location("plant.vehicle")))
+        reports.append(_of_vehicle(facts, vehicle_location(text)))
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
-        reports.append(_of_thruster(thruster, "thruster"))
+        in_scenario = text.location("plant.thruster")
+        reports.append(_of_thruster(thruster, "thruster", lambda key: _place(thruster, key) or in_scenario))
     if any(report.errors for report in reports):
         return reports  # their errors would cause others in what contains them
     reports.append(_report(check_contract(loop.plant), partial(_place, loop.plant)))
@@ -161,6 +162,7 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
     if ".py:" in thing or thing.endswith(".py"):
         function = catalogue.find("", thing, what="THING")
         make = lambda *given: factory.call(function, options, given, Path())[0]
+        _check_model_comes_first(function, options)
         part, name = make(*_leading(function)), thing.rpartition(":")[2]
         if not factory.is_part(part):
             raise _no_part(name, part)
@@ -190,9 +192,27 @@ def _no_part(name: str, thing: Any) -> BadInput:
     return BadInput("", "", f"`{name}` returns a `{kind}`, which is not a part", hint=hint, where=place)
 
 
+def _check_model_comes_first(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
+    """Check the first argument of a function in a file that defines a controller.
+
+    Raises:
+        BadInput: it is required, and not called `model`.
+    """
+    first = next(iter(inspect.signature(function).parameters.values()), None)
+    if first is None or first.name == "model" or first.name in options or first.default is not first.empty:
+        return
+    classes = [one for one in getattr(function, "__globals__", {}).values() if inspect.isclass(one) and place_of(one)]
+    if any(issubclass(one, AbstractController) for one in classes):
+        says = (
+            f"the first argument of a controller must be `model`, but that of `{function.__name__}` is `{first.name}`"
+        )
+        hint = "Call it `model`: undertow gives the nominal model of the plant there"
+        raise BadInput("", "", says, hint=hint, where=place_of(function))
+
+
 def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:
     """First argument of a controller: the model of the default vehicle."""
-    if next(iter(inspect.signature(function).parameters), "") != "model":
+    if not factory.takes_model(function):
         return ()
     return (factory.make("plants", "hybrid_vehicle", Path())[0].model(),)
 

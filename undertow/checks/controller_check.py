@@ -37,7 +37,7 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
         due = f"must return an input of shape {(inputs,)}, one entry per input of the plant"
         yield Finding("error", "contract", "command", f"`command` {due}, but returns {form(u)}", _DEFAULT)
         return
-    check_declared(controller, signals)
+    check_declared(controller, signals, "command")
     sizes = {"axis": n, "actuator": inputs}
     for name, signal in controller.signals().items():
         found = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # sizes of the law's own dimensions

@@ -21,6 +21,7 @@ from undertow.core.contracts import (
     Measurement,
     Pose,
 )
+from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.user_code import fault_of
 from undertow.sensors.estimate import estimate_of, motion_of
@@ -67,6 +68,8 @@ def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ..
 
 def _failed(part: Any, complaint: Exception) -> Finding:
     """Finding for an exception in a part or in its use."""
+    if isinstance(complaint, BadInput):  # worded already, with its place
+        return Finding("error", "contract", "", str(complaint))
     says, hint = fault_of(complaint)
     if says.startswith("cannot"):
         return Finding("error", "contract", "", says[:1].upper() + says[1:], hint)

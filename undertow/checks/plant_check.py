@@ -86,7 +86,7 @@ def _forms(plant: AbstractPlant) -> Iterator[Finding]:
     if isinstance(effort, Effort):
         yield from (finding for value in effort for finding in shaped("effort", value, (m,)))
     recorded = jax.eval_shape(plant.diagnostics, x, u)
-    check_declared(plant, recorded)
+    check_declared(plant, recorded, "diagnostics")
     sizes = {"axis": n, "actuator": m}
     for name, signal in plant.signals().items():
         if set(signal.dimensions) <= set(sizes):

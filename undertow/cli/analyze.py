@@ -33,7 +33,7 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool,
         built = build(read(scenario, allow_code=allow_code))
         with shares(console) as progress:
             prediction = interruptible(lambda: predict(built, progress))
-        warnings = (*built.advice(), *advice(prediction))
+        warnings = (*(one.sentence for one in built.advice()), *advice(prediction))
         text = to_json(summary(prediction), indent=1) + "\n"
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail

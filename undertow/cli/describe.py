@@ -1,13 +1,15 @@
-"""`undertow list` and `undertow describe`: available parts, and one part, the scenario file, metrics or signals."""
+"""`undertow list` and `undertow describe`: available parts, and one part, kind of file, the metrics or the signals."""
 
 import json
 from collections.abc import Mapping
 
+from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
+from undertow.campaign.campaign_schema import SECTIONS, Campaign, campaign_json_schema
 from undertow.cli.tables import titled, wide_console
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
@@ -16,7 +18,9 @@ from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.describing import summary, text_of
 from undertow.scenario.json_schema import scenario_schema
-from undertow.scenario.schema import keys
+from undertow.scenario.schema import Scenario, keys
+
+_SCHEMAS = {"scenario": scenario_schema, "campaign": campaign_json_schema}
 
 _PARTS = (
     "A part is given by its name, such as `thruster: t200`, or with options, such as `thruster: {kind: t200, supply: "
@@ -26,19 +30,22 @@ _PARTS = (
 
 
 def describe(name: str, json_schema: bool = False) -> None:
-    """Print the description of a part, the keys of a scenario, the metrics, or the signals of every run.
+    """Print the description of a part, the keys of a scenario or campaign, the metrics, or the signals of every run.
 
-    With `json_schema`, print the keys of a scenario as a JSON schema.
+    With `json_schema`, print the keys as a JSON schema.
     """
     console = wide_console()
     if json_schema:
-        if name != "scenario":
-            raise BadInput("--json-schema", "follow `describe scenario`", f"given for `{name}`")
-        print(json.dumps(scenario_schema(), indent=1))
+        if name not in _SCHEMAS:
+            raise BadInput("--json-schema", f"follow `describe {' or '.join(_SCHEMAS)}`", f"given for `{name}`")
+        print(json.dumps(_SCHEMAS[name](), indent=1))
     elif name == "scenario":
-        rows = [(key.path, key.type, text_of(key.default), key.meaning) for key in keys()]
-        _show_table(console, "Scenario", ("key", "type", "default", "meaning"), rows)
+        _show_keys(console, "Scenario", Scenario)
         console.print(_PARTS, highlight=False, markup=False, soft_wrap=True)
+    elif name == "campaign":
+        _show_keys(console, "Campaign", Campaign)
+        for section, model in SECTIONS.items():
+            _show_keys(console, f"Keys of {section}", model)
     elif name == "metrics":
         rows = [
             (key, one.unit.replace("[axis]", "[output]"), PER_AXIS.get(key, ""), one.meaning)
@@ -50,6 +57,11 @@ def describe(name: str, json_schema: bool = False) -> None:
     else:
         for description in describing.describe(name):
             _show_part(console, description)
+
+
+def _show_keys(console: Console, title: str, model: type[BaseModel]) -> None:
+    rows = [(key.path, key.type, text_of(key.default), key.meaning) for key in keys(model)]
+    _show_table(console, title, ("key", "type", "default", "meaning"), rows)
 
 
 def _show_part(console: Console, part: describing.Description) -> None:

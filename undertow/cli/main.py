@@ -318,17 +318,19 @@ def describe(
         typer.Argument(
             metavar="NAME",
             help="A part (see `undertow list`), ./file.py:function, a vehicle file, or one of the words scenario, "
-            "metrics and signals.",
+            "campaign, metrics and signals.",
         ),
     ],
     json_schema: Annotated[
-        bool, typer.Option("--json-schema", help="With NAME scenario: print the JSON schema that editors use.")
+        bool,
+        typer.Option("--json-schema", help="With NAME scenario or campaign: print the JSON schema that editors use."),
     ] = False,
 ) -> None:
     """Describe a part.
 
     The command shows the options of the part, its parameters with unit, symbol and source, and advice. `describe
-    scenario` shows the keys of a scenario file, `describe metrics` the metrics with their units.
+    scenario` shows the keys of a scenario file, `describe campaign` those of a campaign file, `describe metrics` the
+    metrics with their units.
     """
     from undertow.cli.describe import describe
 

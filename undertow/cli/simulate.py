@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from undertow.analysis.linearization.response import compare_metrics
-from undertow.checks.vehicle_lint import vehicle_warnings
+from undertow.checks.vehicle_lint import vehicle_advice
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
@@ -90,8 +90,8 @@ def _run(path: Path, console: Console, allow_code: bool, video: bool) -> Execute
         built = build(text)
     if video and not can_be_shown(built.closed_loop.plant):
         raise BadInput("--video", "be left out for a plant that is no vehicle with thrusters", "given")
-    for sentence in (*built.advice(), *vehicle_warnings(built.closed_loop.plant, built.resolved["plant"])):
-        typer.echo(f"Advice: {sentence}", err=True)
+    for one in (*built.advice(), *vehicle_advice(built)):
+        typer.echo(f"Advice: {one.sentence}", err=True)
     with stage(console, "compiling and running"):
         return interruptible(lambda: execute(built))
 

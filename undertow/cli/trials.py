@@ -102,7 +102,7 @@ def run_trials(
     """
     if replaced is not None:
         _clear(folder, replaced)
-    with chosen(where, workers) as executor, _live(console) as watch:
+    with chosen(where, workers) as executor, _live(console, replaced is None) as watch:
         try:
             interruptible(lambda: run_campaign(prepared, folder, executor, watch))
         except (KeyboardInterrupt, OSError):
@@ -126,13 +126,17 @@ def _clear(folder: Path, names: Sequence[str]) -> None:
 
 
 @contextlib.contextmanager
-def _live(console: Console) -> Iterator[Watch]:
-    """Show the number of finished trials, their rate and the remaining time."""
+def _live(console: Console, resumed: bool) -> Iterator[Watch]:
+    """Show the number of finished trials, their rate and the remaining time; first, where resumed, what is kept."""
     begun, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
 
         def watch(tally: Tally) -> None:
             nonlocal first
+            if first is None and resumed:
+                again = "" if tally.done == tally.trials else "; chunks that were not finished run again"
+                kept = f"continuing: {tally.done} of {tally.trials} trials kept{again}"
+                console.print(kept, markup=False, highlight=False)
             first = tally.done if first is None else first
             rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
             invalid = f", {tally.invalid} invalid" if tally.invalid else ""

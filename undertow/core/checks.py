@@ -60,8 +60,16 @@ def hurwitz(name: str, feedback: Any) -> None:
             )
 
 
-def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
-    """Check that a square matrix, or each of a stack, is symmetric with positive eigenvalues."""
+def positive_definite(name: str, matrix: Any, unit: str = "", whole: str = "", hint: str = "") -> None:
+    """Check that a square matrix, or each of a stack, is symmetric with positive eigenvalues.
+
+    Args:
+        name: of the value.
+        matrix: the value, or a matrix that it is a part of.
+        unit: of its entries.
+        whole: what the matrix is, where the value is a part of it.
+        hint: remedy where an eigenvalue is not positive.
+    """
     shape = np.shape(matrix)
     if isinstance(matrix, Tracer):
         return
@@ -72,7 +80,10 @@ def positive_definite(name: str, matrix: Any, unit: str = "") -> None:
             raise BadInput(name, "be symmetric", f"off by {skew:.3g} {unit}".strip())
         smallest = float(np.linalg.eigvalsh(block).min())
         if not smallest > 0:
-            raise BadInput(name, "be positive definite", f"a matrix with smallest eigenvalue {smallest:.3g}")
+            if whole:
+                got = f"such that its smallest eigenvalue is {smallest:.3g}"
+                raise BadInput(name, f"leave {whole} positive definite", got, hint=hint)
+            raise BadInput(name, "be positive definite", f"a matrix with smallest eigenvalue {smallest:.3g}", hint=hint)
 
 
 def _each(name: str, value: Any, good: Any, must: str, unit: str) -> None:

@@ -5,7 +5,10 @@
 Whoever reads a file says where he stands (`within`), so that an error is worded once, where it is found, with the key
 path and the line that the user knows.
 
-Advice is not an error: a part returns it from its method `advice()`, and the run continues.
+Advice is not an error: the run continues. A part returns sentences from its method `advice()`; advice on a key of a
+file names its place like an error.
+
+    Advice: `reference` has yaw at 45 rad, which is 7.16 turns (scenario.yaml, line 5). Angles are in radians
 """
 
 import contextlib
@@ -21,25 +24,59 @@ class _Place(NamedTuple):
     key: str
     location: Callable[[str], str]  # file and line of a key path that starts here; "" where unknown
     note: str
+    written: Callable[[str], str]
 
 
 _PLACES: ContextVar[tuple[_Place, ...]] = ContextVar("places", default=())
 
 
 @contextlib.contextmanager
-def within(key: str = "", location: Callable[[str], str] = lambda name: "", note: str = "") -> Iterator[None]:
+def within(
+    key: str = "",
+    location: Callable[[str], str] = lambda name: "",
+    note: str = "",
+    written: Callable[[str], str] = lambda name: name,
+) -> Iterator[None]:
     """Errors that arise inside are about what stands at a key; may be nested, and used as a decorator.
 
     Args:
         key: key path of what is read or made inside; goes before the names that errors give.
         location: file and line of a key path; the innermost that knows it is asked.
         note: follows the location.
+        written: a key path that starts here as the user wrote it, where there is a short form.
     """
-    token = _PLACES.set((*_PLACES.get(), _Place(key, location, note)))
+    token = _PLACES.set((*_PLACES.get(), _Place(key, location, note, written)))
     try:
         yield
     finally:
         _PLACES.reset(token)
+
+
+def _placed(name: str, where: str) -> tuple[str, str]:
+    """Key path of a name from the outermost place that the code stands within, and its location."""
+    for place in reversed(_PLACES.get()):
+        where = where or place.location(name)
+        where = ", ".join(filter(None, (where, place.note)))
+        name = ".".join(filter(None, (place.key, place.written(name)))).replace(".[", "[")
+    return name, where
+
+
+class Advice(NamedTuple):
+    """What is surely not meant by a value that can be used."""
+
+    says: str  # with the numbers that caused it
+    where: str = ""  # file and line, when known
+    hint: str = ""  # remedy, a full sentence
+
+    @property
+    def sentence(self) -> str:
+        """One line, without full stop."""
+        return _sentence(self.says, self.where, self.hint)
+
+
+def advice(name: str, says: str, hint: str = "") -> Advice:
+    """Advice on the value of a key, located from the key that the code stands within."""
+    return Advice(says, _placed(name, "")[1], hint)
 
 
 class BadInput(ValueError):
@@ -54,28 +91,33 @@ class BadInput(ValueError):
     """
 
     def __init__(self, name: str, must: str, got: object = None, *, hint: str = "", where: str = ""):
-        for place in reversed(_PLACES.get()):
-            where = where or place.location(name)
-            where = ", ".join(filter(None, (where, place.note)))
-            name = ".".join(filter(None, (place.key, name))).replace(".[", "[")
+        name, where = _placed(name, where)
         self.name, self.must, self.got, self.hint, self.where = name, must, got, hint, where
         super().__init__(name, must, got)
 
     def __str__(self) -> str:
         got = "" if self.got is None else f", but is {_one_line(self.got)}"
-        where = f" ({self.where})" if self.where else ""
-        hint = f". {self.hint}" if self.hint else ""
+        says = f"`{_one_line(self.name)}` must {self.must}{got}"
         if not self.must:
             failed = _one_line(self.got)
-            said = f"`{_one_line(self.name)}`: {failed}" if self.name else failed[:1].upper() + failed[1:]
-            return f"{said}{where}{hint}"
-        return f"`{_one_line(self.name)}` must {self.must}{got}{where}{hint}"
+            says = f"`{_one_line(self.name)}`: {failed}" if self.name else failed[:1].upper() + failed[1:]
+        return _sentence(says, self.where, self.hint)
+
+
+def _sentence(says: str, where: str, hint: str) -> str:
+    place = f" ({where})" if where else ""
+    return f"{says}{place}{f'. {hint}' if hint else ''}"
 
 
 def known_key(key: str, known: Iterable[str]) -> str:
     """As `did_you_mean`, for a key; digits are what follows the decimal comma of `{supply: 16,5}`."""
     comma = "Write a decimal point: in braces, a comma starts a new key"
     return comma if key.isdecimal() else did_you_mean(key, known)
+
+
+def joined(*hints: str) -> str:
+    """Hints one behind the other, without those that are empty; each is a sentence without full stop."""
+    return ". ".join(filter(None, hints)).replace("?. ", "? ")
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput
+from undertow.core.user_code import place_of
 
 
 class Signal(NamedTuple):
@@ -26,8 +27,13 @@ class Signal(NamedTuple):
         return ", ".join(units).replace("[input]", input_unit)
 
 
-def check_declared(part: Any, values: Mapping[str, Any]) -> None:
+def check_declared(part: Any, values: Mapping[str, Any], method: str) -> None:
     """Check that a part gives the signals that it declares; names only, so it costs nothing in compiled code.
+
+    Args:
+        part: a plant or a controller.
+        values: of its signals, by name.
+        method: of the part that gives them.
 
     Raises:
         BadInput: a signal is undeclared, or a declared one is missing.
@@ -35,8 +41,11 @@ def check_declared(part: Any, values: Mapping[str, Any]) -> None:
     declared, who = part.signals(), type(part).__name__
     for name in values:
         if name not in declared:
-            hint = f"Declare it: `signals` of {who} returns {{{name!r}: Signal(dimensions, unit, meaning), ...}}"
-            raise BadInput(name, f"be declared by `signals` of {who}", "not", hint=hint)
+            says = f"`{who}.{method}` gives a signal `{name}`, which `{who}.signals` does not declare"
+            hint = f"Declare it: `signals` returns {{{name!r}: Signal(dimensions, unit, meaning), ...}}"
+            raise BadInput("", "", says, hint=hint, where=place_of(part, "signals"))
     for name in declared:
         if name not in values:
-            raise BadInput(name, f"be given by {who}, whose `signals` declares it", "not")
+            says = f"`{who}.signals` declares a signal `{name}`, which `{who}.{method}` does not give"
+            hint = f"Give it among the signals of `{method}`, as {{{name!r}: value}}, or remove its declaration"
+            raise BadInput("", "", says, hint=hint, where=place_of(part, "signals"))

@@ -65,13 +65,13 @@ def python_says(error: BaseException) -> str:
 
 
 def place_of(part: Any, method: str = "") -> str:
-    """`mine.py, line 7`, where a class of the user's own begins, or a method of it; "" for other people's classes.
+    """`mine.py, line 7`, where a class or function of the user's own begins, or a method; "" for other people's.
 
     Args:
-        part: an object, or the class.
+        part: an object, or the class, or a function.
         method: its name; "" for the class itself.
     """
-    kind = part if isinstance(part, type) else type(part)
+    kind = part if inspect.isclass(part) or inspect.isfunction(part) else type(part)
     thing: Any = inspect.unwrap(getattr(kind, method, None) or str) if method else kind
     if not _is_own(getattr(thing, "__module__", None)):
         return ""

@@ -151,8 +151,8 @@ class Realization(NamedTuple):
         acceleration = plant.acceleration(t, x, applied, self.load(t, x))
         effort = plant.effort(x, applied)
         of_plant = plant.diagnostics(x, applied)
-        check_declared(plant, of_plant)
-        check_declared(controller, of_controller)
+        check_declared(plant, of_plant, "diagnostics")
+        check_declared(controller, of_controller, "command")
         recorded = {
             "position": truth.position,
             "velocity": truth.velocity,

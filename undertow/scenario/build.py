@@ -1,7 +1,7 @@
 """Build the closed loop of a scenario."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
@@ -12,7 +12,7 @@ from undertow.core import runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.catalogue import KIND_OF
 from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation
-from undertow.core.errors import within
+from undertow.core.errors import Advice, advice, within
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
@@ -54,23 +54,33 @@ class Built(NamedTuple):
     scenario: Scenario
     resolved: dict[str, Any]  # the scenario with every default filled in
     metrics: tuple[AbstractMetric, ...]  # the scenario's own
+    text: Text  # of the scenario, whose lines advice names
 
     @in_its_precision
-    def advice(self) -> tuple[str, ...]:
+    def advice(self) -> tuple[Advice, ...]:
         """Warnings about a scenario that can be run."""
-        (start, _), end = self.window(), self.scenario.loop.duration
-        late = f"there are no steady metrics: the steady window starts at {start:g} s, and the run ends at {end:g} s"
-        plant = self.closed_loop.plant
-        fast = step_advice(plant.thruster, self.scenario.loop) if isinstance(plant, HybridVehicle) else ()
-        loop, steps = self.scenario.loop, self.scenario.loop.duration / self.scenario.loop.dt
-        times = rounded_times(loop)
-        if self.scenario.precision == "float32" and loop.method != "adaptive" and steps > _EXACT_INTEGERS:
-            limit = f"{_EXACT_INTEGERS} steps, {_EXACT_INTEGERS * loop.dt:.6g} s"
-            times += (f"float32 cannot distinguish instants beyond {limit}",)
-        navigation = self.closed_loop.navigation
-        unseen = navigation.advice(end) if isinstance(navigation, Navigation) else ()
-        unmeant = plausibility(self.closed_loop, end, self.scenario.initial.position)
-        return plant.advice() + fast + times + ((late,) if start >= end else ()) + unseen + unmeant
+        with within(location=self.text.location):
+            return tuple(self._advised())
+
+    def _advised(self) -> Iterator[Advice]:
+        loop, plant, navigation = self.scenario.loop, self.closed_loop.plant, self.closed_loop.navigation
+        of_thruster = plant.thruster.advice() if isinstance(plant, HybridVehicle) else ()
+        for sentence in plant.advice():
+            yield advice("plant.thruster" if sentence in of_thruster else "plant", sentence.rstrip("."))
+        if isinstance(plant, HybridVehicle):
+            yield from step_advice(plant.thruster, loop)
+        yield from rounded_times(loop)
+        if self.scenario.precision == "float32" and loop.method != "adaptive":
+            if loop.duration / loop.dt > _EXACT_INTEGERS:
+                limit = f"{_EXACT_INTEGERS} steps, {_EXACT_INTEGERS * loop.dt:.6g} s"
+                yield advice("precision", f"float32 cannot distinguish instants beyond {limit}")
+        (start, _), end = self.window(), loop.duration
+        if start >= end:
+            window = f"the steady window starts at {start:g} s, and the run ends at {end:g} s"
+            yield advice("steady.start", f"there are no steady metrics: {window}")
+        if isinstance(navigation, Navigation):
+            yield from (advice("navigation", sentence) for sentence in navigation.advice(end))
+        yield from plausibility(self.closed_loop, end, self.scenario.initial.position)
 
     def known_metrics(self) -> dict[str, Metric]:
         """Metrics that its runs may have, by name, with their units."""
@@ -99,7 +109,7 @@ def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None)
     """
     text = source if isinstance(source, Text) else from_data(source)
     scenario = validate(text)
-    with runtime.on_processor(), within(location=text.location):
+    with runtime.on_processor(), within(location=text.location, written=text.as_written):
         with runtime.in_precision("float64"):
             built = _build(text, scenario, part_cache or PartCache())
         with runtime.in_precision(scenario.precision):
@@ -153,7 +163,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     several = [one("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
     if several:
         resolved["metrics"] = [description for _, description in several]
-    built = Built(loop.starting_at(scenario.initial.position), scenario, resolved, tuple(part for part, _ in several))
+    metrics = tuple(part for part, _ in several)
+    built = Built(loop.starting_at(scenario.initial.position), scenario, resolved, metrics, text)
     with within("controller.signals"):
         loop.signals()
     with within("success"):

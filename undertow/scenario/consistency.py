@@ -9,7 +9,8 @@ import jax.numpy as jnp
 
 from undertow.core import checks
 from undertow.core.contracts import Load
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import Advice, BadInput, advice, within
+from undertow.core.signals import check_declared
 from undertow.core.user_code import python_says
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.schema import Initial, Loop, Window
@@ -58,20 +59,22 @@ def check_window(window: Window, duration: float) -> None:
         raise BadInput("stop", f"be later than steady.start ({start:g} s)", f"{stop:g} s")
 
 
-def rounded_times(loop: Loop) -> tuple[str, ...]:
-    """Sentences where a run does not end at its duration, or its last record is not at its end."""
-    stepped, sentences = loop.method != "adaptive", []
+def rounded_times(loop: Loop) -> tuple[Advice, ...]:
+    """Advice where a run does not end at its duration, or its last record is not at its end."""
+    stepped, found = loop.method != "adaptive", []
     dt = loop.dt if loop.kind == "sampled" else loop.record / round(loop.record / loop.dt) if stepped else 0.0
     end = round(loop.duration / dt) * dt if stepped else loop.duration
     if abs(end - loop.duration) > _ROUNDING * loop.duration:
-        sentences.append(f"the run lasts {end:.9g} s, a whole number of steps of {dt:g} s, not {loop.duration:.9g} s")
+        says = f"the run lasts {end:.9g} s, a whole number of steps of {dt:g} s, not {loop.duration:.9g} s"
+        found.append(advice("loop.duration", says))
     last = math.floor(end / loop.record * (1 + _ROUNDING)) * loop.record
     if end - last > _ROUNDING * end:
-        sentences.append(
+        says = (
             f"the last record is at {last:.9g} s, {end - last:.3g} s before the end: `loop.duration` is not a multiple "
             f"of `loop.record` ({loop.record:g} s)"
         )
-    return tuple(sentences)
+        found.append(advice("loop.record", says))
+    return tuple(found)
 
 
 def whole_steps(interval: float, step: float) -> bool:
@@ -118,7 +121,7 @@ def check_fit(loop: ClosedLoop) -> None:
         _traced(lambda realization, x: loop.plant.dynamics(zero, x, rest, realization.load(zero, x)), realization, x)
     with within("controller"):
         decided = lambda realization, x, z: realization.decide(zero, x, z, realization.initial_measuring(x))
-        _traced(decided, realization, x, z)
+        check_declared(loop.controller, _traced(decided, realization, x, z).signals, "command")
 
 
 def _traced(function: Callable[..., Any], *arguments: Any) -> Any:

@@ -51,7 +51,8 @@ def describe(name: str) -> tuple[Description, ...]:
         found = read_vehicle(Path(name), what="NAME")
         return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), (), {}),)
     if ".py:" in name:
-        return (_describe("", name, catalogue.find("", name, what="NAME")),)
+        part = catalogue.find("", name, what="NAME")
+        return (_describe("controllers" if factory.takes_model(part) else "", name, part),)
     given, _, short = name.rpartition("/")
     kinds = [kind for kind in catalogue.KINDS if given in ("", kind)]
     known = {kind: catalogue.names(kind) for kind in kinds}
@@ -59,7 +60,9 @@ def describe(name: str) -> tuple[Description, ...]:
     found = tuple(one for kind, part in named for one in _presets(kind, short, part))
     if not found:
         every = {part for parts_of_kind in known.values() for part in parts_of_kind}
-        raise BadInput("NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "metrics", "signals"}))
+        raise BadInput(
+            "NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "campaign", "metrics", "signals"})
+        )
     return found
 
 

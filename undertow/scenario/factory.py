@@ -164,6 +164,11 @@ def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -
     return _made(lambda: type(part)(**values))
 
 
+def takes_model(function: Callable[..., Any]) -> bool:
+    """Whether a function makes a controller: its first argument is the nominal model, which undertow gives."""
+    return next(iter(inspect.signature(function).parameters), "") == "model"
+
+
 def is_part(thing: Any) -> bool:
     """Whether an object keeps the contract of some kind of part."""
     return isinstance(thing, tuple(_CONTRACTS.values()))

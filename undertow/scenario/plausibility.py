@@ -1,4 +1,4 @@
-"""Advice on what a scenario can run but surely does not mean; each sentence names the numbers that caused it.
+"""Advice on what a scenario can run but surely does not mean; each names the numbers that caused it, and the line.
 
 Only what holds whatever the controller does is said: speeds are compared with one that no direction exceeds.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.core.contracts import AbstractReference
+from undertow.core.errors import Advice, advice
 from undertow.disturbances.adding import Together
 from undertow.disturbances.current import Current
 from undertow.disturbances.gauss_markov_current import GaussMarkovCurrent
@@ -37,8 +38,8 @@ class Motion(NamedTuple):
     start: Float[np.ndarray, " n"]  # position of the plant at t = 0
 
 
-def plausibility(loop: ClosedLoop, duration: float, start: list[float] | None) -> tuple[str, ...]:
-    """One sentence for each thing that is surely not meant.
+def plausibility(loop: ClosedLoop, duration: float, start: list[float] | None) -> tuple[Advice, ...]:
+    """Advice for each thing that is surely not meant.
 
     Args:
         loop: of the scenario.
@@ -89,16 +90,14 @@ def _angles(loop: ClosedLoop, desired: Motion):
             whole = [value for value in values if abs(value) > _FULL_TURN and value % 1 == 0]
             if whole:
                 output, value = plant.outputs[axis], whole[0]
-                yield (
-                    f"`{name}` has {output} at {value:g} rad, which is {abs(value) / _FULL_TURN:.3g} turns: angles are "
-                    f"in radians, and {value:g} degrees are {np.radians(value):.4g} rad"
-                )
+                says = f"`{name}` has {output} at {value:g} rad, which is {abs(value) / _FULL_TURN:.3g} turns"
+                yield advice(name, says, f"Angles are in radians: {value:g} degrees are {np.radians(value):.4g} rad")
     if isinstance(plant, HybridVehicle):
         steepest = float(np.abs(desired.position[:, 4]).max())
         if np.pi / 2 < steepest < _FULL_TURN:
-            yield (
-                f"`reference` has a pitch of up to {steepest:.4g} rad ({np.degrees(steepest):.4g} degrees), beyond 90 "
-                "degrees, where roll and yaw turn over: angles are in radians"
+            says = f"`reference` has a pitch of up to {steepest:.4g} rad ({np.degrees(steepest):.4g} degrees)"
+            yield advice(
+                "reference", f"{says}, beyond 90 degrees, where roll and yaw turn over", "Angles are in radians"
             )
 
 
@@ -115,10 +114,8 @@ def _unfinished(reference: AbstractReference, desired: Motion):
     last = int(np.flatnonzero(~there)[-1])
     between = _sampled(reference, np.linspace(late.time[last], late.time[last + 1], _SAMPLES), desired.start)
     ends = between.time[np.abs(between.position - goal).max(axis=1) <= size][0]
-    yield (
-        f"the run ends at {duration:g} s, before the reference reaches its end at {ends:.3g} s: give `loop.duration` "
-        f"at least {ends:.3g} s, unless a part is enough"
-    )
+    says = f"the run ends at {duration:g} s, before the reference reaches its end at {ends:.3g} s"
+    yield advice("loop.duration", says, f"Give `loop.duration` at least {ends:.3g} s, unless a part is enough")
 
 
 def _above(loop: ClosedLoop, desired: Motion):
@@ -129,16 +126,14 @@ def _above(loop: ClosedLoop, desired: Motion):
         surface = -float(waves.depth)
         for name, value in (("reference", highest), ("initial.position", start)):
             if value < surface:
-                yield (
-                    f"`{name}` is at down = {value:.4g} m, above the surface at down = {surface:.4g} m (`depth` of the "
-                    "waves): down is positive downward, from the world's origin"
-                )
+                says = f"`{name}` is at down = {value:.4g} m, above the surface at down = {surface:.4g} m"
+                hint = "The surface is `depth` of the waves above the world's origin, and down is positive downward"
+                yield advice(name, says, hint)
         return
     if highest < -_RISES and down.max() <= 0 <= start:
-        yield (
-            f"`reference` leads to down = {highest:.4g} m, {start - highest:.4g} m above the start at down = "
-            f"{start:.4g} m: down is positive downward, and a depth of {-highest:.4g} m is {-highest:.4g}"
-        )
+        says = f"`reference` leads to down = {highest:.4g} m, {start - highest:.4g} m above the start at down = "
+        hint = f"Down is positive downward: a depth of {-highest:.4g} m is {-highest:.4g}"
+        yield advice("reference", f"{says}{start:.4g} m", hint)
 
 
 def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
@@ -150,24 +145,24 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
     flow = float(np.linalg.norm(np.sum([np.asarray(one, dtype=float) for one in flows], axis=0))) if flows else 0.0
     most = f"the thrusters give the vehicle at most {top:.3g} m/s through the water"
     if flow > _SPARE * top:
-        yield f"the current is {flow:.3g} m/s, but {most}: it drifts away. 1 knot is 0.514 m/s"
+        says = f"the current is {flow:.3g} m/s, but {most}: it drifts away"
+        yield advice("disturbance", says, "1 knot is 0.514 m/s")
         return
     speed = float(np.linalg.norm(desired.velocity[:, :3], axis=1).max())
     duration, way = float(desired.time[-1]), desired.position[:, :3] - desired.start[:3]
     far = float(np.linalg.norm(way[-1]))
     step = float(np.linalg.norm(way[0]))
     if speed > _SPARE * (top + flow):
-        yield f"`reference` moves at up to {speed:.3g} m/s, but {most}: make it slower"
+        yield advice("reference", f"`reference` moves at up to {speed:.3g} m/s, but {most}", "Make it slower")
     elif far > _SPARE * (top + flow) * duration:
-        yield (
-            f"`reference` is {far:.4g} m from the start at the end of the run, but {most}, which takes "
-            f"{far / top:.3g} s: give `loop.duration` more than {duration:g} s"
-        )
+        says = f"`reference` is {far:.4g} m from the start at the end of the run, but {most}"
+        hint = f"That takes {far / top:.3g} s: give `loop.duration` more than {duration:g} s"
+        yield advice("reference", says, hint)
     elif step > _FAR * top:
-        yield (
-            f"`reference` begins {step:.4g} m from the vehicle, but {most}: the thrusters are at their limits for "
-            f"{step / top:.3g} s or more. Set `initial.position`, or approach smoothly (`settling` of a setpoint)"
-        )
+        says = f"`reference` begins {step:.4g} m from the vehicle, but {most}"
+        hint = "Set `initial.position`, or approach smoothly (`settling` of a setpoint)"
+        at_limits = f"the thrusters are at their limits for {step / top:.3g} s or more"
+        yield advice("reference", f"{says}: {at_limits}", hint)
 
 
 def _members(loop: ClosedLoop, kind: type) -> list:

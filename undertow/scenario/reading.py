@@ -35,6 +35,17 @@ class Text(NamedTuple):
             return ""
         return f"{self.name}, line {self.lines[path]}" if path in self.lines else self.name
 
+    def as_written(self, name: str) -> str:
+        """A key path as the user wrote it: `plant.vehicle` for the `kind` of `vehicle: my_rov.yaml`."""
+        section, _, last = name.rpartition(".")
+        value: Any = self.data
+        for step in key_path(section):
+            try:
+                value = value[step]
+            except (KeyError, IndexError, TypeError):  # a default that is not written
+                return name
+        return section if last == "kind" and isinstance(value, str) else name
+
     def location(self, name: str) -> str:
         """Location of a key by its path in words, such as `thrusters[2].position`."""
         return self.where(key_path(name))
@@ -146,7 +157,8 @@ def parse(text: str, name: str, folder: Path, what: str) -> Text:
     data, lines = load(text, name, what)
     if not isinstance(data, dict):
         got = "empty" if data is None else "a list" if isinstance(data, list) else f"a single {type(data).__name__}"
-        hint = "Write `key: value` lines; `undertow describe scenario` shows the keys"
+        file = "campaign" if what == "CAMPAIGN" else "scenario"
+        hint = f"Write `key: value` lines; `undertow describe {file}` shows the keys"
         raise BadInput(what, "be a mapping of keys to values", got, where=name, hint=hint)
     return Text(data, name, folder, lines)
 

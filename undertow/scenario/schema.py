@@ -2,13 +2,14 @@
 
 import re
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
 
-from undertow.core.errors import BadInput, known_key
+from undertow.core.errors import BadInput, joined, known_key
 from undertow.scenario.reading import Text
+from undertow.scenario.synonyms import hint_for
 from undertow.scenario.values import remedy_of
 from undertow.scenario.vehicle_schema import KEYS as VEHICLE_KEYS
 
@@ -39,6 +40,7 @@ OneOrMore = Annotated[
     Discriminator(lambda given: _SEVERAL if isinstance(given, list) else _ONE),
 ]
 Numbers = list[float]
+_LISTED = 5  # further wrong keys that a message names
 
 
 class Strict(BaseModel):
@@ -216,22 +218,40 @@ def check_kind(text: Text, key: str = "SCENARIO", where: str = "") -> None:
 
 
 def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scenario) -> BadInput:
-    """The first of pydantic's errors as BadInput; a misspelt key comes before the key that it leaves missing."""
-    what = model.__name__.lower()
-    error: Any = min(errors.errors(), key=lambda each: each["type"] != "extra_forbidden")
-    path = tuple(step for step in error["loc"] if step not in (_ONE, _SEVERAL))
-    name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).lstrip(".")
-    name = " ".join(name.split())
-    where = text.where(path)
-    if error["type"] == "extra_forbidden":
-        hint = _section_of(path, model) or known_key(str(path[-1]), _keys_beside(path, model))
-        return BadInput(name, f"be a key of the {what}", "unknown", hint=hint, where=where)
-    if error["type"] == "missing":
+    """The first of pydantic's errors as BadInput, misspelt keys before others, and the names of the other keys."""
+    first: Any
+    line = lambda one: text.lines.get(_path_of(one), 0)
+    first, *others = sorted(errors.errors(), key=lambda one: (one["type"] != "extra_forbidden", line(one)))
+    what, path, name = model.__name__.lower(), _path_of(first), _name_of(first)
+    where, also = text.where(path), _also(first, others, text)
+    if first["type"] == "extra_forbidden":
+        hint = _section_of(path, model) or hint_for(path, what) or known_key(str(path[-1]), _keys_beside(path, model))
+        return BadInput(name, f"be a key of the {what}", "unknown", hint=joined(hint, also), where=where)
+    if first["type"] == "missing":
         section, _, key = name.rpartition(".")
         place = f"`{section}`" if section else f"the {what}"
-        return BadInput(name, "be given", hint=f"Add `{key}:` to {place}", where=where)
-    got = error["input"]
-    return BadInput(name, _must(error), "empty" if got is None else repr(got), hint=_remedy(error), where=where)
+        return BadInput(name, "be given", hint=joined(f"Add `{key}:` to {place}", also), where=where)
+    got = "empty" if first["input"] is None else repr(first["input"])
+    return BadInput(name, _must(first), got, hint=joined(_remedy(first), also), where=where)
+
+
+def _path_of(error: Any) -> tuple[str | int, ...]:
+    return tuple(step for step in error["loc"] if step not in (_ONE, _SEVERAL))
+
+
+def _name_of(error: Any) -> str:
+    name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in _path_of(error)).lstrip(".")
+    return " ".join(name.split())
+
+
+def _also(first: Any, others: Sequence[Any], text: Text) -> str:
+    """Sentence with the other keys that are wrong; without those that a misspelt key leaves missing."""
+    misspelt = {_path_of(one)[:-1] for one in (first, *others) if one["type"] == "extra_forbidden"}
+    others = [one for one in others if one["type"] != "missing" or _path_of(one)[:-1] not in misspelt]
+    lines = {_name_of(one): text.lines.get(_path_of(one)) for one in others}
+    named = [f"`{name}`{f' (line {line})' if line else ''}" for name, line in lines.items() if name != _name_of(first)]
+    more = f" and {len(named) - _LISTED} more" if len(named) > _LISTED else ""
+    return f"Also wrong: {', '.join(named[:_LISTED])}{more}" if named else ""
 
 
 def _must(error: Any) -> str:
@@ -256,7 +276,9 @@ _INSIDE = {"vehicle": "plant", "thruster": "plant", "battery": "plant", "esc": "
 
 
 def _section_of(path: tuple, model: type[BaseModel]) -> str:
-    """Where a key at the top of a scenario belongs; "" for a key that no section has."""
+    """Where a key at the top of a file belongs; "" for a key that no section has."""
+    if len(path) == 1 and "scenario" in model.model_fields and path[0] in Scenario.model_fields:
+        return "It is a key of the scenario"
     if model is not Scenario or len(path) != 1:
         return ""
     sections = [key.path.split(".") for key in keys()]

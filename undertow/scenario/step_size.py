@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
+from undertow.core.errors import Advice, advice
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.continuous import flow
@@ -22,19 +23,19 @@ _LIMITS = {"rk4": 2.785, "euler": 2.0}
 _LOOKS = 9
 
 
-def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[str, ...]:
-    """A sentence when steps are too long for the linearised thrusters at rest."""
+def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[Advice, ...]:
+    """Advice when steps are too long for the linearised thrusters at rest."""
     if loop.method not in _LIMITS:
         return ()
     rate, step = fastest_decay(thruster), loop.dt / loop.substeps
     longest = _LIMITS[loop.method] / rate if rate else np.inf
     if step <= longest:
         return ()
-    return (
+    says = (
         f"the thrusters have a time constant of {1e3 / rate:.3g} ms, for which integration steps above "
-        f"{1e3 * longest:.3g} ms are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically. "
-        f"Use {_remedy(loop, longest)}, or another fidelity level",
+        f"{1e3 * longest:.3g} ms are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically"
     )
+    return (advice("loop.dt", says, f"Use {_remedy(loop, longest)}, or another fidelity level"),)
 
 
 def _remedy(loop: Loop, longest: float) -> str:

@@ -11,6 +11,8 @@ from undertow.scenario.schema import kind_of
 from undertow.scenario.vehicle_schema import INSTEAD, VehicleData, parse
 from undertow.vehicles.vehicle import Vehicle
 
+_FROM = {"weight": "mass", "buoyancy": "volume"}  # where the key itself is not given
+
 
 class VehicleFile(NamedTuple):
     """A vehicle file as read, some of its keys perhaps changed."""
@@ -19,6 +21,10 @@ class VehicleFile(NamedTuple):
     contents: dict[str, Any]  # plain data from which the same vehicle can be made again
     text: Text
     changed: frozenset[str]  # keys that are no longer the file's
+
+    def location(self, name: str) -> str:
+        """Location of a key in the file, also of one that is changed."""
+        return _location(self.text, frozenset())(name)
 
     @double_outside_runs
     def vehicle(self) -> Vehicle:
@@ -64,6 +70,24 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
         return VehicleFile(parse(contents), contents, text, changed)
 
 
+def vehicle_location(scenario: Text) -> Callable[[str], str]:
+    """Location of a key of a scenario's vehicle: a line of the vehicle file, or of the scenario where that sets it."""
+    plant = scenario.data.get("plant")
+    given = plant.get("vehicle") if isinstance(plant, Mapping) else None
+    options = {"kind": given} if isinstance(given, str) else dict(given or {})
+    name = options.pop("kind", "")
+    in_scenario = lambda key: scenario.location(f"plant.vehicle.{key}")
+    if not is_vehicle_file(name) or "contents" in options or not (scenario.folder / name).is_file():
+        return in_scenario
+    in_file = _location(read(scenario.folder / name), frozenset(options))
+    return lambda key: in_file(key) or in_scenario(key)
+
+
 def _location(text: Text, changed: frozenset[str]) -> Callable[[str], str]:
-    """Location of a key in the file; none where the key has been changed."""
-    return lambda name: "" if set(key_path(name)[:1]) & changed else text.location(name)
+    """Location of a key in the file, or of the key from which it follows; none where it has been changed."""
+
+    def location(name: str) -> str:
+        given = name if name in text.data else _FROM.get(name, name)
+        return "" if set(key_path(given)[:1]) & changed else text.location(given)
+
+    return location

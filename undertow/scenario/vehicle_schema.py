@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from undertow.core import checks
-from undertow.core.errors import BadInput, did_you_mean, known_key
+from undertow.core.errors import BadInput, did_you_mean, joined, known_key
 from undertow.core.measurement import BODY_AXES
+from undertow.scenario.synonyms import hint_for
 from undertow.scenario.values import checked
 from undertow.vehicles.facts import Facts
 from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
@@ -36,21 +37,26 @@ _LARGEST = 1e15
 
 def check_keys(contents: Mapping[str, Any]) -> None:
     """Raise BadInput unless all keys are known, none is redundant, and none is missing."""
+    if unknown := [key for key in contents if key not in KEYS]:
+        hint = hint_for((unknown[0],), "vehicle file") or did_you_mean(unknown[0], KEYS)
+        hint = joined(hint, _listed("Also unknown", unknown[1:]))
+        raise BadInput(unknown[0], "be a key of a vehicle file", "unknown", hint=hint)
     for key in contents:
-        if key not in KEYS:
-            raise BadInput(key, "be a key of a vehicle file", "unknown", hint=did_you_mean(key, KEYS))
         for other in INSTEAD.get(key, ()):
             if other in contents:
                 raise BadInput(key, f"be left out when there is `{other}`", contents[key])
-    for key in _REQUIRED:
-        if key not in contents:
-            raise BadInput(key, "be given")
+    if missing := [key for key in _REQUIRED if key not in contents]:
+        raise BadInput(missing[0], "be given", hint=_listed("Also missing", missing[1:]))
     if "buoyancy" not in contents:
         for key in ("volume", "water_density"):
             if key not in contents:
                 raise BadInput(
                     key, "be given", hint="Or `buoyancy`, N, instead of `volume`, m^3, and `water_density`, kg/m^3"
                 )
+
+
+def _listed(title: str, names: list[str]) -> str:
+    return f"{title}: {', '.join(f'`{name}`' for name in names)}" if names else ""
 
 
 def text_at(contents: Mapping[str, Any], key: str, default: str) -> str:

@@ -35,6 +35,7 @@ class DCMotor(eqx.Module):
         "N m s^2/rad^2", "the same in reverse", symbol="c_q-", default=None
     )
     sources: Sources = sources_field()
+    tested_voltage: float = eqx.field(static=True, default=float("inf"))  # V, up to which the data of the constants go
 
     def __post_init__(self):
         if self.reverse_thrust_coefficient is None:

@@ -2,6 +2,7 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from undertow.core.errors import BadInput
@@ -23,7 +24,12 @@ class AbstractMotorThruster(AbstractThruster):
         return self.motor.voltage_gain
 
     def advice(self):
-        return self.motor.advice()
+        supply, tested = float(np.max(self.supply)), self.motor.tested_voltage
+        beyond = (
+            f"`supply` is {supply:g} V, but the data of this thruster end at {tested:g} V: thrust and current beyond "
+            "are extrapolated",
+        )
+        return self.motor.advice() + (beyond if supply > tested else ())
 
 
 class IdealThruster(AbstractMotorThruster, AbstractQuasiStaticThruster):

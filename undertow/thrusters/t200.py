@@ -53,5 +53,6 @@ def t200(
             "rotor_inertia": "not published; chosen for a time constant of 0.1 s about half of the full speed at 16 V",
             "reverse_torque_coefficient": "as forward: the table shows no significant difference",
         },
+        tested_voltage=20.0,
     )
     return with_fidelity(motor, fidelity, supply, dead_zone, dead_zone_kind)

@@ -28,7 +28,7 @@ def t500(
 
     Args:
         fidelity: ideal, static, shaft or electromechanical.
-        supply: voltage limit, V.
+        supply: voltage limit, V; the data end at 24 V.
         dead_zone: voltage below which the thrust is zero, V.
         dead_zone_kind: effect of a voltage outside it: pass, all of it, or subtract, its part beyond the zone.
     """
@@ -51,5 +51,6 @@ def t500(
             "friction": "not identifiable from the data; counted as propeller torque",
             "rotor_inertia": "not published; chosen for a time constant of 0.1 s about half of the full speed at 24 V",
         },
+        tested_voltage=24.0,
     )
     return with_fidelity(motor, fidelity, supply, dead_zone, dead_zone_kind)

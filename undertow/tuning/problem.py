@@ -68,7 +68,7 @@ def _problem(text: Text, built: Built) -> Problem:
         raise BadInput("loop.kind", "be sampled, for gains to be used on a vehicle", scenario.loop.kind)
     known, dt, angles = _law_of(built), scenario.loop.dt, loop.controller.model.coordinates.angles
     function, given = _controller(text, built)
-    chosen = _parameters(known, function, tune, dt, angles)
+    chosen = _parameters(known, function, given, tune, dt, angles)
     train, held_out = training_and_held_out(text, built)
     duration = min(scenario.loop.duration, _LONGEST) if tune.duration is None else tune.duration
     start = duration / 2 if tune.start is None else tune.start
@@ -102,17 +102,24 @@ def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractControl
 
 
 def _parameters(
-    known: Law, function: Callable[..., Any], tune: Any, dt: float, angles: tuple[bool, ...]
+    known: Law, function: Callable[..., Any], given: Mapping[str, Any], tune: Any, dt: float, angles: tuple[bool, ...]
 ) -> list[TunableParameter]:
-    ranges = tune.parameters or known.ranges(dt)
+    ranges, options = tune.parameters or known.ranges(dt), list(inspect.signature(function).parameters)[1:]
     if not ranges:
-        raise BadInput("tune.parameters", "be given for this controller", hint="As `gain: [low, high]`")
-    options = list(inspect.signature(function).parameters)[1:]
+        raise BadInput("tune.parameters", "be given: this controller has no ranges of its own", hint=_example(given))
     for name in ranges:
         if name.partition("[")[0] not in options:
             hint = did_you_mean(name, options)
             raise BadInput(f"tune.parameters.{name}", "be an option of the controller", "unknown", hint=hint)
     return tunable_parameters.parameters(ranges, _groups(tune.per, angles), SHARED)
+
+
+def _example(given: Mapping[str, Any]) -> str:
+    """How to give ranges: of an option of the controller with one number, around its value."""
+    numbers = {name: value for name, value in given.items() if type(value) in (int, float) and value > 0}
+    name, value = next(iter(numbers.items()), ("OPTION", 1.0))
+    others = f"; its options with one number are {', '.join(numbers)}" if len(numbers) > 1 else ""
+    return f"For example `tune: {{parameters: {{{name}: [{value / 10:g}, {10 * value:g}]}}}}`{others}"
 
 
 def _groups(per: str, angles: tuple[bool, ...]) -> list[tuple[int, ...]]:

@@ -1,5 +1,7 @@
 """Certificate of stability of tuned gains: spectral radii of the exactly linearised loop on every training plant."""
 
+from collections import Counter
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -81,10 +83,29 @@ def _plant(trials: Trials, number: int) -> Any:
     return jax.tree.map(lambda leaf: leaf[number] if eqx.is_array(leaf) else leaf, trials.plants)
 
 
-def no_certificate(given: Certificate, tried: int) -> BadInput:
-    """The error where none of the tried points is certified; `given` is the certificate of the scenario's own gains."""
-    plant = f" on the plant variant {given.worst_variant}" if given.worst_variant else ""
-    sets = ", use another nominal model, or leave this variant out of tune.train.sets" if plant else ""
-    hint = f"With the given gains the loop has a spectral radius of {given.worst:.4g}{plant}. Widen the ranges{sets}"
-    must, got = "allow gains for which the loop is stable", f"ranges in which none of {tried} points is certified"
+def no_certificate(given: Certificate, tried: Mapping[str, Certificate], points: int) -> BadInput:
+    """The error where none of the tried points is certified, with the point that came nearest.
+
+    Args:
+        given: certificate of the given gains, each moved to the nearest bound where it is outside its range.
+        tried: certificates by gains in words; without those that an earlier, interrupted tuning computed.
+        points: number of points that were tried.
+    """
+    radius = f"the given gains, within the ranges, have {given.worst:.4g}{_on(given)}"
+    says = [f"A loop is stable with a spectral radius below 1: {radius}"]
+    remedies = ["Widen the ranges"]
+    if tried:
+        nearest = min(tried, key=lambda gains: tried[gains].worst)
+        says.append(f"the nearest point has {tried[nearest].worst:.4g}, with {nearest}")
+        remedies = ["Widen the ranges beyond this point"]
+    (variant, times), *_ = Counter(one.worst_variant for one in (given, *tried.values())).most_common()
+    if variant:
+        often = f" ({times} of {1 + len(tried)} times the least stable one)" if tried else ""
+        remedies += ["use another nominal model", f"leave variant {variant}{often} out of tune.train.sets"]
+    must, got = "allow gains for which the loop is stable", f"ranges in which none of {points} points is certified"
+    hint = f"{', '.join(says)}. {', or '.join(remedies)}"
     return BadInput("tune.parameters", must, got, hint=hint)
+
+
+def _on(found: Certificate) -> str:
+    return f" on the plant variant {found.worst_variant}" if found.worst_variant else ""

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.core.contracts import AbstractController
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, within
 from undertow.scenario.build import in_its_precision
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
@@ -93,14 +93,23 @@ def tune(
     if method == "gradient" and not notes.is_over:
         evaluation.precompile_slope(task.start)
     certifier = Certifier(task.training_loop, task.train, first)
-    objective = Objective(evaluation, lambda point: certifier(evaluation.law(point)), notes, watch)
+    tried: dict[str, Certificate] = {}
+
+    def certify(point: np.ndarray) -> Certificate:
+        pairs = zip(task.parameters, point, strict=True)
+        words = ", ".join(f"{parameter.name} = {parameter.value(share):.3g}" for parameter, share in pairs)
+        tried[words] = certifier(evaluation.law(point))
+        return tried[words]
+
+    objective = Objective(evaluation, certify, notes, watch)
     say("compiling and evaluating the initial design")
     seed = task.built.scenario.seed
     others = spread_points(_INITIAL_DESIGN - 1, len(task.parameters), seed)
     objective.costs(np.vstack([task.start, others]), must=True)  # otherwise slow compiling would leave no result
     start = objective.best
     if start is None:
-        raise no_certificate(certifier(first), _INITIAL_DESIGN)
+        with within(location=text.location):
+            raise no_certificate(certifier(first), tried, _INITIAL_DESIGN)
     say("tuning")
     finished = True
     try:

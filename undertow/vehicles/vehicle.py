@@ -55,7 +55,19 @@ class Vehicle(eqx.Module):
             if shape != (size, size):
                 raise BadInput(name, f"be a {size} x {size} matrix", f"of shape {shape}")
             checks.finite(name, getattr(self, name))
-        checks.positive_definite("mass_matrix", self.mass_matrix())
+        self._check_mass_matrix()
+
+    def _check_mass_matrix(self) -> None:
+        """Check M; the error names the added mass, or the inertia where that is at fault."""
+        whole = self.mass_matrix()
+        if isinstance(whole, Tracer):
+            return
+        rigid = np.asarray(whole) - np.asarray(self.added_mass)
+        definite = np.abs(rigid - rigid.T).max() <= 1e-9 * np.abs(rigid).max() and np.linalg.eigvalsh(rigid).min() > 0
+        name, hint = "inertia", "That of the rigid body, M_RB, is not by itself"
+        if definite:
+            name, hint = "added_mass", "With mass and inertia alone it would be: check the signs of the added mass"
+        checks.positive_definite(name, whole, whole="M = M_RB + M_A", hint=hint)
 
     def _check_thrusters(self) -> None:
         shapes = np.shape(self.thruster_positions), np.shape(self.thruster_directions)

@@ -17,19 +17,21 @@ from undertow.checks.finding import Finding
 from undertow.checks.vehicle_lint import hydrodynamics, layout, mass, statics, transcription
 from undertow.checks.vehicle_lint.layout import scaled
 from undertow.core.contracts import AbstractPlant
+from undertow.core.errors import Advice, advice, within
+from undertow.scenario.build import Built
+from undertow.scenario.vehicle_file import vehicle_location
 from undertow.scenario.vehicle_schema import angles_of
 from undertow.vehicles.facts import Facts as Facts
 from undertow.vehicles.facts import facts_of as facts_of
 from undertow.vehicles.vehicle import Vehicle
 
-_RULES = (*mass.RULES, *statics.RULES, *hydrodynamics.RULES, *layout.RULES, *transcription.RULES)
+_RULES = (*mass.RULES, *statics.RULES, *hydrodynamics.RULES, *layout.RULES, *layout.OF_DIRECTIONS, *transcription.RULES)
 
 
 def lint(facts: Facts) -> tuple[Finding, ...]:
-    """All errors and advice on a vehicle, errors first; angles in radians alone, because they cause others."""
-    if units := tuple(layout.degrees(facts)):
-        return units
-    findings = [finding for rule in _RULES for finding in rule(facts)]
+    """All errors and advice on a vehicle, errors first; without those that angles in radians cause."""
+    causes = set(layout.OF_DIRECTIONS) if any(layout.degrees(facts)) else set()
+    findings = [finding for rule in _RULES if rule not in causes for finding in rule(facts)]
     return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
 
 
@@ -82,19 +84,21 @@ def vehicle_facts(plant: AbstractPlant, description: Mapping[str, Any]) -> Facts
     return facts_of(vehicle)._replace(**known)
 
 
-_SHOWN = ("gravity", "degrees")  # advice that matters before a run
+_SHOWN = ("gravity", "degrees", "arm")  # advice that matters before a run
 
 
-def vehicle_warnings(plant: AbstractPlant, description: Mapping[str, Any]) -> tuple[str, ...]:
-    """A sentence for each impossible property, for a weight that is not that of the mass, and for angles in radians.
+def vehicle_advice(built: Built) -> tuple[Advice, ...]:
+    """What matters before a run: impossible properties, wrong units, and a weight that is not that of the mass.
 
-    A weight differs where only the mass is changed, in a scenario or from trial to trial. Arguments as `vehicle_facts`.
+    A weight differs where only the mass is changed, in a scenario or from trial to trial.
     """
-    facts = vehicle_facts(plant, description)
+    description = built.resolved["plant"]
+    facts = vehicle_facts(built.closed_loop.plant, description)
     findings = () if facts is None else lint(facts)
     shown = [finding for finding in findings if finding.level == "error" or finding.rule in _SHOWN]
     given = description.get("vehicle", {})
     if "mass" in given and "weight" not in given:
         stays = "With `mass` alone changed, weight and buoyancy stay: give `weight` and `buoyancy`, too"
         shown = [finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in shown]
-    return tuple(f"{finding.says}. {finding.hint}".rstrip(". ") for finding in shown)
+    with within("plant.vehicle", vehicle_location(built.text)):
+        return tuple(advice(finding.key, finding.says, finding.hint) for finding in shown)

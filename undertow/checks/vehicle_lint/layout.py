@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from undertow.checks.finding import Finding, advice, error
+from undertow.checks.vehicle_lint.transcription import printed_matrix
 from undertow.core.measurement import BODY_AXES
 from undertow.plants.reachability import open_loop_advice
 from undertow.vehicles.facts import FRESH_WATER, Facts
@@ -12,7 +13,7 @@ from undertow.vehicles.facts import FRESH_WATER, Facts
 _ROUNDING = 5e-3
 _STEP = np.pi / 12  # rad; angles of thrusters are multiples of it
 _WORST_CONDITION = 10.0
-_FARTHEST = 5.0  # thruster arm per cube root of the volume; torpedoes have 2
+_FARTHEST, _IMPOSSIBLE = 5.0, 20.0  # thruster arm per cube root of the volume; torpedoes have 2
 
 
 def unit_directions(facts: Facts) -> Iterator[Finding]:
@@ -31,9 +32,11 @@ def degrees(facts: Facts) -> Iterator[Finding]:
         key, value = next(iter(given.items()))
         angle = f"{np.degrees(_STEP) * round(steps[key]):g}"
         others = ", and the other angles in degrees as well" if len(given) > 1 else ""
-        yield advice(
-            "degrees", key, "be in degrees", f"{value:g}, which is {angle} degrees in radians", f"Write {angle}{others}"
-        )
+        got, hint = f"{value:g}, which is {angle} degrees in radians", f"Write {angle}{others}"
+        if any(printed_matrix(facts)):
+            yield error("degrees", key, "be in degrees", f"{got}, and `thruster_matrix` contradicts it", hint)
+        else:
+            yield advice("degrees", key, "be in degrees", got, hint)
 
 
 def arms(facts: Facts) -> Iterator[Finding]:
@@ -42,10 +45,10 @@ def arms(facts: Facts) -> Iterator[Finding]:
         side = np.cbrt(facts.displaced_mass / (facts.water_density or FRESH_WATER))
         share = facts.lever / side
         got = f"{facts.lever:.4g} m from the centre of gravity, {share:.3g} times the side of a cube of the volume"
-        if share > 100:
+        if share > _IMPOSSIBLE:
             yield error("arm", "thrusters", "sit on the vehicle", got, "Are the positions in mm?")
         elif share > _FARTHEST:
-            yield advice("arm", "thrusters", "sit nearer to the vehicle", got)
+            yield advice("arm", "thrusters", "sit nearer to the vehicle", got, "Are the positions in metres?")
         return
     for j, position in enumerate(facts.positions):
         beyond = np.abs(position - facts.r_g) / facts.size  # half of the size is the side of the hull
@@ -101,4 +104,5 @@ def scaled(matrix: np.ndarray) -> np.ndarray:
     return np.concatenate([matrix[:3], matrix[3:] / (longest if longest > 0 else 1.0)])
 
 
-RULES = (unit_directions, arms, rank, same_line, mirror)
+RULES = (degrees, unit_directions, arms)
+OF_DIRECTIONS = (rank, same_line, mirror, printed_matrix)

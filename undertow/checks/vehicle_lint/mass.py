@@ -25,10 +25,16 @@ def mass_matrix(facts: Facts) -> Iterator[Finding]:
         if skew > 1e-9 * np.abs(matrix).max():
             hint = "Take (A + A^T) / 2 if this is rounding" if skew < 0.01 * np.abs(matrix).max() else ""
             yield error("symmetry", key, "be symmetric", f"off by {skew:.3g}", hint)
-    smallest = np.linalg.eigvalsh(0.5 * (facts.mass_matrix + facts.mass_matrix.T)).min()
-    if not smallest > 0:
-        got = f"such that M, with it, has the eigenvalue {smallest:.3g}"
-        yield error("definite", "added_mass", "leave M = M_RB + M_A positive definite", got)
+    whole, rigid = (_smallest(matrix) for matrix in (facts.mass_matrix, facts.mass_matrix - facts.added_mass))
+    if not whole > 0 and rigid > 0:  # else it is the inertia, see `triangle`
+        got = f"such that M, with it, has the eigenvalue {whole:.3g}"
+        hint = f"With mass and inertia alone the smallest is {rigid:.3g}"
+        yield error("definite", "added_mass", "leave M = M_RB + M_A positive definite", got, hint)
+
+
+def _smallest(matrix: np.ndarray) -> float:
+    """Smallest eigenvalue of the symmetric part."""
+    return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min())
 
 
 def triangle(facts: Facts) -> Iterator[Finding]:
