@@ -32,6 +32,16 @@ Pdf = Annotated[
     ),
 ]
 
+Replay = Annotated[
+    bool,
+    typer.Option(
+        "--replay",
+        help="Run some trials again and show them on the page in three dimensions: the first trial of up to four "
+        "contestants, or the three worst trials. Compiling takes up to a minute for each controller. With --resume the "
+        "replay is added to results that are there.",
+    ),
+]
+
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
@@ -239,6 +249,7 @@ def campaign(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier campaign in DIR.")] = False,
     allow_code: AllowCode = False,
     pdf: Pdf = None,
+    replay: Replay = False,
 ) -> int:
     """Run a Monte Carlo study or a parameter sweep of one scenario.
 
@@ -249,11 +260,11 @@ def campaign(
 
     if str(campaign) == "status":
         given = {"--out": out, "--resume": resume, "--workers": workers, "--cluster": cluster, "--overwrite": overwrite}
-        given |= {"--allow-code": allow_code, "--pdf": pdf}
+        given |= {"--allow-code": allow_code, "--pdf": pdf, "--replay": replay}
         return command.status(folder or Path(), [name for name, value in given.items() if value])
     if folder is not None:
         command.refuse_second(folder)
-    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code, pdf)
+    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code, pdf, replay)
 
 
 @app.command()
@@ -286,6 +297,7 @@ def compare(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier comparison in DIR.")] = False,
     allow_code: AllowCode = False,
     pdf: Pdf = None,
+    replay: Replay = False,
 ) -> int:
     """Compare controllers on one scenario, or several scenarios, on the same seeds.
 
@@ -295,7 +307,7 @@ def compare(
     """
     from undertow.cli.compare import compare
 
-    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf)
+    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf, replay)
 
 
 @app.command("list")
