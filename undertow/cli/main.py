@@ -95,7 +95,14 @@ def init(
         typer.Argument(metavar="[PATH]", help="Folder for scenario.yaml, or a name that ends in .yaml. Default: here."),
     ] = Path(),
     vehicle: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Vehicle: bluerov2, bluerov2_heavy (default), odin or rexrov.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Vehicle: bluerov2, bluerov2_heavy (default), odin, rexrov, or a vehicle file of yours.",
+        ),
+    ] = None,
+    controller: Annotated[
+        str | None, typer.Option(metavar="FILE.py:FUNCTION", help="Controller of yours. Default: pid.")
     ] = None,
     own_vehicle: Annotated[
         bool, typer.Option("--own-vehicle", help="Also write my_rov.yaml, a vehicle file for your numbers.")
@@ -111,7 +118,7 @@ def init(
     """
     from undertow.cli.init import init
 
-    init(path, vehicle, own_vehicle, own_controller)
+    init(path, vehicle, controller, own_vehicle, own_controller)
 
 
 @app.command()
