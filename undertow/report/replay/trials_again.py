@@ -1,6 +1,7 @@
 """Replays of chosen trials of a campaign or a comparison: these keep no series, so the trials are run again."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -59,8 +60,9 @@ def _time_between_records(built: Built) -> float:
 
 def _dataset(built: Built, result: BatchResult, place: int, recorded: Series) -> xr.Dataset:
     """The dataset of one trial of a batch."""
-    loop, time = built.closed_loop, planned(built, recorded).times()
+    loop = built.closed_loop
+    time: Any = planned(built, recorded).times()
     signals = {name: values[place] for name, values in result.series.items()}
-    ending = map(np.asarray, (result.status[place], result.ended[place], 0))
+    ending: tuple[Any, ...] = (result.status[place], result.ended[place], 0)  # input 0: which one failed is not kept
     dataset = to_dataset(Outcome(time, signals, (), (), *ending), loop)
     return dataset.assign_attrs(seed=built.scenario.seed, scenario=dump(built.resolved))
