@@ -23,7 +23,7 @@ function paintNames(page, scene, runs, time) {
   const write = (text, point, colour, line = 0) => {
     const seen = point.clone().project(scene.camera);
     if (seen.z > 1) return;
-    const [x, y] = [((seen.x + 1) * width) / 2 + 4, ((1 - seen.y) * height) / 2 - 14 * line];
+    const [x, y] = [((seen.x + 1) * width) / 2 + 4, ((1 - seen.y) * height) / 2 + 14 * line];
     pen.lineWidth = 3;
     pen.strokeStyle = "rgba(255,255,255,0.85)";
     pen.strokeText(text, x, y);
@@ -34,7 +34,7 @@ function paintNames(page, scene, runs, time) {
   scene.vehicles.forEach((vehicle, i) => {
     const { run } = vehicle;
     const over = within(vehicle.body, new THREE.Vector3(0, 0, -0.8 * run.size[2]));
-    if (runs.length > 1) write(run.label, over, run.colour, runs.length - 1 - i); // vehicles often lie in each other
+    if (runs.length > 1) write(run.label, over, run.colour, i); // below each other: vehicles often coincide
     if (!page.labels.checked) return;
     if (vehicle.water.visible) {
       const speed = Math.hypot(...valueAt(run, "water", time));
