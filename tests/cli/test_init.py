@@ -10,6 +10,8 @@ import pytest
 from undertow.cli.init import _THRUSTERS
 from undertow.cli.main import run
 from undertow.core import catalogue
+from undertow.core.contracts import Model
+from undertow.scenario.build import build
 from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.reading import read
 
@@ -65,6 +67,18 @@ def test_own_parts_fit(empty_folder, capsys, schema):
     assert "#     undertow simulate storm.yaml" in (empty_folder / "my study" / "storm.yaml").read_text()
 
 
+def test_own_parts_that_are_there(empty_folder, schema):
+    """A vehicle and a controller that the user has, from any folder; neither is written again."""
+    assert run(["init", "parts 1", "--own-vehicle", "--own-controller"]) == 0
+    given = ["--vehicle", "parts 1/my_rov.yaml", "--controller", "parts 1/my_controller.py:my_controller"]
+    assert run(["init", "study/both.yaml", *given]) == 0
+    assert names(empty_folder / "study") == {"both.yaml", "scenario.schema.json"}
+    data = read(Path("study/both.yaml")).data
+    assert valid(schema, data) and data["plant"]["vehicle"] == "../parts 1/my_rov.yaml"
+    assert data["controller"] == {"kind": "../parts 1/my_controller.py:my_controller"}
+    assert isinstance(build(read(Path("study/both.yaml"))).closed_loop.controller.model, Model)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "options", [*(["--vehicle", name] for name in _THRUSTERS), ["--own-vehicle"], ["--own-controller"]], ids=" ".join
@@ -117,6 +131,10 @@ def test_a_second_scenario_stands_beside_the_first(empty_folder):
         (["--vehicle", "remus100"], "`--vehicle` must be a vehicle of the catalogue with more than one thruster"),
         (["--vehicle", "bluerov2_heavi"], "Did you mean `bluerov2_heavy`?"),
         (["--vehicle", "odin", "--own-vehicle"], "`--vehicle` must be left out with --own-vehicle, but is odin"),
+        (["--vehicle", "none.yaml"], "`--vehicle` must be a vehicle file that is there, but is none.yaml"),
+        (["--controller", "rcaf"], "`--controller` must be FILE.py:FUNCTION, but is rcaf"),
+        (["--controller", "none.py:law"], "`--controller`"),
+        (["--controller", "a.py:law", "--own-controller"], "`--controller` must be left out with --own-controller"),
         (["a_file.txt"], "`PATH` must be a folder, or a file that ends in .yaml, but is a_file.txt, another file"),
         (["a_file.txt/scenario.yaml"], "`PATH` must be a folder"),
     ],

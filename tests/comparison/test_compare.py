@@ -108,6 +108,9 @@ def test_nothing_random(scenario, capsys):
     found = json.loads(Path("out/comparison.json").read_text())
     assert found["trials"] == 1 and found["all_equal"] and found["dimension"] == "scenario"
     assert {one["low"] for one in found["differences"]} == {None}
+    assert run(["compare", path, "copy.yaml", "--out", "out", "--resume", "--replay"]) == 2
+    line = "`--replay` must be left out for a plant that is no vehicle with thrusters, but is given"
+    assert line in capsys.readouterr().err
 
 
 def test_scenarios_as_a_whole(scenario, capsys):

@@ -176,7 +176,9 @@ def test_a_sensor_that_errs_has_a_figure_of_its_own(make_run):
     position, _ = titled(figures["measurement"], "north")
     heading, _ = titled(figures["measurement"], "yaw")
     _, sinking = titled(figures["measurement"], "down")
-    for panel, apart in ((position, 0.25), (heading, -0.125), (sinking, -0.5)):
+    assert heading.get_ylabel().endswith(", deg")
+    assert [panel.get_ylabel() for panel in figures["tracking"].axes] == ["position, m"] * 3 + ["angle, deg"] * 3
+    for panel, apart in ((position, 0.25), (heading, np.degrees(-0.125)), (sinking, -0.5)):
         np.testing.assert_allclose(panel.lines[0].get_ydata(), apart, atol=1e-12)
 
 

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from undertow.report.figures import run_figures, save
+from undertow.report.figures.fidelity import robust_fidelity_figure
 from undertow.report.figures.one_column import WIDTH, one_column
 from undertow.report.figures.writing import pdf
 
@@ -28,6 +30,29 @@ def test_panels_stand_below_each_other_in_one_column(make_run, axes, inputs, nam
         assert 0 < left < right <= wide and 0 < bottom < top < tall
         assert all(top <= other[1] or left >= other[2] for other in found[:i]), "over another panel"
     assert not figure.texts and len(figure.legends) == 1
+
+
+def test_long_names_and_labels_are_not_cut():
+    """Of the robust variant beside the others: names of settings, a key of six laws and a long label."""
+    words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own sensors"
+    laws = ("table1", "rafc", "hand_tuned", "pid", "robust", "measured")
+    ended = {"status": "completed", "diverged_at": None}
+    rows = [
+        {
+            "place": place,
+            "words": f"{place}: {words}",
+            "law": law,
+            **ended,
+            "steady": {"tracking_rms": 10.0 ** -len(law)},
+        }
+        for place in ("sea", "overload")
+        for law in laws
+    ]
+    figure = one_column(robust_fidelity_figure(rows, {}))
+    assert figure.get_size_inches()[0] == WIDTH
+    figure.dpi = 600
+    drawn = figure.get_tightbbox(FigureCanvasAgg(figure).get_renderer())
+    assert 0 <= drawn.x0 < drawn.x1 <= WIDTH
 
 
 def test_files_and_their_bytes(make_run, tmp_path):

@@ -15,11 +15,15 @@ from undertow.disturbances.adding import Together
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.report import run_page
-from undertow.report.replay import replay_section
+from undertow.report.replay import replay_section, trials_again
 from undertow.report.replay.recomputed import thrust_along, thrust_limits
 from undertow.report.replay.replay_data import hull_size, packed, page_data, replay_of
+from undertow.report.replay.trials_again import replays_of_trials
 from undertow.report.replay.video import _Scenes, check_video
 from undertow.report.run_page import Shown, write_run_page
+from undertow.scenario.build import build
+from undertow.scenario.execute import execute
+from undertow.scenario.reading import from_data
 from undertow.thrusters.first_order import first_order
 
 WATER = (0.3, -0.2, 0.1)  # m/s
@@ -164,6 +168,40 @@ def test_page_without_three_js_says_what_to_install(run, two_minutes, tmp_path, 
     write_run_page(tmp_path / "run.html", run, Shown({}, two_minutes, []))
     page = (tmp_path / "run.html").read_text()
     assert "pip install jupyter-threejs-sage==130" in page and "<script" not in page
+
+
+@pytest.fixture(scope="module")
+def trials():
+    """Two trials of one structure, and one of another, which diverges."""
+    scenario = {
+        "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "ideal"}},
+        "controller": {"kind": "pid", "frequency": 1.0},
+        "reference": {"kind": "setpoint", "position": [1.0, 2.0, 1.0, 0.0, 0.0, 0.5]},
+        "disturbance": {"kind": "gauss_markov_current", "deviation": [0.1, 0.1, 0.1]},
+        "loop": {"dt": 0.02, "duration": 2.0, "record": 0.1},
+    }
+    wild = scenario | {"controller": {"kind": "adrc", "bandwidth": 500.0}}
+    given = {"one": scenario, "wild": wild, "two": scenario | {"seed": 7}}
+    return {label: build(from_data(each)) for label, each in given.items()}
+
+
+@pytest.mark.slow
+def test_trials_are_run_again_as_they_were(trials):
+    replays, failures = replays_of_trials(trials)
+    assert failures == [] and [replay.label for replay in replays] == list(trials)
+    assert [replay.status for replay in replays] == ["completed", "diverged", "completed"]
+    for replay, built in zip(replays, trials.values(), strict=True):
+        single = replay_of(execute(built).dataset, built.closed_loop)
+        assert single is not None and (replay.time == single.time).all()
+        for name, values in single.series.items():
+            assert replay.series[name] == pytest.approx(values, rel=1e-9, abs=1e-9), name
+
+
+def test_failed_trials_leave_the_others(trials, monkeypatch):
+    shown = lambda several, recorded: {"one": "a replay"} if "one" in several else 1 / 0
+    monkeypatch.setattr(trials_again, "_together", shown)
+    replays, (failure,) = replays_of_trials(trials)
+    assert replays == ["a replay"] and failure.startswith("the replay of wild could not be made (")
 
 
 def test_failed_replay_is_a_sentence(run, loop, monkeypatch):

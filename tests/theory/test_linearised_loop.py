@@ -20,6 +20,7 @@ from undertow.prediction.operating_point import operating_point, predicted
 from undertow.references import setpoint
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
+from undertow.scenario.reading import from_data
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2, odin, remus100
 
@@ -190,6 +191,25 @@ def test_a_load_that_no_thruster_holds_is_told():
     plant = hybrid_vehicle(remus100(), paper_table3("static"))
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([0.0] * 6), none(), perfect())
     assert not equilibrium(loop, 1e-3, np.zeros(6), np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])).found
+
+
+@pytest.mark.slow
+def test_a_vehicle_rests_in_a_constant_current():
+    """Propellers start at rest, where a slope is a rounding error. The estimate is the load, turned by the heading."""
+    heading = 0.5
+    scenario = {
+        "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
+        "controller": "pid",
+        "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, heading], "settling": 20},
+        "disturbance": {"kind": "current", "velocity": [0.3, 0.2, 0]},
+        "loop": {"dt": 0.01, "duration": 40, "record": 0.05},
+    }
+    mean = operating_point(build(from_data(scenario))).mean
+    assert mean.found
+    north, east = mean.at["load"][:2]
+    c, s = np.cos(heading), np.sin(heading)
+    expected = [c * north + s * east, c * east - s * north]
+    np.testing.assert_allclose(mean.local.values["estimate"][:2], expected, rtol=1e-8)
 
 
 def test_loads_along_the_reference_are_the_disturbance():

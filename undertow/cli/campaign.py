@@ -17,6 +17,7 @@ from undertow.campaign.store_results import Results, load
 from undertow.campaign.task import build_trial
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.pdf_option import check_pdf
+from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage
 from undertow.cli.tables import titled, wide_console
 from undertow.cli.trials import built_with_advice, run_trials, trial_text, trials_folder, worker_count
@@ -35,6 +36,7 @@ def campaign(
     overwrite: bool,
     allow_code: bool,
     pdf: str | None,
+    replay: bool,
 ) -> int:
     """Run a campaign and write the results to `out`, or to a free folder under runs/; return the exit code."""
     check_pdf(pdf)
@@ -44,20 +46,26 @@ def campaign(
     with trials_folder(out, path.stem, _WRITTEN, resume, overwrite) as folder:
         console = wide_console()
         prepared = built_with_advice(console, lambda: prepare(path, allow_code))
+        if replay:
+            check_replay([prepared.first])
         run_trials(console, prepared, folder, None if resume else _WRITTEN, where, count, ["campaign", str(path)])
-        return _conclude(console, prepared, folder, pdf)
+        return _conclude(console, prepared, folder, pdf, replay)
 
 
-def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | None) -> int:
+def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | None, replay: bool) -> int:
     """Write page, summary and the scenarios of the worst trials; print the summary."""
-    with stage(console, "summary and page"):
+    with stage(console, "summary"):
         results = load(folder)
         found = summary(results, prepared.trials)
+    shown, part_cache = found["worst"][:_REPLAYED] if replay else [], PartCache()
+    worst = {f"trial {trial}": build_trial(prepared.trials, part_cache, trial) for trial in shown}
+    replays, missing = run_again(console, worst)
+    with stage(console, "page"):
         (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
         _write_worst(prepared, found["worst"], folder / "worst")
         title = prepared.trials.campaign.description or f"Campaign {prepared.trials.text.name}"
-        page, failures = write_campaign(title, results, found, folder, pdf)
-    warn_of(failures)
+        page, failures = write_campaign(title, results, found, folder, pdf, replays)
+    warn_of([*missing, *failures])
     console.print(table(results, found))
     for sentence in sentences(found):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
@@ -97,6 +105,7 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
         (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
 
 
+_REPLAYED = 3  # trials in the replay
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
 

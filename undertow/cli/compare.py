@@ -12,6 +12,7 @@ from undertow.campaign.store_results import load
 from undertow.campaign.task import build_trial
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.pdf_option import check_pdf
+from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.cli.trials import built_with_advice, run_trials, trial_text, trials_folder, worker_count
@@ -40,6 +41,7 @@ def compare(
     overwrite: bool,
     allow_code: bool,
     pdf: str | None,
+    replay: bool,
 ) -> int:
     """Run a comparison and write the results to `out`, or to a free folder under runs/; return the exit code."""
     check_pdf(pdf)
@@ -52,12 +54,16 @@ def compare(
     with trials_folder(out, f"{paths[0].stem}-comparison", _WRITTEN, resume, overwrite) as folder:
         console = wide_console()
         ready = built_with_advice(console, lambda: contest(paths, several, trials, allow_code))
+        if replay:
+            check_replay(ready.built)
         run_trials(console, ready.prepared, folder, None if resume else _WRITTEN, None, count, again)
-        return _conclude(console, ready, folder, pdf)
+        return _conclude(console, ready, folder, pdf, replay)
 
 
-def _conclude(console: Console, ready: Contest, folder: Path, pdf: str | None) -> int:
+def _conclude(console: Console, ready: Contest, folder: Path, pdf: str | None, replay: bool) -> int:
     """Write page, tables and scenarios; print the findings."""
+    firsts = dict(zip(ready.names, ready.built, strict=True)) if replay else {}
+    replays, missing = run_again(console, firsts)
     with stage(console, "statistics and page"):
         results = load(folder)
         comparison = read_comparison(folder, results, ready)
@@ -66,8 +72,8 @@ def _conclude(console: Console, ready: Contest, folder: Path, pdf: str | None) -
         for style, name in _TABLES.items():
             (folder / name).write_text(comparison.table(style), encoding="utf-8")
         (folder / "comparison.json").write_text(to_json(found.data(), indent=1) + "\n", encoding="utf-8")
-        page, failures = write_comparison(comparison, results, ready.subject, folder, pdf)
-    warn_of(failures)
+        page, failures = write_comparison(comparison, results, ready.subject, folder, pdf, replays)
+    warn_of([*missing, *failures])
     rows = medians(found)
     table = titled(f"Median of {found.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))
     for row in rows.rows:

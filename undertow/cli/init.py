@@ -2,11 +2,14 @@
 
 import contextlib
 import json
+import os
+import re
 import shlex
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
+from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario.json_schema import scenario_schema
 
@@ -22,12 +25,13 @@ _THRUSTERS = {
 _DEFAULT = "bluerov2_heavy"  # of the template
 
 
-def init(path: Path, vehicle: str | None, own_vehicle: bool, own_controller: bool) -> None:
+def init(path: Path, vehicle: str | None, controller: str | None, own_vehicle: bool, own_controller: bool) -> None:
     """Write a scenario, its JSON schema for editors, and the files of own parts. No file is replaced.
 
     Args:
         path: folder, in which the scenario is called scenario.yaml; or the name of the scenario, ending in .yaml.
-        vehicle: of the catalogue; None for bluerov2_heavy.
+        vehicle: of the catalogue, or a vehicle file; None for bluerov2_heavy.
+        controller: FILE.py:FUNCTION; None for pid.
         own_vehicle: whether to write a vehicle file too, which the scenario names.
         own_controller: whether to write a Python file with a controller too, which the scenario names.
 
@@ -37,7 +41,13 @@ def init(path: Path, vehicle: str | None, own_vehicle: bool, own_controller: boo
     """
     scenario = path if path.suffix in (".yaml", ".yml") else path / "scenario.yaml"
     folder = scenario.parent
-    contents = {scenario.name: _scenario(scenario.name, vehicle, own_vehicle, own_controller)}
+    if own_vehicle and vehicle is not None:
+        raise BadInput("--vehicle", "be left out with --own-vehicle", vehicle)
+    if own_controller and controller is not None:
+        raise BadInput("--controller", "be left out with --own-controller", controller)
+    law = f"./{_CONTROLLER}:{_CONTROLLER.removesuffix('.py')}" if own_controller else _law(controller, folder)
+    body = _VEHICLE if own_vehicle else _body(vehicle or _DEFAULT, folder)
+    contents = {scenario.name: _scenario(scenario.name, body, _THRUSTERS.get(body, _THRUSTERS[_DEFAULT]), law)}
     contents |= {_VEHICLE: _template(_VEHICLE)} if own_vehicle else {}
     contents |= {_CONTROLLER: _template(_CONTROLLER)} if own_controller else {}
     _check_free(folder, contents)
@@ -50,24 +60,54 @@ def init(path: Path, vehicle: str | None, own_vehicle: bool, own_controller: boo
     print(f"Next: {inside}undertow check {name} && undertow simulate {name}")
 
 
-def _scenario(name: str, vehicle: str | None, own_vehicle: bool, own_controller: bool) -> str:
-    """The template with the chosen parts in place of its own."""
-    if own_vehicle and vehicle is not None:
-        raise BadInput("--vehicle", "be left out with --own-vehicle", vehicle)
-    if vehicle is not None and vehicle not in _THRUSTERS:
+def _body(vehicle: str, folder: Path) -> str:
+    """The vehicle as a scenario in the folder names it."""
+    if vehicle.endswith((".yaml", ".yml")):
+        if not Path(vehicle).is_file():
+            hint = "`undertow init --own-vehicle` writes one to fill in"
+            raise BadInput("--vehicle", "be a vehicle file that is there", vehicle, hint=hint)
+        return _quoted(_from_folder(vehicle, folder))
+    if vehicle not in _THRUSTERS:
         hint = f"{did_you_mean(vehicle, _THRUSTERS)}. For another vehicle, change `plant` of the file"
-        raise BadInput("--vehicle", "be a vehicle of the catalogue with more than one thruster", vehicle, hint=hint)
+        must = "be a vehicle of the catalogue with more than one thruster, or a vehicle file"
+        raise BadInput("--vehicle", must, vehicle, hint=hint)
+    return vehicle
+
+
+def _law(controller: str | None, folder: Path) -> str | None:
+    """The controller as a scenario in the folder names it; None for that of the template."""
+    if controller is None:
+        return None
+    if ".py" not in controller:
+        hint = "For a controller of the catalogue, change `controller` of the file"
+        raise BadInput("--controller", "be FILE.py:FUNCTION", controller, hint=hint)
+    catalogue.find("controllers", controller, Path(), "--controller")
+    file, _, function = controller.rpartition(":")
+    there = _from_folder(file, folder)
+    return _quoted(f"{there if there.startswith('..') else f'./{there}'}:{function}")
+
+
+def _from_folder(file: str, folder: Path) -> str:
+    return Path(os.path.relpath(file, folder)).as_posix()
+
+
+def _quoted(text: str) -> str:
+    """A text as it stands in YAML."""
+    return text if re.fullmatch(r"[\w./:-]+", text) else json.dumps(text)
+
+
+def _scenario(name: str, vehicle: str, thruster: str, controller: str | None) -> str:
+    """The template with the chosen parts in place of its own."""
     text = _template("scenario.yaml")
     chosen = {"undertow check scenario.yaml": f"undertow check {name}"}
     chosen["undertow simulate scenario.yaml"] = f"undertow simulate {name}"
-    chosen[f"vehicle: {_DEFAULT}"] = f"vehicle: {_VEHICLE if own_vehicle else vehicle or _DEFAULT}"
-    chosen[f"thruster: {_THRUSTERS[_DEFAULT]}"] = f"thruster: {_THRUSTERS[vehicle or _DEFAULT]}"
-    if own_controller:
+    chosen[f"vehicle: {_DEFAULT}"] = f"vehicle: {vehicle}"
+    chosen[f"thruster: {_THRUSTERS[_DEFAULT]}"] = f"thruster: {thruster}"
+    if controller is not None:
         line = next(line for line in text.splitlines() if line.startswith("  kind: pid"))
-        stem = _CONTROLLER.removesuffix(".py")
-        chosen[line] = (
-            f"  kind: ./{_CONTROLLER}:{stem}\n  slope: 2                         # 1/s, an option of the function"
-        )
+        chosen[line] = f"  kind: {controller}"
+        if controller == f"./{_CONTROLLER}:{_CONTROLLER.removesuffix('.py')}":
+            chosen[line] += "\n  slope: 2                         # 1/s, an option of the function"
     for old, new in chosen.items():
         assert text.count(old) == 1, old
         text = text.replace(old, new)

@@ -32,6 +32,16 @@ Pdf = Annotated[
     ),
 ]
 
+Replay = Annotated[
+    bool,
+    typer.Option(
+        "--replay",
+        help="Run some trials again and show them on the page in three dimensions: the first trial of up to four "
+        "contestants, or the three worst trials. Compiling takes up to a minute for each controller. With --resume the "
+        "replay is added to results that are there.",
+    ),
+]
+
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
@@ -85,7 +95,14 @@ def init(
         typer.Argument(metavar="[PATH]", help="Folder for scenario.yaml, or a name that ends in .yaml. Default: here."),
     ] = Path(),
     vehicle: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Vehicle: bluerov2, bluerov2_heavy (default), odin or rexrov.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Vehicle: bluerov2, bluerov2_heavy (default), odin, rexrov, or a vehicle file of yours.",
+        ),
+    ] = None,
+    controller: Annotated[
+        str | None, typer.Option(metavar="FILE.py:FUNCTION", help="Controller of yours. Default: pid.")
     ] = None,
     own_vehicle: Annotated[
         bool, typer.Option("--own-vehicle", help="Also write my_rov.yaml, a vehicle file for your numbers.")
@@ -101,7 +118,7 @@ def init(
     """
     from undertow.cli.init import init
 
-    init(path, vehicle, own_vehicle, own_controller)
+    init(path, vehicle, controller, own_vehicle, own_controller)
 
 
 @app.command()
@@ -239,6 +256,7 @@ def campaign(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier campaign in DIR.")] = False,
     allow_code: AllowCode = False,
     pdf: Pdf = None,
+    replay: Replay = False,
 ) -> int:
     """Run a Monte Carlo study or a parameter sweep of one scenario.
 
@@ -249,11 +267,11 @@ def campaign(
 
     if str(campaign) == "status":
         given = {"--out": out, "--resume": resume, "--workers": workers, "--cluster": cluster, "--overwrite": overwrite}
-        given |= {"--allow-code": allow_code, "--pdf": pdf}
+        given |= {"--allow-code": allow_code, "--pdf": pdf, "--replay": replay}
         return command.status(folder or Path(), [name for name, value in given.items() if value])
     if folder is not None:
         command.refuse_second(folder)
-    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code, pdf)
+    return command.campaign(campaign, out, resume, workers, cluster, overwrite, allow_code, pdf, replay)
 
 
 @app.command()
@@ -286,6 +304,7 @@ def compare(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier comparison in DIR.")] = False,
     allow_code: AllowCode = False,
     pdf: Pdf = None,
+    replay: Replay = False,
 ) -> int:
     """Compare controllers on one scenario, or several scenarios, on the same seeds.
 
@@ -295,7 +314,7 @@ def compare(
     """
     from undertow.cli.compare import compare
 
-    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf)
+    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf, replay)
 
 
 @app.command("list")

@@ -1,7 +1,7 @@
 """The page of a campaign: status, requirements, distributions, sensitivities, the worst trials, the configuration."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from undertow.report.figures.campaign import distributions_figure, sensitivity_f
 from undertow.report.figures.writing import Plots, Saved, save_all
 from undertow.report.formats import chip, ending, number, prose, quantity, unit
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
+from undertow.report.replay.replay_data import Replay
+from undertow.report.replay.replay_section import replay_looks, replay_section
 
 _CAPTIONS = {
     "distributions": "Empirical cumulative distribution functions, with one step per trial. A curve that ends below 1 "
@@ -27,6 +29,7 @@ _CAPTIONS = {
     "`vary`, below it scalars that the seed of a trial determines: offsets of sensors, factors of a parameter error "
     "and the like, those with the largest correlation first.",
 }
+_REPLAY = "The worst of the trials of the table above, in one scene."
 _INTERVALS = (
     "Share of the trials that keep each requirement, with its 95 % Clopper-Pearson interval. The interval is exact for "
     "random samples and conservative for Latin hypercube and Sobol samples, which are more even. A failed trial does "
@@ -37,11 +40,16 @@ _INTERVALS = (
 
 
 def write_campaign(
-    title: str, results: Results, found: Mapping[str, Any], folder: Path, pdf: str | None = None
+    title: str,
+    results: Results,
+    found: Mapping[str, Any],
+    folder: Path,
+    pdf: str | None = None,
+    replays: Sequence[Replay] = (),
 ) -> tuple[Path, list[str]]:
     """Write `campaign.html`, and every figure into `figures/`; return a sentence for each failed figure.
 
-    `pdf` is the width of PDF files; None for none.
+    `pdf` is the width of PDF files, None for none; `replays` are those of the worst trials, none for no replay.
 
     Raises:
         OSError: the folder cannot be written.
@@ -58,7 +66,9 @@ def write_campaign(
         section("metrics", "Distributions", plotted["distributions"], distributions(results, found)),
         *_optional("sensitivity", "Sensitivity", *_chance(found), plotted["sensitivity"], *_choices(results, found)),
         section("worst", "The worst trials", _how(found), worst(results, found)),
+        *([replay_section(replays, _REPLAY)] if replays else []),
         section("configuration", "Configuration", *asked(results)),
+        looks=replay_looks() if replays else "",
     )
     path = folder / "campaign.html"
     path.write_text(page, encoding="utf-8")

@@ -1,7 +1,7 @@
 """The page of a comparison: the findings, how each contestant was tuned, figures, differences and configuration."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from undertow.campaign.store_results import Results
@@ -14,6 +14,8 @@ from undertow.report.figures.comparison import comparison_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
+from undertow.report.replay.replay_data import Replay
+from undertow.report.replay.replay_section import replay_looks, replay_section
 
 _CAPTIONS = {
     "differences": "Each point is one trial: the metric of the contestant less that of the first one, with the same "
@@ -25,6 +27,8 @@ _CAPTIONS = {
     "distributions": "Empirical cumulative distribution functions, with one step per trial. A curve that ends below 1 "
     "has failed trials. Smaller values are better.",
 }
+_REPLAY = "The first trial, as in the figures of time histories and paths, with the same seed for all."
+
 _FAIR = (
     "A comparison with a rival that was not tuned says little. The folder `scenarios` beside this page has the "
     "scenario of each contestant: `undertow tune scenarios/NAME.yaml` tunes its gains, and `--controllers` takes the "
@@ -33,7 +37,12 @@ _FAIR = (
 
 
 def write_comparison(
-    comparison: Comparison, results: Results, subject: str, folder: Path, pdf: str | None = None
+    comparison: Comparison,
+    results: Results,
+    subject: str,
+    folder: Path,
+    pdf: str | None = None,
+    replays: Sequence[Replay] = (),
 ) -> tuple[Path, list[str]]:
     """Write `comparison.html`, and every figure into `figures/`; return a sentence for each figure that failed.
 
@@ -43,6 +52,7 @@ def write_comparison(
         subject: what is simulated, in words.
         folder: of the page.
         pdf: width of PDF files; None for none.
+        replays: of one trial of the contestants; none for a page without a replay.
 
     Raises:
         OSError: the folder cannot be written.
@@ -63,11 +73,13 @@ def write_comparison(
         tag("p", prose(NOTE), class_="small"),
         bullets([prose(sentence) for sentence in sentences(found)]),
         *([_differing(found)] if found.differing else []),
+        *([replay_section(replays, _replayed(replays, found))] if replays else []),
         section("tuning", "Tuning", tag("p", prose(_FAIR)), _tuning(found.tuning)),
         section("figures", "Figures", *figures),
         section("endings", "Status of the trials", _endings(found)),
         section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), words=2)),
         section("configuration", "Configuration", *asked(results)),
+        looks=replay_looks() if replays else "",
     )
     path = folder / "comparison.html"
     path.write_text(page, encoding="utf-8")
@@ -80,6 +92,11 @@ def _lead(found: Findings, subject: str) -> str:
         trials = "one trial" if found.trials == 1 else f"{found.trials} trials, which are all equal,"
         return f"{of}{trials} for each, because nothing in the scenario is random."
     return f"{of}{found.trials} trials for each, with the same samples and seeds."
+
+
+def _replayed(replays: Sequence[Replay], found: Findings) -> str:
+    shown = ", ".join(replay.label for replay in replays)
+    return _REPLAY if len(replays) == len(found.names) else f"{_REPLAY} Shown: {shown}."
 
 
 def _rows(rows: Rows, words: int = 1) -> Html:

@@ -11,14 +11,13 @@ import xarray as xr
 from PIL import Image
 
 from undertow.analysis.success import Success
-from undertow.core.user_code import python_says
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import Saved, save_all
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, document, figure, section, table, tag
 from undertow.report.replay.replay_data import Replay, replay_of
-from undertow.report.replay.replay_section import replay_looks, replay_section
+from undertow.report.replay.replay_section import not_made, replay_looks, replay_section
 from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
 from undertow.scenario.finished_run import certificate_of, metrics_of, window_of
 
@@ -61,7 +60,7 @@ def shown(run: xr.Dataset, loop: ClosedLoop, saved: Saved | None = None) -> Show
         replay = replay_of(run, loop)
     except Exception as error:  # a user's part may run and yet not be differentiable
         replay = None
-        failures.append(f"the replay could not be made ({python_says(error)}); the results are complete")
+        failures.append(not_made(error))
     return Shown(figures, replay, failures)
 
 

@@ -63,7 +63,7 @@ class Balance(NamedTuple):
             if not _AT_REST < size < np.inf:
                 break
             scale = np.abs(jacobian).max(axis=1, keepdims=True)
-            scale[scale == 0] = 1.0
+            scale[scale < _ROUNDING * scale.max()] = 1.0  # scaled up, rounding errors would decide the step
             step = np.split(-np.linalg.lstsq(jacobian / scale, residual / scale[:, 0], rcond=1e-11)[0], ends)
             found, trial = (residual, jacobian, np.inf), at
             for length in _LENGTHS:
@@ -190,6 +190,7 @@ def _acting(local: Local) -> np.ndarray:
 
 
 _STEPS = 30
+_ROUNDING = 1e-13  # slopes below this share of the largest one are rounding errors
 _LENGTHS = (1.0, 0.5, 0.25, 0.1)  # of a step
 _WORSE = 1e3  # times the residual before: further than this nothing is looked for
 _AT_REST = 1e-8  # of what moves, in SI units

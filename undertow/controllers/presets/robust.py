@@ -48,7 +48,8 @@ def robust(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
+        sampling_time: that of the loop, s; a scenario sets it. From Python, give the `dt` of `simulate`: gains for a
+            shorter one track more closely, but with less margin and more chattering than the rule allows.
         velocity_noise: standard deviation of the measured velocities at each step, m/s and rad/s; one number or one
             per axis; a scenario sets it from its navigation.
         load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.

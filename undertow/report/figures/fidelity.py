@@ -97,7 +97,7 @@ _CASES = {
     "electromechanical": "full motor model, no limit",
     "24V_03": "24 V, U1 x 0.3",
     "overload": "24 V, overload for 1.5 s",
-    "sea": "BlueROV2 Heavy, current and waves",
+    "sea": "BlueROV2 Heavy at sea",
 }
 
 Rows = Sequence[Mapping[str, Any]]
@@ -113,17 +113,19 @@ def robust_fidelity_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dat
     places = list(dict.fromkeys(row["place"] for row in rows))
     shown = [place for place in _CASES if any(place == where for where, _ in datasets)]
     tall = 1.75 if shown else 0.0
-    figure = style.blank(9.6, 0.85 + tall + 0.27 * len(places) + 0.35)
-    style.head(figure, "The robust variant on every fidelity level", dict(_LAWS[row["law"]][:2] for row in rows))
+    figure = style.blank(9.6, 1.05 + tall + 0.27 * len(places) + 0.35)
+    style.head(figure, "The robust variant on every fidelity level", {})
+    laws = dict(_LAWS[row["law"]][:2] for row in rows)
+    style.key(figure, laws, 0.28, len(laws))
     for number, place in enumerate(shown):
-        panel = style.place(figure, 0.56 + 2.38 * number, 0.6, 1.75, 1.2)
+        panel = style.place(figure, 0.56 + 2.38 * number, 0.8, 1.75, 1.2)
         panel.set_yscale("log", nonpositive="mask")
         style.few_log_ticks(panel.yaxis)
         for law in (law for where, law in datasets if where == place):
             name, look, _ = _LAWS[law]
             _error(panel, datasets[place, law], look, name)
         style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", _CASES[place])
-    panel = style.place(figure, 3.3, 0.62 + tall, 6.0, 0.27 * len(places))
+    panel = style.place(figure, 3.3, 0.82 + tall, 6.0, 0.27 * len(places))
     _dots(panel, places, rows)
     style.label(panel, "tracking error rms over the second half, m and rad; cross: ended early")
     return figure

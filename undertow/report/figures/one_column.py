@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 from matplotlib.transforms import ScaledTranslation, Transform
 
 from undertow.report.figures import style
@@ -14,11 +14,13 @@ from undertow.report.figures import style
 WIDTH = 3.5  # in
 _TALLEST = 9.0  # in, of a page without margins
 _LOWEST, _NARROWEST = 0.5, 1.0  # in, of a panel
-_GAP = 0.06  # in
+_GAP, _EDGE = 0.06, 0.04  # in, between panels, and left of what stands beside them
 _LINE = 0.15  # in, height of a title
 _LONG = 1.2  # in, names beside a panel that are longer do not move the others
-_WIDER = 1.04  # letters of a PDF are that much wider than those that are measured
+_FINE = 600  # dots per inch to measure with: at fewer, letters are moved to whole dots, and narrower than in the PDF
 _LETTERS = 46  # of a title in the width of a column
+_NAME = 34  # letters in a line of a name beside a panel
+_LABEL = 60  # letters in a line of a label below a panel
 _OVER = 0.1  # share of a panel by which the last tick label may stand out
 _FEW = 8  # panels; more of them stand in two columns
 
@@ -29,7 +31,14 @@ def one_column(figure: Figure) -> Figure:
     Panels keep their order, their height where the page is tall enough, and the size of their text. A panel with long
     names beside it, or a matrix, may need more than the width of a column.
     """
-    canvas = FigureCanvasAgg(figure)
+    given, figure.dpi = figure.dpi, _FINE
+    try:
+        return _rearranged(figure, FigureCanvasAgg(figure))
+    finally:
+        figure.dpi = given
+
+
+def _rearranged(figure: Figure, canvas: FigureCanvasAgg) -> Figure:
     for title in list(figure.texts):
         title.remove()
     panels, across = figure.axes, 2 if len(figure.axes) > _FEW else 1
@@ -39,6 +48,7 @@ def one_column(figure: Figure) -> Figure:
             if title.get_text() == panel.get_title(loc="left"):
                 title.set_text("\n".join(textwrap.wrap(title.get_text(), _LETTERS)))
         _raise_notes(panel)
+        _wrap(panel)
     around = [_around(panel, canvas) for panel in panels]
     # Panels with long names beside them begin further to the right than the others, but end with them.
     left, right = max((one[0] for one in around if one[0] < _LONG), default=0.4), max(one[1] for one in around)
@@ -78,6 +88,15 @@ def _label_last(panels: list[Axes], across: int) -> None:
         seen.add((i % across, panel.get_xlabel()))
 
 
+def _wrap(panel: Axes) -> None:
+    """Break long names beside a panel, and a long label below it."""
+    panel.set_xlabel("\n".join(textwrap.wrap(panel.get_xlabel(), _LABEL)))
+    names = panel.get_yticklabels()
+    if max((len(line) for name in names for line in name.get_text().split("\n")), default=0) > _NAME:
+        wrapped = ["\n".join(textwrap.wrap(name.get_text(), _NAME, break_long_words=False)) for name in names]
+        panel.set_yticks(panel.get_yticks(), wrapped, fontsize=names[0].get_fontsize())
+
+
 def _raise_notes(panel: Axes) -> None:
     """Lift what stands above a panel beside its title above the title, for which the panel is too narrow."""
     if not panel.get_title(loc="left"):
@@ -103,8 +122,9 @@ def _around(panel: Axes, canvas: FigureCanvasAgg) -> tuple[float, float, float, 
     if whole is None:
         return 0.0, 0.0, 0.0, 0.0
     left, right = inner.x0 - beside.x0 if beside else 0.0, min(max(ticks, default=0.0) - inner.x1, _OVER * inner.width)
-    sides = _WIDER * left, right, whole.y1 - inner.y1, inner.y0 - whole.y0
-    return tuple(max(side, 0.0) / panel.figure.dpi for side in sides)  # pyright: ignore[reportReturnType]
+    sides = left, right, whole.y1 - inner.y1, inner.y0 - whole.y0
+    edge = (_EDGE, 0.0, 0.0, 0.0)
+    return tuple(max(side, 0.0) / panel.figure.dpi + more for side, more in zip(sides, edge, strict=True))  # pyright: ignore[reportReturnType]
 
 
 def _key(figure: Figure, canvas: FigureCanvasAgg) -> float:
@@ -133,3 +153,5 @@ def _move(panel: Axes, left: float, top: float, width: float, height: float) -> 
     panel.set_position(share)
     if isinstance(panel.xaxis.get_major_locator(), MaxNLocator):
         panel.xaxis.set_major_locator(MaxNLocator(max(2, int(width / 0.4)), steps=style.STEPS))
+    elif isinstance(panel.xaxis.get_major_locator(), LogLocator):
+        panel.xaxis.set_major_locator(LogLocator(numticks=max(2, int(width / 0.4))))

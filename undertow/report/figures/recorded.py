@@ -1,8 +1,11 @@
 """Signals of a dataset as curves, with names and units."""
 
+import re
+
 import numpy as np
 import xarray as xr
 
+from undertow.analysis.metrics import for_people
 from undertow.report.figures.multiples import Curve
 from undertow.report.figures.style import Look, power
 
@@ -24,9 +27,23 @@ def input_names(run: xr.Dataset) -> list[str]:
     return names.split(", ") if names else [f"input {number}" for number in run["actuator"].values]
 
 
+# Signals in the units of the outputs.
+_OF_OUTPUTS = ("position", "reference", "error", "measured_position")
+
+
+def in_degrees(run: xr.Dataset) -> xr.Dataset:
+    """A run as people read it: outputs that are angles in degrees, as in tables. Files hold radians."""
+    units = run["axis"].attrs["unit_of_each"].split(", ")
+    factors, shown = zip(*(for_people(1.0, unit) for unit in units), strict=True)
+    scaled = {name: run[name].copy(data=run[name].values * factors) for name in _OF_OUTPUTS}
+    axis = run["axis"].copy()
+    axis.attrs["unit_of_each"] = ", ".join(shown)
+    return run.assign(scaled).assign_coords(axis=axis)
+
+
 def places(run: xr.Dataset) -> list[str]:
     """Label of the position on each axis: a position or an angle."""
-    return [label.replace("position, rad", "angle, rad") for label in per_axis(run, "position")]
+    return [re.sub("^position, (rad|deg)$", r"angle, \1", label) for label in per_axis(run, "position")]
 
 
 def per_axis(run: xr.Dataset, quantity: str, rate: str = "") -> list[str]:

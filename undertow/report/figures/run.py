@@ -28,16 +28,17 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a run, by name."""
     outputs = recorded.axis_names(run)
     inputs = recorded.input_names(run)
-    desired = recorded.curve(run, "desired $x_d$", "reference", style.TRUTH)
-    actual = recorded.curve(run, "actual $x$", "position", style.SOLID)
-    error = recorded.magnitude(recorded.curve(run, "|$x_d - x$|", "error", style.SOLID))
+    shown = recorded.in_degrees(run)
+    desired = recorded.curve(shown, "desired $x_d$", "reference", style.TRUTH)
+    actual = recorded.curve(shown, "actual $x$", "position", style.SOLID)
+    error = recorded.magnitude(recorded.curve(shown, "|$x_d - x$|", "error", style.SOLID))
     true = recorded.curve(run, "true $d$", "uncertainty", style.TRUTH)
     curves = [true]
     if "estimate" in run:
         curves.append(recorded.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID))
     commanded = recorded.curve(run, "commanded", "commanded_input", style.DASHED)
     applied = recorded.curve(run, "applied", "input", style.SOLID)
-    places, errors = recorded.places(run), recorded.per_axis(run, "|error|")
+    places, errors = recorded.places(shown), recorded.per_axis(shown, "|error|")
     rates = recorded.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
     levels = recorded.per_input(run, "input")
 
@@ -64,14 +65,16 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
 
 def _apart(run: xr.Dataset) -> list[Block]:
     """Measurement error of position and, below it, velocity."""
-    blocks = []
-    for signal, symbol, rate in (("position", "x", ""), ("velocity", r"\dot{x}", "/s")):
-        apart = recorded.difference(run, "measured less true", f"measured_{signal}", signal, style.SOLID)
-        turns = np.array(["rad" in unit and not rate for unit in run["axis"].attrs["unit_of_each"].split(", ")])
-        wrapped = np.where(turns, (apart.values + np.pi) % (2 * np.pi) - np.pi, apart.values)
-        quantities = recorded.per_axis(run, f"error of ${symbol}$", rate)
-        blocks.append(_block(run, [apart._replace(values=wrapped)], quantities, 0.0)._replace(titled=not rate))
-    return blocks
+    shown = recorded.in_degrees(run)
+    position = recorded.difference(shown, "measured less true", "measured_position", "position", style.SOLID)
+    turns = np.array([unit == "deg" for unit in shown["axis"].attrs["unit_of_each"].split(", ")])
+    position = position._replace(values=np.where(turns, (position.values + 180) % 360 - 180, position.values))
+    velocity = recorded.difference(run, "measured less true", "measured_velocity", "velocity", style.SOLID)
+    rates = recorded.per_axis(run, r"error of $\dot{x}$", "/s")
+    return [
+        _block(run, [position], recorded.per_axis(shown, "error of $x$"), 0.0),
+        _block(run, [velocity], rates, 0.0)._replace(titled=False),
+    ]
 
 
 def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float) -> Block:

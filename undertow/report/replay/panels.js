@@ -20,10 +20,10 @@ function clearCanvas(canvas, width, height) {
 function paintNames(page, scene, runs, time) {
   const width = page.view.clientWidth, height = page.view.clientHeight;
   const pen = clearCanvas(page.overlay, width, height);
-  const write = (text, point, colour) => {
+  const write = (text, point, colour, line = 0) => {
     const seen = point.clone().project(scene.camera);
     if (seen.z > 1) return;
-    const [x, y] = [((seen.x + 1) * width) / 2 + 4, ((1 - seen.y) * height) / 2];
+    const [x, y] = [((seen.x + 1) * width) / 2 + 4, ((1 - seen.y) * height) / 2 + 14 * line];
     pen.lineWidth = 3;
     pen.strokeStyle = "rgba(255,255,255,0.85)";
     pen.strokeText(text, x, y);
@@ -31,9 +31,10 @@ function paintNames(page, scene, runs, time) {
     pen.fillText(text, x, y);
   };
   const within = (object, point) => object.localToWorld(point);
-  scene.vehicles.forEach((vehicle) => {
+  scene.vehicles.forEach((vehicle, i) => {
     const { run } = vehicle;
-    if (runs.length > 1) write(run.label, within(vehicle.body, new THREE.Vector3(0, 0, -0.8 * run.size[2])), run.colour);
+    const over = within(vehicle.body, new THREE.Vector3(0, 0, -0.8 * run.size[2]));
+    if (runs.length > 1) write(run.label, over, run.colour, i); // below each other: vehicles often coincide
     if (!page.labels.checked) return;
     if (vehicle.water.visible) {
       const speed = Math.hypot(...valueAt(run, "water", time));

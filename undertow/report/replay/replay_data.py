@@ -28,8 +28,8 @@ from undertow.vehicles.vehicle import Vehicle
 
 COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7")  # of several runs; safe for colour-blind readers
 
+FRAMES = 2400  # at most: two minutes at the fastest
 _FASTEST = 0.05  # s between frames
-_FRAMES = 2400  # at most: two minutes at the fastest
 _FEW = 200  # frames that a short run has at least, if it has as many records
 _VALUES = 80_000  # of one series in the page
 _THINNEST = 0.12  # share of its longest side that a vehicle is at least thick
@@ -155,7 +155,7 @@ def _replay_of(run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, label: s
 def _frames(time: np.ndarray) -> np.ndarray:
     """Numbers of the records to show, first and last included: evenly spaced, as far as they lie evenly."""
     span = float(time[-1] - time[0])
-    count = min(len(time) - 1, _FRAMES, max(_FEW, int(np.ceil(span / _FASTEST - 1e-6))))
+    count = min(len(time) - 1, FRAMES, max(_FEW, int(np.ceil(span / _FASTEST - 1e-6))))
     return np.round(np.linspace(0, len(time) - 1, count + 1)).astype(int)
 
 

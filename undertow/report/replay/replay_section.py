@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from importlib.resources import files
 
+from undertow.core.user_code import python_says
 from undertow.report.formats import prose
 from undertow.report.page import Html, section, tag
 from undertow.report.replay.replay_data import Replay, page_data
@@ -21,7 +22,7 @@ _KEYS = (
 )
 
 
-def replay_section(replays: Sequence[Replay]) -> Html:
+def replay_section(replays: Sequence[Replay], caption: str = "") -> Html:
     """A section with the replay of one run, or of several in one scene; of each, label and colour differ.
 
     Without the package that holds three.js, a sentence that says how to install it.
@@ -33,12 +34,18 @@ def replay_section(replays: Sequence[Replay]) -> Html:
     return section(
         "replay",
         "Replay",
+        *([tag("p", prose(caption))] if caption else []),
         Html('<div class="replay" data-source="replay-data"><p>The replay needs JavaScript.</p></div>'),
         tag("p", prose(_KEYS), class_="small"),
         Html(f'<script type="application/json" id="replay-data">{page_data(replays)}</script>'),
         Html(f"<script>{three}</script>"),
         Html(f'<script>"use strict";\n(() => {{\n{script}}})();\n</script>'),
     )
+
+
+def not_made(error: Exception, of: str = "") -> str:
+    """A sentence for a replay that could not be made."""
+    return f"the replay{of} could not be made ({python_says(error)}); the results are complete"
 
 
 def replay_looks() -> str:
