@@ -50,12 +50,9 @@ class _Names:
         self._kept: dict[int, tuple[Any, bytes]] = {}
 
     def of(self, value: Any) -> bytes:
-        if isinstance(value, ClosedJaxpr):
-            return _digest("closed", self.of(value.jaxpr), *map(self.of, value.consts))
-        if isinstance(value, Jaxpr):
-            if id(value) not in self._kept:
-                self._kept[id(value)] = (value, self._jaxpr(value))
-            return self._kept[id(value)][1]
+        if isinstance(value, ClosedJaxpr | Jaxpr):  # one class in later versions of JAX
+            body = self._body(value.jaxpr if isinstance(value, ClosedJaxpr) else value)
+            return _digest("function", body, *map(self.of, getattr(value, "consts", ())))
         if value is None or isinstance(value, bool | int | float | complex | str | bytes):
             return _digest(type(value).__name__, repr(value))
         if isinstance(value, np.ndarray | np.generic | jax.Array):
@@ -64,15 +61,21 @@ class _Names:
             return _digest("type", str(np.dtype(value)))
         if isinstance(value, enum.Enum):
             return _digest("enum", f"{type(value).__qualname__}.{value.name}")
-        if type(value).__name__ == "PRNGImpl":  # no public name; its `str` is what `threefry` goes by
-            return _digest("random numbers", str(value))
+        # These have no public names: a generator of random numbers, and how the operands of a loop are grouped.
+        if type(value).__name__ in ("PRNGImpl", "FTTuple"):
+            return _digest(type(value).__name__, str(value))
         if isinstance(value, tuple | list):
             return _digest(type(value).__qualname__, *map(self.of, value))
         if isinstance(value, Mapping):
             return _digest("mapping", *(part for pair in value.items() for part in map(self.of, pair)))
         raise Nameless(f"a value of type {type(value).__qualname__}")
 
-    def _jaxpr(self, jaxpr: Jaxpr) -> bytes:
+    def _body(self, jaxpr: Jaxpr) -> bytes:
+        if id(jaxpr) not in self._kept:
+            self._kept[id(jaxpr)] = (jaxpr, self._equations(jaxpr))
+        return self._kept[id(jaxpr)][1]
+
+    def _equations(self, jaxpr: Jaxpr) -> bytes:
         numbers: dict[Any, int] = {}
 
         def new(variables: Sequence[Any]) -> str:
