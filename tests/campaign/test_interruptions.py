@@ -39,6 +39,7 @@ def killed(path, out, kills, longest):
     return counted
 
 
+@pytest.mark.slow
 def test_kill_9_loses_nothing(campaign_file, tmp_path):
     path = campaign_file(trials=200, chunk=10)
     assert run(["campaign", str(path), "--out", str(tmp_path / "whole")]) == 0

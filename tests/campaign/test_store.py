@@ -251,7 +251,7 @@ def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp
     "kind, name, at",
     [
         pytest.param(zarr.Array, "__setitem__", 0, marks=pytest.mark.slow),
-        (zarr.Array, "__setitem__", 1),
+        pytest.param(zarr.Array, "__setitem__", 1, marks=pytest.mark.slow),
         (zarr.Array, "resize", 0),
         (zarr.Array, "resize", 9),
         (zarr.Group, "update_attributes", 0),

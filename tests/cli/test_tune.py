@@ -93,6 +93,7 @@ def test_wrong_options(refused, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_a_budget_that_ends_while_compiling_gives_what_was_begun(undertow, tmp_path):
     """No time for anything: the given gains are tried all the same, with some beside them, certified and evaluated."""
     (tmp_path / "s.yaml").write_text(SCENARIO)

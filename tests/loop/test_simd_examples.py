@@ -71,6 +71,7 @@ def at_70_steps(simulate, every):
     return simulate(loop, **(how | {"dt": 0.001, "record_every": every}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every", [35, *(pytest.param(every, marks=pytest.mark.slow) for every in (0, 10, 70))])
 def test_a_run_lasts_as_long_however_seldom_it_is_recorded(every):
     """70 steps, recorded every 32, and at divisors of 70 or never: the same end and statistics by lanes and by XLA."""

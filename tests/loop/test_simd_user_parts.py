@@ -40,7 +40,7 @@ def scenario(name, backend):
 
 
 # Each compiles a loop twice; the operations themselves are those of batch_compiler/test_primitives.
-SLOW = ("network", "table", "ordered", "chosen", "of_bytes", "by_python", "predictive", "spectrum")
+SLOW = ("network", "table", "ordered", "chosen", "of_bytes", "by_python", "predictive", "spectrum", "kalman")
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in PARTS])

@@ -127,6 +127,7 @@ def turned(starts, short_way):
     return jax.tree.map(np.asarray, jax.jit(jax.vmap(run))(starts, short_way))
 
 
+@pytest.mark.slow
 def test_no_start_unwinds_and_without_the_short_way_half_of_them_do():
     long_starts = QUATERNIONS[QUATERNIONS[:, 0] < 0][:200]
     starts = np.concatenate([QUATERNIONS, long_starts])

@@ -6,6 +6,7 @@ from undertow.scenario.build import build
 from undertow.scenario.part_cache import PartCache
 
 
+@pytest.mark.slow
 def test_what_only_the_full_reproduction_runs_can_be_built():
     """A `BadInput` would come after ten minutes of it."""
     sources = (fidelity.scenarios, claims.scenarios, claims.batched, horizons.scenarios, lag_map.scenarios)

@@ -67,6 +67,7 @@ def test_w1_lasts_only_with_bounded_weights():
     assert bounded.series["weights_peak"].max() <= 20 < free.series["weights_peak"].max()
 
 
+@pytest.mark.slow
 def test_five_sets_bear_a_lag_that_one_rule_does_not():
     """20 s of U1 behind 50 ms: 1.8e-4 and 876 V/s against a limit cycle."""
     both = {name: one for name, one in lag_map.scenarios(False).items() if name.startswith("map_lag_50ms")}

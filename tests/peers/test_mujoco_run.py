@@ -34,6 +34,7 @@ def parts():
     return plant, thruster, law, ut.references.setpoint([1, 0.5, 0.5, 0, 0, 0.5], settling=4.0)
 
 
+@pytest.mark.slow
 def test_closed_loops_agree(parts):
     """Five seconds in a current at 100 Hz: 1e-8 m and rad, 1e-6 V, mostly of undertow's steps of 10 ms."""
     plant, thruster, law, reference = parts

@@ -26,6 +26,7 @@ def short(one, steps):
     return one._replace(plan=one.plan._replace(steps=steps))
 
 
+@pytest.mark.slow
 def test_the_workload_is_that_of_plain_numpy():
     """Mean square of the error over the second half of the first second: two programs that share no code."""
     late = eqx.tree_at(lambda run: (run.accumulators[0].start, run.accumulators[0].stop), W1.run, (0.4995, 0.9995))

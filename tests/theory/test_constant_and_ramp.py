@@ -40,6 +40,7 @@ def bounded_rate_signals():
     return np.concatenate([times[:, None], values], axis=1)
 
 
+@pytest.mark.slow
 def test_errors_stay_below_the_peak_gains(rails):
     rows = bounded_rate_signals()
     assert np.abs(np.diff(rows[:, 1:], axis=0) / np.diff(rows[:, :1], axis=0)).max() <= RATE * (1 + 1e-9)

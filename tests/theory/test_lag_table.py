@@ -77,6 +77,7 @@ def departure(law, speed):
     return jax.lax.scan(second, (start._replace(velocity=jnp.full(1, 1e-7)), z), None, length=12)[1]
 
 
+@pytest.mark.slow
 def test_sign_of_the_rightmost_eigenvalue_is_the_verdict_of_twenty_nonlinear_runs():
     laws = [rcaf(MotorRail(WHOLE).model(), **choices) for choices in GAINS.values()]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *laws)

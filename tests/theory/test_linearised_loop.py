@@ -146,6 +146,7 @@ def test_counters_and_idle_weights_are_not_poles():
     assert poles.real.max() < 0
 
 
+@pytest.mark.slow
 def test_what_no_input_moves_rests_where_the_plant_lets_it():
     """Two outputs that one input pushes alike, on springs: their difference is held by the springs, as in a run."""
     load, dt = np.array([0.3, -0.1, 0.2]), 0.01
@@ -241,7 +242,9 @@ SCENARIOS = {
 }
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=pytest.mark.slow) if one == "two sines, sampled" else one for one in SCENARIOS]
+)
 def test_runs_do_what_was_foretold(name):
     """Every metric within 10 %, from the transient of the start on."""
     common = {"plant": {"kind": "double_integrator", "axes": 2}, "initial": {"position": [0.02, -0.01]}}
@@ -254,6 +257,7 @@ def test_runs_do_what_was_foretold(name):
             assert one.departure < 0.10, one
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sets", "said"), [(5, "adapting weights may change that"), pytest.param(1, "", marks=pytest.mark.slow)]
 )

@@ -56,6 +56,7 @@ def test_fixed_point_stays_for_a_hundred_seconds():
         assert np.abs(np.asarray(samples[name])).max() <= 1e-12, name
 
 
+@pytest.mark.slow
 def test_axes_do_not_meet():
     """Disturb one axis: the others stay. Negative control: disturb all, and they do not."""
     for axis in range(6):

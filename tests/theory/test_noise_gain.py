@@ -50,6 +50,7 @@ def test_deviations_within_five_percent(name):
     np.testing.assert_allclose(found, expected, rtol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bound", "gain", "deviation"), [pytest.param(6.0, 50.0, 1.55, marks=pytest.mark.slow), (20.0, 169.0, 2.9)]
 )

@@ -37,6 +37,7 @@ def minute(**choices):
     return law, drift.gain_of(law, outcome.signals["weights"]), float(outcome.signals["weights_peak"].max()), windows
 
 
+@pytest.mark.slow
 def test_a_minute_with_a_box_and_without():
     law, gain, peak, windows = minute(preset="robust")
     print(f"robust: c {gain.max():.4g} 1/s, weights {peak:.4g}, {windows}")

@@ -29,6 +29,7 @@ def tracking(loop):
     return float(np.sqrt((late**2).mean())), int(run.status), run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("speed_sensor", "bar"), [pytest.param(True, 5e-4, marks=pytest.mark.slow), (False, 1.5e-3)])
 def test_whole_motor_at_24_volts(speed_sensor, bar):
     """Suite U1 scaled by 0.3, which is attainable; Table 1 limit-cycles there."""
@@ -40,6 +41,7 @@ def test_whole_motor_at_24_volts(speed_sensor, bar):
     assert float(jnp.abs(run.signals["input"]).max()) <= 24.0
 
 
+@pytest.mark.slow
 def test_table_1_does_not_hold_there():
     plant = hybrid_vehicle(odin(), paper_table3("electromechanical", supply=24.0), ledger=False)
     rms, status, run = tracking(ClosedLoop(plant, rcaf(plant.model()), setpoint(TARGET), u1(scale=0.3), perfect()))

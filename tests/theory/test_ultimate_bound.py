@@ -6,6 +6,7 @@ From Vf_dot <= -1/2 E^T Q E + 0.2785 (phi w_bar + phi_c gamma_eps omega_bar), wh
 
 import jax
 import numpy as np
+import pytest
 
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
@@ -30,6 +31,7 @@ def draws():
     return gains, {"amplitude": omega, "frequency": spread(0.3, 5.0), "offset": random.uniform(-3, 3, AXES)}
 
 
+@pytest.mark.slow
 def test_ultimate_error_is_within_the_bound(rails):
     gains, signals = draws()
     loop = rails(AXES, goal=0.5, disturbance=sinusoid(**signals), compensation_layer=0.5, **gains)

@@ -55,6 +55,7 @@ def test_slope_equals_finite_differences(axis):
     np.testing.assert_allclose(evaluation.slope(point), (ahead - behind) / (2 * step), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_both_methods_come_to_the_same_gains(axis, tmp_path):
     found, evaluation = axis
     certifier = Certifier(found.training_loop, found.train, evaluation.law(found.start))

@@ -168,7 +168,7 @@ def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
     departing = [one for one in compared if one.name not in _PEAKS and one.departure > _DEPARTS]
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"
-    named = ", ".join(f"{one.name} by {one.departure:.0%}" for one in departing)
+    named = ", ".join(f"{one.name} by {100 * one.departure:.0f} %" for one in departing)
     return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed.steady)}"
 
 
