@@ -1,5 +1,7 @@
 """Scenarios of the reproduction, of which a quick one runs a part."""
 
+import pytest
+
 from undertow.reproduction import claims, horizons, lag_map
 from undertow.reproduction.robust_variant import fidelity
 from undertow.scenario.build import build

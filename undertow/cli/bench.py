@@ -7,6 +7,7 @@ import typer
 from rich.table import Table
 
 from undertow.bench.measure import measure
+from undertow.bench.waiting import waiting_times
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.stages import shares
@@ -30,15 +31,18 @@ _WORKLOADS = {
 }
 
 
-def bench(as_json: bool) -> int:
-    """Measure workloads W1 and W2 and print tables or JSON."""
-    console = wide_console()
+def bench(as_json: bool, users: bool) -> int:
+    """Measure workloads W1 and W2, or how long users wait, and print tables or JSON."""
+    console, work = wide_console(), waiting_times if users else measure
     if as_json:
-        found = interruptible(lambda: measure(lambda what, share: None))
+        found = interruptible(lambda: work(lambda what, share: None))
         typer.echo(json.dumps({key: _short(value) for key, value in found.items()}, indent=1))
         return DONE
     with shares(console) as progress:
-        found = interruptible(lambda: measure(progress))
+        found = interruptible(lambda: work(progress))
+    if users:
+        console.print(_waiting_table(found))
+        return DONE
     if "simd_unavailable" in found:
         console.print(f"Figures of SIMD batches are left out: {found['simd_unavailable']}.", highlight=False)
     for words, prefix in _WORKLOADS.items():
@@ -59,6 +63,14 @@ def bench(as_json: bool) -> int:
     first = f"{found['first_cold_s']:.2g} s without cached code, {found['first_kept_s']:.2g} s with it"
     console.print(f"Time from the start of a process to its first result (W1): {first}.", highlight=False)
     return DONE
+
+
+def _waiting_table(found: dict[str, Any]) -> Table:
+    """Seconds that commands take, and how many times as long as the start of JAX that is."""
+    table = titled("Seconds that users wait", "command", *map(numbers, ("s", "times the start of JAX")))
+    for key, value in found.items():
+        table.add_row(key.removesuffix("_s").replace("_", " "), f"{value:.3g}", f"{value / found['jax_start_s']:.3g}")
+    return table
 
 
 def _table(words: str, found: dict[str, Any], prefix: str) -> Table:

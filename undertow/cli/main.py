@@ -161,15 +161,21 @@ def simulate(
 
 
 @app.command()
-def bench(as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False) -> int:
+def bench(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+    users: Annotated[
+        bool, typer.Option("--users", help="Measure how long commands take, with empty caches and after a change.")
+    ] = False,
+) -> int:
     """Measure the speed of undertow on this machine, compared with plain NumPy.
 
     The workloads are W1 (ODIN with eight full motor models under the paper's controller, 1 kHz) and W2 (BlueROV2 Heavy
-    in current and waves, 100 Hz). The command takes some minutes, most of them for compiling.
+    in current and waves, 100 Hz). The command takes some minutes, most of them for compiling. With `--users` it measures
+    seconds until `simulate` has printed its metrics and written its files, and those of `compare`.
     """
     from undertow.cli.bench import bench
 
-    return bench(as_json)
+    return bench(as_json, users)
 
 
 @app.command()
