@@ -85,7 +85,7 @@ def results(name: str, equation: Equation, given: Sequence[Nodes]) -> list[Nodes
     kinds = [_kind(out) for out in equation.outs]
     found = _RULES[name]
     for key, value in equation.params.items():
-        if key not in found.read | found.idle and value is not None:  # None is: nothing is asked
+        if key not in found.read and key not in found.idle and value is not None:  # None is: nothing is asked
             raise Unsupported(f"no rule for `{name}` with {key} {value}")
     try:
         made = found.make(equation, *given)

@@ -69,11 +69,17 @@ def measure(watch: Watch) -> dict[str, Any]:
 def _first_results() -> tuple[float, float]:
     """Seconds from the start of a process to its first result, without and with cached compiled code."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = {**os.environ, "UNDERTOW_CACHE": folder}
-        settings.pop("JAX_COMPILATION_CACHE_DIR", None)
+        settings = with_cache(folder)
         command = [sys.executable, "-W", "ignore", "-m", "undertow.bench.first"]
         work = lambda: subprocess.run(command, env=settings, check=True, capture_output=True)
         return _timed(work)[1], _timed(work)[1]
+
+
+def with_cache(folder: str) -> dict[str, str]:
+    """Environment of a process that keeps all compiled code in a folder, and finds none elsewhere."""
+    settings = {**os.environ, "UNDERTOW_CACHE": folder}
+    settings.pop("JAX_COMPILATION_CACHE_DIR", None)
+    return settings
 
 
 def _single(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:

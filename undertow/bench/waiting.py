@@ -6,13 +6,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from undertow.bench.measure import Watch, with_cache
 from undertow.bench.workload import W2
-
-Watch = Callable[[str, float], None]  # called with the current stage and the share done
 
 
 class Case(NamedTuple):
@@ -93,9 +92,7 @@ def waiting_times(
 
 def _settings(folder: Path) -> dict[str, str]:
     """Environment of a process whose caches lie in a folder."""
-    settings = {**os.environ, "UNDERTOW_CACHE": str(folder / "cache"), "PYTHONUNBUFFERED": "1"}
-    settings.pop("JAX_COMPILATION_CACHE_DIR", None)
-    return settings
+    return with_cache(str(folder / "cache")) | {"PYTHONUNBUFFERED": "1"}
 
 
 def _simulated(folder: Path, settings: dict[str, str], scenario: Mapping[str, Any]) -> tuple[float, float]:

@@ -170,8 +170,8 @@ def bench(
     """Measure the speed of undertow on this machine, compared with plain NumPy.
 
     The workloads are W1 (ODIN with eight full motor models under the paper's controller, 1 kHz) and W2 (BlueROV2 Heavy
-    in current and waves, 100 Hz). The command takes some minutes, most of them for compiling. With `--users` it measures
-    seconds until `simulate` has printed its metrics and written its files, and those of `compare`.
+    in current and waves, 100 Hz). The command takes some minutes, most of them for compiling. With `--users` it
+    measures the seconds until `simulate` has printed its metrics and written its files, and those of `compare`.
     """
     from undertow.cli.bench import bench
 

@@ -59,7 +59,7 @@ def simulate(
         if video is not None:
             check_video(video, folder, overwrite)
         executed = _run(scenario, console, allow_code, video is not None)
-        write(executed, draft.path, {})
+        write(executed, draft.path)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
         _print_results(executed, folder, console)

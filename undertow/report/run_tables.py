@@ -45,14 +45,8 @@ def prediction_rows(
     for one in compared:
         unit = known[one.name].unit
         shown = (_defined(for_people(value, unit)[0]) for value in (one.predicted, one.measured))
-        rows.append(
-            (
-                one.name,
-                *shown,
-                "-" if isinf(one.departure) else f"{100 * one.departure:.0f} %",
-                for_people(0.0, unit)[1],
-            )
-        )
+        departs = "-" if isinf(one.departure) else f"{100 * one.departure:.0f} %"
+        rows.append((one.name, *shown, departs, for_people(0.0, unit)[1]))
     return RunTable("Prediction", ("metric", "predicted", _span(window), "departs by", "unit"), rows)
 
 

@@ -110,14 +110,14 @@ def run_loop(
     return jax.device_get(sampled.simulate(loop, **common)), lacking
 
 
-def write(executed: Executed, folder: Path, further: Mapping[str, Any]) -> None:
-    """Write run.nc, metrics.json with further entries, and scenario.yaml to a folder.
+def write(executed: Executed, folder: Path) -> None:
+    """Write run.nc, metrics.json and scenario.yaml to a folder.
 
     Raises:
         OSError: the folder cannot be written.
     """
     save(executed.dataset, folder / "run.nc")
-    write_metrics(executed, folder, further)
+    write_metrics(executed, folder, {})
     (folder / "scenario.yaml").write_text(dump(executed.built.resolved), encoding="utf-8")
 
 
