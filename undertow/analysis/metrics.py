@@ -307,8 +307,10 @@ MEANINGS = {
     "settling_time": Metric("s", "time after which the reference rests and the error stays within 2 % of the step"),
     "saturated_fraction": Metric("", "share of the time, mean over inputs, at which an input is saturated"),
     "bad_readings": Metric("", "number of readings that were not finite, left out or replaced by expected values"),
-    "energy_balance_residual": Metric("", "residual of the energy balance, share of the energy supplied: rounding"),
-    "energy_integration_residual": Metric("", "the same computed from the state: error of the integrator"),
+    "energy_balance_residual": Metric(
+        "", "residual of the energy balance as a share of the energy supplied, due to rounding"
+    ),
+    "energy_integration_residual": Metric("", "the same residual computed from the state, due to the integrator"),
     "rules": Metric("", "fuzzy rules per axis"),
 }
 

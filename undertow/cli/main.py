@@ -36,9 +36,9 @@ Replay = Annotated[
     bool,
     typer.Option(
         "--replay",
-        help="Run some trials again and show them on the page in three dimensions: the first trial of up to four "
-        "contestants, or the three worst trials. Compiling takes up to a minute for each controller. With --resume the "
-        "replay is added to results that are there.",
+        help="Run some trials again and show them on the page in three dimensions: `compare` the first trial of up to "
+        "four controllers or scenarios, `campaign` the three worst trials. Compiling takes up to a minute for each "
+        "controller. With --resume, add the replay to existing results.",
     ),
 ]
 
@@ -98,11 +98,11 @@ def init(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Vehicle: bluerov2, bluerov2_heavy (default), odin, rexrov, or a vehicle file of yours.",
+            help="Vehicle: bluerov2, bluerov2_heavy (default), odin, rexrov, or a vehicle file of your own.",
         ),
     ] = None,
     controller: Annotated[
-        str | None, typer.Option(metavar="FILE.py:FUNCTION", help="Controller of yours. Default: pid.")
+        str | None, typer.Option(metavar="FILE.py:FUNCTION", help="Controller of your own. Default: pid.")
     ] = None,
     own_vehicle: Annotated[
         bool, typer.Option("--own-vehicle", help="Also write my_rov.yaml, a vehicle file for your numbers.")
@@ -132,8 +132,7 @@ def simulate(
         ),
     ] = None,
     overwrite: Annotated[
-        bool,
-        typer.Option("--overwrite", help="Replace an earlier result in DIR. Without this option that is an error."),
+        bool, typer.Option("--overwrite", help="Replace an earlier result in DIR, which is an error otherwise.")
     ] = False,
     prediction: Annotated[
         bool,
@@ -171,7 +170,7 @@ def bench(
 
     The workloads are W1 (ODIN with eight full motor models under the paper's controller, 1 kHz) and W2 (BlueROV2 Heavy
     in current and waves, 100 Hz). The command takes some minutes, most of them for compiling. With `--users` it
-    measures the seconds until `simulate` has printed its metrics and written its files, and those of `compare`.
+    measures how many seconds `simulate` and `compare` take to print their results and to write their files.
     """
     from undertow.cli.bench import bench
 
@@ -314,9 +313,9 @@ def compare(
 ) -> int:
     """Compare controllers on one scenario, or several scenarios, on the same seeds.
 
-    The command runs each of them on the same samples and seeds, and writes the medians, the paired differences with
-    confidence intervals and a rank test, and the failures: comparison.html, .json, .csv, .tex and .md, figures/,
-    trials.zarr, and scenarios/ with the scenario of each controller.
+    The command runs all of them on the same samples and seeds. It reports the medians, the paired differences with
+    confidence intervals and a rank test, and the failures. It writes comparison.html, .json, .csv, .tex and .md,
+    figures/, trials.zarr, and scenarios/ with the scenario of each controller.
     """
     from undertow.cli.compare import compare
 

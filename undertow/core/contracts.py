@@ -323,7 +323,7 @@ class AbstractDisturbance(eqx.Module):
 
     @abc.abstractmethod
     def realize(self, key: PRNGKeyArray) -> PyTree:
-        """Path: everything random about one realisation."""
+        """Realization: everything random about one run."""
 
     @abc.abstractmethod
     def at(self, realization: PyTree, t: Time, pose: Pose | None, load: Load) -> Load:
@@ -362,7 +362,7 @@ class AbstractNavigation(eqx.Module):
 
     @abc.abstractmethod
     def realize(self, key: PRNGKeyArray) -> PyTree:
-        """Path: everything random about one realisation."""
+        """Realization: everything random about one run."""
 
     @abc.abstractmethod
     def init(self, realization: PyTree, truth: Measurement) -> PyTree:

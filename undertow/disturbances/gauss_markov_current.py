@@ -12,7 +12,7 @@ from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 from undertow.disturbances.adding import with_water
 
-_LONGEST = 1_000_000  # samples of a realisation
+_LONGEST = 1_000_000  # samples of a realization
 
 
 class GaussMarkovCurrent(AbstractDisturbance):

@@ -48,7 +48,7 @@ _GRAVITY = 9.81  # m/s^2
 
 
 class Sea(NamedTuple):
-    """One realisation: long-crested waves of equal amplitude."""
+    """One realization: long-crested waves of equal amplitude."""
 
     frequency: Float[Array, " k"]  # rad/s
     phase: Float[Array, " k"]  # rad
@@ -111,7 +111,7 @@ class Waves(AbstractDisturbance):
 
 
 def waves(height=0.5, period=5.0, heading=0.0, spreading=0.0, peakedness=3.3, depth=3.0, components: int = 32) -> Waves:
-    """Sea state by its JONSWAP spectrum (Hasselmann et al. 1973); another realisation for every seed.
+    """Sea state by its JONSWAP spectrum (Hasselmann et al. 1973); another realization for every seed.
 
     Args:
         height: significant wave height, m.
