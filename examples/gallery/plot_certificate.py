@@ -17,7 +17,8 @@ goal = ut.references.setpoint([2, 3, 4, np.pi / 3, np.pi / 4, 2 * np.pi / 5])  #
 run = ut.simulate(plant, law, goal, disturbance=ut.disturbances.u1())
 
 # %%
-# The Lyapunov function falls while the set-point is approached. It is not monotonic: the disturbance moves.
+# The Lyapunov function falls while the set-point is approached. It does not fall at every step, because the
+# disturbance changes.
 
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 axes.semilogy(run.dataset["time"], run.dataset["lyapunov"])

@@ -19,7 +19,7 @@ for inductance in (0.01, 0.003, 0.001):  # H; Table 3 prints 0.01
     runs[inductance] = ut.simulate(plant, ut.rcaf(plant.model()), goal, disturbance=ut.disturbances.u1(), duration=5.0)
 
 # %%
-# The largest voltage of the eight thrusters. There is no supply limit, so a diverging loop demands ever more of it.
+# The largest voltage of the eight thrusters. Without a supply limit, a diverging loop demands an ever larger voltage.
 
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 for inductance, run in runs.items():

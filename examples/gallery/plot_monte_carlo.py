@@ -36,7 +36,7 @@ axes.legend(title="controller")
 plt.show()
 
 # %%
-# The same seeds, so the two are compared run by run.
+# Both controllers ran with the same seeds, so they are compared run by run.
 
 for name in laws:
     median, most = np.quantile(errors.sel(controller=name), [0.5, 0.9])

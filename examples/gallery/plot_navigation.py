@@ -2,7 +2,7 @@
 Sensors and the error of the navigation observer
 ================================================
 
-A vehicle does not know its position, it estimates it. The observer integrates an inertial measurement unit (IMU) and
+A vehicle does not know its position but estimates it. The observer integrates an inertial measurement unit (IMU) and
 corrects it with a Doppler velocity log (DVL), depth, compass and acoustic position fixes, each with its own period,
 noise, bias and delay.
 """
@@ -22,8 +22,8 @@ observer = ut.navigation.observer([s.imu(), s.dvl(), s.depth(), s.compass(), s.p
 run = ut.simulate(plant, law, hold, disturbance=current, navigation=observer, dt=0.01, record=0.05, duration=30.0)
 
 # %%
-# Measured less true position. The horizontal estimate wanders by centimetres, and no controller can be better than what
-# it is given. Depth has a sensor of its own.
+# Measured less true position. The horizontal estimate wanders by centimetres, and no controller can hold the position
+# better than that. Depth has a sensor of its own.
 
 error = 1e3 * (run.dataset["measured_position"] - run.dataset["position"])
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")

@@ -21,7 +21,7 @@ for name, bound in {"without a bound": np.inf, "weights bounded by 5 m/s²": 5.0
     runs[name] = ut.simulate(plant, law, hold, navigation=noise, duration=60.0, record=0.1)
 
 # %%
-# The vehicle has nothing to do in this run: there is no disturbance, and it starts where it should be.
+# The vehicle has nothing to do in this run: there is no disturbance, and it starts at its reference.
 
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 for name, run in runs.items():
