@@ -53,7 +53,7 @@ class PickedUp(AbstractDisturbance):
 
 
 def payload(mass=2.0, weight=12.0, point=(0.2, 0.0, 0.1), start=0.0, stop=1e9) -> PickedUp:
-    """Something picked up and carried.
+    """Payload that the vehicle picks up and carries.
 
     Args:
         mass: kg.
