@@ -7,6 +7,7 @@ The variable is w = -log(1 - x^2), in three parts, after M. Giles, Approximating
 
 from math import inf, nan
 
+from simdjit.calls import called, rarely
 from simdjit.functions import log, polynomial
 from simdjit.scalar import Scalar, smaller, where
 
@@ -78,12 +79,15 @@ _FAR = [
 ]
 
 
+@called("erf_inv_tail")
+def _tail(w: Scalar) -> Scalar:
+    """erfinv(x) / x for |x| above 0.999: one number in 500."""
+    root = w.apply("sqrt")
+    return where(w < 16.0, polynomial(root - 3.25, _MIDDLE), polynomial(root - 5.0, _FAR))
+
+
 def erf_inv(x: Scalar) -> Scalar:
     """x for which erf is the given number; infinite at -1 and 1, and none beyond."""
     w = smaller(-log((1.0 - x) * (x + 1.0)), 37.0)
-    root = w.apply("sqrt")
-    central, middle, far = (
-        polynomial(t, terms) for t, terms in ((w - 3.125, _CENTRAL), (root - 3.25, _MIDDLE), (root - 5.0, _FAR))
-    )
-    result = x * where(w < 6.25, central, where(w < 16.0, middle, far))
+    result = x * rarely(w.apply("ge", 6.25), w, _tail, polynomial(w - 3.125, _CENTRAL))
     return where(abs(x) < 1.0, result, where(abs(x).equal(1.0), x * inf, nan))

@@ -103,7 +103,7 @@ class Realization(NamedTuple):
         """States of plant and controller at t = 0, from the outputs there."""
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
-        y, _ = self._read(zero, self.loop.plant.output(zero, x), self.initial_measuring(x))
+        y, _ = self.read(zero, self.loop.plant.output(zero, x), self.initial_measuring(x))
         return x, self.loop.controller.init(y, self.loop.reference.at(zero))
 
     def initial_measuring(self, x: PyTree) -> MeasurementState:
@@ -113,7 +113,7 @@ class Realization(NamedTuple):
         state = navigation.init(self.navigation_realization, truth)
         if navigation.smooth is True:  # where the field is not static it is traced, and treated as False
             return MeasurementState(state, None)
-        y, _ = navigation.measure(self.navigation_realization, state, zero, truth)
+        y, _ = _measured(navigation, self.navigation_realization, state, zero, truth)
         return MeasurementState(state, at_start(self.loop.controller.model.coordinates, truth, y))
 
     def load(self, t: Time, x: PyTree) -> Load:
@@ -121,26 +121,24 @@ class Realization(NamedTuple):
         plant = self.loop.plant
         return self.loop.disturbance.at(self.disturbance_realization, t, plant.pose(x), plant.no_load())
 
+    def motion(self, t: Time, x: PyTree, applied: Inputs) -> PyTree:
+        """Rates of the plant's state, of the shape of that."""
+        return _moved(self, t, x, applied)
+
     def decide(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Decision:
         """Measure, compute the command and limit it; `measuring` is that of the previous step."""
-        y, measuring = self._read(t, self.loop.plant.output(t, x), measuring)
-        r = self.loop.reference.at(t)
-        command, signals = self.loop.controller.command(z, y, r)
-        return Decision(y, r, command, self.loop.plant.admissible(x, command), signals, measuring)
+        return _decided(self, t, x, z, measuring)
 
-    def _read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
+    def read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
         """Measurement for the law, and the state of measuring afterwards."""
 
-        def measure(realization, state, t, truth):
-            y, state = self.loop.navigation.measure(realization, state, t, truth)
-            return completed(y, truth), state
-
+        loop, realization = self.loop, self.navigation_realization
         if not isinstance(measuring, MeasurementState):
-            return measure(self.navigation_realization, measuring, t, truth)
-        y, state = measure(self.navigation_realization, measuring.navigation, t, truth)
+            return _completed(_measured(loop.navigation, realization, measuring, t, truth), truth)
+        y, state = _completed(_measured(loop.navigation, realization, measuring.navigation, t, truth), truth)
         if measuring.expected is None:
             return y, MeasurementState(state, None)
-        y, expected = measuring.expected.repaired(self.loop.controller.model.coordinates, y)
+        y, expected = measuring.expected.repaired(loop.controller.model.coordinates, y)
         return y, MeasurementState(state, expected)
 
     def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
@@ -183,3 +181,27 @@ class Realization(NamedTuple):
     def record(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Signals:
         """Signals of the decision taken at time t."""
         return self.signals(t, x, z, self.decide(t, x, z, measuring))
+
+
+# Start, every stage of a step, and records call these alike: JAX traces each once.
+@eqx.filter_jit
+def _decided(realization: Realization, t: Time, x: PyTree, z: PyTree, measuring: Any) -> Decision:
+    loop = realization.loop
+    y, measuring = realization.read(t, loop.plant.output(t, x), measuring)
+    r = loop.reference.at(t)
+    command, signals = loop.controller.command(z, y, r)
+    return Decision(y, r, command, loop.plant.admissible(x, command), signals, measuring)
+
+
+@eqx.filter_jit
+def _measured(navigation: AbstractNavigation, realization: PyTree, state: PyTree, t: Time, truth: Measurement):
+    return navigation.measure(realization, state, t, truth)
+
+
+@eqx.filter_jit
+def _moved(realization: Realization, t: Time, x: PyTree, applied: Inputs) -> PyTree:
+    return realization.loop.plant.dynamics(t, x, applied, realization.load(t, x))
+
+
+def _completed(measured: tuple[Measurement, PyTree], truth: Measurement) -> tuple[Measurement, PyTree]:
+    return completed(measured[0], truth), measured[1]

@@ -26,7 +26,7 @@ def flow(t: Float[Array, ""], state: tuple[PyTree, PyTree], realization: Realiza
     x, z = state
     controller = cast(AbstractContinuousController, realization.loop.controller)
     decision = realization.decide(t, x, z)
-    x_rate = realization.loop.plant.dynamics(t, x, decision.applied, realization.load(t, x))
+    x_rate = realization.motion(t, x, decision.applied)
     commanded = jnp.isfinite(decision.command).all()  # limits and dead zones would hide a NaN
     x_rate = jax.tree.map(lambda rate: jnp.where(commanded, rate, jnp.nan), x_rate)
     return x_rate, controller.flow(z, decision.y, decision.r, decision.applied)

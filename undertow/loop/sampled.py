@@ -111,7 +111,8 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     if accumulators:
         signals = realization.signals(t, x, z, decision)
         gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
-    motion, h = partial(_motion, realization, decision.applied), dt / substeps
+    h = dt / substeps
+    motion = lambda t, x: realization.motion(t, x, decision.applied)
     if substeps == 1:
         new_x = integrate(motion, t, x, h)
     else:
@@ -126,6 +127,3 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     state, ending = freeze_on_failure(loop, (x, z, measuring), new, ending, t, dt, decision.command)
     return state, gathered, ending
 
-
-def _motion(realization: Realization, applied, t, x):
-    return realization.loop.plant.dynamics(t, x, applied, realization.load(t, x))

@@ -103,6 +103,7 @@ def check_fit(loop: ClosedLoop) -> None:
     """
     axes, zero = len(loop.plant.outputs), jnp.zeros(())
     with within("reference"):
+        loop = loop.starting_at(None)  # as the run has it, which then need not be traced again
         target = _traced(loop.reference.at, zero)
         if target.position.shape != (axes,):
             got = f"{len(target.position)} long" if target.position.ndim == 1 else f"of shape {target.position.shape}"
@@ -118,7 +119,7 @@ def check_fit(loop: ClosedLoop) -> None:
         if any(signal.shape != (axes,) for signal in load[:2]):
             raise BadInput("", f"have {axes} axes", f"of shapes {[signal.shape for signal in load[:2]]}")
         rest = jnp.zeros(loop.plant.inputs())
-        _traced(lambda realization, x: loop.plant.dynamics(zero, x, rest, realization.load(zero, x)), realization, x)
+        _traced(lambda realization, x: realization.motion(zero, x, rest), realization, x)
     with within("controller"):
         decided = lambda realization, x, z: realization.decide(zero, x, z, realization.initial_measuring(x))
         check_declared(loop.controller, _traced(decided, realization, x, z).signals, "command")
