@@ -15,7 +15,7 @@ from undertow.navigation.drift import drift_advice, drifts
 from undertow.navigation.observer import observer
 from undertow.reproduction import ablations
 from undertow.scenario.build import build
-from undertow.scenario.plausibility import plausibility, top_speed
+from undertow.scenario.plausibility import held_speed, plausibility, top_speed
 from undertow.scenario.reading import read
 from undertow.sensors import compass, depth, dvl, imu, position_fix
 from undertow.thrusters import commanded_thrust, t200
@@ -53,6 +53,10 @@ def test_top_speed_of_one_thruster_is_where_its_force_balances_linear_drag():
         plain.with_thrusters([1]), commanded_thrust(thrust_forward_max=30.0, thrust_reverse_max=20.0)
     )
     assert top_speed(plant) == pytest.approx(30.0 / 20.0, rel=2e-3)
+    column = np.asarray(plant.thruster_matrix)[:, 0]
+    share = 20.0 * column[0] / (column @ column)  # of the thrust per speed, N s/m: moments are left to the vehicle
+    for speed, held in ((4.0, 20.0 / share), (-4.0, 30.0 / share), (1.2, 1.2)):
+        assert held_speed(plant, np.zeros(6), np.array([speed, 0.0, 0.0])) == pytest.approx(held, abs=0.041)
     heavier = eqx.tree_at(lambda p: p.body.weight, plant, plant.body.weight + 5.0)  # it may also sink
     assert 30.0 / 20.0 < top_speed(heavier) <= 35.0 / 20.0 * (1 + 1e-9)
 

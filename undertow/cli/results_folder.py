@@ -100,8 +100,9 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
         yield Draft(staging, publish)
         publish()
     except KeyboardInterrupt:
-        left = f"The results are in {folder}, without figures" if published else f"No results were written to {folder}"
-        print(f"{left}.", file=sys.stderr)
+        missing = ", ".join(name for name in names if not (folder / name).exists())
+        left = f"The results are in {folder}" + (f", without {missing}" if missing else "")
+        print(f"{left if published else f'No results were written to {folder}'}.", file=sys.stderr)
         raise
     finally:
         shutil.rmtree(staging, ignore_errors=True)

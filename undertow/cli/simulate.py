@@ -1,9 +1,10 @@
 """`undertow simulate`: run one scenario and write its results and figures."""
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import typer
 from rich.console import Console
@@ -64,22 +65,25 @@ def simulate(
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
         _print_results(executed, folder, console)
         code = max(_ending_code(executed), _repetition_code(repetition, console) if repetition else DONE)
-        with stage(console, "prediction, figures, page" if prediction else "figures and page"):
-            saved, predicted = with_prediction(
-                lambda: save_all(lambda: run_plots(executed.dataset), draft.path / "figures", pdf),
-                executed.built,
-                prediction,
-            )
-            looks = shown(executed.dataset, executed.built.closed_loop, saved)
-            warn_of(looks.failures)
-            write_metrics(executed, draft.path, in_results(predicted))
-            write_run_page(draft.path / "run.html", executed.dataset, looks, predicted.metrics if predicted else None)
-    if predicted:
-        _print_prediction(predicted, executed, console)
+        page = draft.path / "run.html"
+        with _predicting(executed.built, prediction) as predicting:
+            with stage(console, "figures and page"):
+                saved = save_all(lambda: run_plots(executed.dataset), draft.path / "figures", pdf)
+                looks = shown(executed.dataset, executed.built.closed_loop, saved)
+                warn_of(looks.failures)
+                write_run_page(page, executed.dataset, looks)
+            draft.publish()  # nobody waits for the prediction, which is added to the page
+            console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
+            if predicting is not None:
+                with stage(console, "prediction"):
+                    predicted = predicting.result()
+                write_metrics(executed, draft.path, in_results(predicted))
+                write_run_page(page, executed.dataset, looks, predicted.metrics)
+                draft.publish()
+                _print_prediction(predicted, executed, console)
     if video is not None and looks.replay is not None:
         with shares(console) as progress:
             write_video(looks.replay, video, progress)
-    console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
     return code
 
 
@@ -136,8 +140,6 @@ def _repetition_code(repetition: Repetition, console: Console) -> int:
     return RUN_FAILED
 
 
-Result = TypeVar("Result")
-
 # A measured metric that departs from the predicted one by more than this share is reported.
 _DEPARTS = 0.10
 
@@ -148,13 +150,14 @@ _PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
 _NOTHING = 1e-9
 
 
-def with_prediction(work: Callable[[], Result], built: Built, enabled: bool) -> tuple[Result, PredictedMetrics | None]:
-    """Run `work`, and predict the scenario meanwhile in another thread: compiling takes most of the time of both."""
+@contextlib.contextmanager
+def _predicting(built: Built, enabled: bool) -> Iterator[Future[PredictedMetrics] | None]:
+    """The prediction of a scenario, made in another thread meanwhile; None where none is wanted."""
     if not enabled:
-        return work(), None
+        yield None
+        return
     with ThreadPoolExecutor(1) as other:
-        predicting: Future[PredictedMetrics] = other.submit(_predict, built)
-        return work(), predicting.result()
+        yield other.submit(_predict, built)
 
 
 def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
@@ -172,10 +175,8 @@ def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
     return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed.steady)}"
 
 
-def in_results(predicted: PredictedMetrics | None) -> dict[str, Any]:
+def in_results(predicted: PredictedMetrics) -> dict[str, Any]:
     """Entries of metrics.json."""
-    if predicted is None:
-        return {}
     return {"predicted": predicted.metrics} | ({"not_predicted": predicted.why_not} if predicted.why_not else {})
 
 

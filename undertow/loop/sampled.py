@@ -126,4 +126,3 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     new = (new_x, new_z, remembered)
     state, ending = freeze_on_failure(loop, (x, z, measuring), new, ending, t, dt, decision.command)
     return state, gathered, ending
-

@@ -20,6 +20,8 @@ from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
 
 _MAX_STEPS = 200_000  # largest number of predicted steps
+_ABSURD = 10.0  # an input of so many times its limit comes from a gain near zero, not from the load
+_LITTLE = 0.05  # of its limit: an input close to zero
 
 
 class OperatingPoint(NamedTuple):
@@ -98,6 +100,13 @@ def _beyond_limits(known: OperatingPoint, inputs: np.ndarray) -> str:
     if share.max(initial=0.0) <= 1:
         return ""
     worst, unit = int(share.argmax()), known.built.closed_loop.plant.input_unit
+    at_rest = known.mean.at["u"][worst]
+    if share[worst] > _ABSURD and abs(at_rest) < _LITTLE * max(-low[worst], high[worst]):
+        return (
+            f"the loop is in equilibrium with input {worst + 1} at {at_rest:.2g} {unit}, where it has almost no effect "
+            "(in a dead zone, or where force grows with its square), so that no linear model describes the loop there. "
+            "The run itself is not affected"
+        )
     required = f"the linear model requires {size[worst]:.3g} {unit} (rms) of input {worst + 1}"
     limit = f"which is limited to {max(-low[worst], high[worst]):.3g} {unit}"
     return f"{required}, {limit}: the loop leaves its linear range"

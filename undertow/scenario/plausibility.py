@@ -1,6 +1,7 @@
 """Advice on what a scenario can run but surely does not mean; each names the numbers that caused it, and the line.
 
-Only what holds whatever the controller does is said: speeds are compared with one that no direction exceeds.
+Only what holds whatever the controller does is said: speeds are compared with one that no direction exceeds, and a
+current with the one that the thrusters can balance.
 """
 
 from typing import NamedTuple
@@ -10,6 +11,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import lsq_linear
+from scipy.spatial.transform import Rotation
 
 from undertow.core.contracts import AbstractReference
 from undertow.core.errors import Advice, advice
@@ -27,6 +30,9 @@ _RISES = 0.2  # m above the start; less is no mistake of sign
 _SPARE = 1.05  # a speed is too large from this multiple of the top speed on
 _FAR = 10.0  # s at top speed; a longer step saturates the thrusters for long
 _DIRECTIONS = 2000
+_AT_REST = 1e-3  # m/s
+_SHARES = 101  # of a current, tried one after the other
+_BALANCED = 0.01  # of the force: what may be left of it
 
 
 class Motion(NamedTuple):
@@ -60,13 +66,10 @@ def top_speed(plant: HybridVehicle) -> float:
     In a direction the force is at most the sum of what each thruster gives, and the surplus of weight or buoyancy,
     although these also turn the vehicle and push it sideways. Drag balances that force at the speed.
     """
-    actuators = plant.thruster.actuator_model(plant.inputs(), False)
-    if actuators.time_constant() is None:  # the steady force is unknown, too
+    thrusts = _thrusts(plant)
+    if thrusts is None:
         return np.inf
-    held = actuators.quasi_static()
-    low, high = (np.asarray(limit, dtype=float) for limit in held.range(held.init(), jnp.ones(())))
-    if not (np.isfinite(low).all() and np.isfinite(high).all()):
-        return np.inf
+    low, high = thrusts
     along = _sphere(_DIRECTIONS)
     shares = along @ np.asarray(plant.thruster_matrix, dtype=float)[:3]
     body = plant.body
@@ -78,6 +81,52 @@ def top_speed(plant: HybridVehicle) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         speed = 2 * force / (a + np.sqrt(a**2 + 4 * b * force))  # a v + b v^2 = force
     return float(np.where(np.isnan(speed), np.inf, speed).max())
+
+
+def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Float[np.ndarray, " 3"]) -> float:
+    """Speed of a current, m/s and at most that of `flow`, against which the thrusters hold the vehicle where it is.
+
+    Damping, the moment of the added mass and the surplus of weight or buoyancy are balanced along all directions in
+    which the thrusters act; along the others nothing is.
+
+    Args:
+        plant: vehicle with thrusters.
+        position: that is held, m and rad.
+        flow: velocity of the current, world axes, m/s.
+    """
+    thrusts, body = _thrusts(plant), plant.body
+    if thrusts is None or not flow.any():
+        return _size(flow)
+    rotation = Rotation.from_euler("ZYX", position[:2:-1]).as_matrix()
+    shares = np.linspace(0.0, 1.0, _SHARES)
+    through = np.concatenate([-rotation.T @ flow, np.zeros(3)])
+    forces = jax.jit(
+        jax.vmap(lambda nu: body.coriolis(nu) + body.damping(nu) + body.restoring(jnp.asarray(rotation[2])))
+    )
+    matrix = np.asarray(plant.thruster_matrix, dtype=float)
+    acting = matrix @ np.linalg.pinv(matrix)
+    needed = np.asarray(forces(jnp.asarray(np.outer(shares, through)))) @ acting.T
+    held = 0.0
+    for share, force in zip(shares, needed, strict=True):
+        left = matrix @ lsq_linear(matrix, force, bounds=thrusts).x - force
+        if _size(left) > _BALANCED * _size(force):
+            break
+        held = float(share * _size(flow))
+    return held
+
+
+def _thrusts(plant: HybridVehicle) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]] | None:
+    """Lowest and highest steady thrusts, N; None where there is no limit, or none is known."""
+    actuators = plant.thruster.actuator_model(plant.inputs(), False)
+    if actuators.time_constant() is None:  # the steady force is unknown, too
+        return None
+    held = actuators.quasi_static()
+    low, high = (np.asarray(limit, dtype=float) for limit in held.range(held.init(), jnp.ones(())))
+    return (low, high) if np.isfinite(low).all() and np.isfinite(high).all() else None
+
+
+def _size(vector: Float[np.ndarray, " k"]) -> float:
+    return float(np.linalg.norm(vector))
 
 
 def _angles(loop: ClosedLoop, desired: Motion):
@@ -142,19 +191,28 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
     if not np.isfinite(top):
         return
     flows = [one.velocity for one in _members(loop, Current)] + [one.mean for one in _members(loop, GaussMarkovCurrent)]
-    flow = float(np.linalg.norm(np.sum([np.asarray(one, dtype=float) for one in flows], axis=0))) if flows else 0.0
+    flow = np.sum([np.asarray(one, dtype=float) for one in flows], axis=0) if flows else np.zeros(3)
+    drift = _size(flow)
     most = f"the thrusters give the vehicle at most {top:.3g} m/s through the water"
-    if flow > _SPARE * top:
-        says = f"the current is {flow:.3g} m/s, but {most}: it drifts away"
+    if drift > _SPARE * top:
+        says = f"the current is {drift:.3g} m/s, but {most}: it drifts away"
+        yield advice("disturbance", says, "1 knot is 0.514 m/s")
+        return
+    held = held_speed(plant, desired.position[-1], flow) if _size(desired.velocity[-1, :3]) < _AT_REST else drift
+    if held < drift:
+        says = (
+            f"the current is {drift:.3g} m/s, but at the attitude of `reference` the thrusters hold the vehicle "
+            f"against at most {held:.3g} m/s of it: it drifts away"
+        )
         yield advice("disturbance", says, "1 knot is 0.514 m/s")
         return
     speed = float(np.linalg.norm(desired.velocity[:, :3], axis=1).max())
     duration, way = float(desired.time[-1]), desired.position[:, :3] - desired.start[:3]
     far = float(np.linalg.norm(way[-1]))
     step = float(np.linalg.norm(way[0]))
-    if speed > _SPARE * (top + flow):
+    if speed > _SPARE * (top + drift):
         yield advice("reference", f"`reference` moves at up to {speed:.3g} m/s, but {most}", "Make it slower")
-    elif far > _SPARE * (top + flow) * duration:
+    elif far > _SPARE * (top + drift) * duration:
         says = f"`reference` is {far:.4g} m from the start at the end of the run, but {most}"
         hint = f"That takes {far / top:.3g} s: give `loop.duration` more than {duration:g} s"
         yield advice("reference", says, hint)
