@@ -83,11 +83,19 @@ class Graph:
         self.endless = 0
         self.memory: dict[Any, Node] = {}
         self._known: dict[Any, Node] = {}
+        self._values: list[Any] = []  # numbers of the constants
+        self._plain: dict[Any, Node] = {}  # constants by Python's numbers
 
     def constant(self, value: Any, dtype: str) -> Node:
         """A number that is the same in every lane."""
+        plain = (value, dtype) if type(value) in (int, float) and value != 0 else None  # zeros have a sign
+        if plain in self._plain:
+            return self._plain[plain]
         number = np.asarray(value).astype(_supported(dtype))[()]
-        return self.node(Operation("constant", detail=number), dtype, key=(number.tobytes(), dtype))
+        node = self.node(Operation("constant", detail=number), dtype, key=(number.tobytes(), dtype))
+        if plain:
+            self._plain[plain] = node
+        return node
 
     def like(self, value: Any, node: Node) -> Node:
         """A constant of the type of another node."""
@@ -99,8 +107,7 @@ class Graph:
 
     def value(self, node: Node) -> Any:
         """The number of a constant, None for what may differ between lanes."""
-        operation = self.operations[node]
-        return operation.detail if operation.name == "constant" else None
+        return self._values[node]
 
     def apply(self, name: str, *nodes: Node, dtype: str = "") -> Node:
         """Result of an operation.
@@ -110,15 +117,20 @@ class Graph:
             nodes: operands.
             dtype: type of the result where the operation changes it.
         """
-        dtype = dtype or (BOOL if name in COMPARISONS else self.types[nodes[-1]])
-        assert len({self.types[node] for node in nodes[name == "select" :]}) == 1, (name, dtype)
-        values = [self.value(node) for node in nodes]
-        if all(value is not None for value in values):
+        types, numbers = self.types, self._values
+        kind = types[nodes[-1]]
+        for node in nodes[name == "select" :]:
+            assert types[node] == kind, (name, dtype)
+        dtype = dtype or (BOOL if name in COMPARISONS else kind)
+        if name in _EITHER_WAY and nodes[0] > nodes[1]:
+            nodes = nodes[::-1]
+        values = [numbers[node] for node in nodes]
+        for value in values:
+            if value is None:
+                break
+        else:
             with np.errstate(all="ignore"):
                 return self.constant(RESULTS[name](*values, dtype), dtype)
-        if name in _EITHER_WAY:
-            nodes = tuple(sorted(nodes))
-            values = [self.value(node) for node in nodes]
         same = simpler(self, name, nodes, values)
         return self.node(Operation(name, nodes), dtype) if same is None else same
 
@@ -133,17 +145,20 @@ class Graph:
     def node(self, operation: Operation, dtype: str, home: int | None = None, key: Any = None) -> Node:
         """The node of an operation, the same for the same one."""
         key = (operation, dtype) if key is None else key
-        if key not in self._known:
-            self._known[key] = len(self.operations)
+        known = self._known.get(key)
+        if known is None:
+            known = self._known[key] = len(self.operations)
             self.operations.append(operation)
             self.types.append(dtype)
+            self._values.append(operation.detail if operation.name == "constant" else None)
             inner = self.innermost(*operation.operands)
             self.homes.append(max(home, inner, key=self._depth))
-        return self._known[key]
+        return known
 
     def innermost(self, *nodes: Node) -> int | None:
         """The home of what is made of some nodes."""
-        return max((self.homes[node] for node in nodes), key=self._depth, default=None)
+        homes = {self.homes[node] for node in nodes}
+        return max(homes, key=self._depth, default=None)
 
     def inside(self, node: Node, region: int) -> bool:
         """Whether a node depends on what happens in a region."""

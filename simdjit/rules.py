@@ -5,7 +5,7 @@ A primitive without a rule, a parameter that its rule does not know, a result of
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 from simdjit.graph import TYPES, U32, Graph, Node, Nodes, Unsupported
@@ -106,9 +106,14 @@ def _is_of(graph: Graph, nodes: Nodes, kind: tuple[tuple[int, ...], str]) -> boo
 
 def _kind(out: Any) -> tuple[tuple[int, ...], str]:
     """Shape and type of what stands for a result; keys of random numbers are two words each."""
-    dtype = str(getattr(out, "dtype", out))
+    dtype = _name(getattr(out, "dtype", out))
     if dtype == "key<fry>":
         return (*out.shape, 2), U32
     if dtype not in TYPES:
         raise Unsupported(f"numbers of type {dtype}")
     return out.shape, dtype
+
+
+@cache
+def _name(dtype: Any) -> str:
+    return str(dtype)

@@ -30,8 +30,12 @@ class Scalar:
 
     def apply(self, name: str, *others: Any) -> "Scalar":
         """An operation on this and others."""
-        given = (other.node if isinstance(other, Scalar) else self.constant(other).node for other in others)
-        return Scalar(self.graph, self.graph.apply(name, self.node, *given))
+        graph = self.graph
+        given = [
+            other.node if isinstance(other, Scalar) else graph.constant(other, graph.types[self.node])
+            for other in others
+        ]
+        return Scalar(graph, graph.apply(name, self.node, *given))
 
     def __add__(self, other):
         return self.apply("add", other)
