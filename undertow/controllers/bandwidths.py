@@ -12,6 +12,7 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +20,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
+from undertow.core.arrays import as_array
 from undertow.core.contracts import Model
 from undertow.numerics.linear_algebra import matvec
 
@@ -109,17 +111,26 @@ def axes_of(model: Model, sampling_time: float, delay: float, velocity_noise, lo
     checks.positive("load_rate", load_rate)
     axes = len(model.coordinates.angles)
     with jax.ensure_compile_time_eval():  # bandwidths are numbers even where a law is made inside a compiled function
-        actuators, still = model.actuators, jnp.zeros(axes)
-        known = actuators.time_constant()
-        lag = None if known is None else float(jnp.max(known))
-        max_bandwidth = float(actuators.max_bandwidth(jnp.asarray(_FASTEST / sampling_time, dtype=float)))
-        gain = jnp.abs(model.dynamics.gain(model.coordinates.measurement(still, still)))
-        reached = np.asarray(matvec(gain, largest_forces(actuators, gain.shape[1])))
+        still = as_array(np.zeros(axes))
+        lag, max_bandwidth, forces = _actuation(model, still, as_array(_FASTEST / sampling_time))
+    lag, max_bandwidth, reached = None if lag is None else float(lag), float(max_bandwidth), np.asarray(forces)
     authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
     rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
     common = (float(sampling_time), lag, max_bandwidth, float(delay))
     return [Axis(*common, *row) for row in rows]
+
+
+@eqx.filter_jit
+def _actuation(
+    model: Model, still: Float[Array, " n"], fastest: Float[Array, ""]
+) -> tuple[Array | None, Array, Float[Array, " n"]]:
+    """Lag of the slowest actuator (s, None without one), their largest bandwidth (rad/s), and the largest forces."""
+    actuators = model.actuators
+    known = actuators.time_constant()
+    gain = jnp.abs(model.dynamics.gain(model.coordinates.measurement(still, still)))
+    forces = matvec(gain, largest_forces(actuators, gain.shape[1]))
+    return None if known is None else jnp.max(known), actuators.max_bandwidth(fastest), forces
 
 
 def alike(values: Sequence[float]):

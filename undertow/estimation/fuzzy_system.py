@@ -82,6 +82,7 @@ class FuzzySystem(eqx.Module):
         """Number M^p of rules."""
         return self.centres.shape[1] ** self.inputs
 
+    @eqx.filter_jit
     def basis(self, inputs: Float[Array, "n p"]) -> Float[Array, "n rules"]:
         """Fuzzy basis functions xi of Eq. (37): positive, summing to one, for each of n axes.
 
@@ -99,6 +100,7 @@ class FuzzySystem(eqx.Module):
         """theta^T xi of Eqs. (36) and (42); between the smallest and the largest weight."""
         return (weights * basis).sum(-1)
 
+    @eqx.filter_jit
     def basis_norm_squared(self) -> Float[Array, ""]:
         """|xi(0)|^2: the only figure of the fuzzy design that matters for small signals; between 1/rules and 1."""
         return (self.basis(jnp.zeros((1, self.inputs))) ** 2).sum()

@@ -4,12 +4,13 @@ import functools
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
+import equinox as eqx
 import numpy as np
 
 from undertow.analysis.metrics import meanings
 from undertow.analysis.success import criterion_of
 from undertow.core import runtime
-from undertow.core.arrays import in_present_precision
+from undertow.core.arrays import as_array, in_present_precision
 from undertow.core.catalogue import KIND_OF
 from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation
 from undertow.core.errors import Advice, advice, within
@@ -146,7 +147,9 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     with within("model"):
         model, resolved["model"] = part_cache.part("model", scenario.model, (plant,), known)
     navigation = make("navigation")
-    noise = isinstance(navigation, AbstractInformedNavigation) and navigation.velocity_noise(scenario.loop.dt)
+    noise = isinstance(navigation, AbstractInformedNavigation) and _velocity_noise(
+        navigation, as_array(scenario.loop.dt)
+    )
     context["velocity_noise"] = np.asarray(noise, dtype=float).tolist()
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
@@ -170,3 +173,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     with within("success"):
         criterion = criterion_of(scenario.success, built.known_metrics())
     return built._replace(resolved=resolved | {"success": criterion})
+
+
+@eqx.filter_jit
+def _velocity_noise(navigation: AbstractInformedNavigation, dt):
+    return navigation.velocity_noise(dt)

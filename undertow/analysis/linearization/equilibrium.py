@@ -2,11 +2,14 @@
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
+from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement, Model
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.reachability import lost_directions
@@ -113,7 +116,7 @@ def equilibrium(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Equili
     """
     parts, start = take_apart(loop, position)
     load, model = np.asarray(load, dtype=float), parts.loop.controller.model.in_body_axes()
-    y = parts.loop.plant.output(jnp.zeros(()), parts.plant_state(jnp.asarray(start["plant"])))
+    y = _output(parts, as_array(start["plant"]))
     balance = Balance(parts, dt, _acting(parts.differentiate(start, dt)), _steered(model, y))
     holding = lambda load: np.asarray(_settled_input(model, y, jnp.asarray(load)))
     from_afar = lambda load: _from_afar(balance, start | {"load": load, "u": holding(load)})
@@ -129,6 +132,11 @@ def equilibrium(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Equili
         else:
             step /= 2
     return found
+
+
+@eqx.filter_jit
+def _output(parts: Parts, state: Array) -> Measurement:
+    return parts.loop.plant.output(jnp.zeros(()), parts.plant_state(state))
 
 
 def _from_afar(balance: Balance, at: dict) -> Equilibrium:

@@ -14,6 +14,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PyTree
 
+from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractContinuousController, Target, known_acceleration
 from undertow.core.measurement import with_outputs
 from undertow.loop.closed_loop import ClosedLoop
@@ -59,7 +60,7 @@ class Parts(NamedTuple):
         point = [
             np.asarray(at.get(name, np.zeros(size)), dtype=float) for name, size in zip(INPUTS, self.sizes, strict=True)
         ]
-        values, slopes = _evaluated(self, tuple(map(jnp.asarray, point)), jnp.asarray(dt, dtype=float))
+        values, slopes = _evaluated(self, tuple(map(as_array, point)), as_array(dt))
         ends = np.cumsum([0, *self.sizes])
         columns = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(INPUTS)}
         return Local(

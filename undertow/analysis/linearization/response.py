@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile
@@ -12,6 +11,7 @@ from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.linearization.minimal_realization import visible
 from undertow.analysis.metrics import of_group, output_groups
+from undertow.core.arrays import as_array
 
 _ENTRIES = ("load", "noise")
 _START = "start"  # a column: where the states are at first
@@ -47,7 +47,7 @@ def signals_within(
     small = visible(loop, (*_ENTRIES, _START), tuple(loop.signals))
     entry = np.hstack([small.entries[name] for name in _ENTRIES])
     driven = np.hstack([around.load - at.at["load"], around.noise])
-    states = np.asarray(_driven(*map(jnp.asarray, (small.entries[_START][:, 0], small.matrix, entry, driven))))
+    states = np.asarray(_driven(*map(as_array, (small.entries[_START][:, 0], small.matrix, entry, driven))))
     hair = loop.dt / 2
     recorded = np.arange(len(around.time)) % every == 0
     inside = recorded & (around.time >= window[0] - hair) & (around.time <= window[1] + hair)

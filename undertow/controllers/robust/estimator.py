@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.arrays import as_array
 from undertow.core.param import Param, param
 from undertow.estimation.fuzzy_system import FuzzySystem
 
@@ -71,6 +72,7 @@ class Estimator(eqx.Module):
         basis = self.fuzzy.basis(error[:, None])
         return Estimate(error, basis, self.fuzzy.output(state.weights, basis))
 
+    @eqx.filter_jit
     def gains(self, dt: Float[Array, ""]) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
         """Correction of the rates (1) and of d_hat (1/s) per modelling error."""
         decay = jnp.exp(-self.damping * self.bandwidth * dt)
@@ -129,7 +131,12 @@ def widened(fuzzy: FuzzySystem, bandwidth, damping, bound) -> FuzzySystem:
         damping: zeta.
         bound: theta_max, m/s^2 and rad/s^2; without a finite one the sets are unchanged.
     """
-    slope = jnp.abs(jax.jacfwd(lambda x: fuzzy.basis(x[None, None])[0])(jnp.zeros(()))).sum()
-    reach = jnp.asarray(bound, dtype=float) * slope / (_ADDED * 2 * jnp.asarray(damping) * jnp.asarray(bandwidth))
-    factor = jnp.maximum(_LEAST, jnp.max(jnp.where(jnp.isfinite(reach), reach, _LEAST)))
+    factor = _widening(fuzzy, *map(as_array, (bandwidth, damping, bound)))
     return FuzzySystem(factor * fuzzy.centres, factor * fuzzy.widths, evenly_spaced=fuzzy.evenly_spaced)
+
+
+@eqx.filter_jit
+def _widening(fuzzy: FuzzySystem, bandwidth: Array, damping: Array, bound: Array) -> Float[Array, ""]:
+    slope = jnp.abs(jax.jacfwd(lambda x: fuzzy.basis(x[None, None])[0])(jnp.zeros(()))).sum()
+    reach = bound * slope / (_ADDED * 2 * damping * bandwidth)
+    return jnp.maximum(_LEAST, jnp.max(jnp.where(jnp.isfinite(reach), reach, _LEAST)))
