@@ -165,6 +165,24 @@ def test_metres_and_radians_never_make_one_number():
     np.testing.assert_array_equal(peaks, np.abs(series["weights"]).max((0, 2)))
 
 
+def test_energy_is_that_of_the_ledger_where_there_is_one():
+    """Between two times, in a made-up run whose power at the samples says something else."""
+    gathered, times = Metrics(0.1, 0.3), np.arange(5) / 10
+    names = ("error", "reference", "uncertainty", "input", "saturated")
+    still = {name: jnp.zeros(1) for name in names} | {"bad_readings": jnp.zeros(())}
+
+    def energy(**series):
+        at = lambda k: still | {name: jnp.asarray(values[k]) for name, values in series.items()}
+        state = gathered.init(at(0))
+        for k, t in enumerate(times):
+            state = gathered.update(state, jnp.asarray(t), at(k))
+        return gathered.values(state)["energy"]
+
+    power = np.stack([100 * times, 0 * times], axis=-1)
+    assert energy(power=power) == pytest.approx(50 * (0.3**2 - 0.1**2))
+    assert energy(power=power, energy_source=7.0 + times**3) == pytest.approx(0.3**3 - 0.1**3)
+
+
 def test_units_of_metrics_of_the_outputs():
     arm, law = two_link_arm(), lambda plant: rcaf(plant.model(), preset="robust", sampling_time=DT)
     loop = ClosedLoop(arm, law(arm), setpoint(np.zeros(2)), none(), perfect())

@@ -118,7 +118,7 @@ def _replayed(replays: Sequence[Replay], found: Findings) -> str:
 def _rows(rows: Rows, words: int = 1) -> Html:
     """A table; its first columns hold words, the others numbers."""
     cells = [tuple(map(_cell, row)) for row in rows.rows]
-    return table(rows.head, cells, numeric=range(words, len(rows.head)), wide=len(rows.head) > 3)
+    return table(rows.head, cells, numeric=range(words, len(rows.head)))
 
 
 def _cell(content: str) -> Html:

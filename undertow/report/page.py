@@ -53,8 +53,8 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
         numeric: columns set to the right.
         wide: too wide for a phone; keeps its width and scrolls.
 
-    A table whose numbers need more than the width of a phone has a hint that it scrolls, too; there the first column
-    stays in view.
+    On a phone the first column of the other tables stays in view, and those whose numbers need more than its width have
+    a hint that they scroll, too.
     """
     style = lambda column: {"class_": "number"} if column in numeric else {}
     titles = tag("tr", *(tag("th", cell, scope="col", **style(i)) for i, cell in enumerate(head)))
