@@ -1,6 +1,7 @@
 """One closed loop from Python: what `undertow simulate` does, one level down."""
 
 import dataclasses
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from undertow.analysis.metrics import for_people, meanings
+from undertow.analysis.metrics import for_people, infinite, meanings
 from undertow.analysis.success import Success, criterion_of
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
@@ -97,12 +98,18 @@ class Run:
         lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.dataset.attrs['status_sentence']}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
         for name, metric in metrics_of(self.dataset).items():
-            value, unit = for_people(whole[name], metric.unit)
-            late = f"{for_people(steady[name], metric.unit)[0]:.4g}" if steady and name in steady else "-"
-            lines.append(f"  {name:<20}{late:>12}{value:>12.4g}  {unit}".rstrip())
+            late, value = (_shown(each.get(name), metric.unit) for each in (steady or {}, whole))
+            lines.append(f"  {name:<20}{late:>12}{value:>12}  {for_people(0.0, metric.unit)[1]}".rstrip())
         if self.success is not None:
             lines.append(f"  {self.success.sentence(metrics_of(self.dataset))}")
         return "\n".join(lines)
+
+
+def _shown(value: float | None, unit: str) -> str:
+    """A metric in four digits as people read it; a dash for one that is not defined."""
+    if value is None:
+        return "-"
+    return infinite(unit) if math.isinf(value) else f"{for_people(value, unit)[0]:.4g}"
 
 
 def simulate(

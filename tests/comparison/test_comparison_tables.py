@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.comparison.findings import find
+from undertow.comparison.findings import Median, find
 from undertow.comparison.sentences import digits, sentences
-from undertow.comparison.tables import medians, table
+from undertow.comparison.tables import median, medians, table
+from undertow.core.metric import Metric
+from undertow.report.run_tables import metrics_rows
 
 TRIALS = 10
 
@@ -50,9 +52,18 @@ def test_medians(findings):
     rows = {row[0]: row[1:] for row in medians(findings).rows}
     assert rows["completed trials"] == ("10 of 10", "10 of 10", "8 of 10")
     assert rows["within the criterion of success"] == ("10 of 10", "10 of 10", "8 of 8")
-    assert rows["position rms (m)"][:2] == ("1.04 [1.01, 1.08]", "0.59 [0.52, 0.66]*")
-    assert rows["attitude rms (deg)"][0] == "5.5 [2, 9]"
+    assert rows["position rms per axis (m)"][:2] == ("1.04 [1.01, 1.08]", "0.59 [0.52, 0.66]*")
+    assert rows["attitude rms per axis (deg)"][0] == "5.5 [2, 9]"
     assert rows["saturated fraction"] == ("0 [0, 0]",) * 3
+
+
+def test_what_never_happens_is_never():
+    """In the table of a run too; other infinite numbers are `inf`."""
+    assert median(Median(12.1, 5.55, np.inf, 20), "s") == "12.1 [5.55, never]"
+    assert median(Median(np.inf, 5.55, np.inf, 20), "m") == "inf [5.55, inf]"
+    known = {"settling_time": Metric("s", "when it settles"), "position_max": Metric("m", "how far")}
+    rows = metrics_rows(None, {"settling_time": None, "position_max": np.inf}, None, known).rows
+    assert [row[2] for row in rows] == ["never", "inf"], "null is infinity in a result file"
 
 
 def test_sentences(findings):
@@ -77,9 +88,9 @@ def test_latex(findings):
     assert text.startswith(
         "% Needs \\usepackage{booktabs}.\n\\begin{tabular}{lrrr}\n\\toprule\nmetric & a & b\\_1 & c \\\\"
     )
-    assert "position rms (m) & 1.04 [1.01, 1.08] & 0.59 [0.52, 0.66]$^{*}$ & " in text
+    assert "position rms per axis (m) & 1.04 [1.01, 1.08] & 0.59 [0.52, 0.66]$^{*}$ & " in text
     assert "input variation (m/s$^{2}$/s) & $1.04 \\times 10^{-5}$ [" in text
-    assert "b\\_1 $-$ a & position rms (m) & $-$0.455 [" in text and "$-$43.5 \\%" in text
+    assert "b\\_1 $-$ a & position rms per axis (m) & $-$0.455 [" in text and "$-$43.5 \\%" in text
     for line in text.splitlines():
         if "&" in line:
             assert line.count(" & ") in (3, 6) and line.endswith(" \\\\")

@@ -60,9 +60,13 @@ def test_a_moving_target_has_no_settling_time():
 
 
 def test_until_a_window_ends():
-    """What comes after the window does not count: a load that unsettles it later."""
-    assert settling(setpoint([1.0, 1.0]), stop=1.0)[0] == np.inf
-    assert settling(setpoint([1.0, 1.0]), stop=12.0)[0] == settling(setpoint([1.0, 1.0]))[0] < 12.0
+    """What comes after the window does not count: a load that unsettles it later.
+
+    To enter the band last at 11.91 s says nothing by 12 s, when less than a tenth of the time has passed since.
+    """
+    stopped = lambda stop: settling(setpoint([1.0, 1.0]), stop=stop)[0]
+    assert stopped(1.0) == stopped(12.0) == np.inf
+    assert stopped(14.0) == settling(setpoint([1.0, 1.0]))[0] == pytest.approx(11.91, abs=DT)
 
 
 def test_never_and_no_way_to_go():
@@ -159,6 +163,24 @@ def test_metres_and_radians_never_make_one_number():
     assert not {"estimation_rms", "weights_peak", "tracking_rms"} & set(found)
     peaks = gathered.per_axis(state)["weights_peak_axes"]
     np.testing.assert_array_equal(peaks, np.abs(series["weights"]).max((0, 2)))
+
+
+def test_energy_is_that_of_the_ledger_where_there_is_one():
+    """Between two times, in a made-up run whose power at the samples says something else."""
+    gathered, times = Metrics(0.1, 0.3), np.arange(5) / 10
+    names = ("error", "reference", "uncertainty", "input", "saturated")
+    still = {name: jnp.zeros(1) for name in names} | {"bad_readings": jnp.zeros(())}
+
+    def energy(**series):
+        at = lambda k: still | {name: jnp.asarray(values[k]) for name, values in series.items()}
+        state = gathered.init(at(0))
+        for k, t in enumerate(times):
+            state = gathered.update(state, jnp.asarray(t), at(k))
+        return gathered.values(state)["energy"]
+
+    power = np.stack([100 * times, 0 * times], axis=-1)
+    assert energy(power=power) == pytest.approx(50 * (0.3**2 - 0.1**2))
+    assert energy(power=power, energy_source=7.0 + times**3) == pytest.approx(0.3**3 - 0.1**3)
 
 
 def test_units_of_metrics_of_the_outputs():

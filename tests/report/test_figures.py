@@ -247,10 +247,12 @@ def test_results_without_names_have_numbers(make_run):
     assert [panel.get_title(loc="left") for panel in run_figures(run)["effort"].axes] == ["input 1", "input 2"]
 
 
-def test_small_values_have_their_power_of_ten_in_the_unit(make_run):
+@pytest.mark.parametrize(("unit", "label"), [("V", "\u00b5V"), ("N m", "\u00b5N m"), ("A^2", "$10^{-6}$ A^2")])
+def test_small_values_have_a_prefix_or_their_power_of_ten_in_the_unit(make_run, unit, label):
+    """A prefix before a power would be raised with it."""
     run = make_run(axes=1, inputs=1)
-    run["input"] = 2e-5 * np.sin(run["time"]) + 0 * run["input"]
+    run["input"] = (2e-5 * np.sin(run["time"]) + 0 * run["input"]).assign_attrs(units=unit)
     run["commanded_input"] = run["input"]
     panel = run_figures(run)["effort"].axes[0]
-    assert panel.get_ylabel() == "input, $10^{-6}$ V"
+    assert panel.get_ylabel() == f"input, {label}"
     assert panel.yaxis.get_major_formatter()(-1e-5, 0) == "\u221210"

@@ -8,7 +8,7 @@ from undertow.report.formats import chip, number, percent, prose
 from undertow.report.page import Html, document, join, table, tag, text
 from undertow.report.reproduction.report import write_report
 
-VOID = {"meta", "img", "br"}
+VOID = {"meta", "img", "br", "wbr"}
 
 
 class Checked(HTMLParser):

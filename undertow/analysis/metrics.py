@@ -26,8 +26,10 @@ Scalar = Float[Array, ""]
 # Sampling times are k * dt in floating point: a window takes its borders in.
 _HAIR = 1e-9  # s
 
-# Share of the way to the last target that the error must leave no more to be settled.
-_SETTLED = 0.02
+# Share of the way to the last target that the error must leave no more to be settled, and the share of the time at the
+# end during which it must have stayed: an error that crosses the band again and again is inside it at some last moment
+# too, and the shorter that moment, the less it says about what follows. A tenth leaves most of a run for settling.
+_SETTLED, _STAYS = 0.02, 0.1
 _NO_WAY = 1e-9  # m, rad; an axis that has no further to go has nothing to settle
 
 
@@ -46,7 +48,7 @@ class MetricsState(NamedTuple):
     weights_peak: PerAxis | None  # None for a law without weights
     bad_readings: Scalar
     settling: "Settling"
-    previous: Any  # (t, input, power, inside) of the sample before
+    previous: Any  # (t, input, supply, inside) of the sample before
 
 
 class Settling(NamedTuple):
@@ -76,7 +78,7 @@ class Settling(NamedTuple):
         Of results on the host, whose leaves may have leading axes.
         """
         last, resting = self.last[..., None], self.resting[..., None]
-        found = np.where(self.since < last, self.since, np.inf)
+        found = np.where(self.since < (1 - _STAYS) * last, self.since, np.inf)
         return np.where((np.abs(self.start + self.target) > _NO_WAY) & (resting > 0), found, np.nan)
 
 
@@ -144,8 +146,9 @@ class Metrics(AbstractAccumulator):
 
     def update(self, state: MetricsState, t: Scalar, signals: Signals) -> MetricsState:
         inside = jnp.where((t >= self.start - _HAIR) & (t <= self.stop + _HAIR), 1.0, 0.0)
-        last_t, last_input, last_power, last_inside = state.previous
-        power, between = signals["power"].sum(), inside * last_inside
+        last_t, last_input, last_supply, last_inside = state.previous
+        between = inside * last_inside
+        supply, energy = _supplied(signals, last_supply, t - last_t)
         size, applied = jnp.abs(signals["error"]), signals["input"]
         weights_peak = state.weights_peak
         if weights_peak is not None:
@@ -158,12 +161,12 @@ class Metrics(AbstractAccumulator):
             input_peak=jnp.maximum(state.input_peak, inside * jnp.abs(applied).max()),
             variation=state.variation + between * jnp.abs(applied - last_input).mean(),
             span=state.span + between * (t - last_t),
-            energy=state.energy + between * (t - last_t) * (power + last_power) / 2,
+            energy=state.energy + between * energy,
             saturated=state.saturated + inside * signals["saturated"].mean(),
             weights_peak=weights_peak,
             bad_readings=jnp.maximum(state.bad_readings, inside * signals["bad_readings"].astype(inside.dtype)),
             settling=state.settling.updated(t, signals, t <= self.stop + _HAIR),
-            previous=(t, applied, power, inside),
+            previous=(t, applied, supply, inside),
         )
 
     def values(self, state: MetricsState) -> dict[str, np.ndarray]:
@@ -199,6 +202,18 @@ class Metrics(AbstractAccumulator):
             found["weights_peak_axes"] = state.weights_peak.tolist()
         settled = state.settling.times()
         return found if np.isnan(settled).all() else found | {"settling_time_axes": settled.tolist()}
+
+
+def _supplied(signals: Signals, before: Scalar, span: Scalar) -> tuple[Scalar, Scalar]:
+    """What the energy supplied since the sample before, J, follows from, and that energy.
+
+    The ledger is integrated with the plant. Without one only the power at the samples is known, right after a step of
+    the input, and not how it goes on until the next.
+    """
+    if "energy_source" in signals:
+        return signals["energy_source"], signals["energy_source"] - before
+    power = signals["power"].sum()
+    return power, span * (power + before) / 2
 
 
 class Windowed(AbstractAccumulator):
@@ -278,14 +293,14 @@ def _over_series(gathered: Gathered, time: Array, signals: Signals) -> tuple[Any
 
 
 # Metrics of the outputs: each comes for those in m, for those in rad (the short way round), or for all where they
-# share another unit.
+# share another unit. An rms per axis is the root of the mean square over the samples and over these axes.
 _OF_OUTPUTS = {
-    "error_rms": Metric("[axis]", "rms of the tracking error x_d - x"),
-    "error_max": Metric("[axis]", "largest tracking error"),
-    "estimation_rms": Metric("[axis]/s^2", "rms of d_hat - d"),
-    "uncertainty_rms": Metric("[axis]/s^2", "rms of the uncertainty d = x_ddot - F - G u"),
-    "robust_rms": Metric("[axis]/s^2", "rms of the robust term u_r"),
-    "model_rms": Metric("[axis]/s", "rms of the modelling error x_hat_dot - x_dot"),
+    "error_rms": Metric("[axis]", "rms per axis of the tracking error x_d - x"),
+    "error_max": Metric("[axis]", "largest tracking error of any axis"),
+    "estimation_rms": Metric("[axis]/s^2", "rms per axis of d_hat - d"),
+    "uncertainty_rms": Metric("[axis]/s^2", "rms per axis of the uncertainty d = x_ddot - F - G u"),
+    "robust_rms": Metric("[axis]/s^2", "rms per axis of the robust term u_r"),
+    "model_rms": Metric("[axis]/s", "rms per axis of the modelling error x_hat_dot - x_dot"),
     "weights_peak": Metric("[axis]/s^2", "largest |theta|, which shows parameter drift"),
 }
 _WHICH = {"position": "outputs in m", "attitude": "outputs in rad", _ALL: "outputs that share another unit"}
@@ -302,9 +317,17 @@ MEANINGS = {
     "input_rms": Metric("[input]", "rms of the applied input over all inputs"),
     "input_peak": Metric("[input]", "largest applied input"),
     "input_variation": Metric("[input]/s", "total variation of the input per second, mean over inputs (chattering)"),
-    "energy": Metric("J", "electrical energy supplied"),
+    "energy": Metric(
+        "J",
+        "electrical energy supplied: energy_source of the energy ledger, or, without one, the power at the samples by "
+        "the trapezium rule",
+    ),
     # Infinite if it never settles; not defined for a reference that moves until the end.
-    "settling_time": Metric("s", "time after which the reference rests and the error stays within 2 % of the step"),
+    "settling_time": Metric(
+        "s",
+        "time after which the reference rests and the error stays within 2 % of the step, at least for the last 10 % "
+        "of the run",
+    ),
     "saturated_fraction": Metric("", "share of the time, mean over inputs, at which an input is saturated"),
     "bad_readings": Metric("", "number of readings that were not finite, left out or replaced by expected values"),
     "energy_balance_residual": Metric(
@@ -354,3 +377,14 @@ def gathered_meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> d
 def for_people(value: float, unit: str) -> tuple[float, str]:
     """A value and its unit as tables show them: angles in degrees."""
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
+
+
+def infinite(unit: str) -> str:
+    """What tables say in place of an infinite value: a time that does not come is `never`."""
+    return "never" if unit == "s" else "inf"
+
+
+def titled_name(metric: str) -> str:
+    """A metric as words of a heading, which say that the rms of several axes is per axis."""
+    of_outputs = metric in PER_AXIS and metric.endswith("_rms")
+    return metric.replace("_", " ") + (" per axis" if of_outputs else "")

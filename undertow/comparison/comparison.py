@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from undertow.comparison.findings import Findings
     from undertow.comparison.paired import Difference
 
-# Metrics that are compared, where they are defined: those that mean the same for every law. Smaller is better.
+# Metrics that are compared, where they are defined: those that mean the same for every law.
 _COMPARED = (
     "position_rms",
     "attitude_rms",

@@ -7,10 +7,10 @@ import re
 from collections.abc import Callable
 from typing import NamedTuple
 
-from undertow.analysis.metrics import for_people
+from undertow.analysis.metrics import for_people, infinite, titled_name
 from undertow.comparison.findings import Findings, Median
 from undertow.comparison.paired import Difference
-from undertow.comparison.sentences import digits, metric_name, relative
+from undertow.comparison.sentences import digits, relative
 
 NOTE = (
     "Median over completed trials [95 % interval of the median]; metrics of the steady window. "
@@ -65,14 +65,19 @@ def median(one: Median, unit: str) -> str:
     """A median with its interval, in the unit of tables for people."""
     if math.isnan(one.value):
         return _NOTHING
-    value, low, high = (digits(for_people(number, unit)[0]) for number in one[:3])
+    value, low, high = (value_in(number, unit) for number in one[:3])
     return value if math.isnan(one.low) else f"{value} [{low}, {high}]"
+
+
+def value_in(number: float, unit: str) -> str:
+    """A value in the unit of tables for people, without its name."""
+    return infinite(unit) if math.isinf(number) else digits(for_people(number, unit)[0])
 
 
 def titled(found: Findings, metric: str) -> str:
     """A metric with its unit."""
     unit = for_people(0.0, found.units[metric])[1]
-    return f"{metric_name(metric)} ({unit})" if unit else metric_name(metric)
+    return f"{titled_name(metric)} ({unit})" if unit else titled_name(metric)
 
 
 def _is(one: Difference, metric: str) -> bool:

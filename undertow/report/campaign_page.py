@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from undertow.analysis.metrics import for_people
+from undertow.analysis.metrics import for_people, infinite, titled_name
 from undertow.campaign.campaign_schema import Distribution
 from undertow.campaign.columns import ENDINGS
 from undertow.campaign.labels import words
@@ -274,7 +274,7 @@ def _words(spread: Distribution) -> str:
 
 def _headed(results: Results, name: str) -> Html:
     """A metric and its unit; angles in degrees."""
-    return join(_metric(name), " ", unit(_people(results, name)[1]))
+    return join(titled_name(name), " ", unit(_people(results, name)[1]))
 
 
 def _people(results: Results, name: str) -> tuple[float, str]:
@@ -289,5 +289,7 @@ def _shown(results: Results, name: str, value: float | None) -> Html:
 def _spread(results: Results, name: str, quantiles: Mapping[str, float] | None) -> Html:
     if quantiles is None:
         return number(None)
-    low, middle, high = (number(for_people(value, results.unit(name))[0]) for value in quantiles.values())
+    of = results.unit(name)
+    said = lambda value: infinite(of) if np.isinf(value) else number(for_people(value, of)[0])
+    low, middle, high = map(said, quantiles.values())
     return join(middle, " [", low, ", ", high, "]")

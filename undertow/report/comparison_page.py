@@ -1,16 +1,18 @@
-"""The page of a comparison: the findings, how each contestant was tuned, figures, differences and configuration."""
+"""The page of a comparison: the findings, how each controller was tuned, figures, differences and configuration."""
 
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import xarray as xr
+
 from undertow.campaign.store_results import Results
 from undertow.comparison.comparison import Comparison
 from undertow.comparison.findings import Findings
 from undertow.comparison.sentences import HOW, sentences
-from undertow.comparison.tables import NOTE, Rows, medians, paired
+from undertow.comparison.tables import NOTE, Rows, medians, paired, titled, value_in
 from undertow.report.campaign_page import asked
-from undertow.report.figures.comparison import comparison_plots
+from undertow.report.figures.comparison import alike, comparison_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
@@ -18,20 +20,23 @@ from undertow.report.replay.replay_data import Replay
 from undertow.report.replay.replay_section import replay_looks, replay_section
 
 _CAPTIONS = {
-    "differences": "Each point is one trial: the metric of the contestant less that of the first one, with the same "
-    "sample and seed. The diamond is the median, the bar its 95 % bootstrap interval. Left of zero the contestant has "
-    "the smaller value.",
-    "histories": "Euclidean norm of the tracking error. Lines end where a run failed. The area holds 5 % to 95 % of "
-    "the trials that were running at that time.",
-    "plan": "Positions north and east in the first trial, with the same seed for all. A cross marks a failure.",
+    "differences": "Each point is one trial: the metric of a {one} less that of the first {one}, with the same sample "
+    "and seed. The diamond is the median, the bar its 95 % bootstrap interval. Left of zero the {one} has the smaller "
+    "value.",
+    "histories": "Tracking error per axis: the root of its mean square over the axes, whose rms over the steady window "
+    "is the metric of the table. Lines end where a run failed. The area holds 5 % to 95 % of the trials that were "
+    "running at that time.",
+    "plan": "Positions north and east in the first trial, with the same seed for each {one}, on axes that fit the "
+    "completed runs. A dot marks the end of the reference, a cross a failure.",
     "distributions": "Empirical cumulative distribution functions, with one step per trial. A curve that ends below 1 "
-    "has failed trials. Smaller values are better.",
+    "has failed trials.",
 }
+_COMPARED = ("controller", "scenario")  # what is compared, by name; else values of a key or variants of a campaign
 _REPLAY = "The first trial, as in the figures of time histories and paths, with the same seed for all."
 
 _FAIR = (
-    "A comparison with a rival that was not tuned says little. The folder `scenarios` beside this page has the "
-    "scenario of each contestant: `undertow tune scenarios/NAME.yaml` tunes its gains, and `--controllers` takes the "
+    "A comparison with a controller that was not tuned says little. The folder `scenarios` beside this page has the "
+    "scenario of each {one}: `undertow tune scenarios/NAME.yaml` tunes its gains, and `--controllers` takes the "
     "`tuned.yaml` that this writes."
 )
 
@@ -52,18 +57,22 @@ def write_comparison(
         subject: what is simulated, in words.
         folder: of the page.
         pdf: width of PDF files; None for none.
-        replays: of one trial of the contestants; none for a page without a replay.
+        replays: of one trial of the controllers; none for a page without a replay.
 
     Raises:
         OSError: the folder cannot be written.
     """
     found = comparison.findings
+    one = found.dimension if found.dimension in _COMPARED else "variant"
     saved = save_all(lambda: comparison_plots(comparison.dataset, found), folder / "figures", pdf)
     title = f"Comparison: {', '.join(found.names)}"
     figures = [
-        figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
+        figure(vector.read_text(encoding="utf-8"), name, caption, prose(caption))
         for name, vector in saved.vectors.items()
+        for caption in [_CAPTIONS[name].format(one=one)]
     ]
+    if said := _alike(comparison.dataset, found):
+        figures.insert(0, tag("p", prose(said)))
     page = document(
         title,
         tag("h1", prose(title)),
@@ -74,7 +83,7 @@ def write_comparison(
         bullets([prose(sentence) for sentence in sentences(found)]),
         *([_differing(found)] if found.differing else []),
         *([replay_section(replays, _replayed(replays, found))] if replays else []),
-        section("tuning", "Tuning", tag("p", prose(_FAIR)), _tuning(found.tuning)),
+        section("tuning", "Tuning", tag("p", prose(_FAIR.format(one=one))), _tuning(one, found.tuning)),
         section("figures", "Figures", *figures),
         section("endings", "Status of the trials", _endings(found)),
         section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), words=2)),
@@ -94,6 +103,13 @@ def _lead(found: Findings, subject: str) -> str:
     return f"{of}{found.trials} trials for each, with the same samples and seeds."
 
 
+def _alike(dataset: xr.Dataset, found: Findings) -> str:
+    """A sentence on the metrics that no figure shows, because they have one value only; empty without any."""
+    same = alike(dataset, found)
+    each = ", ".join(f"{titled(found, metric)}: {value_in(one, found.units[metric])}" for metric, one in same.items())
+    return f"The same in all completed trials, and therefore not shown in figures: {each}." if same else ""
+
+
 def _replayed(replays: Sequence[Replay], found: Findings) -> str:
     shown = ", ".join(replay.label for replay in replays)
     return _REPLAY if len(replays) == len(found.names) else f"{_REPLAY} Shown: {shown}."
@@ -102,7 +118,7 @@ def _replayed(replays: Sequence[Replay], found: Findings) -> str:
 def _rows(rows: Rows, words: int = 1) -> Html:
     """A table; its first columns hold words, the others numbers."""
     cells = [tuple(map(_cell, row)) for row in rows.rows]
-    return table(rows.head, cells, numeric=range(words, len(rows.head)), wide=len(rows.head) > 3)
+    return table(rows.head, cells, numeric=range(words, len(rows.head)))
 
 
 def _cell(content: str) -> Html:
@@ -116,8 +132,8 @@ def _differing(found: Findings) -> Html:
     return section("scenarios", "What differs", table(("key", *found.names), rows, wide=len(found.names) > 2))
 
 
-def _tuning(tuning: Mapping[str, str]) -> Html:
-    return table(("contestant", "gains"), [(name, prose(sentence)) for name, sentence in tuning.items()])
+def _tuning(one: str, tuning: Mapping[str, str]) -> Html:
+    return table((one, "gains"), [(name, prose(sentence)) for name, sentence in tuning.items()])
 
 
 def _endings(found: Findings) -> Html:

@@ -7,6 +7,9 @@ from collections.abc import Callable, Sequence
 from importlib.resources import files
 from typing import Any
 
+# Letters in the width of a phone, and those that the space between two columns takes.
+_PHONE, _BETWEEN = 46, 2.5
+
 
 class Html(str):
     """Markup, put into a page as it is. Every other text is escaped."""
@@ -49,6 +52,9 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
         rows: cells, the first of a row names it.
         numeric: columns set to the right.
         wide: too wide for a phone; keeps its width and scrolls.
+
+    On a phone the first column of the other tables stays in view, and those whose numbers need more than its width have
+    a hint that they scroll, too.
     """
     style = lambda column: {"class_": "number"} if column in numeric else {}
     titles = tag("tr", *(tag("th", cell, scope="col", **style(i)) for i, cell in enumerate(head)))
@@ -58,7 +64,20 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
         first = tag("th", row[0], scope="row", **style(0))
         body.append(tag("tr", first, *(tag("td", cell, **style(i)) for i, cell in enumerate(row[1:], 1))))
     whole = tag("table", *head_rows, tag("tbody", *body), class_="wide" if wide else "fit")
-    return tag("div", whole, class_="scroll wide" if wide else "scroll", tabindex="0")
+    scrolls = wide or _letters(head, rows, numeric) > _PHONE
+    return tag("div", whole, class_="scroll wide" if scrolls else "scroll", tabindex="0")
+
+
+def _letters(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[int]) -> float:
+    """Letters in the width below which a table scrolls: columns of numbers do not break, others do between words."""
+    plain = lambda cell: html.unescape(re.sub(r"<(?!wbr)[^>]*>", "", text(cell)).replace("<wbr>", " "))
+    widest: dict[int, int] = {}
+    for row in (head, *rows):
+        for column, cell in enumerate(row):
+            whole = column in numeric and row is not head
+            parts = [plain(cell)] if whole else plain(cell).split()
+            widest[column] = max([widest.get(column, 0), *map(len, parts)])
+    return sum(widest.values()) + _BETWEEN * len(widest)
 
 
 def figure(picture: str | bytes, name: str, alternative: str, caption: Any) -> Html:

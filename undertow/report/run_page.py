@@ -15,7 +15,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import Saved, save_all
 from undertow.report.formats import number, prose
-from undertow.report.page import Html, document, figure, section, table, tag
+from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text
 from undertow.report.replay.replay_data import Replay, replay_of
 from undertow.report.replay.replay_section import not_made, replay_looks, replay_section
 from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
@@ -28,7 +28,7 @@ _DIGITS = 4
 _CAPTIONS = {
     "tracking": "Desired and actual outputs.",
     "error": "Size of the tracking error on a logarithmic scale; for attitude, of the difference of the angles.",
-    "estimate": "Lumped uncertainty, measured from the true acceleration, and the controller's estimate of it.",
+    "estimate": "Lumped uncertainty, measured from the true acceleration (grey), and the controller's estimate of it.",
     "effort": "Commanded input, and the input that was applied within the limits.",
     "certificate": "Lyapunov function of the stability proof and its rate along the run, and the fuzzy weights.",
     "measurement": "What the controller received less the true outputs and rates.",
@@ -98,7 +98,7 @@ def _page(
     metrics = json.loads(run.attrs["metrics"])
     measured = metrics_rows(metrics["steady"], metrics["whole"], window, metrics_of(run), predicted)
     certificate = certificate_of(run)
-    sections = [replay, section("metrics", measured.title, _table(measured))]
+    sections = [replay, section("metrics", measured.title, _table(measured), _meanings(measured))]
     if certificate is not None:
         hypotheses = certificate_rows(certificate, window)
         below = [tag("p", prose(one)) for one in hypotheses.sentences]
@@ -120,10 +120,24 @@ def _page(
 
 
 def _table(rows: RunTable) -> Html:
-    numeric = [place for place, title in enumerate(rows.head) if place and title != "unit"]
+    """A table of a run. Units stand beside the names, where a narrow screen shows them without scrolling."""
     shown = lambda cell: prose(cell) if isinstance(cell, str) else number(cell, _DIGITS)
-    cells = [[shown(cell) for cell in row] for row in rows.rows]
-    return table([prose(title) for title in rows.head], cells, numeric=numeric)
+    named = lambda name: _explained(name, rows.meanings[name]) if name in rows.meanings else prose(name)
+    columns = sorted(range(len(rows.head)), key=lambda place: (place > 0, rows.head[place] != "unit"))
+    cells = [[named(row[i]) if not i else shown(row[i]) for i in columns] for row in rows.rows]
+    numeric = [place for place, i in enumerate(columns) if i and rows.head[i] != "unit"]
+    return table([prose(rows.head[i]) for i in columns], cells, numeric=numeric)
+
+
+def _explained(name: str, meaning: str) -> Html:
+    """The name of a metric, which may break at its underscores, with its meaning for a pointer that rests on it."""
+    return tag("abbr", Html(text(name).replace("_", "_<wbr>")), title=meaning)
+
+
+def _meanings(rows: RunTable) -> Html:
+    """The meanings of the metrics as a list that opens, for screens without a pointer."""
+    listed = bullets([join(tag("code", name), ": ", prose(meaning)) for name, meaning in rows.meanings.items()])
+    return tag("details", tag("summary", "What the metrics mean"), listed)
 
 
 def _status(run: xr.Dataset) -> str:

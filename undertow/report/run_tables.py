@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from math import isinf
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from undertow.analysis.linearization.response import Comparison
-from undertow.analysis.metrics import for_people
+from undertow.analysis.metrics import for_people, infinite
 from undertow.core.metric import Metric
 
 
@@ -16,6 +17,7 @@ class RunTable(NamedTuple):
     head: tuple[str, ...]
     rows: list[tuple[str | float, ...]]
     sentences: tuple[str, ...] = ()
+    meanings: Mapping[str, str] = MappingProxyType({})  # of what the first column names
 
 
 def metrics_rows(
@@ -29,12 +31,12 @@ def metrics_rows(
     rows = []
     for name, metric in known.items():
         if name in whole:
-            said = lambda values, name=name, metric=metric: _defined(for_people(values[name], metric.unit)[0])
+            said = lambda values, name=name, metric=metric: _measured(values[name], metric.unit)
             shown = [said(predicted) if name in predicted else ""] if predicted else []
             late = said(steady) if steady and name in steady else "-"
             rows.append((name, *shown, late, said(whole), for_people(0.0, metric.unit)[1]))
     head = ("metric", *(("predicted",) if predicted else ()), _span(window), "whole run", "unit")
-    return RunTable("Metrics", head, rows)
+    return RunTable("Metrics", head, rows, meanings={name: known[name].meaning for name, *_ in rows})
 
 
 def prediction_rows(
@@ -44,7 +46,7 @@ def prediction_rows(
     rows = []
     for one in compared:
         unit = known[one.name].unit
-        shown = (_defined(for_people(value, unit)[0]) for value in (one.predicted, one.measured))
+        shown = (_measured(value, unit) for value in (one.predicted, one.measured))
         departs = "-" if isinf(one.departure) else f"{100 * one.departure:.0f} %"
         rows.append((one.name, *shown, departs, for_people(0.0, unit)[1]))
     return RunTable("Prediction", ("metric", "predicted", _span(window), "departs by", "unit"), rows)
@@ -55,7 +57,7 @@ def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float]
     rows = []
     for one in certificate["hypotheses"]:
         if one["whole"] is None:
-            rows.append((one["sentence"], "-", "-", one["unknown"]))
+            rows.append((f"{one['sentence']} (not testable: {one['unknown']})", "-", "-", "-"))
             continue
         first = "never" if one["first_failure"] is None else f"{one['first_failure']:.4g} s"
         rows.append((one["sentence"], _share(one["steady"]), _share(one["whole"]), first))
@@ -97,9 +99,9 @@ def _share(value: float | None) -> str:
     return f"{100 * value:.0f} %"
 
 
-def _defined(value: float | None) -> str | float:
-    """A number, or the word for one that is not: null in JSON, which stands for an infinite value, is `-`."""
-    return "-" if value is None else "never" if value == float("inf") else value
+def _measured(value: float | None, unit: str) -> str | float:
+    """A metric as people read it, or the word for an infinite one, which is null in a result file."""
+    return infinite(unit) if value is None or isinf(value) else for_people(value, unit)[0]
 
 
 def plain(value: str | float) -> str:
@@ -108,4 +110,5 @@ def plain(value: str | float) -> str:
 
 
 def _number(value: float | None) -> str:
-    return plain(_defined(value))
+    """A number of the certificate; a dash for one that is not finite, which is null in a result file."""
+    return "-" if value is None else plain(value)

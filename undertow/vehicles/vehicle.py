@@ -14,7 +14,7 @@ from undertow.core.runtime import double_outside_runs
 from undertow.vehicles.body import Body, rigid_body_mass
 
 _NEAR = 0.1  # share of the largest lever within which a thruster is in the middle
-_UPRIGHT = 0.9  # vertical part of the direction of a thruster that is called vertical
+_PUSHES, _ALONG = {1: "lateral", 2: "vertical"}, 0.9  # body axes, and the part of its direction along one of them
 
 
 class Vehicle(eqx.Module):
@@ -87,12 +87,15 @@ class Vehicle(eqx.Module):
         return self.thruster_positions.shape[0]
 
     def thruster_names(self) -> tuple[str, ...]:
-        """T1, T2, ... with what the pose tells: `T5 vertical bow port` pushes along z, ahead of the origin, to port."""
+        """T1, T2, ... with what the pose tells: `T5 vertical bow port` pushes along z, ahead of the origin, to port.
+
+        One that pushes along y is `lateral`.
+        """
         positions, directions = np.asarray(self.thruster_positions), np.asarray(self.thruster_directions)
         near = _NEAR * max(np.abs(positions).max(), 1e-9)
         found = []
         for number, ((x, y, _), direction) in enumerate(zip(positions, directions, strict=True), 1):
-            words = ["vertical"] if abs(direction[2]) > _UPRIGHT else []
+            words = [word for axis, word in _PUSHES.items() if abs(direction[axis]) > _ALONG]
             words += [word for at, word in ((x, "bow"), (-x, "stern"), (-y, "port"), (y, "starboard")) if at > near]
             found.append(" ".join([f"T{number}", *words]))
         return tuple(found)

@@ -37,7 +37,7 @@ def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterat
     yield Hypothesis("limits", "no input is at its limit", (run["saturated"].values == 0).all(-1))
     full = run["attained_share"].values >= 1 - ROUNDING
     yield Hypothesis("demand", "the command gives the whole required acceleration (sigma = 0)", full)
-    unknown = "G depends on what actuators report"
+    unknown = "G depends on what the actuators report"
     yield Hypothesis("rank", "G has full rank: every axis can be accelerated", _full_rank(law.model, run), unknown)
     yield Hypothesis("measurement", "the measurement is the truth", true("position") & true("velocity"))
     yield Hypothesis("weights", "no weight is at its bound (projection idle)", run["weights_at_bound"].values == 0)
@@ -64,7 +64,7 @@ def of_robust(law: RobustRCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     rho = (np.asarray(fuzzy.basis(as_array(eps.reshape(-1, 1)))) ** 2).sum(-1).reshape(eps.shape)
     still = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
     yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", still)
-    yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records")
+    yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records is not recorded")
 
 
 def _constant(d: np.ndarray) -> np.ndarray:

@@ -1,11 +1,13 @@
 """Figures of a campaign: empirical distribution functions of the metrics, and rank correlations."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from undertow.analysis.metrics import titled_name
 from undertow.report.figures import style
 
 # The metrics to plot, where they are defined.
@@ -16,6 +18,7 @@ _SHOWN = (
     "position_estimation_rms",
     "attitude_estimation_rms",
     "estimation_rms",
+    "energy",
     "input_rms",
     "input_variation",
     "saturated_fraction",
@@ -38,6 +41,21 @@ _LETTER = 0.058  # in, mean width of a letter in its names
 _HUNDREDTH = 0.005  # what rounds to less is zero
 
 
+def looks_of(names: Sequence[str]) -> dict[str, style.Look]:
+    """Colours and dashes of controllers or scenarios that are compared."""
+    return dict(zip(names, itertools.cycle(LOOKS), strict=False))
+
+
+def beside(key: Mapping[str, style.Look]) -> int:
+    """Entries of a key in a line."""
+    return max(1, int(9.4 / (0.8 + 0.065 * max(map(len, key)))))
+
+
+def key_height(key: Mapping[str, style.Look]) -> float:
+    """Height of a key, in."""
+    return 0.2 * -(-len(key) // beside(key))
+
+
 def distributions_figure(
     values: Mapping[str, Mapping[str, np.ndarray]], counts: Mapping[str, int], units: Mapping[str, str]
 ) -> Figure:
@@ -52,12 +70,11 @@ def distributions_figure(
     rows = -(-len(shown) // _COLUMNS)
     names = list(dict.fromkeys(name for each in values.values() for name in each))
     looks = dict(zip(names, LOOKS, strict=False))
-    beside = max(1, int(9.4 / (0.8 + 0.065 * max(map(len, looks)))))  # entries of the key in a line
-    key = 0.2 * -(-len(looks) // beside) if len(looks) > 1 else 0.0
+    key = key_height(looks) if len(looks) > 1 else 0.0
     figure = style.blank(9.6, 0.35 + key + 2.25 * rows)
     style.head(figure, "Empirical CDF of the metrics", {})
     if key:
-        style.key(figure, looks, 0.3, beside)
+        style.key(figure, looks, 0.3, beside(looks))
     for i, metric in enumerate(shown):
         row, column = divmod(i, _COLUMNS)
         panel = style.place(figure, 0.6 + 3.1 * column, 0.65 + key + 2.25 * row, 2.35, 1.45)
@@ -69,9 +86,9 @@ def distributions_figure(
         if everything.min() > 0 and everything.max() > _WIDE * everything.min():
             panel.set_xscale("log")
             panel.xaxis.set_minor_formatter(NullFormatter())  # their numbers would run into one another
-        panel.set_ylim(0, 1)
+        panel.set_ylim(0, 1.04)  # the line at 1 in its whole width
         said = [style.power(unit) for unit in units[metric].split(", ") if unit]
-        words = ", ".join([metric.replace("_", " "), *said])
+        words = ", ".join([titled_name(metric), *said])
         style.label(panel, words, "" if column else "share of the trials", below=0.27)  # clear of powers of ten
     return figure
 

@@ -1,45 +1,61 @@
-"""Figures of a comparison: paired differences, time histories of the error, and the path in the horizontal plane."""
+"""Figures of a comparison: paired differences, time histories of the error, and distributions of the metrics."""
 
-import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from undertow.analysis.metrics import for_people, output_groups
-from undertow.campaign.store_layout import SAMPLES
+from undertow.analysis.metrics import for_people, output_groups, titled_name
 from undertow.comparison.findings import Findings
-from undertow.comparison.sentences import metric_name
 from undertow.core.status import Status
 from undertow.report.figures import style
-from undertow.report.figures.campaign import LOOKS, distributions_figure
+from undertow.report.figures.campaign import beside, distributions_figure, key_height, looks_of
 from undertow.report.figures.limits import fit_log
+from undertow.report.figures.paths import PLANE, plan_figure
 
 _COLUMNS = 3
 _BAND = (0.05, 0.95)
-_PLANE = ("north", "east")
 
 
 def comparison_plots(dataset: xr.Dataset, found: Findings) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a comparison, by name; those for which there is something to show."""
     plots: dict[str, Callable[[], Figure]] = {}
-    if any(one.pairs and one.baseline == found.names[0] for one in found.differences):
+    if _differing(dataset, found):
         plots["differences"] = lambda: differences_figure(dataset, found)
     if "series:error" in dataset:
         plots["histories"] = lambda: histories_figure(dataset, found)
-        if set(_PLANE) <= set(map(str, dataset["axis"].values)):
+        if set(PLANE) <= set(map(str, dataset["axis"].values)):
             plots["plan"] = lambda: plan_figure(dataset, found)
-    if not found.all_equal and found.medians:
+    if not found.all_equal and len(alike(dataset, found)) < len(found.medians):
         plots["distributions"] = lambda: _distributions(dataset, found)
     return plots
+
+
+def alike(dataset: xr.Dataset, found: Findings) -> dict[str, float]:
+    """Metrics that are the same in every completed trial of every controller, and their value; no figure shows them."""
+    same = {}
+    for metric in found.medians:
+        values = np.concatenate([_values(dataset, found, metric, name) for name in found.names])
+        values = values[~np.isnan(values)]
+        if values.size and (values == values[0]).all():
+            same[metric] = float(values[0])
+    return same
+
+
+def _differing(dataset: xr.Dataset, found: Findings) -> list[str]:
+    """Metrics with pairs to compare with the first controller, that differ in some trial of some controller."""
+    paired, same = (
+        {one.metric for one in found.differences if one.baseline == found.names[0] and one.pairs},
+        alike(dataset, found),
+    )
+    return [metric for metric in found.units if metric in paired and metric not in same]
 
 
 def differences_figure(dataset: xr.Dataset, found: Findings) -> Figure:
     """Difference of each contestant from the first one: a point per pair, and the median with its 95 % interval."""
     first, *others = found.names
-    from_first = [one for one in found.differences if one.baseline == first and one.pairs]
-    shown = [metric for metric in found.units if any(one.metric == metric for one in from_first)]
+    shown = _differing(dataset, found)
     rows, tall = -(-len(shown) // _COLUMNS), 0.35 + 0.3 * len(others)
     left = min(2.4, 0.3 + 0.068 * max(map(len, others)))
     figure = style.blank(9.6, 0.45 + rows * (tall + 0.75))
@@ -52,7 +68,7 @@ def differences_figure(dataset: xr.Dataset, found: Findings) -> Figure:
         panel.axvline(0.0, color=style.INK, linewidth=0.8)
         for place, name in enumerate(others):
             one = next(one for one in found.against(name, first) if one.metric == metric)
-            look, scale = LOOKS[(place + 1) % len(LOOKS)], for_people(1.0, found.units[metric])[0]
+            look, scale = looks_of(found.names)[name], for_people(1.0, found.units[metric])[0]
             apart = scale * (_values(dataset, found, metric, name) - _values(dataset, found, metric, first))
             apart = apart[np.isfinite(apart)]
             beside = place + 0.28 * (chance.random(apart.size) - 0.5)
@@ -64,27 +80,30 @@ def differences_figure(dataset: xr.Dataset, found: Findings) -> Figure:
         panel.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
         panel.xaxis.get_offset_text().set_fontsize(style.TINY)
         unit = for_people(0.0, found.units[metric])[1]
-        style.label(panel, ", ".join([metric_name(metric), *([style.power(unit)] if unit else [])]))
+        style.label(panel, ", ".join([titled_name(metric), *([style.power(unit)] if unit else [])]))
         panel.xaxis.set_label_coords(0.5, -0.32 / tall)
     return figure
 
 
 def histories_figure(dataset: xr.Dataset, found: Findings) -> Figure:
-    """Size of the error over time, position and attitude apart: the first trial, and the range of all."""
+    """Error per axis over time, position and attitude apart: the first trial, and the range of all.
+
+    The root of the mean square over the axes: the rms of this curve over a window is the metric of that window.
+    """
     units = dataset["axis"].attrs["unit_of_each"].split(", ")
     groups = output_groups(units) or {"tracking": ("", list(range(len(units))))}
-    looks = _looks(found)
-    key, height = _key_height(looks), 2.0
+    looks, height = looks_of(found.names), 2.0
+    key = key_height(looks)
     figure = style.blank(9.6, 0.5 + key + (height + 0.55) * len(groups))
-    style.head(figure, "Size of the error: first trial (line), 5 % to 95 % of all trials (area)", {})
-    style.key(figure, looks, 0.3, _beside(looks))
+    style.head(figure, "Tracking error per axis: first trial (line), 5 % to 95 % of all trials (area)", {})
+    style.key(figure, looks, 0.3, beside(looks))
     time = dataset["time"].values
     for row, (group, (unit, axes)) in enumerate(groups.items()):
         panel = style.place(figure, 0.72, 0.55 + key + row * (height + 0.55), 8.7, height)
         lines = []
         for i, (name, look) in enumerate(looks.items()):
             rows = dataset.isel({found.dimension: i})
-            sizes = np.linalg.norm(rows["series:error"].values[..., axes], axis=-1)
+            sizes = np.sqrt((rows["series:error"].values[..., axes] ** 2).mean(-1))
             sizes = for_people(1.0, unit)[0] * np.where(time <= rows["ended"].values[:, None], sizes, np.nan)
             some = ~np.isnan(sizes).all(axis=0)
             if len(sizes) > 1:
@@ -94,40 +113,19 @@ def histories_figure(dataset: xr.Dataset, found: Findings) -> Figure:
             lines.append((name, time, sizes[0]))
         fit_log(panel, lines, 0.0)
         panel.set_xlim(time[0], time[-1])
-        style.label(panel, "time, s", f"{group} error, {for_people(0.0, unit)[1]}")
-    return figure
-
-
-def plan_figure(dataset: xr.Dataset, found: Findings) -> Figure:
-    """Paths of the first trial in the horizontal plane, and the reference."""
-    looks = _looks(found)
-    key = {**looks, "reference": style.TRUTH}
-    figure = style.blank(9.6, 5.3 + _key_height(key))
-    style.head(figure, "Path in the horizontal plane, first trial", {})
-    style.key(figure, key, 0.3, _beside(key))
-    panel = style.place(figure, 0.72, 0.5 + _key_height(key), 8.7, 4.3)
-    time, place = dataset["time"].values, lambda one: (one.sel(axis="east").values, one.sel(axis="north").values)
-    for i, look in reversed(list(enumerate(looks.values()))):
-        row = dataset.isel({found.dimension: i, SAMPLES: 0})
-        lived = row.isel(time=time <= float(row["ended"]))
-        panel.plot(*place(lived["series:position"]), **look.line)
-        if int(row["status"]) != int(Status.OK):
-            panel.plot(*(one[-1:] for one in place(lived["series:position"])), "x", color=look.colour, markersize=7)
-    desired = dataset["series:reference"].isel({found.dimension: 0, SAMPLES: 0})
-    panel.plot(*place(desired), **style.TRUTH.line)
-    panel.plot(*(one[-1:] for one in place(desired)), "o", color=style.INK, markersize=3)
-    panel.set_aspect("equal", adjustable="datalim")
-    style.label(panel, "east, m", "north, m")
+        style.label(panel, "time, s", f"{group} error per axis, {for_people(0.0, unit)[1]}")
     return figure
 
 
 def _distributions(dataset: xr.Dataset, found: Findings) -> Figure:
     """Empirical CDFs of the metrics that have them."""
+    same = alike(dataset, found)
     values = {
         metric: {
             name: each[np.isfinite(each)] for name in found.names for each in [_values(dataset, found, metric, name)]
         }
         for metric in found.units
+        if metric not in same
     }
     values = {metric: each for metric, each in values.items() if any(one.size for one in each.values())}
     units = {metric: for_people(1.0, unit) for metric, unit in found.units.items()}
@@ -140,16 +138,3 @@ def _values(dataset: xr.Dataset, found: Findings, metric: str, name: str) -> np.
     """A metric of one contestant in every trial; NaN where it failed."""
     rows = dataset.isel({found.dimension: found.names.index(name)})
     return np.where(rows["status"].values == int(Status.OK), rows[metric].values, np.nan)
-
-
-def _looks(found: Findings) -> dict[str, style.Look]:
-    return dict(zip(found.names, itertools.cycle(LOOKS), strict=False))
-
-
-def _beside(key: Mapping[str, style.Look]) -> int:
-    """Entries of a key in a line."""
-    return max(1, int(9.4 / (0.8 + 0.065 * max(map(len, key)))))
-
-
-def _key_height(key: Mapping[str, style.Look]) -> float:
-    return 0.2 * -(-len(key) // _beside(key))

@@ -1,5 +1,6 @@
 """Ranges of the y axes; values outside are noted above the panel."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,10 @@ from undertow.report.figures import style
 from undertow.report.formats import plain
 
 _SMALL, _LARGE = 1e-2, 1e5  # outside of these tick labels are long
+
+# Powers of ten that have a prefix, and units that take one: the first of a product or quotient, if it is no power.
+_PREFIXES = {-9: "n", -6: "\u00b5", -3: "m", 3: "k", 6: "M"}
+_PREFIXABLE = re.compile(r"(m|rad|s|V|A|N|W|J)(?![\w^$])")
 
 Named = Sequence[tuple[str, np.ndarray, np.ndarray]]  # name, time, values
 
@@ -41,7 +46,8 @@ def _shorten(panel: Axes) -> None:
         return
     power = 3 * int(np.floor(np.log10(size) / 3))
     quantity, _, unit = panel.get_ylabel().rpartition(", ")
-    panel.set_ylabel(f"{quantity}, $10^{{{power}}}$ {unit}")
+    prefixed = power in _PREFIXES and _PREFIXABLE.match(unit)
+    panel.set_ylabel(f"{quantity}, {_PREFIXES[power]}{unit}" if prefixed else f"{quantity}, $10^{{{power}}}$ {unit}")
     panel.yaxis.set_major_formatter(lambda value, _: f"{value / 10.0**power:.4g}".replace("-", "\u2212"))
 
 

@@ -32,14 +32,14 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     desired = recorded.curve(shown, "desired $x_d$", "reference", style.TRUTH)
     actual = recorded.curve(shown, "actual $x$", "position", style.SOLID)
     error = recorded.magnitude(recorded.curve(shown, "|$x_d - x$|", "error", style.SOLID))
-    true = recorded.curve(run, "true $d$", "uncertainty", style.TRUTH)
+    true = recorded.curve(run, "true $d$", "uncertainty", style.MEASURED)
     curves = [true]
     if "estimate" in run:
         curves.append(recorded.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID))
     commanded = recorded.curve(run, "commanded", "commanded_input", style.DASHED)
     applied = recorded.curve(run, "applied", "input", style.SOLID)
     places, errors = recorded.places(shown), recorded.per_axis(shown, "|error|")
-    rates = recorded.per_axis(run, r"$d$, $\hat{d}$", "/s^2")
+    rates = recorded.per_axis(run, "uncertainty", "/s^2")
     levels = recorded.per_input(run, "input")
 
     def plot(what: str, names: list[str], blocks: Callable[[], list[Block]]) -> Callable[[], Figure]:

@@ -33,6 +33,7 @@ class Look(NamedTuple):
 
 
 TRUTH = Look("#000000", (0, (1, 1.8)), 1.1, 4)  # dotted: desired or true
+MEASURED = Look("#8c8c8c", "-", 0.8, 1)  # what an estimate is of: a noisy line under it
 SOLID = Look("#0072b2", "-", 1.1, 3)  # RCAFC, or what the run did
 DASHED = Look("#e07b00", (0, (4, 1.6)), 1.1, 2)  # RAFC, or the second of two
 CONTROLLERS = {"rcafc": ("RCAFC", SOLID), "rafc": ("RAFC", DASHED)}

@@ -17,40 +17,75 @@ function clearCanvas(canvas, width, height) {
   return pen;
 }
 
+// Places of a label beside its point, px: the first that is free is taken, and kept while it stays free.
+const PLACES = [[6, 0], [6, -14], [6, 14], [-6, 0], [-6, -14], [-6, 14], [6, -28], [6, 28], [-6, -28], [-6, 28], [6, -42], [6, 42]];
+
 function paintNames(page, scene, runs, time) {
   const width = page.view.clientWidth, height = page.view.clientHeight;
   const pen = clearCanvas(page.overlay, width, height);
-  const write = (text, point, colour, line = 0) => {
+  const taken = []; // boxes: left, top, right, bottom
+  const seenAt = (point) => {
     const seen = point.clone().project(scene.camera);
-    if (seen.z > 1) return;
-    const [x, y] = [((seen.x + 1) * width) / 2 + 4, ((1 - seen.y) * height) / 2 + 14 * line];
+    return seen.z > 1 ? null : [((seen.x + 1) * width) / 2, ((1 - seen.y) * height) / 2];
+  };
+  const write = (key, text, point, colour) => {
+    const at = seenAt(point);
+    if (!at) return;
+    const long = pen.measureText(text).width;
+    const boxAt = ([right, down]) => {
+      const left = at[0] + (right < 0 ? right - long : right);
+      return [left, at[1] + down - 7, left + long, at[1] + down + 7];
+    };
+    const free = (place) => taken.every((one) => apart(boxAt(place), one));
+    const before = page.places.get(key);
+    const place = (before && free(before) && before) || PLACES.find(free) || PLACES[0];
+    const box = boxAt(place);
+    page.places.set(key, place);
+    taken.push(box);
     pen.lineWidth = 3;
     pen.strokeStyle = "rgba(255,255,255,0.85)";
-    pen.strokeText(text, x, y);
+    pen.strokeText(text, box[0], box[1] + 7);
     pen.fillStyle = colour;
-    pen.fillText(text, x, y);
+    pen.fillText(text, box[0], box[1] + 7);
   };
   const within = (object, point) => object.localToWorld(point);
+  for (const { water, uncertainty, estimate } of scene.vehicles) {
+    for (const arrow of [water, uncertainty, estimate]) if (arrow.visible) taken.push(...alongArrow(arrow, seenAt));
+  }
   scene.vehicles.forEach((vehicle, i) => {
-    const { run } = vehicle;
-    const over = within(vehicle.body, new THREE.Vector3(0, 0, -0.8 * run.size[2]));
-    if (runs.length > 1) write(run.label, over, run.colour, i); // below each other: vehicles often coincide
-    if (!page.labels.checked) return;
+    const over = within(vehicle.body, new THREE.Vector3(0, 0, -0.8 * vehicle.run.size[2]));
+    if (runs.length > 1) write(`run ${i}`, vehicle.run.label, over, vehicle.run.colour);
+  });
+  if (page.labels.checked) {
+    const vehicle = scene.vehicles[Number(page.which.value)], { run } = vehicle; // several vehicles often coincide
     if (vehicle.water.visible) {
       const speed = Math.hypot(...valueAt(run, "water", time));
-      const above = vehicle.water.position.clone().add(new THREE.Vector3(0, 0, -0.12 * run.longest));
-      write(`water ${speed.toFixed(2)} m/s`, within(scene.world, above), COLOUR.water);
+      const tail = within(scene.world, vehicle.water.position.clone());
+      write("water", `water ${speed.toFixed(2)} m/s`, tail, COLOUR.water);
     }
-    if (sizeInView(scene, vehicle, width) < LEAST_FOR_NAMES) return;
-    for (const thruster of run.thrusters) {
-      write(thruster.name.split(" ")[0], within(vehicle.body, vector(thruster.position)), COLOUR.ink);
+    if (sizeInView(scene, vehicle, width) >= LEAST_FOR_NAMES) {
+      run.thrusters.forEach((thruster, j) => {
+        const name = thruster.name.split(" ")[0];
+        write(`thruster ${j}`, name, within(vehicle.body, vector(thruster.position)), COLOUR.ink);
+      });
     }
-  });
+  }
   paintCompass(pen, scene.camera, height);
   pen.fillStyle = "#555555";
   pen.textAlign = "right";
   pen.fillText(`grid ${Number(scene.step.toPrecision(3))} m`, width - 8, height - 12);
   pen.textAlign = "left";
+}
+
+function apart(one, other) {
+  return one[2] < other[0] || other[2] < one[0] || one[3] < other[1] || other[3] < one[1];
+}
+
+// Small boxes along an arrow in the view, which labels keep clear of.
+function alongArrow(arrow, seenAt) {
+  const length = arrow.head.position.y + arrow.head.scale.y / 2;
+  const places = Array.from({ length: 12 }, (_, i) => seenAt(arrow.localToWorld(new THREE.Vector3(0, (i / 11) * length, 0))));
+  return places.filter(Boolean).map(([x, y]) => [x - 5, y - 5, x + 5, y + 5]);
 }
 
 // Length of a vehicle in the view, px.
@@ -87,39 +122,45 @@ function makePanel(page, title, rows, rowHeight, paint) {
   };
 }
 
-const NAMES = 112, NUMBERS = 72; // px, columns of names and numbers
+const NUMBERS = 72; // px, column of numbers
 
-function paintRow(pen, width, top, height, name, number) {
-  const middle = (NAMES + width - NUMBERS) / 2;
+// Width of the column of names, px: that of the longest name of a thruster or an axis, but no more than half.
+function namesWidth(pen, run, width) {
+  const names = [...run.thrusters.map((thruster) => thruster.name), ...run.axes];
+  return Math.min(Math.max(...names.map((name) => pen.measureText(name).width)) + 12, width / 2);
+}
+
+function paintRow(pen, names, width, top, height, name, number) {
+  const middle = (names + width - NUMBERS) / 2;
   pen.fillStyle = COLOUR.ink;
-  pen.fillText(name, 0, top + height / 2, NAMES - 8);
+  pen.fillText(name, 0, top + height / 2, names - 8);
   pen.textAlign = "right";
   pen.fillText(number, width, top + height / 2);
   pen.textAlign = "left";
   pen.fillStyle = COLOUR.faint;
-  pen.fillRect(NAMES, top + height - 1, width - NUMBERS - NAMES, 1);
+  pen.fillRect(names, top + height - 1, width - NUMBERS - names, 1);
   pen.fillRect(middle, top, 1, height);
   return (share, from, thick, colour) => {
-    const length = (Math.max(-1, Math.min(1, share)) * (width - NUMBERS - NAMES)) / 2;
+    const length = (Math.max(-1, Math.min(1, share)) * (width - NUMBERS - names)) / 2;
     pen.fillStyle = colour;
     pen.fillRect(Math.min(middle, middle + length), top + from, Math.abs(length), thick);
   };
 }
 
 function paintThrust(pen, run, width, time) {
-  const thrust = valueAt(run, "thrust", time);
+  const thrust = valueAt(run, "thrust", time), names = namesWidth(pen, run, width);
   run.thrusters.forEach((thruster, i) => {
     const share = shareOfLimit(thruster, thrust[i]);
-    const bar = paintRow(pen, width, 18 * i, 18, thruster.name, `${withDigits(thrust[i], thruster.limits[1])} N`);
+    const bar = paintRow(pen, names, width, 18 * i, 18, thruster.name, `${withDigits(thrust[i], thruster.limits[1])} N`);
     bar(Math.sign(thrust[i]) * share, 4, 10, `#${shareColour(share).getHexString()}`);
   });
 }
 
 function paintUncertainty(pen, run, width, time) {
   const actual = valueAt(run, "uncertainty", time);
-  const estimate = run.series.estimate ? valueAt(run, "estimate", time) : null;
+  const estimate = run.series.estimate ? valueAt(run, "estimate", time) : null, names = namesWidth(pen, run, width);
   run.axes.forEach((axis, i) => {
-    const bar = paintRow(pen, width, 20 * i, 20, axis, withDigits(actual[i], run.scale.uncertainty[i]));
+    const bar = paintRow(pen, names, width, 20 * i, 20, axis, withDigits(actual[i], run.scale.uncertainty[i]));
     bar(actual[i] / run.scale.uncertainty[i], 3, 6, COLOUR.uncertainty);
     if (estimate) bar(estimate[i] / run.scale.uncertainty[i], 10, 6, COLOUR.estimate);
   });
@@ -128,18 +169,18 @@ function paintUncertainty(pen, run, width, time) {
 // One column per rule: up or down by its weight, the darker the more it fires.
 function paintRules(pen, run, width, time) {
   const weights = valueAt(run, "weights", time), firing = run.series.firing ? valueAt(run, "firing", time) : null;
-  const height = 34, column = (width - NAMES) / run.rules;
+  const height = 34, names = namesWidth(pen, run, width), column = (width - names) / run.rules;
   run.axes.forEach((axis, i) => {
     const rows = Array.from({ length: run.rules }, (_, rule) => i * run.rules + rule), top = i * height;
     const most = Math.max(...rows.map((k) => run.peak[k]), 1e-9);
     pen.fillStyle = COLOUR.ink;
     pen.fillText(axis, 0, top + height / 2);
     pen.fillStyle = COLOUR.faint;
-    pen.fillRect(NAMES, top + height / 2, width - NAMES, 1);
+    pen.fillRect(names, top + height / 2, width - names, 1);
     rows.forEach((k, rule) => {
       const tall = (weights[k] / most) * (height / 2 - 2);
       pen.fillStyle = `rgba(0, 90, 160, ${firing ? 0.12 + 0.88 * firing[k] : 0.6})`;
-      const left = NAMES + rule * column + 1, upper = top + height / 2 - Math.max(tall, 0);
+      const left = names + rule * column + 1, upper = top + height / 2 - Math.max(tall, 0);
       pen.fillRect(left, upper, Math.max(column - 2, 1), Math.max(Math.abs(tall), 1));
     });
   });
@@ -167,7 +208,7 @@ function withDigits(value, scale) {
 function showReadings(page, runs, time) {
   const named = (cells) => (runs.length > 1 ? cells : cells.slice(1));
   const row = (kind, cells) => element("tr", {}, ...named(cells).map((cell) => element(kind, {}, cell)));
-  const head = ["", "position error, m", "attitude error, deg", "energy, J"];
+  const head = ["", "|position error|, m", "|attitude error|, deg", "energy, J"];
   const rows = runs.map((run) => {
     const [position, attitude] = valueAt(run, "error", time), [energy] = valueAt(run, "energy", time);
     const ended = time > run.end ? ` (${run.status.replace(/_/g, " ")})` : "";

@@ -47,7 +47,7 @@ function buildPage(box, runs) {
   box.tabIndex = 0;
   return {
     box, view, canvas, overlay, play, slider, time, speed, camera, which, readings, panels, start, end,
-    labels: labels.input, forces: forces.input,
+    labels: labels.input, forces: forces.input, places: new Map(),
   };
 }
 
@@ -62,6 +62,14 @@ function legend(runs) {
     ...(has("water") ? [["water", "velocity of the water"]] : []),
   ];
   return element("ul", { class: "legend" }, ...entries.map(([kind, text]) => element("li", { class: kind }, text)));
+}
+
+// The first time at which the thrusters push half as hard as they ever do, s: at the start they often do not push at all.
+function openingTime(run) {
+  const { frames, width, values } = run.series.thrust;
+  const sizes = Array.from({ length: frames }, (_, i) => Math.hypot(...values.slice(i * width, (i + 1) * width)));
+  const most = sizes.reduce((one, other) => Math.max(one, other), 0);
+  return run.start + (sizes.findIndex((size) => 2 * size >= most) / (frames - 1)) * (run.end - run.start);
 }
 
 function startReplay(box) {
@@ -82,7 +90,8 @@ function startReplay(box) {
     makePanel(page, `${what}, m/s\u00b2, rad/s\u00b2`, (run) => run.axes.length, 20, paintUncertainty),
     makePanel(page, "Fuzzy rules: weight (height), firing (darkness)", ruled, 34, paintRules),
   ];
-  let time = page.start, playing = false, last = 0, asked = false;
+  // The page opens where something happens; until somebody chooses a time, Play begins at the start all the same.
+  let time = openingTime(runs[0]), untouched = true, playing = false, last = 0, asked = false;
 
   const detailed = () => runs[Number(page.which.value)];
   const place = () => valueAt(detailed(), "position", time);
@@ -117,7 +126,8 @@ function startReplay(box) {
   }
 
   function setPlaying(wish) {
-    if (wish && time >= page.end) time = page.start;
+    if (wish && (time >= page.end || untouched)) time = page.start;
+    untouched = false;
     playing = wish;
     last = performance.now();
     ask();
@@ -125,6 +135,7 @@ function startReplay(box) {
 
   function setTime(wish) {
     time = Math.min(Math.max(wish, page.start), page.end);
+    untouched = false;
     ask();
   }
 

@@ -1,0 +1,69 @@
+"""Figures of a comparison: what they draw is what the tables say, and nothing is drawn that is the same for all."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from undertow.comparison.findings import find
+from undertow.report.figures.comparison import alike, comparison_plots
+
+NAMES, TRIALS, TIME = ["a", "b"], 6, np.linspace(0.0, 20.0, 101)
+
+
+@pytest.fixture
+def compared():
+    """Both go 1 m north within 5 s and hold there; `a` to 3 mm, `b` to 10 mm, which fails at 15 s in the first trial."""
+    rng, along = np.random.default_rng(0), ("controller", "sample", "time", "axis")
+    reference = np.stack([np.minimum(TIME / 5, 1.0), 0 * TIME, 0 * TIME], axis=-1)
+    error = np.array([0.003, 0.01])[:, None, None, None] * rng.normal(size=(2, TRIALS, len(TIME), 3))
+    rms = np.sqrt((error[:, :, TIME >= 10] ** 2).mean((2, 3)))
+    status, ended = np.zeros((2, TRIALS), np.int8), np.full((2, TRIALS), 20.0)
+    status[1, 0], ended[1, 0] = 1, 15.0
+    each = ("controller", "sample")
+    dataset = xr.Dataset(
+        {
+            "position_rms": (each, rms, {"units": "m"}),
+            "saturated_fraction": (each, 0 * rms, {"units": "1"}),
+            "status": (each, status),
+            "ended": (each, ended),
+            "success": (each, np.where(status == 0, 1, -1)),
+            "series:error": (along, error),
+            "series:position": (along, reference - error),
+            "series:reference": (along, np.broadcast_to(reference, error.shape)),
+        },
+        {"controller": NAMES, "time": TIME, "axis": ("axis", ["north", "east", "down"], {"unit_of_each": "m, m, m"})},
+    )
+    metrics = ["position_rms", "saturated_fraction"]
+    return dataset, find(dataset, "controller", metrics, dict.fromkeys(NAMES, ""), {})
+
+
+def test_rms_of_the_error_over_time_is_the_metric(compared):
+    dataset, found = compared
+    (panel,) = comparison_plots(dataset, found)["histories"]().axes
+    line = next(one for one in panel.lines if one.get_color() == "#0072b2")
+    late = np.asarray(line.get_ydata())[TIME >= 10]
+    assert np.sqrt((late**2).mean()) == pytest.approx(float(dataset["position_rms"][0, 0]), rel=1e-12)
+
+
+def test_metric_that_is_the_same_for_all_has_no_panel(compared):
+    dataset, found = compared
+    assert alike(dataset, found) == {"saturated_fraction": 0.0}
+    for name in ("differences", "distributions"):
+        assert [panel.get_xlabel() for panel in comparison_plots(dataset, found)[name]().axes] == [
+            "position rms per axis, m"
+        ]
+
+
+def test_paths_have_one_scale_and_the_second_half_another(compared):
+    dataset, found = compared
+    panels = comparison_plots(dataset, found)["plan"]().axes
+    words = [panel.get_title(loc="left") for panel in panels]
+    assert words == ["a, whole run", "b, whole run", "a, 10 to 20 s", "b, 10 to 20 s"]
+    limits = [(*panel.get_xlim(), *panel.get_ylim()) for panel in panels]
+    assert limits[0] == limits[1] and limits[2] == limits[3]
+    held = dataset["series:position"].sel(controller="a", sample=0, axis="north").values[TIME >= 10]
+    assert limits[2][2] < held.min() and held.max() < limits[2][3] < 1.05, "of the completed runs"
+    for panel in panels:  # a metre is as long to the north as to the east
+        shown, size = panel.get_position(), panel.figure.get_size_inches()
+        east, north = np.ptp(panel.get_xlim()), np.ptp(panel.get_ylim())
+        assert shown.width * size[0] / east == pytest.approx(shown.height * size[1] / north)
