@@ -97,6 +97,8 @@ class Run:
         lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.dataset.attrs['status_sentence']}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
         for name, metric in metrics_of(self.dataset).items():
+            if name not in whole:
+                continue
             value, unit = for_people(whole[name], metric.unit)
             late = f"{for_people(steady[name], metric.unit)[0]:.4g}" if steady and name in steady else "-"
             lines.append(f"  {name:<20}{late:>12}{value:>12.4g}  {unit}".rstrip())

@@ -182,14 +182,12 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
 
 def _no_part(name: str, thing: Any) -> BadInput:
     """Error for what a function returns instead of a part."""
-    contract, shared = factory.contract_like(thing)
-    place, kind = place_of(thing), type(thing).__name__
+    place = place_of(thing)
     if not place:
         hint = "Return a vehicle, thruster, plant, controller or another part"
         return BadInput("", "", f"`{name}` returns {thing!r}, which is not a part", hint=hint)
-    hint = f"Derive `{kind}` from {contract}: it has {', '.join(f'`{one}`' for one in shared)}" if contract else ""
-    hint = hint or f"Derive `{kind}` from the contract of its kind, such as AbstractController"
-    return BadInput("", "", f"`{name}` returns a `{kind}`, which is not a part", hint=hint, where=place)
+    says = f"`{name}` returns a `{type(thing).__name__}`, which is not a part"
+    return BadInput("", "", says, hint=factory.derive_hint(thing), where=place)
 
 
 def _check_model_comes_first(function: Callable[..., Any], options: Mapping[str, Any]) -> None:

@@ -26,6 +26,7 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput
 from undertow.core.measurement import completed
+from undertow.core.returned import check_command, check_state
 from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
 from undertow.loop.recorded_signals import RECORDED, Signals
@@ -101,10 +102,17 @@ class Realization(NamedTuple):
 
     def start(self, position: Outputs | None = None, velocity: Outputs | None = None) -> tuple[PyTree, PyTree]:
         """States of plant and controller at t = 0, from the outputs there."""
+        x, y = self.measured_at_start(position, velocity)
+        return x, self.loop.controller.init(y, self.loop.reference.at(jnp.zeros(())))
+
+    def measured_at_start(
+        self, position: Outputs | None = None, velocity: Outputs | None = None
+    ) -> tuple[PyTree, Measurement]:
+        """State of the plant at t = 0, from the outputs there, and its measurement."""
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
         y, _ = self.read(zero, self.loop.plant.output(zero, x), self.initial_measuring(x))
-        return x, self.loop.controller.init(y, self.loop.reference.at(zero))
+        return x, y
 
     def initial_measuring(self, x: PyTree) -> MeasurementState:
         """State of measuring at t = 0."""
@@ -128,6 +136,10 @@ class Realization(NamedTuple):
     def decide(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Decision:
         """Measure, compute the command and limit it; `measuring` is that of the previous step."""
         return _decided(self, t, x, z, measuring)
+
+    def advance(self, z: PyTree, decision: Decision, dt: Time) -> PyTree:
+        """State of the controller after a control step."""
+        return _advanced(self.loop.controller, z, decision.y, decision.r, decision.applied, dt)
 
     def read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
         """Measurement for the law, and the state of measuring afterwards."""
@@ -189,8 +201,17 @@ def _decided(realization: Realization, t: Time, x: PyTree, z: PyTree, measuring:
     loop = realization.loop
     y, measuring = realization.read(t, loop.plant.output(t, x), measuring)
     r = loop.reference.at(t)
-    command, signals = loop.controller.command(z, y, r)
+    answer = loop.controller.command(z, y, r)
+    check_command(loop.controller, answer, loop.plant.inputs())
+    command, signals = answer
     return Decision(y, r, command, loop.plant.admissible(x, command), signals, measuring)
+
+
+@eqx.filter_jit
+def _advanced(law: AbstractController, z: PyTree, y: Measurement, r: Target, applied: Inputs, dt: Time) -> PyTree:
+    after = law.advance(z, y, r, applied, dt)
+    check_state(law, after, z)
+    return after
 
 
 @eqx.filter_jit

@@ -118,7 +118,7 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     else:
         new_x = jax.lax.fori_loop(0, substeps, lambda i, x: integrate(motion, t + instant(i, h), x, h), x)
     y, law = decision.y, loop.controller
-    new_z = law.advance(z, y, decision.r, decision.applied, dt)
+    new_z = realization.advance(z, decision, dt)
     remembered = decision.measuring
     if remembered.expected is not None:
         expected = remembered.expected.after(law, z, y, decision.signals.get("estimate"), decision.applied, dt)
