@@ -96,7 +96,7 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
         kind: folder of the catalogue.
         name: of the part, or of a callable in a file.
         folder: where the file's name starts.
-        what: the argument or key that gives the name, for messages.
+        what: the key that gives the name, for messages, or the name itself where it is an argument.
 
     Raises:
         BadInput: no such part, file or callable.
@@ -104,7 +104,8 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
     if ".py:" in name:
         return _from_file(name, folder or Path(), what)
     if name.endswith(".py"):
-        raise BadInput(what, "name a file and a function in it", name, hint=maker_in((folder or Path()) / name, name))
+        hint = maker_in((folder or Path()) / name, name)
+        raise BadInput(what, "name a file and a function in it", "a file alone" if what == name else name, hint=hint)
     parts = names(kind)
     if name not in parts:
         hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
@@ -133,16 +134,19 @@ def _from_file(name: str, folder: Path, what: str) -> Part:
     path_text, attribute = name.rsplit(":", 1)
     path = (folder / path_text).resolve()
     if not path.is_file():
+        if what == name:
+            raise BadInput(path_text, "be an existing file", "not")
         raise BadInput(what, "name an existing file", path_text)
     try:
         module = _module(path, path.read_bytes())
     except (Exception, SystemExit) as error:
         fault = fault_of(error)
-        raise BadInput(what, "name a file that Python can run", fault.says, hint=fault.hint) from error
+        says = f"{'' if fault.says.startswith('cannot') else 'Python cannot run it: '}{fault.says}"
+        raise BadInput(what, "", says, hint=fault.hint) from error
     part = getattr(module, attribute, None)
     if not callable(part):
         functions, classes = _defined_in(path)
-        hint = did_you_mean(attribute, functions or classes)
+        hint = did_you_mean(attribute, functions or classes) if functions or classes else ""
         raise BadInput(what, f"name a function in {path.name}", attribute or "empty", hint=hint)
     return part
 
@@ -167,5 +171,6 @@ def _defined_in(path: Path) -> tuple[list[str], list[str]]:
         tree = ast.parse(path.read_bytes())
     except (OSError, SyntaxError, ValueError):
         return [], []
-    of = lambda kind: [node.name for node in tree.body if isinstance(node, kind) and not node.name.startswith("_")]
-    return of(ast.FunctionDef), of(ast.ClassDef)
+    functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")]
+    classes = [node.name for node in tree.body if isinstance(node, ast.ClassDef) and not node.name.startswith("_")]
+    return functions, classes

@@ -26,7 +26,7 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput
 from undertow.core.measurement import completed
-from undertow.core.returned import check_command, check_state
+from undertow.core.returned import check_command
 from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
 from undertow.loop.recorded_signals import RECORDED, Signals
@@ -137,10 +137,6 @@ class Realization(NamedTuple):
         """Measure, compute the command and limit it; `measuring` is that of the previous step."""
         return _decided(self, t, x, z, measuring)
 
-    def advance(self, z: PyTree, decision: Decision, dt: Time) -> PyTree:
-        """State of the controller after a control step."""
-        return _advanced(self.loop.controller, z, decision.y, decision.r, decision.applied, dt)
-
     def read(self, t: Time, truth: Measurement, measuring: Any) -> tuple[Measurement, Any]:
         """Measurement for the law, and the state of measuring afterwards."""
 
@@ -205,13 +201,6 @@ def _decided(realization: Realization, t: Time, x: PyTree, z: PyTree, measuring:
     check_command(loop.controller, answer, loop.plant.inputs())
     command, signals = answer
     return Decision(y, r, command, loop.plant.admissible(x, command), signals, measuring)
-
-
-@eqx.filter_jit
-def _advanced(law: AbstractController, z: PyTree, y: Measurement, r: Target, applied: Inputs, dt: Time) -> PyTree:
-    after = law.advance(z, y, r, applied, dt)
-    check_state(law, after, z)
-    return after
 
 
 @eqx.filter_jit
