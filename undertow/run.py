@@ -98,6 +98,8 @@ class Run:
         lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.dataset.attrs['status_sentence']}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
         for name, metric in metrics_of(self.dataset).items():
+            if name not in whole:
+                continue
             late, value = (_shown(each.get(name), metric.unit) for each in (steady or {}, whole))
             lines.append(f"  {name:<20}{late:>12}{value:>12}  {for_people(0.0, metric.unit)[1]}".rstrip())
         if self.success is not None:

@@ -1,5 +1,6 @@
 """Mistakes in a campaign file or on the command line: one line each, and nothing is lost."""
 
+import importlib.util
 import json
 import re
 from pathlib import Path
@@ -31,7 +32,7 @@ from undertow.scenario.reading import dump
         ({"series": {"signals": ["positon"]}}, r"`series.signals\[0\]` must be one of .*position.*, but is positon"),
         (
             {"requirements": {"tracking": {"below": 1.0}}},
-            r"`requirements.tracking` must be a metric, but is unknown. Known: ",
+            r"`requirements.tracking` must be a metric, but is unknown .*, line 16\). Known: ",
         ),
         (
             {"vary": {"": {"uniform": [1.0, 2.0]}}},
@@ -99,11 +100,11 @@ from undertow.scenario.reading import dump
         ),
         (
             {"vary": {"disturbence[0].amplitude": {"uniform": [1.0, 2.0]}}},
-            r"must name an entry of a list of the scenario, but is of `disturbence`.* Did you mean `disturbance`\?",
+            r"must name an entry of a list of the scenario, which has no `disturbence` there .* Did you mean `disturbance`\?",
         ),
         (
             {"vary": {"initial.position[0]": {"uniform": [1.0, 2.0]}}},
-            r"but is of `position`, which it does not have .*Give `position` in the scenario, with all its entries",
+            r"which has no `position` there .*Give `position` there, with all its entries",
         ),
         (
             {"vary": {"disturbance.0.amplitude": {"uniform": [1.0, 2.0]}}},
@@ -137,22 +138,22 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
     [
         (
             ["campaign", "scenario.yaml"],
-            r"`CAMPAIGN` must be a campaign, but is scenario.yaml, a scenario. Run it: undertow simulate scenario.yaml",
+            r"`scenario.yaml` must be a campaign, but is a scenario. Run it: undertow simulate scenario.yaml",
         ),
         (
             ["simulate", "campaign.yaml"],
-            r"`SCENARIO` must be a scenario, but is campaign.yaml, a campaign. Run it: undertow campaign campaign.yaml",
+            r"`campaign.yaml` must be a scenario, but is a campaign. Run it: undertow campaign campaign.yaml",
         ),
         (["campaign", "campaign.yaml", "out"], r"`DIR` must follow the word `status`, but is out. .*`--out out`"),
         (["campaign", "status", "out", "--resume"], r"`--resume` must be left out with `status`"),
         (["campaign", "campaign.yaml", "--resume", "--overwrite"], r"`--resume` must be without --overwrite"),
         (
-            ["check", "campaign.yaml"],
-            r"be a vehicle or scenario file, but is campaign.yaml, a campaign. `undertow campaign`",
+            ["check", "campaign.yaml", "--option", "seed=1"],
+            r"`--option` must be left out for a campaign, but is seed=1",
         ),
         (
             ["campaign", "campaign.yaml", "--out", "/proc/out"],
-            r"`--out` must be a folder that can be written, but is /proc",
+            r"`--out` must be a folder that can be made and written, but is /proc/out, where nothing can",
         ),
     ],
 )
@@ -184,6 +185,19 @@ def test_a_cluster_that_is_not_there_is_told(campaign_file, tmp_path, capsys, mo
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1 and re.search(said, complaint), complaint
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("cluster", "module"), [("local", "dask"), ("slurm", "dask_jobqueue"), ("ssh", "asyncssh")])
+def test_what_a_cluster_lacks_is_told_before_anything_is_built(
+    campaign_file, tmp_path, capsys, monkeypatch, cluster, module
+):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == module else name)
+    assert run(["campaign", str(campaign_file()), "--out", str(tmp_path / "out"), "--cluster", cluster]) == 2
+    complaint = capsys.readouterr().err
+    assert (
+        complaint.startswith(f"Error: `--cluster` must have {module} installed, but is not. ")
+        and "[cluster]" in complaint
+    )
 
 
 def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):

@@ -82,12 +82,12 @@ def test_mistakes_are_those_of_a_scenario(refused, tmp_path):
     assert refused("analyze", "s.yaml") == (
         "`controller.bandwidth` must be positive, but is -30 rad/s (s.yaml, line 2)"
     )
-    assert refused("analyze", "none.yaml") == "`SCENARIO` must be an existing file, but is none.yaml"
+    assert refused("analyze", "none.yaml") == "`none.yaml` must be an existing file, but is not. Files there: s.yaml"
 
 
 def test_a_loop_without_finite_slopes_is_refused(refused, tmp_path):
     """Where numbers are so large that their products are not finite."""
     text = "plant: two_link_arm\nreference: {kind: sine, amplitude: [1, 1], frequency: 1e154}\nloop: {duration: 0.04"
     (tmp_path / "s.yaml").write_text(f"{text}, dt: 0.01, record: 0.01}}\n")
-    said = "`SCENARIO` must be a loop that can be linearised, but is one whose slopes are not finite"
+    said = "The loop cannot be linearised: its slopes are not finite"
     assert refused("analyze", "s.yaml").startswith(said)

@@ -5,7 +5,7 @@ from good_scenario import SCENARIO
 
 from undertow.scenario.reading import read
 
-YAML = "`SCENARIO` must be valid YAML, but is not:"
+YAML = "`s.yaml` must be valid YAML, but is not:"
 
 # (what is replaced, by what, what is said)
 MISTAKES = {
@@ -251,14 +251,14 @@ def test_mistake_is_one_exact_line(refused, tmp_path, mistake):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "`SCENARIO` must be a mapping of keys to values, but is empty (s.yaml)"),
-        ("# nothing\n", "`SCENARIO` must be a mapping of keys to values, but is empty (s.yaml)"),
-        ("- plant\n", "`SCENARIO` must be a mapping of keys to values, but is a list (s.yaml)"),
-        ("plant", "`SCENARIO` must be a mapping of keys to values, but is a single str (s.yaml)"),
-        ("[" * 1000, "`SCENARIO` must have at most 20 levels, but is more deeply nested (s.yaml, line 1)"),
+        ("", "`s.yaml` must be a mapping of keys to values, but is empty"),
+        ("# nothing\n", "`s.yaml` must be a mapping of keys to values, but is empty"),
+        ("- plant\n", "`s.yaml` must be a mapping of keys to values, but is a list"),
+        ("plant", "`s.yaml` must be a mapping of keys to values, but is a single str"),
+        ("[" * 1000, "`s.yaml` must have at most 20 levels, but is more deeply nested (s.yaml, line 1)"),
         ("a: &a [*a]\n", f"{YAML} found undefined alias 'a' (s.yaml, line 1)"),
-        ("a: 1\n---\nb: 2\n", "`SCENARIO` must be one YAML document, but is several (s.yaml, line 2)"),
-        ("? [a, b]\n: 1\n", "`SCENARIO` must have words for keys, but is a list or mapping for a key (s.yaml, line 1)"),
+        ("a: 1\n---\nb: 2\n", "`s.yaml` must be one YAML document, but is several (s.yaml, line 2)"),
+        ("? [a, b]\n: 1\n", "`s.yaml` must have words for keys, but is a list or mapping for a key (s.yaml, line 1)"),
         ("loop: {<<: 3}", f"{YAML} `<<` takes a mapping, or a list of them (s.yaml, line 1)"),
         ("seed: 1" + 5000 * "0", f"{YAML} Exceeds the limit (4300 digits) for integer string conversion"),
     ],
@@ -270,19 +270,19 @@ def test_file_that_is_no_scenario(refused, tmp_path, text, said):
 
 def test_file_that_is_not_text(refused, tmp_path):
     (tmp_path / "s.yaml").write_bytes(b"\xff\xfe\x00\x01")
-    assert refused("simulate", "s.yaml") == (
-        "`SCENARIO` must be a text file in UTF-8, but is s.yaml. Save it with this encoding"
-    )
+    assert refused("simulate", "s.yaml") == ("`s.yaml` must be a text file in UTF-8. Save it with this encoding")
 
 
 def test_file_that_is_missing(refused):
-    assert refused("simulate", "none.yaml") == "`SCENARIO` must be an existing file, but is none.yaml"
+    assert refused("simulate", "none.yaml") == "`none.yaml` must be an existing file, but is not"
 
 
-def test_result_file_that_is_none(refused, tmp_path):
-    (tmp_path / "run.nc").write_text("no result")
-    said = refused("simulate", "run.nc")
-    assert said.startswith("`SCENARIO` must be a result file of undertow, but is run.nc: ")
+@pytest.mark.parametrize(
+    ("text", "said"), [("no result", "damaged, incomplete, or not a netCDF file"), ("", "empty (0 bytes)")]
+)
+def test_result_file_that_is_none(refused, tmp_path, text, said):
+    (tmp_path / "run.nc").write_text(text)
+    assert refused("simulate", "run.nc").startswith(f"`run.nc` must be a result file of undertow, but is {said}. ")
 
 
 def test_numbers_and_words_of_yaml_1_2(tmp_path):

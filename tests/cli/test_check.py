@@ -61,12 +61,12 @@ def test_variant_of_a_catalogue_vehicle(undertow):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["oddin"], "`THING` must be a .yaml file, or the name of a part, but is oddin. Did you mean `odin`?"),
+        (["oddin"], "`oddin` must be a .yaml file, or the name of a part, but is not. Did you mean `odin`?"),
         (["bluerov2_heavy", "--option", "parameters=wu"], "`parameters` must be one of vonbenzon2022, wu2018"),
         (["bluerov2_heavy", "--option", "parameters"], "`--option` must be KEY=VALUE, but is parameters"),
         (["bluerov2_heavy", "--option", "mas=3"], "`mas` must be an option or parameter here, but is unknown"),
-        (["./mine.py:mine"], "`THING` must name an existing file, but is ./mine.py"),
-        (["s.nc"], "`THING` must be an existing file, but is s.nc"),
+        (["./mine.py:mine"], "`./mine.py` must be an existing file, but is not"),
+        (["s.nc"], "`s.nc` must be an existing file, but is not"),
     ],
 )
 def test_bad_argument(refused, arguments, said):
@@ -75,7 +75,7 @@ def test_bad_argument(refused, arguments, said):
 
 def test_file_that_is_neither(refused, tmp_path):
     (tmp_path / "x.yaml").write_text("masss: 3\n")
-    said = "`THING` must be a vehicle or scenario file, but is x.yaml, without a key of either. Did you mean `mass`?"
+    said = "`x.yaml` must be a vehicle, scenario or campaign file, but is without a key of any. Did you mean `mass`?"
     assert refused("check", "x.yaml") == said
 
 
@@ -85,6 +85,16 @@ def test_scenario(undertow, tmp_path):
     assert said.code == 0
     assert said.out.count("torque constant / back-EMF constant is 117") == 1
     assert "odin (vehicle)" in said.out
+
+
+def test_campaign(undertow, tmp_path):
+    """As `undertow campaign` checks it before the first trial; nothing is run or written."""
+    (tmp_path / "s.yaml").write_text(SMALL)
+    (tmp_path / "c.yaml").write_text("scenario: s.yaml\ntrials: 8\nrequirements: {position_rms: {below: 1}}\n")
+    said = undertow("check", "c.yaml")
+    assert said.code == 0 and said.out.startswith("Advice: `requirements.position_rms.share` is 0.95, which takes")
+    assert said.out.endswith("\nc.yaml: 0 errors, 1 piece of advice; 8 trials\n")
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["c.yaml", "s.yaml"]
 
 
 def test_vehicle_of_a_scenario(undertow, tmp_path):

@@ -159,7 +159,7 @@ def test_a_file_that_stands_for_too_much_is_left_early(refused, tmp_path, monkey
     monkeypatch.setattr(yaml_text, "_MOST", 5000)
     (tmp_path / "s.yaml").write_text(BOMBS[bomb])
     said = refused("simulate", "s.yaml")
-    assert said.startswith("`SCENARIO` must have at most 5000 entries, but is larger (s.yaml, line ")
+    assert said.startswith("`s.yaml` must have at most 5000 entries, but is larger (s.yaml, line ")
     assert len(counted) <= 5001
 
 

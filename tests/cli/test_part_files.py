@@ -37,9 +37,9 @@ def test_part_from_a_file_runs(undertow, tmp_path):
         (
             "./my_rov.py:my_rov",
             "1 / 0",
-            "`plant.vehicle.kind` must name a file that Python can run, but is ./my_rov.py",
+            "`plant.vehicle.kind`: Python cannot run it: ZeroDivisionError: division by zero (my_rov.py, line 1)",
         ),
-        ("./my_rov.py:my_rov", "def my_rov(:", "`plant.vehicle.kind` must name a file that Python can run"),
+        ("./my_rov.py:my_rov", "def my_rov(:", "`plant.vehicle.kind`: Python cannot run it: SyntaxError"),
         (
             "./my_rov.py:my_rov",
             "def my_rov():\n    return 1 / 0",
@@ -48,7 +48,7 @@ def test_part_from_a_file_runs(undertow, tmp_path):
         (
             "./my_rov.py:my_rov",
             "def my_rov():\n    return 7",
-            "`plant.vehicle.kind` must name a function that returns a Vehicle, but is ./my_rov.py:my_rov: 7",
+            "`plant.vehicle.kind` must name a function that returns a Vehicle, but is ./my_rov.py:my_rov, which returns 7",
         ),
     ],
 )

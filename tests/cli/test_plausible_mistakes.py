@@ -11,6 +11,7 @@ from undertow.scenario.build import build
 from undertow.scenario.part_cache import PartCache
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+TEMPLATE = Path(simulate.__file__).parents[1] / "scenario/templates/my_controller.py"
 
 SCENARIO = """\
 plant:
@@ -35,6 +36,7 @@ def my_law(model):
 CAMPAIGN = "scenario: s.yaml\ntrials: 2\n"
 
 SIMULATE, CHECK = ("simulate", "s.yaml", "--out", "out"), ("check", "my_rov.yaml")
+OWN = ("simulate", "with_law.yaml", "--out", "out")  # with the law of `undertow init --own-controller` in law.py
 CONTROLLER = "controller: {kind: pid, frequency: 1}"
 
 # The mistake: what is typed, in which file what is replaced by what, and what the line must have.
@@ -44,14 +46,20 @@ ERRORS = {
     "indented too little": (SIMULATE, "s.yaml", "  dt: 0.01", " dt: 0.01", ["s.yaml, line 10", "same column"]),
     "no colon": (SIMULATE, "s.yaml", "  dt: 0.01", "  dt 0.01", ["s.yaml, line 10", "`key: value`"]),
     "no space after the colon": (SIMULATE, "s.yaml", "  dt: 0.01", "  dt:0.01", ["s.yaml, line 10", "space"]),
+    "key with brackets": (("campaign", "c.yaml"), "c.yaml", "trials: 2", "variants: {a: {reference.position[0]: 2}}", ["c.yaml, line 2", 'Inside braces, quote a key that has brackets: {"reference.position[0]": 2}']),
     "bracket": (SIMULATE, "s.yaml", "0, 0.5]}", "0, 0.5}", ["s.yaml, line 5", "`[` is not closed", "Add `]`"]),
     "same key twice": (SIMULATE, "s.yaml", "  dt: 0.01", "  duration: 5", ["s.yaml, line 10", "`duration`", "line 9"]),
-    "vehicle file to simulate": (("simulate", "my_rov.yaml"), "", "", "", ["my_rov.yaml", "`plant: {vehicle: my_rov.yaml}`"]),
-    "campaign to simulate": (("simulate", "c.yaml"), "", "", "", ["c.yaml, a campaign", "undertow campaign c.yaml"]),
-    "scenario to campaign": (("campaign", "s.yaml"), "", "", "", ["s.yaml, a scenario", "undertow simulate s.yaml"]),
-    "vehicle file to campaign": (("campaign", "my_rov.yaml"), "", "", "", ["my_rov.yaml, a vehicle file"]),
+    "vehicle file to simulate": (("simulate", "my_rov.yaml"), "", "", "", ["`my_rov.yaml`", "`plant: {vehicle: my_rov.yaml}`"]),
+    "campaign to simulate": (("simulate", "c.yaml"), "", "", "", ["`c.yaml`", "is a campaign", "undertow campaign c.yaml"]),
+    "scenario to campaign": (("campaign", "s.yaml"), "", "", "", ["`s.yaml`", "is a scenario", "undertow simulate s.yaml"]),
+    "vehicle file to campaign": (("campaign", "my_rov.yaml"), "", "", "", ["`my_rov.yaml`", "is a vehicle file"]),
     "scenario as the vehicle": (SIMULATE, "s.yaml", "vehicle: my_rov.yaml", "vehicle: other.yaml", ["s.yaml, line 2", "other.yaml, a scenario"]),
-    "text file": (("simulate", "notes.txt"), "", "", "", ["notes.txt", "notes.yaml"]),
+    "text file": (("simulate", "notes.txt"), "", "", "", ["`notes.txt`", "notes.yaml"]),
+    "Python file to simulate": (("simulate", "law.py:my_controller"), "", "", "", ["`law.py:my_controller`", "named in a scenario, such as `controller: ./file.py:function`"]),
+    "text file to check": (("check", "notes.txt"), "", "", "", ["`notes.txt`", "notes.yaml"]),
+    "ending left out to check": (("check", "my_rov"), "", "", "", ["`my_rov`", "Did you mean `my_rov.yaml`?"]),
+    "file of another name to check": (("check", "vehicle.yaml"), "", "", "", ["`vehicle.yaml`", "Files there: binary.yaml, c.yaml"]),
+    "result that is empty": (("simulate", "old/run.nc"), "", "", "", ["`old/run.nc`", "is empty (0 bytes)", "Run its scenario again"]),
     "folder": (("check", "."), "", "", "", [".", "a folder", "my_rov.yaml", "s.yaml"]),
     "folder to simulate": (("simulate", "."), "", "", "", [".", "a folder", "my_rov.yaml", "s.yaml"]),
     "missing file": (("simulate", "my_rv.yaml"), "", "", "", ["my_rv.yaml", "`my_rov.yaml`"]),
@@ -73,6 +81,10 @@ ERRORS = {
     "trials of a campaign": (("campaign", "c.yaml"), "c.yaml", "trials", "monte_carlo", ["`monte_carlo`", "c.yaml, line 2", "`trials`"]),
     "distribution": (("campaign", "c.yaml"), "c.yaml", "trials: 2", "vary: {plant.vehicle.mass: {gaussian: [13, 1]}}", ["gaussian`", "c.yaml, line 2", "`normal`"]),
     "range without its distribution": (("campaign", "c.yaml"), "c.yaml", "trials: 2", "vary: {plant.vehicle.mass: [13, 14]}", ["c.yaml, line 2", "such as {uniform: [13, 14]}"]),
+    "bounds swapped": (("campaign", "c.yaml"), "c.yaml", "trials: 2", "vary: {plant.vehicle.mass: {uniform: [0.3, -0.3]}}", ["low below high", "is {uniform: [0.3, -0.3]}", "c.yaml, line 2"]),
+    "metric of a requirement": (("campaign", "c.yaml"), "c.yaml", "trials: 2", "trials: 2\nrequirements: {positon_rms: {below: 1}}", ["c.yaml, line 3", "`position_rms`"]),
+    "list of another name": (("campaign", "c.yaml"), "c.yaml", "trials: 2", "vary:\n  velocities[0]: {uniform: [0, 1]}", ["c.yaml, line 3", "has no `velocities`", "Did you mean `disturbance[0].velocity`?"]),
+    "nothing to resume": (("campaign", "c.yaml", "--resume", "--out", "none"), "", "", "", ["`--resume`", "none in none", "Leave --resume out"]),
     "key of the scenario in a campaign": (("campaign", "c.yaml"), "c.yaml", "trials", "metrics", ["`metrics`", "c.yaml, line 2", "key of the scenario"]),
     "first argument of a controller": (("check", "./mine.py:my_law"), "mine.py", "def my_law(model):\n    return ut.controllers.pid(model,", "class Mine(ut.core.contracts.AbstractController):\n    pass\n\n\ndef my_law(plant):\n    return ut.controllers.pid(plant.model(),", ["must be `model`", "`plant`", "mine.py, line 8"]),
     "capital letters": (SIMULATE, "s.yaml", "kind: t200", "kind: T200", ["`plant.thruster.kind`", "s.yaml, line 3", "`t200`"]),
@@ -83,15 +95,32 @@ ERRORS = {
     "decimal comma": (SIMULATE, "s.yaml", "dt: 0.01", "dt: 0,01", ["`loop.dt`", "s.yaml, line 10", "decimal point: 0.01"]),
     "number as text": (SIMULATE, "s.yaml", "dt: 0.01", "dt: '0.01'", ["`loop.dt`", "s.yaml, line 10", "without quotes: 0.01"]),
     "fraction of pi": (SIMULATE, "s.yaml", "0, 0.5]", "0, pi/2]", ["`reference.position`", "s.yaml, line 5", "1.5708"]),
+    "no mass": (CHECK, "my_rov.yaml", "mass: 13.5", "", ["`mass` must be given: kg, in air"]),
+    "direction in words": (CHECK, "my_rov.yaml", "azimuth: -45", "direction: forward", ["`thrusters[0].direction`", "is forward", "my_rov.yaml, line 25", "[1, 0, 0]"]),
     "negative mass": (CHECK, "my_rov.yaml", "mass: 13.5", "mass: -13.5", ["`mass`", "positive", "-13.5 kg", "my_rov.yaml, line 7"]),
     "unknown vehicle by its name alone": (SIMULATE, "s.yaml", "my_rov.yaml", "bluerov", ["`plant.vehicle` must be", "s.yaml, line 2", "`bluerov2`"]),
     "six outputs": (SIMULATE, "s.yaml", "[2, 0, 1, 0, 0, 0.5]", "[2, 0, 1, 0.5]", ["`reference.position`", "s.yaml, line 5", "north, east, down, roll, pitch, yaw"]),
     "three forces for six": (SIMULATE, "s.yaml", "{kind: current, velocity: [0.3, 0, 0]}", "{kind: wrench, value: [1, 0, 0]}", ["`disturbance[0].value`", "s.yaml, line 7", "surge, sway, heave, roll, pitch, yaw"]),
+    "milliseconds": (SIMULATE, "s.yaml", "dt: 0.01", "dt: 10", ["`loop.dt`", "is 10 s", "s.yaml, line 10", "10 ms are 0.01"]),
+    "several unknown options": (SIMULATE, "s.yaml", "{kind: current, velocity: [0.3, 0, 0]}", "{kind: thruster_loss, thruster: 1, factor: 0.5}", ["`disturbance[0].thruster`", "s.yaml, line 7", "Also unknown: `factor`"]),
+    "sensor of another name": (SIMULATE, "s.yaml", "loop:", "navigation: {kind: observer, sensors: [imu, gps]}\nloop:", ["`navigation.sensors[1]`", "s.yaml, line 8", "`position_fix`"]),
     "record no multiple": (SIMULATE, "s.yaml", "record: 0.05", "record: 0.025", ["`loop.record`", "s.yaml, line 11", "0.02 or 0.03 s"]),
     "controller for another plant": (SIMULATE, "s.yaml", CONTROLLER, "controller: {kind: pid, frequency: [1, 2]}", ["`controller.frequency`", "s.yaml, line 4", "6"]),
     "file without its function": (SIMULATE, "s.yaml", CONTROLLER, "controller: ./mine.py", ["s.yaml, line 4", "./mine.py:my_law"]),
     "function of another name": (SIMULATE, "s.yaml", CONTROLLER, "controller: ./mine.py:my_lw", ["s.yaml, line 4", "`my_law`"]),
     "syntax error": (("check", "./mine.py:my_law"), "mine.py", "(model)", "(model", ["mine.py", "line 4", "SyntaxError"]),
+    "file without its function to check": (("check", "law.py"), "", "", "", ["`law.py`", "Add its name: law.py:my_controller"]),
+    "class for its function": (("check", "law.py:SlidingMode"), "", "", "", ["`slope`", "law.py, line 11", "is a class", "law.py:my_controller"]),
+    "argument without a default": (OWN, "law.py", "slope=2.0", "slope", ["`controller.slope`", "law.py, line 46", "with_law.yaml, line 4", "`def my_controller(model, slope=1.0)`"]),
+    "law for its maker": (OWN, "law.py", "my_controller(model, slope=2.0, reaching=3.0, layer=0.3)", "my_controller(y, r)", ["`controller.r`", "law.py, line 46", "takes `model` first", "undertow init --own-controller"]),
+    "class without its contract": (OWN, "law.py", "(AbstractController)", "(__import__('equinox').Module)", ["returns a `SlidingMode` (law.py, line 11)", "with_law.yaml, line 4", "from AbstractController"]),
+    "input without signals": (OWN, "law.py", 'return u, {"surface": s}', "return u", ["`SlidingMode.command` must return two values", "array of shape (8,)", "law.py, line 26"]),
+    "input of another size": (OWN, "law.py", 'return u, {"surface": s}', 'return u[:6], {"surface": s}', ["`SlidingMode.command`", "an input of shape (8,)", "law.py, line 26"]),
+    "state of another form": (OWN, "law.py", "return z + dt * jnp.where(jnp.abs(s) < self.layer, self.model.coordinates.tracking_error(y, r).error, 0.0)", "return z, s", ["`SlidingMode.advance`", "is a tuple, not an array", "law.py, line 32"]),
+    "state on self": (OWN, "law.py", "return z + dt", "self.last = s\n        return z + dt", ["`self.last`", "`SlidingMode.advance`", "law.py, line 34", "with_law.yaml, line 4", "Try: undertow check law.py:my_controller"]),
+    "if on a traced value": (OWN, "law.py", "nominal + self.reaching * jnp.clip(s / self.layer, -1, 1)", "nominal + (self.reaching if s[0] > 0 else -self.reaching)", ["law.py, line 28", "Use `jnp.where(condition, a, b)`, `jnp.minimum` or `jnp.maximum`. Try: undertow check law.py:my_controller"]),
+    "method of another object": (OWN, "law.py", "self.model.coordinates.tracking_error(y, r)\n", "self.model.tracking_error(y, r)\n", ["law.py, line 38", "Did you mean `.coordinates.tracking_error`?"]),
+    "slice of a measurement": (OWN, "law.py", "self.model.coordinates.tracking_error(y, r)\n", "r[:6] - y[:6], 0, 0\n", ["law.py, line 38", "`y.position` and `y.velocity`"]),
     "module that is missing": (("check", "./mine.py:my_law"), "mine.py", "import undertow", "import pandsa", ["mine.py, line 1", "Install `pandsa`"]),
     "sensor without the observer": (SIMULATE, "s.yaml", "loop:", "navigation: dvl\nloop:", ["`navigation`", "s.yaml, line 8", "`navigation.sensors`"]),
     "sensors at the top": (SIMULATE, "s.yaml", "loop:", "sensors: [imu, dvl]\nloop:", ["`sensors`", "s.yaml, line 8", "`navigation: {kind: observer, sensors: ...}`"]),
@@ -106,9 +135,11 @@ PARTS = PartCache()  # of the scenario above, made once for all tests
 
 
 def prepare(folder, monkeypatch, file, old, new):
-    if file != "my_rov.yaml":
+    if file not in ("my_rov.yaml", "law.py"):
         monkeypatch.setattr(simulate, "build", lambda text: build(text, PARTS))
     shutil.copy(EXAMPLES / "my_rov.yaml", folder)
+    shutil.copy(TEMPLATE, folder / "law.py")
+    (folder / "with_law.yaml").write_text(SCENARIO.replace(CONTROLLER, "controller: ./law.py:my_controller"))
     texts = {"s.yaml": SCENARIO, "other.yaml": SCENARIO, "c.yaml": CAMPAIGN, "mine.py": LAW, "notes.txt": SCENARIO}
     for name, text in (texts | {"empty.yaml": "# later\n"}).items():
         (folder / name).write_text(text)

@@ -137,3 +137,41 @@ def test_continuous_loop_and_late_window(undertow, tmp_path):
         "Advice: there are no steady metrics: the steady window starts at 10 s, and the run ends at 0.1 s" in said.err
     )
     assert json.loads((tmp_path / "out/metrics.json").read_text())["steady"] is None
+
+
+LAW = """\
+import jax.numpy as jnp
+from undertow.core.contracts import AbstractController, Model
+
+
+class Law(AbstractController):
+    model: Model
+
+    def init(self, y, r):
+        return ()
+
+    def command(self, z, y, r):
+        return {input}, {{}}
+
+    def advance(self, z, y, r, u_applied, dt):
+        return z
+
+    def signals(self):
+        return {{}}
+
+
+def law(model):
+    return Law(model)
+"""
+
+
+@pytest.mark.parametrize(
+    ("input", "code", "status"), [("jnp.nan * y.position", 1, "command_not_finite"), ("-r.position", 0, "completed")]
+)
+def test_a_law_that_does_not_control_is_one_to_check(undertow, tmp_path, input, code, status):
+    """A run without a single step has no metrics, not even those of its criterion."""
+    (tmp_path / "mine.py").write_text(LAW.format(input=input))
+    (tmp_path / "s.yaml").write_text(SMALL.replace("{kind: pid, frequency: 2}", "./mine.py:law"))
+    said = undertow("simulate", "s.yaml", "--out", "out")
+    assert said.code == code and f"Status: {status}; tracking: not within position_rms 0.05 m" in said.out
+    assert "undertow check mine.py:law\n" in said.err and (tmp_path / "out" / "run.nc").exists()

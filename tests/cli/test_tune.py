@@ -89,7 +89,7 @@ def test_wrong_options(refused, tmp_path):
     assert refused("tune", "s.yaml", "--budget", "0") == "`--budget` must be positive, but is 0 s"
     assert (
         refused("tune", "s.yaml", "--out", "out", "--resume")
-        == "`--resume` must find an unfinished tuning, but is nothing in out"
+        == "`--resume` must find an unfinished tuning, but is nothing in out. Leave --resume out to start one"
     )
 
 

@@ -125,7 +125,7 @@ def test_described(rov, undertow):
 
 # What is replaced, by what, what is said; of the vehicle file.
 MISTAKES = {
-    "missing key": ("mass: 13.5   ", "# ", "`mass` must be given (my_rov.yaml)"),
+    "missing key": ("mass: 13.5   ", "# ", "`mass` must be given: kg, in air (my_rov.yaml)"),
     "misspelt key": (
         "added_mass:",
         "aded_mass:",
@@ -221,14 +221,16 @@ def test_mistake_is_one_exact_line_in_a_check(rov, refused, mistake):
     old, new, said = MISTAKES[mistake]
     rov(old, new)
     complaint = refused("check", "my_rov.yaml")
-    assert complaint == said or (said is None and complaint.startswith("`THING` must be valid YAML, but is not: "))
+    assert complaint == said or (
+        said is None and complaint.startswith("`my_rov.yaml` must be valid YAML, but is not: ")
+    )
 
 
 def test_missing_file(refused, tmp_path):
     (tmp_path / "s.yaml").write_text(FLIES)
     said = f"`plant.vehicle` must be an existing file, but is {tmp_path / 'my_rov.yaml'} (s.yaml, line 2)"
     assert refused("simulate", "s.yaml") == said
-    assert refused("check", "my_rov.yaml") == "`THING` must be an existing file, but is my_rov.yaml"
+    assert refused("check", "my_rov.yaml") == "`my_rov.yaml` must be an existing file, but is not. Files there: s.yaml"
 
 
 def test_mistake_of_the_scenario_is_placed_there(rov, refused, tmp_path):

@@ -14,6 +14,7 @@ sys.path.append(str(Path(__file__).parents[1] / "docs"))
 from test_blocks import FILE, ROOT, blocks
 
 import undertow as ut
+from undertow.cli import compare
 from undertow.cli.main import run
 from undertow.comparison.contest import contest
 from undertow.scenario.reading import dump
@@ -98,8 +99,12 @@ def test_from_python(scenario):
         found.table("word")
 
 
-def test_nothing_random(scenario, capsys):
-    """One trial and no interval; equal scenarios differ in nothing."""
+def interrupted(*arguments):
+    raise KeyboardInterrupt
+
+
+def test_nothing_random(scenario, capsys, monkeypatch):
+    """One trial and no interval; equal scenarios differ in nothing. Stopped in a replay, it says how to continue."""
     path = scenario(navigation="perfect")
     assert run(["compare", path, scenario("copy", navigation="perfect"), "--out", "out"]) == 0
     said = capsys.readouterr()
@@ -108,6 +113,12 @@ def test_nothing_random(scenario, capsys):
     found = json.loads(Path("out/comparison.json").read_text())
     assert found["trials"] == 1 and found["all_equal"] and found["dimension"] == "scenario"
     assert {one["low"] for one in found["differences"]} == {None}
+    with monkeypatch.context() as patched:
+        patched.setattr(compare, "check_replay", lambda built: None)
+        patched.setattr(compare, "run_again", interrupted)
+        assert run(["compare", path, "copy.yaml", "--out", "out", "--resume", "--replay"]) == 130
+    again = f"To continue: undertow compare {path} copy.yaml --replay --out out --resume\n"
+    assert capsys.readouterr().err.endswith(f"Stopped: 2 of 2 trials are in out. {again}")
     assert run(["compare", path, "copy.yaml", "--out", "out", "--resume", "--replay"]) == 2
     line = "`--replay` must be left out for a plant that is no vehicle with thrusters, but is given"
     assert line in capsys.readouterr().err

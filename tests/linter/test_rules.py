@@ -86,7 +86,7 @@ SPOILT = {
         {"DEGREES"},
         "`thruster_matrix` contradicts it",
     ),
-    "size in mm": ({"size": 1e3 * SOUND.size}, {"VOLUME", "gyration"}, "Is `size` in metres?"),
+    "size in mm": ({"size": 1e3 * SOUND.size}, {"VOLUME"}, "Is `size` in metres?"),
     "size in km": ({"size": 1e-3 * SOUND.size}, None, "Is `size` in metres?"),
     "four thrusters": (
         {"positions": SOUND.positions[4:], "directions": SOUND.directions[4:], "printed_matrix": None},

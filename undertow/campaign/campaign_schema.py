@@ -170,7 +170,7 @@ def validate(text: Text) -> Campaign:
     """
     if (kind := kind_of({key: text.data[key] for key in text.data if key not in _SHARED})) in _REMEDIES:
         name = text.name or "NAME.yaml"
-        raise BadInput("CAMPAIGN", "be a campaign", f"{name}, a {kind}", hint=_REMEDIES[kind].format(name=name))
+        raise BadInput(name, "be a campaign", f"a {kind}", hint=_REMEDIES[kind].format(name=name))
     try:
         found = Campaign.model_validate(text.data)
     except ValidationError as errors:
@@ -228,13 +228,13 @@ def read_campaign(path: Path) -> tuple[Campaign, Text]:
     Raises:
         BadInput: the file is not a valid campaign.
     """
-    text = read(path, "CAMPAIGN")
+    text = read(path, file="campaign")
     return validate(text), text
 
 
 def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
     """A campaign from the text of `whole`; relative paths in it start at `folder`."""
-    parsed = parse(text, "", folder, "CAMPAIGN")
+    parsed = parse(text, "", folder, file="campaign")
     return validate(parsed), parsed
 
 

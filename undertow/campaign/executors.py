@@ -5,6 +5,7 @@ A cluster `local` is processes on this machine; others are machines reached by S
 
 import contextlib
 import functools
+import importlib.util
 import itertools
 import logging
 import os
@@ -101,6 +102,7 @@ def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any)
 
 
 CLUSTERS = ("local", "slurm", "ssh")
+_NEEDED = {"slurm": ("dask_jobqueue",), "ssh": ("asyncssh",)}  # modules beside Dask
 
 # Workers may die often. Dask's own monitoring at 50 Hz would take 3 % of a core in every process.
 _DASK = {
@@ -117,14 +119,21 @@ _INSTALL = "In the folder of undertow, run: pip install -c constraints.txt '.[cl
 
 
 def check_cluster(kind: str) -> None:
-    """Check that the argument is a kind of cluster or an address.
+    """Check that the argument is a kind of cluster or an address, and that what it needs is there.
 
     Raises:
-        BadInput: it is neither.
+        BadInput: it is neither, or something is missing.
     """
     if "://" not in kind and kind not in CLUSTERS:
         must = f"be one of {', '.join(CLUSTERS)}, or an address such as tcp://10.0.0.1:8786"
         raise BadInput("--cluster", must, kind, hint=nearest(kind.lower(), CLUSTERS))
+    for module in ("dask", "distributed", *_NEEDED.get(kind, ())):
+        if importlib.util.find_spec(module) is None:
+            raise BadInput("--cluster", f"have {module} installed", "not", hint=_INSTALL)
+    if kind == "slurm":
+        _check_slurm()
+    elif kind == "ssh" and not _hosts():
+        raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
 
 
 @contextlib.contextmanager
@@ -140,16 +149,11 @@ def cluster(kind: str, workers: int) -> Iterator[Any]:
         BadInput: Dask is not installed, or no such cluster can be reached.
     """
     check_cluster(kind)
-    try:
-        from dask import config
-        from distributed import Client
-    except ImportError:
-        raise BadInput("--cluster", "have Dask installed", "not", hint=_INSTALL) from None
+    from dask import config
+    from distributed import Client
+
     with config.set(_DASK), contextlib.ExitStack() as stack:
-        try:
-            where = kind if "://" in kind else stack.enter_context(_started(kind, workers))
-        except ModuleNotFoundError as error:
-            raise BadInput("--cluster", f"have {error.name} installed", "not", hint=_INSTALL) from None
+        where = kind if "://" in kind else stack.enter_context(_started(kind, workers))
         try:
             client = stack.enter_context(Client(where, timeout=10))
         except OSError as error:
@@ -173,17 +177,19 @@ def _started(kind: str, workers: int) -> Any:
             silence_logs=logging.CRITICAL,  # errors are raised here
         )
     if kind == "ssh":
-        return _over_ssh(os.environ.get("UNDERTOW_HOSTS", ""), workers)
+        return _over_ssh(_hosts(), workers)
     return _in_slurm(workers)
 
 
-def _over_ssh(names: str, workers: int) -> Any:
+def _hosts() -> list[str]:
+    """Machines for a cluster by SSH."""
+    return [name.strip() for name in os.environ.get("UNDERTOW_HOSTS", "").split(",") if name.strip()]
+
+
+def _over_ssh(hosts: list[str], workers: int) -> Any:
     from asyncssh import Error
     from distributed import SSHCluster
 
-    hosts = [name.strip() for name in names.split(",") if name.strip()]
-    if not hosts:
-        raise BadInput("UNDERTOW_HOSTS", "name the hosts, separated by commas", "not set")
     logging.getLogger("distributed.deploy").setLevel(logging.ERROR)  # an error is reported once, below
     try:
         return SSHCluster(
@@ -194,20 +200,26 @@ def _over_ssh(names: str, workers: int) -> Any:
     except (OSError, Error, RuntimeError) as error:
         reason = error.__cause__ or error
         hint = "`ssh HOST` must work without a prompt"
-        raise BadInput("UNDERTOW_HOSTS", "be hosts that accept the login", f"{names}: {reason}", hint=hint) from None
+        raise BadInput(
+            "UNDERTOW_HOSTS", "be hosts that accept the login", f"{','.join(hosts)}: {reason}", hint=hint
+        ) from None
 
 
-def _in_slurm(workers: int) -> Any:
-    from dask import config
-    from dask_jobqueue.slurm import SLURMCluster
-
-    try:  # otherwise Dask would submit jobs that cannot be queued again and again
+def _check_slurm() -> None:
+    """Check that SLURM answers: otherwise Dask would submit jobs that cannot be queued again and again."""
+    try:
         subprocess.run(["sinfo", "--noheader"], check=True, capture_output=True, text=True)
     except OSError as error:
         raise BadInput("--cluster", "find SLURM on this machine", str(error)) from None
     except subprocess.CalledProcessError as error:
         said = error.stderr.strip().splitlines() or ["sinfo fails"]
         raise BadInput("--cluster", "find a SLURM that answers", said[-1]) from None
+
+
+def _in_slurm(workers: int) -> Any:
+    from dask import config
+    from dask_jobqueue.slurm import SLURMCluster
+
     setting = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
     found = SLURMCluster(
         cores=setting("cores", 1),

@@ -85,7 +85,7 @@ def _as_floats(value: Any) -> Any:
 # The stored file and the current one: parsing is slow for large sweeps.
 @functools.lru_cache(maxsize=2)
 def _plain(asked: str) -> dict[str, Any]:
-    return parse(asked, "", Path(), "CAMPAIGN").data
+    return parse(asked, "", Path(), file="campaign").data
 
 
 def difference(before: Any, now: Any, path: str = "") -> str:

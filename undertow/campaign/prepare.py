@@ -54,11 +54,13 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
     text, folder = whole(campaign, several.scenario.data), several.scenario.folder
     here = tasks.site(text, str(folder))
     firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]
-    _check_shapes(campaign, here.probes().values())
+    with within(location=source.location):
+        _check_shapes(campaign, here.probes().values())
     metrics = here.metrics()
     advice: dict[str, str] = {}
     for row, built in firsts:
-        _check(campaign, built, metrics)
+        with within(location=source.location):
+            _check(campaign, built, metrics)
         with within(location=several.location):
             found = (*built.advice(), *vehicle_advice(built))
         for one in found:

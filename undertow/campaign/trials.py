@@ -3,6 +3,7 @@
 import copy
 import itertools
 from collections.abc import Iterator
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 from undertow.campaign.campaign_schema import VARIANT, Campaign
@@ -10,6 +11,7 @@ from undertow.campaign.labels import is_number, words
 from undertow.campaign.sampling import Samples, value
 from undertow.core.errors import BadInput, nearest, within
 from undertow.scenario.reading import Text, key_path, read
+from undertow.scenario.schema import Scenario
 
 # Trials of each combination that are built first, to find errors and the numbers that differ.
 _PROBES = 4
@@ -116,15 +118,36 @@ def _put(data: dict[str, Any], key: str, put: Any) -> None:
         if isinstance(inner, str):
             inner = {"kind": inner}
         elif inner is None and isinstance(following, int):
-            hint = nearest(str(step), node) or f"Give `{step}` in the scenario, with all its entries"
-            got = f"of `{step}`, which it does not have"
-            raise BadInput(key, "name an entry of a list of the scenario", got, hint=hint)
+            elsewhere = _elsewhere(str(step), data) if node is data else ""
+            hint = nearest(str(step), node) or elsewhere or f"Give `{step}` there, with all its entries"
+            raise BadInput(key, f"name an entry of a list of the scenario, which has no `{step}` there", hint=hint)
         elif inner is None:
             inner = {}
         node[step] = inner
         node = inner
     _entry(node, path[-1], key)
     node[path[-1]] = put
+
+
+def _elsewhere(word: str, data: dict[str, Any]) -> str:
+    """Sentence that names the list whose key is nearest to a word that is no key at the top of a scenario."""
+    if word in Scenario.model_fields:
+        return ""
+    paths = {path.rpartition(".")[2]: path for path in _lists(data, "")}
+    near = get_close_matches(word, list(paths), n=1)
+    return f"Did you mean `{paths[near[0]]}`?" if near else ""
+
+
+def _lists(node: Any, path: str) -> Iterator[str]:
+    """Key paths of all lists below a node."""
+    pairs = node.items() if isinstance(node, dict) else ()
+    if isinstance(node, list):
+        pairs = ((i, one) for i, one in enumerate(node) if isinstance(one, dict))
+    for step, one in pairs:
+        inner = f"{path}[{step}]" if isinstance(step, int) else f"{path}.{step}".lstrip(".")
+        if isinstance(one, list):
+            yield inner
+        yield from _lists(one, inner)
 
 
 def _entry(node: Any, step: str | int, key: str) -> Any:

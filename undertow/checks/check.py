@@ -14,13 +14,13 @@ from undertow.checks.thruster_check import derived_of_thruster
 from undertow.checks.vehicle_lint import Facts, derived, facts_of, lint, vehicle_facts
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
-from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.errors import BadInput, did_you_mean, nearest
 from undertow.core.runtime import double_outside_runs
 from undertow.core.user_code import place_of
 from undertow.plants.double_integrator import double_integrator
 from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
-from undertow.scenario.reading import Text, no_file, read
+from undertow.scenario.reading import Text, nearest_file, no_file, read
 from undertow.scenario.schema import Scenario, kind_of
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle, vehicle_location
 from undertow.scenario.vehicle_schema import KEYS
@@ -70,14 +70,11 @@ def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> R
 
 
 def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Report:
-    text = read(path, "THING", allow_code)
+    text = read(path, allow_code=allow_code)
     kind = kind_of(text.data)
-    if kind == "campaign":
-        hint = "`undertow campaign` checks a campaign before it runs; check its scenario in a file of its own"
-        raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, a campaign", hint=hint)
     if not kind:
         hint = did_you_mean(next(iter(text.data), ""), {*KEYS, *Scenario.model_fields})
-        raise BadInput("THING", "be a vehicle or scenario file", f"{path.name}, without a key of either", hint=hint)
+        raise BadInput(str(path), "be a vehicle, scenario or campaign file", "without a key of any", hint=hint)
     if kind == "vehicle file":
         return _joined([_of_vehicle_file(path, options)])
     if options:
@@ -86,7 +83,7 @@ def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Rep
 
 
 def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
-    found = read_vehicle(path, options, "THING")
+    found = read_vehicle(path, options, "")
     report = _of_vehicle(found.data.facts(), found.location)
     if not report.errors:
         found.vehicle()  # raises errors that no rule covers
@@ -160,7 +157,7 @@ def _of_scenario(text: Text) -> list[Report]:
 def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[..., Any]]:
     """Name and instance of a part, and a function that makes another one, for a given model."""
     if ".py:" in thing or thing.endswith(".py"):
-        function = catalogue.find("", thing, what="THING")
+        function = catalogue.find("", thing, what=thing)
         make = lambda *given: factory.call(function, options, given, Path())[0]
         _check_model_comes_first(function, options)
         part, name = make(*_leading(function)), thing.rpartition(":")[2]
@@ -176,20 +173,19 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
     every = {name for names in known.values() for name in names}
     must = "be a .yaml file, or the name of a part"
     if Path(thing).exists() or Path(thing).suffix:
-        raise no_file(Path(thing), "THING", must)
-    raise BadInput("THING", must, thing, hint=did_you_mean(short, every))
+        raise no_file(Path(thing), "", must)
+    hint = nearest_file(Path(thing)) or nearest(short, every) or "`undertow list` shows the names of all parts"
+    raise BadInput(thing, must, "not", hint=hint)
 
 
 def _no_part(name: str, thing: Any) -> BadInput:
     """Error for what a function returns instead of a part."""
-    contract, shared = factory.contract_like(thing)
-    place, kind = place_of(thing), type(thing).__name__
+    place = place_of(thing)
     if not place:
         hint = "Return a vehicle, thruster, plant, controller or another part"
         return BadInput("", "", f"`{name}` returns {thing!r}, which is not a part", hint=hint)
-    hint = f"Derive `{kind}` from {contract}: it has {', '.join(f'`{one}`' for one in shared)}" if contract else ""
-    hint = hint or f"Derive `{kind}` from the contract of its kind, such as AbstractController"
-    return BadInput("", "", f"`{name}` returns a `{kind}`, which is not a part", hint=hint, where=place)
+    says = f"`{name}` returns a `{type(thing).__name__}`, which is not a part"
+    return BadInput("", "", says, hint=factory.derive_hint(thing), where=place)
 
 
 def _check_model_comes_first(function: Callable[..., Any], options: Mapping[str, Any]) -> None:

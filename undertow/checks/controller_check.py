@@ -8,8 +8,9 @@ import numpy as np
 
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
-from undertow.checks.finding import Finding, advice, alike, form, shaped, two_values
+from undertow.checks.finding import Finding, advice, alike, shaped, two_values
 from undertow.core.contracts import AbstractController, Target
+from undertow.core.returned import PAIR, STATE, form
 from undertow.core.signals import check_declared
 from undertow.disturbances.none import none
 from undertow.loop.closed_loop import ClosedLoop
@@ -28,7 +29,7 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
     r, dt = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n)), jnp.asarray(1e-3)
     z = jax.eval_shape(controller.init, y, r)
     answer = jax.eval_shape(controller.command, z, y, r)
-    if wrong := list(two_values("command", answer, "the input and the signals")):
+    if wrong := list(two_values("command", answer, PAIR)):
         yield from wrong
         return
     u, signals = answer
@@ -44,7 +45,7 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
         due = tuple(sizes.get(dimension, found.get(dimension, 1)) for dimension in signal.dimensions)
         yield from shaped(f"command, signal {name}", signals[name], due)  # pyright: ignore[reportArgumentType] - every size is known here
     after = jax.eval_shape(controller.advance, z, y, r, u, dt)
-    wrong = list(alike("advance", after, z, "return the state in the form that `init` gives it", types=True))
+    wrong = list(alike("advance", after, z, STATE, types=True))
     yield from wrong or shaped(
         "command", jax.jit(lambda: controller.command(controller.init(y, r), y, r)[0])(), (inputs,)
     )

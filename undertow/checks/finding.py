@@ -7,6 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.core.returned import difference, form, not_two
+
 
 class Finding(NamedTuple):
     """One error or one advice."""
@@ -55,26 +57,14 @@ def is_a(name: str, value: Any, kind: type) -> Iterator[Finding]:
 
 def two_values(name: str, value: Any, what: str) -> Iterator[Finding]:
     """Check for a tuple of exactly two."""
-    if type(value) is not tuple or len(value) != 2:
-        says = f"`{name}` must return two values, {what}, but returns {form(value)}"
+    if says := not_two(name, value, what):
         yield Finding("error", "contract", name, says)
 
 
 def alike(name: str, value: Any, model: Any, must: str, types: bool = False) -> Iterator[Finding]:
     """Check for the same tree as `model`, with arrays of the same shapes, and of the same types if `types`."""
-    if type(value) is not type(model):
-        yield error("contract", name, must, f"{_kind(value)}, not {_kind(model)}")
-        return
-    (found, tree), (due, model_tree) = map(jax.tree_util.tree_flatten_with_path, (value, model))
-    if tree != model_tree:
-        yield error("contract", name, must, f"a tree of {len(found)} arrays, not of {len(due)}, or with other names")
-        return
-    for (path, one), (_, other) in zip(found, due, strict=True):
-        at = f" in `{jax.tree_util.keystr(path).lstrip('.')}`" if path else ""
-        if jnp.shape(one) != jnp.shape(other):
-            yield error("contract", name, must, f"of shape {jnp.shape(one)} instead of {jnp.shape(other)}{at}")
-        elif types and one.dtype != other.dtype:
-            yield error("contract", name, must, f"of type {one.dtype} instead of {other.dtype}{at}")
+    if got := difference(value, model, types):
+        yield error("contract", name, must, got)
 
 
 def agree(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
@@ -85,18 +75,3 @@ def agree(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
         i = int(off.argmax())
         got = f"{np.ravel(value)[i]:.6g} instead of {np.ravel(other)[i]:.6g} in entry {i + 1}"
         yield error("contract", name, f"agree with {what}", got)
-
-
-def _kind(value: Any) -> str:
-    return "an array" if isinstance(value, jax.Array | jax.ShapeDtypeStruct) else f"a {type(value).__name__}"
-
-
-def form(value: Any) -> str:
-    """Description of a returned value."""
-    if value is None:
-        return "nothing (no `return`?)"
-    if isinstance(value, jax.Array | jax.ShapeDtypeStruct):
-        return f"an array of shape {value.shape}"
-    if type(value) is tuple:
-        return f"{len(value)} values" if len(value) != 1 else "one value"
-    return f"a {type(value).__name__}"

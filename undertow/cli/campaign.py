@@ -20,7 +20,7 @@ from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage
 from undertow.cli.tables import titled, wide_console
-from undertow.cli.trials import built_with_advice, run_trials, trial_text, trials_folder, worker_count
+from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import by_xla, write_campaign
 from undertow.scenario.finished_run import to_json
@@ -48,8 +48,9 @@ def campaign(
         prepared = built_with_advice(console, lambda: prepare(path, allow_code))
         if replay:
             check_replay([prepared.first])
-        run_trials(console, prepared, folder, None if resume else _WRITTEN, where, count, ["campaign", str(path)])
-        return _conclude(console, prepared, folder, pdf, replay)
+        with resumable(folder, ["campaign", str(path), *(["--replay"] if replay else [])]):
+            run_trials(console, prepared, folder, None if resume else _WRITTEN, where, count)
+            return _conclude(console, prepared, folder, pdf, replay)
 
 
 def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | None, replay: bool) -> int:

@@ -1,19 +1,26 @@
-"""`undertow check`: report errors and warnings for a vehicle, another part, or a scenario."""
+"""`undertow check`: report errors and warnings for a vehicle, another part, a scenario, or a campaign."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.text import Text
 
+from undertow.campaign.prepare import prepare
 from undertow.checks import check as checks
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.tables import titled, wide_console
 from undertow.core.errors import BadInput
+from undertow.scenario.reading import read
+from undertow.scenario.schema import kind_of
+from undertow.scenario.vehicle_file import is_vehicle_file
 from undertow.scenario.yaml_text import load
 
 
 def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
     """Print the findings of a check and the derived quantities; return the exit code."""
+    if is_vehicle_file(thing) and Path(thing).is_file() and kind_of(read(Path(thing)).data) == "campaign":
+        return _check_campaign(Path(thing), options, allow_code)
     report = checks.check(thing, dict(map(_option, options)), allow_code)
     console = wide_console()
     for sentence in report.sentences:
@@ -26,6 +33,19 @@ def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
     advice = len(report.sentences) - report.errors
     print(f"{thing}: {_counted(report.errors, 'error')}, {_counted(advice, 'piece')} of advice")
     return BAD_INPUT if report.errors else DONE
+
+
+def _check_campaign(path: Path, options: Sequence[str], allow_code: bool) -> int:
+    """Check a campaign as `undertow campaign` does before its first trial; print the advice."""
+    if options:
+        raise BadInput("--option", "be left out for a campaign", options[0])
+    prepared = prepare(path, allow_code)
+    for sentence in prepared.advice:
+        print(f"Advice: {sentence}")
+    number, each = prepared.trials.number, len(prepared.trials.combinations)
+    of = f" of {each} combinations" if each > 1 else ""
+    print(f"{path}: {_counted(0, 'error')}, {_counted(len(prepared.advice), 'piece')} of advice; {number} trials{of}")
+    return DONE
 
 
 def _option(text: str) -> tuple[str, Any]:

@@ -15,7 +15,7 @@ from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
-from undertow.cli.trials import built_with_advice, run_trials, trial_text, trials_folder, worker_count
+from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
 from undertow.comparison.comparison import Comparison, read_comparison
 from undertow.comparison.contest import Contest, contest
 from undertow.comparison.sentences import sentences
@@ -51,13 +51,15 @@ def compare(
     several = None if entries is None else [one for one in map(str.strip, entries.split(",")) if one]
     again = ["compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
     again += ["--trials", str(trials)] if trials is not None else []
+    again += ["--replay"] if replay else []
     with trials_folder(out, f"{paths[0].stem}-comparison", _WRITTEN, resume, overwrite) as folder:
         console = wide_console()
         ready = built_with_advice(console, lambda: contest(paths, several, trials, allow_code))
         if replay:
             check_replay(ready.built)
-        run_trials(console, ready.prepared, folder, None if resume else _WRITTEN, None, count, again)
-        return _conclude(console, ready, folder, pdf, replay)
+        with resumable(folder, again):
+            run_trials(console, ready.prepared, folder, None if resume else _WRITTEN, None, count)
+            return _conclude(console, ready, folder, pdf, replay)
 
 
 def _conclude(console: Console, ready: Contest, folder: Path, pdf: str | None, replay: bool) -> int:

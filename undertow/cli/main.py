@@ -364,7 +364,10 @@ def describe(
 @app.command()
 def check(
     thing: Annotated[
-        str, typer.Argument(metavar="THING", help="A vehicle file, a scenario, a part by name, or ./file.py:function.")
+        str,
+        typer.Argument(
+            metavar="THING", help="A vehicle file, a scenario, a campaign, a part by name, or ./file.py:function."
+        ),
     ],
     option: Annotated[
         list[str] | None,
@@ -374,7 +377,7 @@ def check(
     ] = None,
     allow_code: AllowCode = False,
 ) -> int:
-    """Check a vehicle, another part or a scenario.
+    """Check a vehicle, another part, a scenario or a campaign.
 
     The command reports errors and advice, each with the numbers that caused it, and quantities derived from the
     parameters. The exit code is 2 if there are errors.

@@ -139,8 +139,8 @@ def _check_place(folder: Path) -> None:
 
 
 def _unwritable(folder: Path, error: OSError) -> BadInput:
-    hint = "Choose a folder of yours"
-    return BadInput("--out", "be a folder that can be written", f"{folder}: {error.strerror}", hint=hint)
+    got, hint = f"{folder}, where nothing can be written ({error.strerror})", "Choose another folder"
+    return BadInput("--out", "be a folder that can be made and written", got, hint=hint)
 
 
 def _staging_name(folder: Path) -> str:

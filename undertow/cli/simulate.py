@@ -26,7 +26,7 @@ from undertow.report.replay.replay_data import can_be_shown
 from undertow.report.replay.video import check_video, write_video
 from undertow.report.run_page import shown, write_run_page
 from undertow.report.run_tables import certificate_rows, metrics_rows, prediction_rows
-from undertow.scenario.build import Built, build, in_its_precision
+from undertow.scenario.build import Built, build, in_its_precision, own_parts
 from undertow.scenario.execute import Executed, execute, write, write_metrics
 from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of
 from undertow.scenario.reading import read
@@ -113,6 +113,9 @@ def _print_results(executed: Executed, folder: Path, console: Console) -> None:
         console.print(terminal_table(certificate_rows(certificate, window)))
     verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
     console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
+    own = own_parts(executed.built.scenario, executed.built.text.folder).get("controller")
+    if own and (executed.status is not Status.OK or (executed.success and not executed.success.within)):
+        typer.echo(f"Advice: for mistakes in the controller, such as a wrong sign: undertow check {own}", err=True)
 
 
 def _print_prediction(predicted: PredictedMetrics, executed: Executed, console: Console) -> None:

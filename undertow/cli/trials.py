@@ -14,6 +14,7 @@ from rich.console import Console
 from undertow.campaign.executors import chosen
 from undertow.campaign.prepare import Prepared
 from undertow.campaign.run_campaign import STORE, Tally, Watch, run_campaign
+from undertow.campaign.store_results import load
 from undertow.cli import results_folder
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder
@@ -67,7 +68,8 @@ def trials_folder(out: Path | None, name: str, written: Sequence[str], resume: b
             hint = "Add --resume to continue it, or --overwrite to replace it"
             results_folder.check_folder(folder, written, STORE, overwrite, hint)
         elif not (folder / STORE).exists():
-            raise BadInput("--resume", "find a campaign to continue", f"none in {folder}")
+            hint = "Leave --resume out to start one"
+            raise BadInput("--resume", "find a campaign to continue", f"none in {folder}", hint=hint)
         yield folder
 
 
@@ -80,16 +82,36 @@ def built_with_advice(console: Console, build: Callable[[], T]) -> T:
     return built
 
 
+@contextlib.contextmanager
+def resumable(folder: Path, command: Sequence[str]) -> Iterator[None]:
+    """Where what is inside is stopped, print how many trials are kept, and the command that continues.
+
+    Args:
+        folder: that of the results.
+        command: words after `undertow` of the command to repeat, without `--out` and `--resume`.
+    """
+    try:
+        yield
+    except (KeyboardInterrupt, OSError):
+        if (folder / STORE).is_dir():
+            again = shlex.join(["undertow", *command, "--out", str(folder), "--resume"])
+            typer.echo(f"Stopped{_kept(folder)}. To continue: {again}", err=True)
+        raise
+
+
+def _kept(folder: Path) -> str:
+    """How many trials are in a folder; "" where a damaged store does not tell."""
+    try:
+        results = load(folder)
+    except (OSError, BadInput):
+        return ""
+    return f": {results.rows.sizes['trial']} of {results.total} trials are in {folder}"
+
+
 def run_trials(
-    console: Console,
-    prepared: Prepared,
-    folder: Path,
-    replaced: Sequence[str] | None,
-    where: str | None,
-    workers: int,
-    command: Sequence[str],
+    console: Console, prepared: Prepared, folder: Path, replaced: Sequence[str] | None, where: str | None, workers: int
 ) -> None:
-    """Run all trials that are not in the folder yet; where it is stopped, print the command that continues.
+    """Run all trials that are not in the folder yet.
 
     Args:
         console: for the progress.
@@ -98,18 +120,11 @@ def run_trials(
         replaced: files and folders of an earlier campaign there, to be removed first; None to continue it.
         where: cluster, or None for this machine.
         workers: number of worker processes.
-        command: words after `undertow` of the command to repeat, without `--out` and `--resume`.
     """
     if replaced is not None:
         _clear(folder, replaced)
     with chosen(where, workers) as executor, _live(console, replaced is None) as watch:
-        try:
-            interruptible(lambda: run_campaign(prepared, folder, executor, watch))
-        except (KeyboardInterrupt, OSError):
-            if (folder / STORE).is_dir():
-                again = shlex.join(["undertow", *command, "--out", str(folder), "--resume"])
-                typer.echo(f"Stopped. To resume: {again}", err=True)
-            raise
+        interruptible(lambda: run_campaign(prepared, folder, executor, watch))
 
 
 def _clear(folder: Path, names: Sequence[str]) -> None:

@@ -142,7 +142,7 @@ def _of_file(text: Text) -> _Asked:
     if len(axes) != 1 or len(next(iter(axes.values()))) < 2:
         got = f"{', '.join(axes)} in the file" if axes else "none in the file"
         hint = "Give --controllers, or sweep one key by `cross`, or by `variants`, with two values or more"
-        raise BadInput("CAMPAIGN", "have one axis with what is compared", got, hint=hint, where=text.name)
+        raise BadInput(text.name, "have one axis with what is compared", got, hint=hint)
     ((axis, entries),) = axes.items()
     return _Asked(text, axis, [None] * len(entries), {})
 

@@ -68,7 +68,7 @@ def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Conte
     for path, text in zip(paths, texts, strict=True):
         if "scenario" in text.data:
             hint = "A campaign file is compared alone: its own `cross` or `variants`, or with --controllers"
-            raise BadInput("SCENARIO", "be a scenario where several are given", f"{path}, a campaign", hint=hint)
+            raise BadInput(str(path), "be a scenario where several are given", "a campaign", hint=hint)
     resolved = [build(text).resolved for text in texts]
     whole = [_flat(each) for each in resolved]
     keys = dict.fromkeys(key for each in whole for key in each)

@@ -19,7 +19,7 @@ from typing import Any
 
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.runtime import double_outside_runs
-from undertow.core.user_code import MODULE_PREFIX, python_says
+from undertow.core.user_code import MODULE_PREFIX, fault_of
 
 KINDS = (
     "vehicles",
@@ -41,6 +41,13 @@ KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation", "metrics"
 KEY_OF = {kind: key for key, kind in KIND_OF.items()}
 KEY_OF |= {"vehicles": "plant.vehicle", "thrusters": "plant.thruster", "power": "plant.battery` or `plant.esc"}
 KEY_OF |= {"sensors": "navigation.sensors` of `kind: observer"}
+
+# What others call a part -> its name here.
+_OTHER_WORDS = {"gps": "position_fix", "gnss": "position_fix", "usbl": "position_fix", "lbl": "position_fix"}
+_OTHER_WORDS |= {"magnetometer": "compass", "heading": "compass", "ahrs": "imu", "gyro": "imu", "accelerometer": "imu"}
+_OTHER_WORDS |= {"pressure": "depth", "barometer": "depth", "tachometer": "propeller_speed", "rpm": "propeller_speed"}
+_OTHER_WORDS |= {"step": "setpoint", "hover": "setpoint", "station_keeping": "setpoint", "lawnmower": "lawn_mower"}
+_OTHER_WORDS |= {"wave": "waves", "ocean_current": "current", "cable": "tether", "noise": "white_noise"}
 
 Part = Callable[..., Any]
 
@@ -89,7 +96,7 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
         kind: folder of the catalogue.
         name: of the part, or of a callable in a file.
         folder: where the file's name starts.
-        what: the argument or key that gives the name, for messages.
+        what: the key that gives the name, for messages, or the name itself where it is an argument.
 
     Raises:
         BadInput: no such part, file or callable.
@@ -97,13 +104,14 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
     if ".py:" in name:
         return _from_file(name, folder or Path(), what)
     if name.endswith(".py"):
-        hint = f"Add its name: {name}:{(_functions_in((folder or Path()) / name) or ['function'])[0]}"
-        raise BadInput(what, "name a file and a function in it", name, hint=hint)
+        hint = maker_in((folder or Path()) / name, name)
+        raise BadInput(what, "name a file and a function in it", "a file alone" if what == name else name, hint=hint)
     parts = names(kind)
     if name not in parts:
         hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
         other = next((one for one in KINDS if one != kind and name in names(one)), None) if parts else None
         hint = f"`{name}` is one of the {other}: give it at `{KEY_OF[other]}`" if other else hint
+        hint = f"Did you mean `{_OTHER_WORDS[name.lower()]}`?" if _OTHER_WORDS.get(name.lower()) in parts else hint
         if kind == "plants" and name.endswith((".yaml", ".yml")):
             hint = f"A vehicle file is named as `plant: {{vehicle: {name}}}`"
         raise BadInput(what, f"be a part in {kind}", name, hint=hint)
@@ -126,23 +134,43 @@ def _from_file(name: str, folder: Path, what: str) -> Part:
     path_text, attribute = name.rsplit(":", 1)
     path = (folder / path_text).resolve()
     if not path.is_file():
+        if what == name:
+            raise BadInput(path_text, "be an existing file", "not")
         raise BadInput(what, "name an existing file", path_text)
     try:
         module = _module(path, path.read_bytes())
     except (Exception, SystemExit) as error:
-        raise BadInput(what, "name a file that Python can run", f"{path_text}: {python_says(error)}") from error
+        fault = fault_of(error)
+        says = f"{'' if fault.says.startswith('cannot') else 'Python cannot run it: '}{fault.says}"
+        raise BadInput(what, "", says, hint=fault.hint) from error
     part = getattr(module, attribute, None)
     if not callable(part):
-        hint = did_you_mean(attribute, _functions_in(path))
+        functions, classes = _defined_in(path)
+        hint = did_you_mean(attribute, functions or classes) if functions or classes else ""
         raise BadInput(what, f"name a function in {path.name}", attribute or "empty", hint=hint)
     return part
 
 
-def _functions_in(path: Path) -> list[str]:
-    """Names of the functions and classes that a file defines, without running it; [] where it cannot be read."""
+def maker_in(file: Path, name: str) -> str:
+    """How to name a function of a user's file that makes a part, where a class or nothing was named.
+
+    Args:
+        file: the file.
+        name: of the file, as the user wrote it.
+    """
+    functions, _ = _defined_in(file)
+    if not functions:
+        return "Add a function that makes the part to the file; `undertow init --own-controller` writes an example"
+    also = f"; others are {', '.join(functions[1:])}" if len(functions) > 1 else ""
+    return f"Add its name: {name}:{functions[0]}{also}"
+
+
+def _defined_in(path: Path) -> tuple[list[str], list[str]]:
+    """Names of the functions and of the classes that a file defines, without running it; none if it cannot be read."""
     try:
         tree = ast.parse(path.read_bytes())
     except (OSError, SyntaxError, ValueError):
-        return []
-    kinds = (ast.FunctionDef, ast.ClassDef)
-    return [node.name for node in tree.body if isinstance(node, kinds) and not node.name.startswith("_")]
+        return [], []
+    functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")]
+    classes = [node.name for node in tree.body if isinstance(node, ast.ClassDef) and not node.name.startswith("_")]
+    return functions, classes

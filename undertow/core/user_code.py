@@ -10,10 +10,14 @@ from typing import Any, NamedTuple
 
 from jax import errors
 
+from undertow.core.errors import nearest
+
 MODULE_PREFIX = "undertow_part_"  # of the modules that users' files become
 
 _ABSTRACT = re.compile(r"Can't instantiate abstract class (\w+).* abstract (method|attribute)s? (.+)")
 _ASSIGNED = re.compile(r"cannot assign to field '(\w+)'")
+# Arithmetic with a Measurement or a Target, whole or in slices.
+_OF_TUPLES = re.compile(r"(unsupported operand.*'(tuple|Measurement|Target)')|(arguments?, got .*(Measurement|Target))")
 _LONGEST = 110  # characters of Python's message
 
 # JAX's error, its cause and the remedy; the first that applies.
@@ -94,7 +98,22 @@ def _reason(error: BaseException, text: str) -> tuple[str, str]:
         hint = f"Install `{error.name}` beside undertow; if it is a file of yours, add its folder to PYTHONPATH"
         return f"{type(error).__name__}: {text}", hint
     shown = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
-    return f"{type(error).__name__}: {shown}", ""
+    return f"{type(error).__name__}: {shown}", _meant(error, text)
+
+
+def _meant(error: BaseException, text: str) -> str:
+    """What was meant by an attribute that an object lacks, or by arithmetic with a tuple; "" where that is unknown."""
+    if isinstance(error, AttributeError) and error.name and error.obj is not None:
+        inner = [one for one in dir(error.obj) if not one.startswith("_")]
+        if outer := next((one for one in inner if hasattr(getattr(error.obj, one, None), error.name)), ""):
+            return f"Did you mean `.{outer}.{error.name}`?"
+        return nearest(error.name, inner)
+    if isinstance(error, TypeError) and _OF_TUPLES.search(text):
+        return (
+            "`y` and `r` are tuples of arrays: use `y.position` and `y.velocity`, and `r.position`, `r.velocity` and "
+            "`r.acceleration`"
+        )
+    return ""
 
 
 def _abstract(found: re.Match[str], frames: list[tuple[FrameType, int]]) -> Fault:

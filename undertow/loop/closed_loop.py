@@ -26,6 +26,7 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput
 from undertow.core.measurement import completed
+from undertow.core.returned import check_command
 from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
 from undertow.loop.recorded_signals import RECORDED, Signals
@@ -101,10 +102,17 @@ class Realization(NamedTuple):
 
     def start(self, position: Outputs | None = None, velocity: Outputs | None = None) -> tuple[PyTree, PyTree]:
         """States of plant and controller at t = 0, from the outputs there."""
+        x, y = self.measured_at_start(position, velocity)
+        return x, self.loop.controller.init(y, self.loop.reference.at(jnp.zeros(())))
+
+    def measured_at_start(
+        self, position: Outputs | None = None, velocity: Outputs | None = None
+    ) -> tuple[PyTree, Measurement]:
+        """State of the plant at t = 0, from the outputs there, and its measurement."""
         zero = jnp.zeros(())
         x = self.loop.plant.initial_state(position, velocity)
         y, _ = self.read(zero, self.loop.plant.output(zero, x), self.initial_measuring(x))
-        return x, self.loop.controller.init(y, self.loop.reference.at(zero))
+        return x, y
 
     def initial_measuring(self, x: PyTree) -> MeasurementState:
         """State of measuring at t = 0."""
@@ -189,7 +197,9 @@ def _decided(realization: Realization, t: Time, x: PyTree, z: PyTree, measuring:
     loop = realization.loop
     y, measuring = realization.read(t, loop.plant.output(t, x), measuring)
     r = loop.reference.at(t)
-    command, signals = loop.controller.command(z, y, r)
+    answer = loop.controller.command(z, y, r)
+    check_command(loop.controller, answer, loop.plant.inputs())
+    command, signals = answer
     return Decision(y, r, command, loop.plant.admissible(x, command), signals, measuring)
 
 

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
+from undertow.core.returned import check_state
 from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.outcome import Outcome, going
 from undertow.loop.recorded_signals import Signals
@@ -119,6 +120,7 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
         new_x = jax.lax.fori_loop(0, substeps, lambda i, x: integrate(motion, t + instant(i, h), x, h), x)
     y, law = decision.y, loop.controller
     new_z = law.advance(z, y, decision.r, decision.applied, dt)
+    check_state(law, new_z, z)
     remembered = decision.measuring
     if remembered.expected is not None:
         expected = remembered.expected.after(law, z, y, decision.signals.get("estimate"), decision.applied, dt)

@@ -34,9 +34,11 @@ def drift_advice(sensors: Sequence[AbstractSensor], duration: float) -> tuple[st
     }
     far = " and ".join(f"{size} ({what})" for what, size in sizes.items())
     remedies = " and ".join(f"`{_REMEDIES[what]}`" for what in found)
+    unbiased = not any(np.any(np.asarray(one.sampling.bias)) for one in sensors)
+    alone = " by noise alone, to which the biases of real sensors add" if unbiased else ""
     return (
         f"no sensor measures {', '.join(found)}: the estimate drifts by about {far} in {duration:g} s, one standard "
-        f"deviation. Add {remedies} to `navigation.sensors`",
+        f"deviation{alone}. Add {remedies} to `navigation.sensors`",
     )
 
 

@@ -1,7 +1,9 @@
 """Build the closed loop of a scenario."""
 
 import functools
+import os
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import equinox as eqx
@@ -117,6 +119,13 @@ def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None)
             return built._replace(closed_loop=in_present_precision(built.closed_loop))
 
 
+def own_parts(scenario: Scenario, folder: Path) -> dict[str, str]:
+    """Parts that the user wrote: key -> ./file.py:function as `undertow check` takes it in the current folder."""
+    parts = {key: getattr(scenario, key) for key in KIND_OF}
+    kinds = {key: part.kind for key, part in parts.items() if isinstance(part, Part) and ".py:" in part.kind}
+    return {key: os.path.relpath(folder / kind) for key, kind in kinds.items()}
+
+
 def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     resolved = scenario.model_dump(include={"description", "loop", "initial", "seed", "precision"})
 
@@ -162,7 +171,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         check_window(scenario.steady, scenario.loop.duration)
     with within("initial"):
         check_start(loop, scenario.initial)
-    part_cache.check_once(loop, lambda: check_fit(loop))
+    part_cache.check_once(loop, lambda: check_fit(loop, own_parts(scenario, text.folder)))
     several = [one("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
     if several:
         resolved["metrics"] = [description for _, description in several]

@@ -1,23 +1,28 @@
 """Consistency of times and parts: only shapes are evaluated."""
 
+import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
 from undertow.core import checks
-from undertow.core.contracts import Load
-from undertow.core.errors import Advice, BadInput, advice, within
+from undertow.core.contracts import Load, Target
+from undertow.core.errors import Advice, BadInput, advice, joined, within
+from undertow.core.returned import check_state, form
 from undertow.core.signals import check_declared
-from undertow.core.user_code import python_says
+from undertow.core.user_code import fault_of
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.schema import Initial, Loop, Window
 
 # A record takes about a kilobyte, a control step some microseconds.
 MOST_RECORDS = 1_000_000
 MOST_STEPS = 2_000_000_000
+
+_LONG = 0.5  # s; few vehicles are stable with a controller that is sampled more slowly
 
 # Relative tolerance for multiples of decimal steps.
 _ROUNDING = 1e-9
@@ -33,6 +38,9 @@ def check_times(loop: Loop) -> None:
     if loop.method not in allowed:
         raise BadInput("method", f"be {' or '.join(allowed)} when {loop.kind}", loop.method)
     stepped = loop.method != "adaptive"
+    if stepped and loop.dt > max(_LONG, loop.record * (1 + _ROUNDING)):
+        hint = f"It is in seconds: {loop.dt:g} ms are {loop.dt / 1e3:g}"
+        raise BadInput("dt", f"be at most `loop.record` ({loop.record:g} s)", f"{loop.dt:g} s", hint=hint)
     shortest = max(loop.record, loop.dt if stepped else 0.0)
     if loop.duration < shortest:
         raise BadInput("duration", f"be at least one record ({shortest:g} s)", f"{loop.duration:g} s")
@@ -95,41 +103,64 @@ def check_start(loop: ClosedLoop, start: Initial) -> None:
             checks.finite(key, value)
 
 
-def check_fit(loop: ClosedLoop) -> None:
+def check_fit(loop: ClosedLoop, own: Mapping[str, str] = MappingProxyType({})) -> None:
     """Check that the parts agree on the number of outputs and can take a step together.
+
+    Args:
+        loop: closed loop.
+        own: key of the scenario -> ./file.py:function, for the parts that the user wrote.
 
     Raises:
         BadInput: they do not fit together.
     """
     axes, zero = len(loop.plant.outputs), jnp.zeros(())
-    with within("reference"):
+    with _part("reference", own) as traced:
         loop = loop.starting_at(None)  # as the run has it, which then need not be traced again
-        target = _traced(loop.reference.at, zero)
+        target = traced(loop.reference.at, zero)
+        if not isinstance(target, Target):
+            raise BadInput("", "", f"`{type(loop.reference).__name__}.at` must give a Target, but is {form(target)}")
         if target.position.shape != (axes,):
             got = f"{len(target.position)} long" if target.position.ndim == 1 else f"of shape {target.position.shape}"
             raise BadInput("position", f"have {axes} entries ({', '.join(loop.plant.outputs)})", got)
-    with within("disturbance"):
-        realization = _traced(loop.realize, jax.random.PRNGKey(0))
-    with within("navigation"):
-        x, z = _traced(lambda realization: realization.start(), realization)
-    with within("disturbance"):
-        load = _traced(lambda realization, x: realization.load(zero, x), realization, x)
+    with _part("disturbance", own) as traced:
+        realization = traced(loop.realize, jax.random.PRNGKey(0))
+    with _part("navigation", own) as traced:
+        x, y = traced(lambda realization: realization.measured_at_start(), realization)
+    with _part("disturbance", own) as traced:
+        load = traced(lambda realization, x: realization.load(zero, x), realization, x)
         if not isinstance(load, Load):
             raise BadInput("", "give a Load", "something else")
         if any(signal.shape != (axes,) for signal in load[:2]):
             raise BadInput("", f"have {axes} axes", f"of shapes {[signal.shape for signal in load[:2]]}")
         rest = jnp.zeros(loop.plant.inputs())
-        _traced(lambda realization, x: realization.motion(zero, x, rest), realization, x)
-    with within("controller"):
+        traced(lambda realization, x: realization.motion(zero, x, rest), realization, x)
+    with _part("controller", own) as traced:
+        z = traced(loop.controller.init, y, target)
         decided = lambda realization, x, z: realization.decide(zero, x, z, realization.initial_measuring(x))
-        check_declared(loop.controller, _traced(decided, realization, x, z).signals, "command")
+        decision = traced(decided, realization, x, z)
+        check_declared(loop.controller, decision.signals, "command")
+        if "controller" in own:  # that of the catalogue is tested
+            after = traced(loop.controller.advance, z, decision.y, decision.r, decision.applied, zero)
+            check_state(loop.controller, after, z)
 
 
-def _traced(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Shapes of a result; any exception means that the part does not fit the others."""
-    try:
-        return jax.eval_shape(function, *arguments)
-    except BadInput:
-        raise
-    except Exception as error:
-        raise BadInput("", "fit the other parts", f"not: {python_says(error)}") from error
+@contextlib.contextmanager
+def _part(key: str, own: Mapping[str, str]) -> Iterator[Callable[..., Any]]:
+    """Inside are the errors of the part at a key; gives a function that traces one of it, for shapes of its result.
+
+    Any exception there means that the part does not fit the others.
+    """
+    remedy = f"Try: undertow check {own[key]}" if key in own else ""
+
+    def traced(function: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return jax.eval_shape(function, *arguments)
+        except BadInput:
+            raise
+        except Exception as error:
+            fault = fault_of(error)
+            says = fault.says if fault.says.startswith("cannot") else f"it does not fit the other parts: {fault.says}"
+            raise BadInput("", "", says, hint=joined(fault.hint, remedy)) from error
+
+    with within(key):
+        yield traced

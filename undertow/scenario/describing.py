@@ -48,7 +48,7 @@ def describe(name: str) -> tuple[Description, ...]:
         BadInput: no such part.
     """
     if is_vehicle_file(name):
-        found = read_vehicle(Path(name), what="NAME")
+        found = read_vehicle(Path(name), what="")
         return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), (), {}),)
     if ".py:" in name:
         part = catalogue.find("", name, what="NAME")

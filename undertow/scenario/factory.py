@@ -11,9 +11,9 @@ import equinox as eqx
 import numpy as np
 
 from undertow.core import catalogue, checks, contracts
-from undertow.core.errors import BadInput, known_key, within
+from undertow.core.errors import BadInput, joined, known_key, within
 from undertow.core.metric import AbstractMetric
-from undertow.core.user_code import fault_of
+from undertow.core.user_code import fault_of, place_of
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import read_csv, samples_of
 from undertow.scenario.values import checked
@@ -86,9 +86,11 @@ def make(
         table = _samples(options, folder)
     part, resolved = call(function, options, given, folder)
     if not isinstance(part, _CONTRACTS[kind]):
-        hint = "Does the function lack a `return`?" if part is None else ""
         must = f"name a function that returns {_title(_CONTRACTS[kind])}"
-        raise BadInput("kind", must, f"{name}: {part!r}", hint=hint)
+        if part is None:
+            raise BadInput("kind", must, f"{name}, which returns nothing", hint="Does the function lack a `return`?")
+        got = f"{name}, which returns {_described(part)}"
+        raise BadInput("kind", must, got, hint=derive_hint(part) if place_of(part) else "")
     if table:
         del resolved["samples"]
     part = adjust(part, changes, tuple(own)) if changes else part
@@ -111,10 +113,10 @@ def call(
     declared = _declared_once if inspect.isfunction(function) else _declared
     signature, hints = declared(function)
     known = {name: option for name, option in signature[len(given) :] if option.kind not in _VARIABLE}
-    for key in options:
-        if key not in known:
-            hint = known_key(str(key), known) if known else "There are none: remove it"
-            raise BadInput(key, "be an option here", "unknown", hint=hint)
+    if unknown := [str(key) for key in options if key not in known]:
+        hint = known_key(unknown[0], known) if known else "There are none: remove it"
+        also = f"Also unknown: {', '.join(f'`{key}`' for key in unknown[1:])}" if unknown[1:] else ""
+        raise BadInput(unknown[0], "be an option here", "unknown", hint=joined(hint, also))
     arguments, resolved = {}, {}
     for name, parameter in known.items():
         if name in INNER:
@@ -124,7 +126,7 @@ def call(
         elif name in options:
             arguments[name] = resolved[name] = checked(name, options[name], hints.get(name), parameter.default)
         elif parameter.default is inspect.Parameter.empty:
-            raise BadInput(name, "be given")
+            raise _missing(function, name, given)
         else:
             arguments[name], resolved[name] = parameter.default, listed(parameter.default)
     return _made(lambda: function(*given, **arguments)), resolved
@@ -172,6 +174,42 @@ def takes_model(function: Callable[..., Any]) -> bool:
 def is_part(thing: Any) -> bool:
     """Whether an object keeps the contract of some kind of part."""
     return isinstance(thing, tuple(_CONTRACTS.values()))
+
+
+def _described(thing: Any) -> str:
+    """An object that is no part, for messages: of a class of the user's own its name and place."""
+    place = place_of(thing)
+    return f"a `{type(thing).__name__}` ({place})" if place else repr(thing)
+
+
+def derive_hint(thing: Any) -> str:
+    """From which contract to derive the class of the user's own of an object that is no part."""
+    contract, shared = contract_like(thing)
+    kind = type(thing).__name__
+    if not contract:
+        return f"Derive `{kind}` from the contract of its kind, such as AbstractController"
+    return f"Derive `{kind}` from {contract}: it has {', '.join(f'`{one}`' for one in shared)}"
+
+
+def _missing(function: Callable[..., Any], name: str, given: tuple[Any, ...]) -> BadInput:
+    """The error for an option without a value; for a function of the user's own with its place and the remedy."""
+    place = place_of(function)
+    if not place:
+        return BadInput(name, "be given")
+    file = Path(inspect.getsourcefile(function) or "")
+    own = function.__name__
+    if inspect.isclass(function):
+        must = f"be given: `{own}` ({place}) is a class, and a part is named by a function that makes it"
+        return BadInput(name, must, hint=catalogue.maker_in(file, file.name))
+    must = f"be given: `{own}` ({place}) has no default for it"
+    first = next(iter(inspect.signature(function).parameters))
+    if first == "model":
+        return BadInput(name, must, hint=f"Give it one: `def {own}(model, {name}=1.0)`, for example")
+    hint = (
+        f"{'A' if given else 'Give it one. A'} function that makes a controller takes `model` first, and returns an "
+        "AbstractController: `undertow init --own-controller` writes one"
+    )
+    return BadInput(name, must, hint=hint)
 
 
 def contract_like(thing: Any) -> tuple[str, list[str]]:

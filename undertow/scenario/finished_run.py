@@ -83,7 +83,8 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
     dataset.attrs |= attributes | versions()
     known = meanings(loop, how.own)
     dataset.attrs["metrics"] = to_json({"steady": steady, "whole": whole})
-    dataset.attrs["metric_meanings"] = to_json({n: one._asdict() for n, one in known.items() if n in whole})
+    shown = {*whole, *how.criterion}  # a run that failed at once lacks metrics that its criterion names
+    dataset.attrs["metric_meanings"] = to_json({n: one._asdict() for n, one in known.items() if n in shown})
     if success is not None:
         dataset.attrs["success"] = to_json(success._asdict())
     dataset.attrs["content_hash"] = content_hash(dataset)
@@ -178,7 +179,7 @@ def _listed(names: list[str]) -> str:
 
 def _code(path: Path, before: dict) -> str:
     """Code files that have changed."""
-    scenario = parse(str(before.get("scenario") or "{}"), path.name, path.resolve().parent, "SCENARIO")
+    scenario = parse(str(before.get("scenario") or "{}"), path.name, path.resolve().parent)
     files = changed(before.get("code"), scenario.data, scenario.folder)
     return ", ".join(f"{file} has changed" for file in files)
 

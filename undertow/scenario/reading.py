@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from undertow.core.errors import BadInput, nearest
-from undertow.core.user_code import python_says
 from undertow.scenario.foreign_code import check_allowed
 from undertow.scenario.provenance import checksum
 
@@ -61,13 +60,14 @@ def key_path(name: str) -> Path_:
     return tuple(int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", name))
 
 
-def read(path: Path, what: str = "SCENARIO", allow_code: bool = False) -> Text:
+def read(path: Path, what: str = "", allow_code: bool = False, file: str = "scenario") -> Text:
     """A scenario from a .yaml file, or the resolved one from a .nc result file.
 
     Args:
         path: of the file.
-        what: the argument or key that names it, for messages.
+        what: the key or option that names it, for messages; "" for an argument.
         allow_code: whether the Python code that a result file names may run; that of a .yaml file may.
+        file: what it should be, for messages: scenario or campaign.
 
     Raises:
         BadInput: missing, unreadable, malformed or damaged file, or one that names code that may not run.
@@ -77,36 +77,75 @@ def read(path: Path, what: str = "SCENARIO", allow_code: bool = False) -> Text:
     if path.suffix == _RESULT:
         return _from_result(path, what, allow_code)
     if path.suffix not in _YAML:
-        hint = f"If it holds YAML, rename it to {path.stem}.yaml"
-        raise BadInput(what, "be a .yaml file, or the run.nc of an earlier run", path.name, hint=hint)
+        raise wrong_file(path, what, "be a .yaml file, or the run.nc of an earlier run", hint=_rename(path))
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise BadInput(what, "be a text file in UTF-8", path.name, hint="Save it with this encoding") from None
+        raise wrong_file(path, what, "be a text file in UTF-8", hint="Save it with this encoding") from None
     except OSError as error:
-        raise BadInput(what, "be a file that can be read", f"{path}: {error.strerror}") from None
-    return parse(text, path.name, path.resolve().parent, what)
+        raise BadInput(what or str(path), "be a file that can be read", f"{path}: {error.strerror}") from None
+    return parse(text, path.name, path.resolve().parent, what, file)
+
+
+def wrong_file(path: Path, what: str, must: str, got: str = "", hint: str = "", where: str = "") -> BadInput:
+    """Error for a file, which is named once.
+
+    Args:
+        path: of the file.
+        what: the key or option that names it; "" for an argument.
+        must: what it must be.
+        got: what it is; "" where that goes without saying.
+        hint: the remedy.
+        where: file and line of the key, when known.
+    """
+    if what:
+        return BadInput(what, must, f"{path}, {got}" if got else str(path), hint=hint, where=where)
+    return BadInput(str(path), must, got or None, hint=hint, where=where)
 
 
 def no_file(path: Path, what: str, must: str = "be an existing file") -> BadInput:
-    """The error for a path that is a folder, or nothing; it names the files that may be meant.
+    """The error for a path that is a folder, a file of another kind, or nothing; it names the files that may be meant.
 
     Args:
-        path: that is no file.
-        what: the argument or key that names it.
+        path: that cannot be read.
+        what: the key or option that names it; "" for an argument.
         must: what that must be.
     """
     if path.is_dir():
-        inside = sorted(one.name for one in path.iterdir() if one.suffix in (*_YAML, _RESULT))
-        more = ", ..." if len(inside) > _LISTED else ""
-        hint = f"Name one of the files in it: {', '.join(inside[:_LISTED])}{more}" if inside else ""
-        return BadInput(what, must, f"{path}, a folder", hint=hint)
+        hint = f"Name one of the files in it: {listed}" if (listed := _listed(_files_in(path))) else ""
+        return wrong_file(path, what, must, "a folder", hint=hint)
+    if path.is_file() or ".py:" in path.name:
+        return wrong_file(path, what, must, hint=_rename(path))
     folder = path.parent
     if not folder.is_dir():
-        return BadInput(what, must, str(path), hint=f"The folder {folder} does not exist")
-    files = [one for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)]
-    known = [one.name for one in files if nearest(path.stem, [one.stem])]  # not alike by their ending alone
-    return BadInput(what, must, str(path), hint=nearest(path.name, known))
+        return wrong_file(path, what, must, hint=f"The folder {folder} does not exist")
+    files = _files_in(folder)
+    there = f"Files there: {_listed(files)}" if files and not what else ""
+    return wrong_file(path, what, must, "" if what else "not", hint=nearest_file(path) or there)
+
+
+def nearest_file(path: Path) -> str:
+    """Sentence that names the YAML or result file beside a path that may be meant by it; "" where there is none."""
+    known = [
+        name for name in _files_in(path.parent) if nearest(path.stem, [Path(name).stem])
+    ]  # not by its ending alone
+    return nearest(path.name, known)
+
+
+def _files_in(folder: Path) -> list[str]:
+    """Names of the YAML and result files in a folder."""
+    return sorted(one.name for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)) if folder.is_dir() else []
+
+
+def _listed(files: Sequence[str]) -> str:
+    return ", ".join(files[:_LISTED]) + (", ..." if len(files) > _LISTED else "")
+
+
+def _rename(path: Path) -> str:
+    """Remedy for a file with another ending."""
+    if ".py" in path.name:
+        return "Python code is named in a scenario, such as `controller: ./file.py:function`"
+    return f"If it holds YAML, rename it to {path.stem}.yaml"
 
 
 def dump(data: Mapping[str, Any]) -> str:
@@ -123,43 +162,47 @@ def dump(data: Mapping[str, Any]) -> str:
 
 
 def _from_result(path: Path, what: str, allow_code: bool) -> Text:
+    must = "be a result file of undertow"
     try:
         with xr.open_dataset(path, engine="netcdf4") as dataset:
             attributes, actual = dict(dataset.attrs), checksum(dataset)
-    except Exception as error:  # whatever netCDF and xarray say of a file that is torn, or no such file
-        raise BadInput(what, "be a result file of undertow", f"{path.name}: {python_says(error)}") from None
+    except Exception:  # netCDF and xarray raise many kinds of errors for a file that is torn, or none of theirs
+        empty = path.stat().st_size == 0
+        got = "empty (0 bytes)" if empty else "damaged, incomplete, or not a netCDF file"
+        raise wrong_file(path, what, must, got, hint="Run its scenario again") from None
     text = attributes.get("scenario")
     if not isinstance(text, str):
-        raise BadInput(what, "be a result file of undertow", f"{path.name}, which holds no scenario")
+        raise wrong_file(path, what, must, "one that holds no scenario")
     if attributes.get("checksum", actual) != actual:
         hint = "Take its scenario.yaml instead, if that can be trusted"
-        got = f"{path.name}, which was changed or damaged since: its checksum does not hold"
-        raise BadInput(what, "be as it was written", got, hint=hint)
+        got = "changed or damaged since: its checksum does not hold"
+        raise wrong_file(path, what, "be as it was written", got, hint=hint)
     found = parse(text, path.name, path.resolve().parent, what)
-    check_allowed(found.data, path, attributes.get("code"), what, allow_code)
+    check_allowed(found.data, path, attributes.get("code"), what or str(path), allow_code)
     return found
 
 
-def parse(text: str, name: str, folder: Path, what: str) -> Text:
+def parse(text: str, name: str, folder: Path, what: str = "", file: str = "scenario") -> Text:
     """YAML text as plain data with the line of every key.
 
     Args:
         text: YAML.
         name: of its file, for messages.
         folder: where relative paths in it start.
-        what: the argument or key that names it, for messages.
+        what: the key or option that names it, for messages; "" for an argument.
+        file: what it should be, for messages: scenario or campaign.
 
     Raises:
         BadInput: malformed.
     """
     from undertow.scenario.yaml_text import load  # what it imports adds filters of warnings to the process
 
+    what = what or name or file
     data, lines = load(text, name, what)
     if not isinstance(data, dict):
         got = "empty" if data is None else "a list" if isinstance(data, list) else f"a single {type(data).__name__}"
-        file = "campaign" if what == "CAMPAIGN" else "scenario"
         hint = f"Write `key: value` lines; `undertow describe {file}` shows the keys"
-        raise BadInput(what, "be a mapping of keys to values", got, where=name, hint=hint)
+        raise BadInput(what, "be a mapping of keys to values", got, where="" if what == name else name, hint=hint)
     return Text(data, name, folder, lines)
 
 

@@ -3,12 +3,13 @@
 import re
 import typing
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 from undertow.core.errors import BadInput, joined, known_key
-from undertow.scenario.reading import Text
+from undertow.scenario.reading import Text, wrong_file
 from undertow.scenario.synonyms import hint_for
 from undertow.scenario.values import remedy_of
 from undertow.scenario.vehicle_schema import KEYS as VEHICLE_KEYS
@@ -205,8 +206,8 @@ def validate(text: Text) -> Scenario:
         raise complaint(errors, text) from None
 
 
-def check_kind(text: Text, key: str = "SCENARIO", where: str = "") -> None:
-    """Check that a text is not another kind of file; `key` and `where` are the place that named it.
+def check_kind(text: Text, key: str = "", where: str = "") -> None:
+    """Check that a text is not another kind of file; `key` and `where` are the place that named it, if any.
 
     Raises:
         BadInput: it is.
@@ -214,7 +215,7 @@ def check_kind(text: Text, key: str = "SCENARIO", where: str = "") -> None:
     if (kind := kind_of(text.data)) in _REMEDIES:
         name = text.name or "NAME.yaml"
         hint = _REMEDIES[kind].format(name=name)
-        raise BadInput(key, "be a scenario", f"{name}, a {kind}", hint=hint, where=where)
+        raise wrong_file(Path(name), key, "be a scenario", f"a {kind}", hint=hint, where=where)
 
 
 def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scenario) -> BadInput:
@@ -231,8 +232,17 @@ def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scen
         section, _, key = name.rpartition(".")
         place = f"`{section}`" if section else f"the {what}"
         return BadInput(name, "be given", hint=joined(f"Add `{key}:` to {place}", also), where=where)
-    got = "empty" if first["input"] is None else repr(first["input"])
+    got = "empty" if first["input"] is None else _as_yaml(first["input"])
     return BadInput(name, _must(first), got, hint=joined(_remedy(first), also), where=where)
+
+
+def _as_yaml(value: Any) -> str:
+    """A value as a file has it, on one line."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {_as_yaml(entry)}' for key, entry in value.items())}}}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_as_yaml, value))}]"
+    return repr(value)
 
 
 def _path_of(error: Any) -> tuple[str | int, ...]:

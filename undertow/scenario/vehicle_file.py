@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput, within
 from undertow.core.runtime import double_outside_runs
-from undertow.scenario.reading import Text, from_data, key_path, read
+from undertow.scenario.reading import Text, from_data, key_path, read, wrong_file
 from undertow.scenario.schema import kind_of
 from undertow.scenario.vehicle_schema import INSTEAD, VehicleData, parse
 from undertow.vehicles.vehicle import Vehicle
@@ -49,7 +49,7 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
         path: of the file.
         changes: other values for some of its keys, as if they stood there; or `contents`, the whole of it, and the
             file need not exist.
-        what: the argument or key that names the file, for messages.
+        what: the key that names the file, for messages; "" for an argument.
 
     Raises:
         BadInput: anything wrong, with the line in the file unless it is among the changes.
@@ -61,7 +61,7 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
     text = read(path, what) if kept is None else from_data(kept)
     if kept is None and (kind := kind_of(text.data)) in ("scenario", "campaign"):
         hint = "A vehicle file has the keys mass, inertia, thrusters, ..., as in examples/my_rov.yaml"
-        raise BadInput(what, "be a vehicle file", f"{path.name}, a {kind}", hint=hint)
+        raise wrong_file(path, what, "be a vehicle file", f"a {kind}", hint=hint)
     forgotten = {other for key in changes for other in INSTEAD.get(key, ())} - set(changes)
     contents = {"name": path.stem, **text.data, **changes}
     contents = {key: value for key, value in contents.items() if key not in forgotten}

@@ -21,7 +21,17 @@ VECTORS = {"r_g": _AXES, "r_b": _AXES, "size": "length, width, height"}
 MATRICES = {"inertia": (3, "about forward, starboard, down")} | {
     name: (6, _SIX) for name in ("added_mass", "linear_damping", "quadratic_damping")
 }
-_REQUIRED = ("mass", "r_g", "r_b", *MATRICES, "thrusters")
+# Required key -> its unit, and what it is.
+_IN_WORDS = {
+    "mass": "kg, in air",
+    "r_g": f"centre of gravity, m ({_AXES})",
+    "r_b": f"centre of buoyancy, m ({_AXES})",
+    "inertia": "kg m^2, three diagonal entries or a 3 x 3 matrix",
+    "added_mass": f"kg and kg m^2, six diagonal entries ({_SIX}) or a 6 x 6 matrix",
+    "linear_damping": "N s/m and N m s, six diagonal entries (zero where there is none) or a 6 x 6 matrix",
+    "quadratic_damping": "N s^2/m^2 and N m s^2, six diagonal entries (zero where there is none) or a 6 x 6 matrix",
+    "thrusters": "a list with one entry per thruster, {position: [...], direction: [...]}",
+}
 KEYS = ("name", "source", "inertia_about", *SCALARS, *VECTORS, *MATRICES, "thrusters", "thruster_matrix")
 
 # Alternatives: where one is given, the others must not be.
@@ -45,8 +55,9 @@ def check_keys(contents: Mapping[str, Any]) -> None:
         for other in INSTEAD.get(key, ()):
             if other in contents:
                 raise BadInput(key, f"be left out when there is `{other}`", contents[key])
-    if missing := [key for key in _REQUIRED if key not in contents]:
-        raise BadInput(missing[0], "be given", hint=_listed("Also missing", missing[1:]))
+    if missing := [key for key in _IN_WORDS if key not in contents]:
+        must = f"be given: {_IN_WORDS[missing[0]]}"
+        raise BadInput(missing[0], must, hint=_listed("Also missing", missing[1:]))
     if "buoyancy" not in contents:
         for key in ("volume", "water_density"):
             if key not in contents:
@@ -165,6 +176,9 @@ def _vector(name: str, entry: Mapping[str, Any], key: str) -> NDArray:
     if key not in entry:
         hint = "" if key == "position" else "Or give `azimuth` and `elevation` in degrees"
         raise BadInput(f"{name}.{key}", "be given", hint=hint)
+    if isinstance(entry[key], str) and key == "direction":
+        hint = "Forward is [1, 0, 0], starboard [0, 1, 0], down [0, 0, 1]; or give `azimuth` and `elevation` in degrees"
+        raise BadInput(f"{name}.{key}", f"be three numbers ({_AXES})", entry[key], hint=hint)
     value = checked(f"{name}.{key}", entry[key], None, 0.0)
     checks.length(f"{name}.{key}", value, 3, _AXES)
     if np.abs(np.asarray(value, dtype=float)).max() > _FARTHEST:

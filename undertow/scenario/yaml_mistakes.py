@@ -7,6 +7,10 @@ from ruamel.yaml.error import MarkedYAMLError
 
 _ALIGN = "Start all keys of a section in the same column, and what belongs to them further right"
 
+_BRACKETED = re.compile(
+    r"""[{,]\s*([\w.-]+\[\d+\][\w.\[\]-]*):(\s[^,}]*)"""
+)  # a key such as position[0], and its value
+
 
 class Mistake(NamedTuple):
     """What is wrong, its line, from 1 (None where unknown), and the remedy, "" where none is known."""
@@ -36,6 +40,9 @@ def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
         return Mistake("the indentation does not fit the lines above", line, _ALIGN)
     if "could not find expected ':'" in problem:
         return Mistake("a key has no colon", begun or line, "Write `key: value`, with a space after the colon")
+    if "expected ',' or '}'" in problem and line and (key := _BRACKETED.search(_uncommented(lines[line - 1]))):
+        hint = f'Inside braces, quote a key that has brackets: {{"{key[1]}":{key[2]}}}'
+        return Mistake(f"the key {key[1]} has brackets, but no quotes", line, hint)
     if opened := re.match(r"expected ',' or '([\]}])'", problem):
         closing = opened[1]
         says = f"a `{'[' if closing == ']' else '{'}` is not closed, or lacks a comma"

@@ -100,7 +100,8 @@ def has_answers(path: Path) -> bool:
 def _read(path: Path, about: str, resume: bool) -> list[dict[str, Any]]:
     if not path.exists():
         if resume:
-            raise BadInput("--resume", "find an unfinished tuning", f"nothing in {path.parent}")
+            hint = "Leave --resume out to start one"
+            raise BadInput("--resume", "find an unfinished tuning", f"nothing in {path.parent}", hint=hint)
         return []
     if not resume:
         hint = "Add --resume to continue it, or choose another folder"

@@ -30,7 +30,7 @@ def closed(at: Equilibrium, dt: float, kind: str = "sampled", **between: float) 
     found = close_sampled(at, dt, **between) if kind == "sampled" else close_continuous(at, dt)
     if not all(np.isfinite(part).all() for part in (found.matrix, *found.entries.values(), *found.signals.values())):
         hint = "`loop.dt` is too long for this plant, or some number too large"
-        raise BadInput("SCENARIO", "be a loop that can be linearised", "one whose slopes are not finite", hint=hint)
+        raise BadInput("", "", "the loop cannot be linearised: its slopes are not finite", hint=hint)
     return found
 
 

@@ -29,9 +29,15 @@ _RULES = (*mass.RULES, *statics.RULES, *hydrodynamics.RULES, *layout.RULES, *lay
 
 
 def lint(facts: Facts) -> tuple[Finding, ...]:
-    """All errors and advice on a vehicle, errors first; without those that angles in radians cause."""
-    causes = set(layout.OF_DIRECTIONS) if any(layout.degrees(facts)) else set()
-    findings = [finding for rule in _RULES if rule not in causes for finding in rule(facts)]
+    """All errors and advice on a vehicle, errors first; without those that angles in radians or a wrong size cause."""
+    consequences = set(layout.OF_DIRECTIONS) if any(layout.degrees(facts)) else set()
+    fitting = facts._replace(size=None) if any(statics.volume(facts)) else facts
+    findings = [
+        finding
+        for rule in _RULES
+        if rule not in consequences
+        for finding in rule(facts if rule is statics.volume else fitting)
+    ]
     return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
 
 
