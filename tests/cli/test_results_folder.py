@@ -135,7 +135,7 @@ def test_what_is_published_stays_whatever_follows(tmp_path):
         ("file/below", "`--out` must be a folder, but is file/below, and file is a file. Choose another name"),
         (
             "/proc/undertow",
-            "`--out` must be a folder that can be written, but is /proc/undertow: No such file or directory. Choose a folder of yours",
+            "`--out` must be a folder that can be made and written, but is /proc/undertow, where nothing can be written (No such file or directory). Choose another folder",
         ),
     ],
 )

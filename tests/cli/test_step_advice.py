@@ -65,7 +65,7 @@ BASE = {
 }
 
 
-@pytest.mark.parametrize("method", ["rk4", "euler"])
+@pytest.mark.parametrize("method", ["rk4", pytest.param("euler", marks=pytest.mark.slow)])
 def test_a_plant_too_stiff_for_its_steps_is_not_called_an_unstable_loop(method):
     """x_ddot = -1000 x_dot + u at 10 ms: 2.785 (2 for Euler's method) over 1000 / s, in so many substeps, and no fewer."""
     failed = execute(BASE | {"loop": BASE["loop"] | {"method": method}})

@@ -127,7 +127,7 @@ def test_a_metric_of_ones_own_in_a_run(folder, capsys):
     assert row.replace("│", " ").split()[-1] == "m"
 
 
-@pytest.mark.parametrize("backend", ["simd", "xla"])
+@pytest.mark.parametrize("backend", ["simd", pytest.param("xla", marks=pytest.mark.slow)])
 def test_a_metric_of_ones_own_in_a_campaign(folder, backend):
     """A column like every other, and a criterion of success: each trial is what its run is."""
     scenario = SCENARIO | {"loop": SCENARIO["loop"] | {"backend": backend}, "success": {"overshoot": 0.2}}

@@ -42,7 +42,7 @@ for command in json.loads(sys.argv[2]):
     print("\\n--", code, file=sys.stderr, flush=True)
 """
 COMMANDS = {
-    "simulate": ["scenario.yaml", "--out", "run"],
+    "simulate": ["scenario.yaml", "--out", "run", "--no-prediction"],
     "campaign": ["campaign.yaml", "--out", "trials"],
     "check": ["scenario.yaml"],
     "list": [],

@@ -73,7 +73,10 @@ def noise_of_a_run(duration, dt, simulate=sampled.simulate):
     return np.asarray(samples["measured_position"] - samples["position"])[:-1, 0]
 
 
-@pytest.mark.parametrize("simulate", [sampled.simulate, simd_batch.simulate], ids=["xla", "simd"])
+@pytest.mark.parametrize(
+    "simulate",
+    [pytest.param(sampled.simulate, id="xla", marks=pytest.mark.slow), pytest.param(simd_batch.simulate, id="simd")],
+)
 @pytest.mark.parametrize(("duration", "dt"), [(6e3, 1.0), (1e7, 2e3), (5e-4, 1e-7)])
 def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
     """Beyond 2^32 microseconds, to four months, and below a microsecond."""

@@ -155,7 +155,7 @@ _NOTHING = 1e-9
 
 @contextlib.contextmanager
 def _predicting(built: Built, enabled: bool) -> Iterator[Future[PredictedMetrics] | None]:
-    """The prediction of a scenario, made in another thread meanwhile; None where none is wanted."""
+    """The prediction of a scenario, made in another thread meanwhile; None where it is left out."""
     if not enabled:
         yield None
         return

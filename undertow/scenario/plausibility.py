@@ -11,8 +11,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import lsq_linear
-from scipy.spatial.transform import Rotation
 
 from undertow.core.contracts import AbstractReference
 from undertow.core.errors import Advice, advice
@@ -32,6 +30,7 @@ _FAR = 10.0  # s at top speed; a longer step saturates the thrusters for long
 _DIRECTIONS = 2000
 _AT_REST = 1e-3  # m/s
 _SHARES = 101  # of a current, tried one after the other
+_WEAK = 0.05  # of the strongest direction: what thrusters do less along is left to the vehicle
 _BALANCED = 0.01  # of the force: what may be left of it
 
 
@@ -94,6 +93,9 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
         position: that is held, m and rad.
         flow: velocity of the current, world axes, m/s.
     """
+    from scipy.optimize import lsq_linear  # a third of a second, which scenarios without current need not wait for
+    from scipy.spatial.transform import Rotation
+
     thrusts, body = _thrusts(plant), plant.body
     if thrusts is None or not flow.any():
         return _size(flow)
@@ -104,7 +106,7 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
         jax.vmap(lambda nu: body.coriolis(nu) + body.damping(nu) + body.restoring(jnp.asarray(rotation[2])))
     )
     matrix = np.asarray(plant.thruster_matrix, dtype=float)
-    acting = matrix @ np.linalg.pinv(matrix)
+    acting = matrix @ np.linalg.pinv(matrix, rcond=_WEAK)
     needed = np.asarray(forces(jnp.asarray(np.outer(shares, through)))) @ acting.T
     held = 0.0
     for share, force in zip(shares, needed, strict=True):
