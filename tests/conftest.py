@@ -52,7 +52,7 @@ def pytest_configure(config):
         return
     flags += " --xla_backend_optimization_level=0"
     if jax.__version_info__ < (0, 11):  # later ones know no other emitters, and stop at a flag that they do not know
-        flags += " --xla_cpu_use_fusion_emitters=false"
+        flags += " --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"  # both cores are busy
     os.environ["XLA_FLAGS"] = flags.strip()
 
 
