@@ -254,7 +254,10 @@ def test_a_refused_overwrite_leaves_a_campaign_that_is_flying(campaign_file, tmp
     assert contents(out) == before
 
 
-@pytest.mark.parametrize("content", ["", *(pytest.param(one, marks=pytest.mark.slow) for one in ("[]", '{"zarr_format": 3, "node_type": "array"}'))])
+@pytest.mark.parametrize(
+    "content",
+    ["", *(pytest.param(one, marks=pytest.mark.slow) for one in ("[]", '{"zarr_format": 3, "node_type": "array"}'))],
+)
 def test_a_store_without_its_first_file_is_told(campaign_file, tmp_path, capsys, content):
     """Nobody can say any more what its rows are of."""
     path, out = campaign_file(trials=4, requirements={}), tmp_path / "out"

@@ -74,7 +74,9 @@ def test_an_hour_at_a_millimetre_per_second():
     assert drift.time_to_divergence(law, DT, 1e-3) > 3600.0
 
 
-@pytest.mark.parametrize("choices", [{"weights_bound": 20.0}, pytest.param({"weights_bound": 6.0}, marks=pytest.mark.slow), {"sets": 1}])
+@pytest.mark.parametrize(
+    "choices", [{"weights_bound": 20.0}, pytest.param({"weights_bound": 6.0}, marks=pytest.mark.slow), {"sets": 1}]
+)
 def test_cures(choices):
     """Box projection bounds c, one set has none: both outlive the unprotected law many times over."""
     law, _, gain, weights, outcome = noisy(15.0, 1e-2, 0.1, **choices)
