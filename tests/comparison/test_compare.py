@@ -16,7 +16,7 @@ from test_blocks import FILE, ROOT, blocks
 import undertow as ut
 from undertow.cli import compare
 from undertow.cli.main import run
-from undertow.comparison.contest import contest
+from undertow.comparison.prepare import prepare_comparison
 from undertow.scenario.reading import dump
 
 WILD = {"kind": "pid", "frequency": 500.0}
@@ -42,7 +42,7 @@ def test_command(scenario, own_law, capsys):
     assert found["names"] == names and found["trials"] == 8
     assert found["endings"]["pid (wild)"] == {"diverged": 8} and found["endings"]["smc"] == {"completed": 8}
     assert "pid (wild) did not complete 8 of 8 trials (diverged 8, median time" in said.out
-    of = {(one["contestant"], one["baseline"], one["metric"]): one for one in found["differences"]}
+    of = {(one["candidate"], one["baseline"], one["metric"]): one for one in found["differences"]}
     beside_itself = [one for key, one in of.items() if key[:2] == ("again", "pid (scenario)")]
     assert all(one["pairs"] == 8 and one["median"] == one["smaller"] == one["larger"] == 0 for one in beside_itself)
     assert "again against pid (scenario) (8 pairs): all differences are zero." in said.out
@@ -55,7 +55,7 @@ def test_command(scenario, own_law, capsys):
     assert of["smc", "pid (scenario)", "position_rms"]["median"] == np.median(apart)
     assert len(np.unique(rows["seed"].values[0])) == 8 and (rows["seed"].values == rows["seed"].values[0]).all()
     table = list(csv.DictReader((out / "comparison.csv").read_text().splitlines()))
-    assert {row["contestant"] for row in table} == set(names[1:])
+    assert {row["candidate"] for row in table} == set(names[1:])
     assert "\\toprule" in (out / "comparison.tex").read_text() and "| smc |" in (out / "comparison.md").read_text()
     page = re.sub(r"<[^>]+>", " ", (out / "comparison.html").read_text())
     for words in ("Comparison: pid (scenario), again", "default gains of", "axis.yaml", "Holm", "diverged"):
@@ -89,7 +89,7 @@ def test_from_python(scenario):
     slow, quick = (found.dataset["position_rms"].sel(controller=name).values for name in ("slow", "quick"))
     assert (slow > quick).all()
     (one,) = [one for one in found.differences if one.metric == "position_rms"]
-    assert (one.contestant, one.baseline, one.smaller) == ("quick", "slow", 8) and one.established
+    assert (one.candidate, one.baseline, one.smaller) == ("quick", "slow", 8) and one.established
     assert one.median == np.median(quick - slow) and one.low <= one.median <= one.high < 0
     (variation,) = [one for one in found.differences if one.metric == "input_variation"]
     assert variation.larger == 8
@@ -139,7 +139,7 @@ def test_scenarios_as_a_whole(scenario, capsys):
 
 
 def test_campaign_file(scenario, capsys):
-    """Its samples are used for every contestant, and its only axis may be what is compared."""
+    """Its samples are used for every candidate, and its only axis may be what is compared."""
     varied = {"scenario": scenario(navigation="perfect"), "trials": 6, "seed": 4}
     varied["vary"] = {"disturbance.amplitude": {"uniform": [0.5, 2.0]}}
     swept = varied | {"cross": {"controller.frequency": [1.0, 2.0]}}
@@ -151,7 +151,7 @@ def test_campaign_file(scenario, capsys):
     assert found["names"] == ["pid (slow)", "pid (scenario)"] and found["differences"][0]["smaller"] == 6
     rows = xr.open_zarr("one/trials.zarr", consolidated=False).load()["vary:disturbance.amplitude"].values
     assert (rows[0] == rows[1]).all() and np.ptp(rows[0]) > 0.1
-    ready = contest([Path("swept.yaml")])
+    ready = prepare_comparison([Path("swept.yaml")])
     assert (ready.dimension, ready.names, ready.campaign.trials) == ("controller.frequency", ("1.0", "2.0"), 6)
     assert "axis.yaml" not in ready.notes[0].sentence and "frequency 1.0" in ready.notes[0].sentence
     capsys.readouterr()

@@ -110,8 +110,8 @@ def test_markdown(findings):
 def test_csv(findings):
     rows = list(csv.DictReader(io.StringIO(table(findings, "csv"))))
     assert len(rows) == 3 * 4
-    assert rows[0]["metric"] == "position_rms" and (rows[0]["contestant"], rows[0]["baseline"]) == ("b_1", "a")
-    assert float(rows[0]["contestant_median"]) - float(rows[0]["baseline_median"]) == pytest.approx(-0.455)
+    assert rows[0]["metric"] == "position_rms" and (rows[0]["candidate"], rows[0]["baseline"]) == ("b_1", "a")
+    assert float(rows[0]["candidate_median"]) - float(rows[0]["baseline_median"]) == pytest.approx(-0.455)
     assert float(rows[0]["median"]) == pytest.approx(-0.455) and rows[0]["established"] == "True"
     assert rows[1]["unit"] == "rad"
 

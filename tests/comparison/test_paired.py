@@ -19,7 +19,7 @@ def test_numbers_by_hand():
     """Differences -1, -2, -3, -4, -5, -6 of 10: a rank sum of zero, whose probability is 2 / 2^6 on both sides."""
     baseline = np.full(6, 10.0)
     found = only({"energy": {"old": baseline, "new": baseline - np.arange(1, 7)}})
-    assert (found.contestant, found.baseline, found.pairs, found.left_out) == ("new", "old", 6, 0)
+    assert (found.candidate, found.baseline, found.pairs, found.left_out) == ("new", "old", 6, 0)
     assert (found.median, found.relative) == (-3.5, pytest.approx(-0.35))
     assert (found.smaller, found.larger) == (6, 0)
     assert found.p == found.p_holm == 2 / 2**6
@@ -41,7 +41,7 @@ def test_only_trials_that_both_completed_count():
     assert math.isnan(found.p) and math.isnan(found.low) and not found.established  # fewer than six pairs
 
 
-def test_a_contestant_beside_itself_differs_in_nothing():
+def test_a_candidate_beside_itself_differs_in_nothing():
     values = np.arange(1.0, 21.0)
     found = only({"energy": {"a": values, "b": values.copy()}})
     assert (found.median, found.low, found.high, found.relative) == (0, 0, 0, 0)
@@ -76,7 +76,7 @@ def test_correction_is_for_all_tests_of_a_comparison():
     baseline = np.full(8, 10.0)
     each = {"a": baseline, "b": baseline - np.arange(1, 9), "c": baseline}
     found = differences({"energy": each, "input_rms": each})
-    assert [(one.contestant, one.baseline) for one in found[::2]] == [("b", "a"), ("c", "a"), ("c", "b")]
+    assert [(one.candidate, one.baseline) for one in found[::2]] == [("b", "a"), ("c", "a"), ("c", "b")]
     assert [one.p for one in found] == pytest.approx([2 / 2**8] * 2 + [NAN] * 2 + [2 / 2**8] * 2, nan_ok=True)
     assert found[0].p_holm == pytest.approx(4 * 2 / 2**8)  # four tests were made
 
@@ -85,6 +85,6 @@ def test_completed_trials_by_hand():
     """Ten trials that one of them alone completed: probability 2 / 2^10 where both are as likely."""
     first = np.array([True] * 12)
     found = completions({"a": first, "b": first & (np.arange(12) >= 10), "c": first})
-    assert [(one.only_contestant, one.only_baseline) for one in found] == [(0, 10), (0, 0), (10, 0)]
+    assert [(one.only_candidate, one.only_baseline) for one in found] == [(0, 10), (0, 0), (10, 0)]
     assert found[0].p == 2 / 2**10 and math.isnan(found[1].p)
     assert found[0].p_holm == 2 * found[0].p

@@ -21,7 +21,7 @@ import pytest
 
 from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
-from undertow.comparison.contest import contest
+from undertow.comparison.prepare import prepare_comparison
 from undertow.report import run_page
 from undertow.report.figures import writing
 from undertow.scenario.reading import read
@@ -75,7 +75,7 @@ def quicker(arguments: list[str], page: str) -> list[str]:
 def compared(arguments: list[str]) -> None:
     """Build the controllers of a comparison, with the scenario's own for the preset `robust`, and run nothing."""
     entries = arguments[arguments.index("--controllers") + 1].replace("robust", "scenario").split(",")
-    assert contest([Path(arguments[1])], entries).campaign.number > 1
+    assert prepare_comparison([Path(arguments[1])], entries).campaign.number > 1
 
 
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built

@@ -56,6 +56,8 @@ RETIRED = {
     r"downhill": "gradient descent",
     r"journal": "checkpoint",
     r"crossed": "swept",
+    r"contests?": "comparison",
+    r"contestants?": "candidate",
     r"wet": "under water",
     r"the sea": "disturbances",
     r"whole motors?": "full motor model",

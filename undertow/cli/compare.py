@@ -17,7 +17,7 @@ from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
 from undertow.comparison.comparison import Comparison, read_comparison
-from undertow.comparison.contest import Contest, contest
+from undertow.comparison.prepare import PreparedComparison, prepare_comparison
 from undertow.comparison.sentences import sentences
 from undertow.comparison.tables import NOTE, medians
 from undertow.core import checks
@@ -54,7 +54,7 @@ def compare(
     again += ["--replay"] if replay else []
     with trials_folder(out, f"{paths[0].stem}-comparison", _WRITTEN, resume, overwrite) as folder:
         console = wide_console()
-        ready = built_with_advice(console, lambda: contest(paths, several, trials, allow_code))
+        ready = built_with_advice(console, lambda: prepare_comparison(paths, several, trials, allow_code))
         if replay:
             check_replay(ready.built)
         with resumable(folder, again):
@@ -62,7 +62,7 @@ def compare(
             return _conclude(console, ready, folder, pdf, replay)
 
 
-def _conclude(console: Console, ready: Contest, folder: Path, pdf: str | None, replay: bool) -> int:
+def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: str | None, replay: bool) -> int:
     """Write page, tables and scenarios; print the findings."""
     firsts = dict(zip(ready.names, ready.built, strict=True)) if replay else {}
     replays, missing = run_again(console, firsts)
@@ -93,8 +93,8 @@ def _conclude(console: Console, ready: Contest, folder: Path, pdf: str | None, r
     return DONE if all(found.completed(name) == found.trials for name in found.names) else RUN_FAILED
 
 
-def _write_scenarios(ready: Contest, comparison: Comparison, folder: Path) -> dict[str, Path]:
-    """Write the scenario of the first trial of each contestant, and of its first failed one; the former by name.
+def _write_scenarios(ready: PreparedComparison, comparison: Comparison, folder: Path) -> dict[str, Path]:
+    """Write the scenario of the first trial of each candidate, and of its first failed one; the former by name.
 
     `undertow simulate` repeats such a trial; `undertow tune` tunes its controller.
     """

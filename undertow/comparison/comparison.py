@@ -18,9 +18,9 @@ from undertow.core import checks
 # at a name of undertow changes nothing.
 if TYPE_CHECKING:
     from undertow.campaign.store_results import Results
-    from undertow.comparison.contest import Contest
     from undertow.comparison.findings import Findings
     from undertow.comparison.paired import Difference
+    from undertow.comparison.prepare import PreparedComparison
 
 # Metrics that are compared, where they are defined: those that mean the same for every law.
 _COMPARED = (
@@ -50,14 +50,14 @@ class Comparison:
 
     @property
     def differences(self) -> "tuple[Difference, ...]":
-        """Every two contestants in every metric."""
+        """Every two candidates in every metric."""
         return self.findings.differences
 
     def table(self, style: str = "markdown") -> str:
         """Metrics and differences as a table.
 
         Args:
-            style: `markdown`; `latex`, which needs the package booktabs; or `csv`, a line per metric and contestant.
+            style: `markdown`; `latex`, which needs the package booktabs; or `csv`, a line per metric and candidate.
 
         Raises:
             BadInput: another style.
@@ -74,7 +74,7 @@ class Comparison:
         return "\n".join([f"Comparison of {names}, {self.findings.trials} trials each.", *sentences(self.findings)])
 
 
-def read_comparison(folder: Path, results: "Results", ready: "Contest") -> Comparison:
+def read_comparison(folder: Path, results: "Results", ready: "PreparedComparison") -> Comparison:
     """The result of a comparison whose campaign has run in a folder and was read from there."""
     from undertow.campaign.columns import DONE
     from undertow.campaign.run_campaign import STORE
@@ -117,14 +117,14 @@ def compare(
     from undertow.campaign.executors import chosen
     from undertow.campaign.run_campaign import run_campaign
     from undertow.campaign.store_results import load
-    from undertow.comparison.contest import contest
+    from undertow.comparison.prepare import prepare_comparison
 
     given: Any = scenario
     if isinstance(scenario, str | Path):
         given = [Path(scenario)]
     elif not isinstance(scenario, Mapping):
         given = list(map(Path, scenario))
-    ready = contest(given, controllers, trials, allow_code)
+    ready = prepare_comparison(given, controllers, trials, allow_code)
     for sentence in ready.advice:
         warnings.warn(sentence, stacklevel=2)
     with tempfile.TemporaryDirectory() as folder, chosen(None, workers or os.cpu_count() or 1) as executor:

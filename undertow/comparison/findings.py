@@ -18,7 +18,7 @@ COMPLETED = Status.OK.word
 
 
 class Median(NamedTuple):
-    """A metric of one contestant over the trials that it completed.
+    """A metric of one candidate over the trials that it completed.
 
     Attributes:
         value: the median; NaN where the metric is never defined.
@@ -37,17 +37,17 @@ class Findings(NamedTuple):
 
     Attributes:
         dimension: what is compared: `controller`, `scenario`, or the swept key of a campaign file.
-        names: of the contestants.
+        names: of the candidates.
         trials: samples that each of them ran.
         all_equal: whether these are all equal, so that one of them tells all.
         units: metric -> unit, empty for a dimensionless number, in the order of tables.
-        medians: metric -> contestant -> median.
-        differences: every two contestants in every metric that is finite in all completed trials.
-        completions: every two contestants, by the trials that only one of them completed.
-        endings: contestant -> how its trials ended -> how many.
-        failed_at: contestant -> median time at which its failed trials ended, s; NaN without any.
-        successes: contestant -> trials within the scenario's criterion of success, and trials that were judged.
-        tuning: contestant -> how its gains came about.
+        medians: metric -> candidate -> median.
+        differences: every two candidates in every metric that is finite in all completed trials.
+        completions: every two candidates, by the trials that only one of them completed.
+        endings: candidate -> how its trials ended -> how many.
+        failed_at: candidate -> median time at which its failed trials ended, s; NaN without any.
+        successes: candidate -> trials within the scenario's criterion of success, and trials that were judged.
+        tuning: candidate -> how its gains came about.
         differing: of scenarios that are compared as a whole: key -> the value in each.
     """
 
@@ -66,16 +66,16 @@ class Findings(NamedTuple):
     differing: dict[str, list[str]]
 
     def completed(self, name: str) -> int:
-        """Number of completed trials of a contestant."""
+        """Number of completed trials of a candidate."""
         return self.endings[name].get(COMPLETED, 0)
 
     def pairs(self) -> list[tuple[str, str]]:
-        """Every two contestants, the later one first."""
+        """Every two candidates, the later one first."""
         return [(second, first) for first, second in itertools.combinations(self.names, 2)]
 
-    def against(self, contestant: str, baseline: str) -> list[Difference]:
-        """Differences between two contestants, one per metric."""
-        return [one for one in self.differences if (one.contestant, one.baseline) == (contestant, baseline)]
+    def against(self, candidate: str, baseline: str) -> list[Difference]:
+        """Differences between two candidates, one per metric."""
+        return [one for one in self.differences if (one.candidate, one.baseline) == (candidate, baseline)]
 
     def data(self) -> dict[str, Any]:
         """The same as numbers, words and lists."""

@@ -1,4 +1,4 @@
-"""Paired statistics: differences of metrics between contestants that ran the same samples with the same seeds."""
+"""Paired statistics: differences of metrics between candidates that ran the same samples with the same seeds."""
 
 import itertools
 import math
@@ -18,25 +18,25 @@ _AT_ONCE = 1_000_000  # numbers that the bootstrap keeps in memory
 
 
 class Difference(NamedTuple):
-    """One metric of a contestant less that of another, over the trials that both completed.
+    """One metric of a candidate less that of another, over the trials that both completed.
 
     Attributes:
         metric: name of the metric.
-        contestant, baseline: whose values are compared: differences are contestant minus baseline.
+        candidate, baseline: whose values are compared: differences are candidate minus baseline.
         pairs: trials that both completed and where the metric is defined for both.
         left_out: the other trials.
         median: of the differences, in the unit of the metric; NaN without pairs.
         low, high: 95 % bootstrap interval of the median (percentiles); NaN with fewer than six pairs.
         relative: median of the differences as shares of the baseline's values; NaN unless all of these are
             positive.
-        smaller, larger: pairs in which the contestant's value is smaller, or larger, than the baseline's.
+        smaller, larger: pairs in which the candidate's value is smaller, or larger, than the baseline's.
         p: of the Wilcoxon signed-rank test, two-sided; NaN where all differences are zero, or with fewer
             than six pairs, which can establish nothing.
         p_holm: the same with Holm's correction for all tests of the comparison.
     """
 
     metric: str
-    contestant: str
+    candidate: str
     baseline: str
     pairs: int
     left_out: int
@@ -56,59 +56,59 @@ class Difference(NamedTuple):
 
 
 class Completion(NamedTuple):
-    """Which of two contestants completed trials that the other did not.
+    """Which of two candidates completed trials that the other did not.
 
     Attributes:
-        contestant, baseline: the two.
-        only_contestant, only_baseline: trials that one of them alone completed.
+        candidate, baseline: the two.
+        only_candidate, only_baseline: trials that one of them alone completed.
         p: of McNemar's exact test, two-sided; NaN where there are none.
-        p_holm: the same with Holm's correction for every two contestants.
+        p_holm: the same with Holm's correction for every two candidates.
     """
 
-    contestant: str
+    candidate: str
     baseline: str
-    only_contestant: int
+    only_candidate: int
     only_baseline: int
     p: float
     p_holm: float
 
 
 def completions(completed: Mapping[str, np.ndarray]) -> list[Completion]:
-    """How the completed trials of every two contestants differ; one entry per sample, in the same order."""
+    """How the completed trials of every two candidates differ; one entry per sample, in the same order."""
     found = []
-    for baseline, contestant in itertools.combinations(completed, 2):
-        alone = int((completed[contestant] & ~completed[baseline]).sum())
-        other = int((completed[baseline] & ~completed[contestant]).sum())
+    for baseline, candidate in itertools.combinations(completed, 2):
+        alone = int((completed[candidate] & ~completed[baseline]).sum())
+        other = int((completed[baseline] & ~completed[candidate]).sum())
         p = float(binomtest(alone, alone + other).pvalue) if alone + other else math.nan
-        found.append(Completion(contestant, baseline, alone, other, p, math.nan))
+        found.append(Completion(candidate, baseline, alone, other, p, math.nan))
     return [one._replace(p_holm=p) for one, p in zip(found, holm([one.p for one in found]), strict=True)]
 
 
 def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[Difference]:
-    """Differences of every metric between every two contestants.
+    """Differences of every metric between every two candidates.
 
     Args:
-        values: metric -> contestant -> value of each sample, the same samples in the same order; NaN where the trial
+        values: metric -> candidate -> value of each sample, the same samples in the same order; NaN where the trial
             failed or has no such metric.
     """
     names = dict.fromkeys(name for each in values.values() for name in each)
     found = [
-        _difference(metric, contestant, baseline, by_name[contestant], by_name[baseline])
-        for baseline, contestant in itertools.combinations(names, 2)
+        _difference(metric, candidate, baseline, by_name[candidate], by_name[baseline])
+        for baseline, candidate in itertools.combinations(names, 2)
         for metric, by_name in values.items()
     ]
     corrected = holm([one.p for one in found])
     return [one._replace(p_holm=p) for one, p in zip(found, corrected, strict=True)]
 
 
-def _difference(metric: str, contestant: str, baseline: str, first: np.ndarray, second: np.ndarray) -> Difference:
+def _difference(metric: str, candidate: str, baseline: str, first: np.ndarray, second: np.ndarray) -> Difference:
     both = np.isfinite(first) & np.isfinite(second)
     first, second = first[both], second[both]
     apart = first - second
     low, high = median_interval(apart)
     return Difference(
         metric=metric,
-        contestant=contestant,
+        candidate=candidate,
         baseline=baseline,
         pairs=int(both.sum()),
         left_out=int((~both).sum()),

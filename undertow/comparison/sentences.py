@@ -1,4 +1,4 @@
-"""The findings of a comparison in sentences: failures, and what is established between every two contestants."""
+"""The findings of a comparison in sentences: failures, and what is established between every two candidates."""
 
 import math
 
@@ -15,14 +15,14 @@ HOW = (
 
 
 def sentences(found: Findings) -> list[str]:
-    """Sentences on failures, then one for every two contestants."""
+    """Sentences on failures, then one for every two candidates."""
     failures = [sentence for name in found.names if (sentence := failed(found, name))]
-    alone = [_alone(one) for one in found.completions if one.only_contestant or one.only_baseline]
+    alone = [_alone(one) for one in found.completions if one.only_candidate or one.only_baseline]
     return [*failures, *alone, *(_between(found, *pair) for pair in found.pairs())]
 
 
 def failed(found: Findings, name: str) -> str:
-    """How the failed and invalid trials of a contestant ended; empty without any."""
+    """How the failed and invalid trials of a candidate ended; empty without any."""
     others = {word: number for word, number in found.endings[name].items() if word != COMPLETED}
     if not others:
         return ""
@@ -35,8 +35,8 @@ def failed(found: Findings, name: str) -> str:
 def _alone(one: Completion) -> str:
     verb = "is established" if one.p_holm < LEVEL else "is not established"
     return (
-        f"{one.contestant} completed {one.only_contestant} trials that {one.baseline} did not, and {one.baseline} "
-        f"{one.only_baseline} that {one.contestant} did not; this difference {verb} (McNemar's exact test, "
+        f"{one.candidate} completed {one.only_candidate} trials that {one.baseline} did not, and {one.baseline} "
+        f"{one.only_baseline} that {one.candidate} did not; this difference {verb} (McNemar's exact test, "
         f"p = {one.p_holm:.2g})."
     )
 
@@ -67,9 +67,9 @@ def relative(one: Difference, unit: str) -> str:
     return f"{sign}{digits(100 * one.relative)} %"
 
 
-def _between(found: Findings, contestant: str, baseline: str) -> str:
-    several = [one for one in found.against(contestant, baseline) if one.pairs]
-    said = f"{contestant} against {baseline}"
+def _between(found: Findings, candidate: str, baseline: str) -> str:
+    several = [one for one in found.against(candidate, baseline) if one.pairs]
+    said = f"{candidate} against {baseline}"
     if not several:
         return f"{said}: there is no trial that both completed."
     pairs = max(one.pairs for one in several)

@@ -27,28 +27,28 @@ class Rows(NamedTuple):
 
 
 def medians(found: Findings) -> Rows:
-    """Metrics by contestant, below the number of completed trials."""
+    """Metrics by candidate, below the number of completed trials."""
     first = found.names[0]
     rows = [("completed trials", *(f"{found.completed(name)} of {found.trials}" for name in found.names))]
     if any(judged for _, judged in found.successes.values()):
         kept = (found.successes[name] for name in found.names)
         rows.append(("within the criterion of success", *(f"{within} of {judged}" for within, judged in kept)))
     for metric, by_name in found.medians.items():
-        marked = {one.contestant for one in found.differences if one.baseline == first and _is(one, metric)}
+        marked = {one.candidate for one in found.differences if one.baseline == first and _is(one, metric)}
         cells = (f"{median(by_name[name], found.units[metric])}{'*' * (name in marked)}" for name in found.names)
         rows.append((titled(found, metric), *cells))
     return Rows(("metric", *found.names), rows)
 
 
 def paired(found: Findings) -> Rows:
-    """Differences of every two contestants in every metric."""
+    """Differences of every two candidates in every metric."""
     rows = []
     for one in found.differences:
         unit = found.units[one.metric]
         of = lambda number, one=one: f"{number} of {one.pairs}"
         rows.append(
             (
-                f"{one.contestant} - {one.baseline}",
+                f"{one.candidate} - {one.baseline}",
                 titled(found, one.metric),
                 median(Median(one.median, one.low, one.high, one.pairs), unit),
                 _NOTHING if math.isnan(one.relative) else relative(one, unit),
@@ -140,10 +140,10 @@ def _csv(found: Findings) -> str:
     stream = io.StringIO()
     fields = [name for name in Difference._fields if name != "metric"]
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["metric", "unit", "contestant_median", "baseline_median", *fields, "established"])
+    writer.writerow(["metric", "unit", "candidate_median", "baseline_median", *fields, "established"])
     for one in found.differences:
         by_name = found.medians[one.metric]
-        values = [by_name[one.contestant].value, by_name[one.baseline].value]
+        values = [by_name[one.candidate].value, by_name[one.baseline].value]
         writer.writerow(
             [one.metric, found.units[one.metric], *values, *(getattr(one, name) for name in fields), one.established]
         )

@@ -53,7 +53,7 @@ def _differing(dataset: xr.Dataset, found: Findings) -> list[str]:
 
 
 def differences_figure(dataset: xr.Dataset, found: Findings) -> Figure:
-    """Difference of each contestant from the first one: a point per pair, and the median with its 95 % interval."""
+    """Difference of each candidate from the first one: a point per pair, and the median with its 95 % interval."""
     first, *others = found.names
     shown = _differing(dataset, found)
     rows, tall = -(-len(shown) // _COLUMNS), 0.35 + 0.3 * len(others)
@@ -135,6 +135,6 @@ def _distributions(dataset: xr.Dataset, found: Findings) -> Figure:
 
 
 def _values(dataset: xr.Dataset, found: Findings, metric: str, name: str) -> np.ndarray:
-    """A metric of one contestant in every trial; NaN where it failed."""
+    """A metric of one candidate in every trial; NaN where it failed."""
     rows = dataset.isel({found.dimension: found.names.index(name)})
     return np.where(rows["status"].values == int(Status.OK), rows[metric].values, np.nan)

@@ -1,12 +1,12 @@
-"""Contestants by name, file and options, and the line that says how each was tuned."""
+"""Candidates by name, file and options, and the line that says how each was tuned."""
 
 import json
 from pathlib import Path
 
 import pytest
 
-from undertow.comparison.contest import contest
-from undertow.comparison.contestants import controllers
+from undertow.comparison.candidates import controllers
+from undertow.comparison.prepare import prepare_comparison
 from undertow.comparison.tuning_note import tuning_note
 from undertow.controllers import adrc, pid, rcaf
 from undertow.core.errors import BadInput
@@ -60,7 +60,7 @@ def test_entries(entry, name, controller, scenario, tmp_path):
 )
 def test_bad_entries(given, said, scenario):
     with pytest.raises(BadInput, match="--controllers") as found:
-        contest([Path(scenario())], given)
+        prepare_comparison([Path(scenario())], given)
     assert said in str(found.value)
 
 

@@ -1,4 +1,4 @@
-"""The campaign of a comparison: one axis with the contestants, the same samples and seeds for each."""
+"""The campaign of a comparison: one axis with the candidates, the same samples and seeds for each."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from undertow.campaign import task as tasks
 from undertow.campaign.campaign_schema import Campaign, validate
 from undertow.campaign.prepare import Prepared, prepare_campaign
 from undertow.campaign.trials import trials as trials_of
-from undertow.comparison.contestants import controllers, scenarios
+from undertow.comparison.candidates import controllers, scenarios
 from undertow.comparison.tuning_note import TuningNote, tuning_note
 from undertow.core.errors import BadInput
 from undertow.numerics.random_keys import key_of_seed
@@ -30,13 +30,13 @@ NOT_RANDOM = "nothing in the scenario is random, so that all trials are equal: o
 VARY = "To compare over a range of conditions, give a campaign file with `vary` (docs/how-to/compare.md)"
 
 
-class Contest(NamedTuple):
+class PreparedComparison(NamedTuple):
     """A comparison that is ready to run.
 
     Attributes:
         prepared: its campaign.
         dimension: what is compared: `controller`, `scenario`, or the swept key of a campaign file.
-        names: of the contestants.
+        names: of the candidates.
         built: the first trial of each.
         notes: how the gains of each came about.
         differing: of scenarios that are compared as a whole: key -> the value in each.
@@ -68,16 +68,16 @@ class _Asked(NamedTuple):
 
     text: Text
     dimension: str
-    sources: list[Path | None]  # scenario files that the gains of the contestants come from
+    sources: list[Path | None]  # scenario files that the gains of the candidates come from
     differing: dict[str, list[str]]
 
 
-def contest(
+def prepare_comparison(
     given: Sequence[Path] | Mapping[str, Any],
     entries: Sequence[str] | Mapping[str, Any] | None = None,
     trials: int | None = None,
     allow_code: bool = False,
-) -> Contest:
+) -> PreparedComparison:
     """A comparison of controllers on one scenario, of several scenarios, or of what a campaign file sweeps.
 
     Args:
@@ -100,7 +100,7 @@ def contest(
     pairs = enumerate(zip(built, asked.sources, strict=True))
     notes = tuple(_note(prepared, number, one, file) for number, (one, file) in pairs)
     advice = (*prepared.advice, *advice, *_fair(names, notes))
-    return Contest(prepared, asked.dimension, names, built, notes, asked.differing, advice)
+    return PreparedComparison(prepared, asked.dimension, names, built, notes, asked.differing, advice)
 
 
 def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: bool) -> _Asked:
@@ -159,14 +159,14 @@ def _scenario_of(text: Text, allow_code: bool) -> Text:
 
 
 def _note(prepared: Prepared, number: int, built: Built, source: Path | None) -> TuningNote:
-    """How the gains of a contestant came about."""
+    """How the gains of a candidate came about."""
     given = prepared.trials.data(number).get("controller", {})
     part = {"kind": given} if isinstance(given, str) else {"kind": "rcaf", **given}
     return tuning_note(part, built.closed_loop.controller, built.scenario.loop.dt, prepared.folder, source)
 
 
 def _prepared(campaign: Campaign, source: Text, allow_code: bool) -> tuple[Prepared, tuple[str, ...]]:
-    """The campaign with time histories of all contestants; without them, and the reason, where that cannot be."""
+    """The campaign with time histories of all candidates; without them, and the reason, where that cannot be."""
     try:
         return prepare_campaign(_recorded(campaign, source, allow_code), source, allow_code), ()
     except BadInput as error:
@@ -187,7 +187,7 @@ def _recorded(campaign: Campaign, source: Text, allow_code: bool) -> Campaign:
 
 
 def _firsts(prepared: Prepared) -> tuple[Built, ...]:
-    """The first valid trial of each contestant."""
+    """The first valid trial of each candidate."""
     several, probes = prepared.trials, tasks.site(prepared.text, str(prepared.folder)).probes()
     return tuple(
         next(probes[row] for row in several.first(number) if row in probes)
@@ -203,7 +203,7 @@ def _random(built: Built) -> bool:
 
 
 def _fair(names: Sequence[str], notes: Sequence[TuningNote]) -> tuple[str, ...]:
-    """Advice where some contestants are tuned and others are not."""
+    """Advice where some candidates are tuned and others are not."""
     rivals = [name for name, note in zip(names, notes, strict=True) if not note.tuned]
     if not rivals:
         return ()

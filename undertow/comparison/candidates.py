@@ -1,4 +1,4 @@
-"""Contestants of a comparison: controllers by name, file or options, and whole scenarios."""
+"""Candidates of a comparison: controllers by name, file or options, and whole scenarios."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,11 +16,11 @@ OWN = "scenario"  # stands for the controller of the scenario itself
 _CODE = ".py:"
 _FILES = (".yaml", ".yml", ".nc")
 
-# Keys of a scenario in which contestants do not differ: each trial has its own seed, and the rest is not simulated.
+# Keys of a scenario in which candidates do not differ: each trial has its own seed, and the rest is not simulated.
 _NOT_COMPARED = {"description", "seed", "tune"}
 
 
-class Contestant(NamedTuple):
+class Candidate(NamedTuple):
     """One side of a comparison.
 
     Attributes:
@@ -34,7 +34,7 @@ class Contestant(NamedTuple):
     source: Path | None
 
 
-def controllers(given: Sequence[str] | Mapping[str, Any], scenario: Text, path: Path | None) -> list[Contestant]:
+def controllers(given: Sequence[str] | Mapping[str, Any], scenario: Text, path: Path | None) -> list[Candidate]:
     """Controllers that are compared on one scenario.
 
     Args:
@@ -54,11 +54,11 @@ def controllers(given: Sequence[str] | Mapping[str, Any], scenario: Text, path: 
     return _unique(found)
 
 
-def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Contestant], dict[str, list[str]]]:
+def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candidate], dict[str, list[str]]]:
     """Scenarios that are compared as a whole.
 
     Returns:
-        The first of them, with the contents of all files that it names; the contestants; and what differs, as key ->
+        The first of them, with the contents of all files that it names; the candidates; and what differs, as key ->
         the value in each.
 
     Raises:
@@ -76,7 +76,7 @@ def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Conte
     alike = [path.stem for path in paths]
     names = [f"{path.parent.name}/{path.stem}" if alike.count(path.stem) > 1 else path.stem for path in paths]
     found = [
-        Contestant(name, {key: each.get(key, []) for key in different}, path)  # `metrics` alone may be missing
+        Candidate(name, {key: each.get(key, []) for key in different}, path)  # `metrics` alone may be missing
         for name, each, path in zip(names, whole, paths, strict=True)
     ]
     return from_data(resolved[0])._replace(folder=texts[0].folder), _unique(found), _differing(texts)
@@ -109,26 +109,26 @@ def _split(entry: str) -> tuple[str, str]:
     return (name.strip(), value.strip()) if equals else ("", entry.strip())
 
 
-def _controller(name: str, entry: Any, scenario: Text, path: Path | None) -> Contestant:
+def _controller(name: str, entry: Any, scenario: Text, path: Path | None) -> Candidate:
     if isinstance(entry, Mapping):
         part = {"kind": "rcaf", **from_data(entry).data}
-        return Contestant(name or label(part), {"controller": part}, None)
+        return Candidate(name or label(part), {"controller": part}, None)
     if not isinstance(entry, str) or not entry:
         raise BadInput("--controllers", "name controllers, separated by commas", repr(entry))
     if entry == OWN:
         part = part_of(validate(scenario).controller, scenario.folder)
-        return Contestant(name or f"{label(part)} (scenario)", {"controller": part}, path)
+        return Candidate(name or f"{label(part)} (scenario)", {"controller": part}, path)
     if entry.endswith(_FILES):
         return _of_file(name, Path(entry))
     part = _named(entry)
-    return Contestant(name or label(part), {"controller": part}, None)
+    return Candidate(name or label(part), {"controller": part}, None)
 
 
-def _of_file(name: str, path: Path) -> Contestant:
+def _of_file(name: str, path: Path) -> Candidate:
     """The controller of a scenario file, of `tuned.yaml` for example."""
     text = read(path, "--controllers")
     part = part_of(validate(text).controller, text.folder)
-    return Contestant(name or f"{label(part)} ({path.stem})", {"controller": part}, path)
+    return Candidate(name or f"{label(part)} ({path.stem})", {"controller": part}, path)
 
 
 def part_of(controller: Part, folder: Path) -> dict[str, Any]:
@@ -159,7 +159,7 @@ def label(part: Mapping[str, Any]) -> str:
     return str(part.get("preset") or part["kind"].rpartition(":")[2])
 
 
-def _unique(found: Sequence[Contestant]) -> list[Contestant]:
+def _unique(found: Sequence[Candidate]) -> list[Candidate]:
     """With a number behind names that occur again."""
     names: list[str] = []
     for one in found:
