@@ -24,6 +24,7 @@ _FLOATS = {
     "add": "fadd {T} {0}, {1}",
     "sub": "fsub {T} {0}, {1}",
     "mul": "fmul {T} {0}, {1}",
+    "fma": "call {T} @llvm.fma.{N}({T} {0}, {T} {1}, {T} {2})",
     "div": "fdiv {T} {0}, {1}",
     "rem": "frem {T} {0}, {1}",
     "neg": "fneg {T} {0}",

@@ -16,7 +16,15 @@ _SCALE = float.fromhex("0x1.ec709dc3a03fdp-1")
 _SCALE_PARTS = (float.fromhex("0x1.ec709d8000000p-1"), float.fromhex("0x1.0e80ff5d27f05p-27"))
 
 # log(m) = 2/3 s (3 + s^2 + r), s = (m - 1) / (m + 1); r = s^4 times this of s^2.
-_TAIL = [3 / (2 * k + 1) for k in range(2, 13)]
+_TAIL = [
+    0.6000000000000004,
+    0.4285714285700776,
+    0.3333333340665351,
+    0.27272712371316815,
+    0.23078362194693047,
+    0.19928936152790028,
+    0.19370426508273375,
+]
 
 
 def exp2(x: Scalar) -> Scalar:

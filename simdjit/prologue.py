@@ -34,7 +34,7 @@ def _by_vmap(function: Callable[[Any], Any], numbers: Any) -> Callable[[Any], An
         runs, pieces = len(jax.tree.leaves(numbers)[0]), []
         for first in range(0, runs, width):
             which = np.minimum(np.arange(first, first + width), runs - 1)
-            results = program(jax.tree.map(lambda leaf, which=which: leaf[which], numbers))
+            results = program(jax.tree.map(lambda leaf, which=which: np.asarray(leaf)[which], numbers))
             pieces.append(jax.tree.map(np.asarray, results))
         return jax.tree.map(lambda *parts: np.concatenate(parts)[:runs], *pieces)
 

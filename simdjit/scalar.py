@@ -109,6 +109,11 @@ def where(which: Scalar, one: Scalar | float, other: Scalar | float) -> Scalar:
     return which.apply("select", one, other if isinstance(other, Scalar) else one.constant(other))
 
 
+def fused(a: Scalar, b: Scalar | float, c: Scalar | float) -> Scalar:
+    """a b + c, rounded once."""
+    return a.apply("fma", b, c)
+
+
 def larger(one: Scalar, other: Scalar | float) -> Scalar:
     """The larger of two; not a number where either is none."""
     return _chosen(one, other, "gt")

@@ -1,6 +1,8 @@
 """What is known of a result without computing it in every lane."""
 
 from collections.abc import Callable
+from fractions import Fraction
+from math import inf, nextafter
 from typing import Any
 
 import numpy as np
@@ -23,11 +25,28 @@ def _quotient(a: Any, b: Any, _: str) -> Any:
     return np.array(abs(int(a)) // abs(int(b)) * (1 if (a < 0) == (b < 0) else -1), dtype=a.dtype)[()]
 
 
+def _fused(a: Any, b: Any, c: Any, _: str) -> Any:
+    """a b + c, rounded once; in single precision by a double that is rounded to odd (S. Boldo, G. Melquiond, 2008)."""
+    if not (np.isfinite(a) and np.isfinite(b) and np.isfinite(c)):
+        return a * b + c
+    exact = Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c))
+    if exact == 0:
+        return a * b + c
+    try:
+        near = float(exact)
+    except OverflowError:
+        near = inf if exact > 0 else -inf
+    if a.dtype == np.float32 and exact != near and np.float64(near).view(np.int64) % 2 == 0:
+        near = nextafter(near, inf if exact > near else -inf)
+    return a.dtype.type(near)
+
+
 # What each operation gives for numbers and the type of its result: the same bits as the machine's instruction.
 RESULTS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b, _: a + b,
     "sub": lambda a, b, _: a - b,
     "mul": lambda a, b, _: a * b,
+    "fma": _fused,
     "div": _quotient,
     "rem": lambda a, b, _: np.fmod(a, b),
     "neg": lambda a, _: -a,
@@ -105,8 +124,19 @@ def _mul(graph, nodes, values):
     return None if None in minus else graph.apply("mul", *minus)
 
 
+def _fma(graph, nodes, values):
+    if _is(values[0], 0) or _is(values[1], 0):
+        return nodes[2]
+    return graph.apply("mul", *nodes[:2]) if _is(values[2], 0) else None
+
+
 def _div(graph, nodes, values):
-    return nodes[0] if _is(values[1], 1) else None
+    if _is(values[1], 1):
+        return nodes[0]
+    if values[1] is not None and values[1].dtype.kind == "f" and 1e-30 < abs(values[1]) < 1e30:
+        if abs(np.frexp(values[1])[0]) == 0.5:  # a power of two: the product is the quotient to the last bit
+            return graph.apply("mul", nodes[0], graph.like(1 / values[1], nodes[1]))
+    return None
 
 
 def _neg(graph, nodes, values):
@@ -141,6 +171,7 @@ _RULES: dict[str, Callable[..., int | None]] = {
     "add": _add,
     "sub": _sub,
     "mul": _mul,
+    "fma": _fma,
     "div": _div,
     "neg": _neg,
     "abs": _abs,

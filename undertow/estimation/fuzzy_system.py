@@ -31,13 +31,13 @@ def even_memberships(
     middle, half = (centres[0] + centres[-1]) / 2, (centres[-1] - centres[0]) / 2
     spacing, width = 2 * half / (count - 1), widths[0]
     offset = x - middle
-    ratio = jnp.exp(-2 * spacing * (jnp.abs(offset) - half) / width**2)
+    ratio = jnp.exp(-2 * spacing / width**2 * (jnp.abs(offset) - half))
     inward = jnp.exp(-((jnp.arange(count, dtype=float) * spacing / width) ** 2))
     powers = [jnp.ones_like(ratio)]
     for _ in range(1, count):
         powers.append(powers[-1] * ratio)
     weights = jnp.stack(powers, -1) * inward[None, :]
-    weights = weights / weights.sum(-1, keepdims=True)
+    weights = weights * (1 / weights.sum(-1, keepdims=True))
     return jnp.where((offset >= 0)[:, None], weights[:, ::-1], weights)
 
 

@@ -116,7 +116,8 @@ class Kinematics:
         self.minus_sin_pitch, *down = rotation[2]
         self.cos_pitch = jnp.sqrt(down[0] ** 2 + down[1] ** 2 + _SMALLEST_COSINE**2)
         self.down = down
-        self.sin_roll, self.cos_roll = down[0] / self.cos_pitch, down[1] / self.cos_pitch
+        self.secant = 1 / self.cos_pitch
+        self.sin_roll, self.cos_roll = down[0] * self.secant, down[1] * self.secant
 
     def to_world(self, nu: Vector6) -> Vector6:
         """J nu: body rates -> (world velocity, Euler rates)."""
@@ -126,9 +127,9 @@ class Kinematics:
                 matvec(self.rotation, nu[:3]),
                 jnp.stack(
                     [
-                        nu[3] - self.minus_sin_pitch / self.cos_pitch * across,
+                        nu[3] - self.minus_sin_pitch * self.secant * across,
                         self.cos_roll * nu[4] - self.sin_roll * nu[5],
-                        across / self.cos_pitch,
+                        across * self.secant,
                     ]
                 ),
             ]
@@ -154,16 +155,16 @@ class Kinematics:
         velocity, omega = nu[:3], nu[3:]
         across = self.sin_roll * omega[1] + self.cos_roll * omega[2]
         pitch_rate = self.cos_roll * omega[1] - self.sin_roll * omega[2]
-        tan_pitch = -self.minus_sin_pitch / self.cos_pitch
+        tan_pitch = -self.minus_sin_pitch * self.secant
         roll_rate = omega[0] + tan_pitch * across
         return jnp.concatenate(
             [
                 matvec(self.rotation, cross(omega, velocity)),
                 jnp.stack(
                     [
-                        pitch_rate * across / self.cos_pitch**2 + tan_pitch * roll_rate * pitch_rate,
+                        pitch_rate * across * self.secant**2 + tan_pitch * roll_rate * pitch_rate,
                         -roll_rate * across,
-                        (roll_rate * pitch_rate + tan_pitch * pitch_rate * across) / self.cos_pitch,
+                        (roll_rate * pitch_rate + tan_pitch * pitch_rate * across) * self.secant,
                     ]
                 ),
             ]

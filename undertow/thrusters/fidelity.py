@@ -26,14 +26,14 @@ class ShaftThruster(AbstractMotorThruster):
 
     def dynamics(self, state, voltage) -> ShaftState:
         motor = self.motor
-        return ShaftState((self.terminal(voltage) - motor.steady_voltage(state.speed)) / motor.k1)
+        return ShaftState((self.terminal(voltage) - motor.steady_voltage(state.speed)) * (1 / motor.k1))
 
     def thrust(self, state, voltage) -> PerThruster:
         return self.motor.thrust(state.speed)
 
     def current(self, state, voltage) -> PerThruster:
         motor = self.motor
-        return (self.terminal(voltage) - motor.back_emf_constant * state.speed) / motor.resistance
+        return (self.terminal(voltage) - motor.back_emf_constant * state.speed) * (1 / motor.resistance)
 
     def powers(self, state, voltage) -> Powers:
         return self.motor.powers(self.terminal(voltage), self.current(state, voltage), state.speed)
@@ -74,7 +74,7 @@ class ElectromechanicalThruster(AbstractMotorThruster):
     def dynamics(self, state, voltage) -> ElectromechanicalState:
         motor = self.motor
         lost = motor.resistance * state.current + motor.back_emf_constant * state.speed
-        current_rate = (self.terminal(voltage) - lost) / motor.inductance  # Eq. (9)
+        current_rate = (self.terminal(voltage) - lost) * (1 / motor.inductance)  # Eq. (9)
         return ElectromechanicalState(self._acceleration(state), current_rate)
 
     def thrust(self, state, voltage) -> PerThruster:
@@ -101,7 +101,7 @@ class ElectromechanicalThruster(AbstractMotorThruster):
     def _acceleration(self, state: ElectromechanicalState) -> PerThruster:
         motor = self.motor
         resisted = motor.friction * state.speed + motor.torque(state.speed)
-        return (motor.torque_constant * state.current - resisted) / motor.rotor_inertia  # Eq. (8)
+        return (motor.torque_constant * state.current - resisted) * (1 / motor.rotor_inertia)  # Eq. (8)
 
 
 FIDELITIES = {

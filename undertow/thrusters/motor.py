@@ -113,7 +113,7 @@ class DCMotor(eqx.Module):
 
     def steady_current(self, speed: PerThruster) -> PerThruster:
         """Current, A, that keeps a speed: Eq. (8) without acceleration."""
-        return (self.friction * speed + self.torque(speed)) / self.torque_constant
+        return (self.friction * speed + self.torque(speed)) * (1 / self.torque_constant)
 
     def speed_term(self, speed: PerThruster, acceleration: PerThruster) -> PerThruster:
         """phi = -alpha (k_1 speed_dot + k_2 speed), N. Eq. (15).

@@ -63,7 +63,7 @@ class SpeedControlledMotor(AbstractActuatorModel):
         volts = self.thruster.terminal(
             jnp.where(limited, self.thruster.supply, 0.0)
         )  # so that an infinite supply has gradients, too
-        low, high = (state.speed + (side * volts - resisted) / (motor.k1 * rate) for side in (-1, 1))
+        low, high = (state.speed + (side * volts - resisted) * (1 / (motor.k1 * rate)) for side in (-1, 1))
         return jnp.where(limited, motor.thrust(low), -jnp.inf), jnp.where(limited, motor.thrust(high), jnp.inf)
 
     def force(self, state: MotorState, u) -> PerThruster:
@@ -72,24 +72,24 @@ class SpeedControlledMotor(AbstractActuatorModel):
     def command(self, state: MotorState, force, rate) -> PerThruster:
         motor = self.thruster.motor
         pull = motor.rotor_inertia * rate * (motor.speed_at(force) - state.speed)
-        current = motor.steady_current(state.speed) + pull / motor.torque_constant
+        current = motor.steady_current(state.speed) + pull * (1 / motor.torque_constant)
         held = motor.resistance * current + motor.back_emf_constant * state.speed
         return self.thruster.commanded(held + self._boost(rate) * (current - state.current))
 
     def target_of(self, state: MotorState, u, rate) -> PerThruster:
         motor, boost = self.thruster.motor, self._boost(rate)
         free = self.thruster.terminal(u) - motor.back_emf_constant * state.speed + boost * state.current
-        pull = (free / (motor.resistance + boost) - motor.steady_current(state.speed)) * motor.torque_constant
-        return motor.thrust(state.speed + pull / (motor.rotor_inertia * rate))
+        pull = (free * (1 / (motor.resistance + boost)) - motor.steady_current(state.speed)) * motor.torque_constant
+        return motor.thrust(state.speed + pull * (1 / (motor.rotor_inertia * rate)))
 
     def advance(self, state: MotorState, u, dt) -> MotorState:
         """Exact current for a constant back-EMF at any winding time constant; speed from the mean current."""
         motor = self.thruster.motor
-        settled = (self.thruster.terminal(u) - motor.back_emf_constant * state.speed) / motor.resistance
+        settled = (self.thruster.terminal(u) - motor.back_emf_constant * state.speed) * (1 / motor.resistance)
         fading = motor.resistance * dt / jnp.maximum(motor.inductance, 1e-12)
-        mean = settled + (state.current - settled) * -jnp.expm1(-fading) / fading
+        mean = settled + (state.current - settled) * (-jnp.expm1(-fading) / fading)
         pull = lambda speed: motor.torque_constant * (mean - motor.steady_current(speed))
-        turning = lambda t, speed: pull(speed) / motor.rotor_inertia
+        turning = lambda t, speed: pull(speed) * (1 / motor.rotor_inertia)
         speed = rk4(turning, jnp.zeros(()), state.speed, dt)
         return MotorState(speed, settled + (state.current - settled) * jnp.exp(-fading))
 

@@ -104,6 +104,6 @@ def seen_from_water(
     rest = jnp.zeros(3)
     return SeenFromWater(
         nu=nu - jnp.concatenate([flow, rest]),
-        down=rotation[2] - acceleration / gravity,
+        down=rotation[2] - acceleration * (1 / gravity),
         rate=jnp.concatenate([acceleration - cross(nu[3:], flow), rest]),
     )
