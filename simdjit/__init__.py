@@ -6,8 +6,8 @@
 
 `compile` is for a function, `Loop` for a loop over steps. Both take examples of the numbers of one run, and run on
 this processor or on an NVIDIA GPU. A result has the same bits on every processor, in every lane, and whatever the other
-runs of the batch are: sums and products are never contracted, and elementary functions are made of them. What the
-compiler has no rule for raises `Unsupported`; `jax.vmap` still does it.
+runs of the batch are: sums and products are never contracted, and elementary functions are made of them and of explicit
+fused products. What the compiler has no rule for raises `Unsupported`; `jax.vmap` still does it.
 
 How it works: a traced function becomes a graph of scalar operations (`lowering`, `graph`, `simplify`), that becomes
 LLVM's assembly in which every scalar is a vector over lanes (`codegen`, `instructions`), and LLVM makes machine code of

@@ -1,6 +1,6 @@
 """A program for an NVIDIA GPU: every run has a thread of its own, and a warp is what a vector register is elsewhere.
 
-The same operations as on a processor, rounded alike and never contracted: the same bits.
+The same operations as on a processor, rounded alike, and contracted nowhere: the same bits.
 """
 
 import functools

@@ -31,6 +31,18 @@ def test_tables_and_functions_give_the_bits_of_vectors(gpu):
     jax.tree.map(np.testing.assert_array_equal, found, wanted)
 
 
+def test_sums_and_products_are_not_contracted(monkeypatch):
+    """Only elementary functions have fused products, and those are written as such."""
+    written = []
+    monkeypatch.setattr(Driver, "load", lambda self, assembly, name: written.append(assembly))
+    x, nothing = np.arange(1.0, 5.0), lambda numbers, *rest: np.zeros(())
+    for look in (lambda numbers, *rest: numbers * numbers + 1 / numbers, lambda numbers, *rest: jnp.exp(numbers)):
+        parts = (lambda numbers: numbers, nothing, lambda numbers, carry, k: carry, look)
+        Loop(*parts, x, driver=Driver(EmulatedGpu()))
+    plain, fused = (text.count("fma.rn.f64") for text in written)
+    assert plain == 0 and "mul.rn.f64" in written[0] and fused > 0
+
+
 def test_remainders_stay_on_the_processor(gpu):
     with pytest.raises(Unsupported):
         nvidia.Kernel("  %x = frem <1 x double> %a, %b", Driver(gpu))

@@ -16,7 +16,7 @@ from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.outcome import Outcome, going
 from undertow.loop.recorded_signals import Signals
 from undertow.loop.recording import freeze_on_failure, instant, record
-from undertow.numerics.integrators import METHODS
+from undertow.numerics.integrators import METHODS, first_stage
 
 
 class AbstractAccumulator(eqx.Module):
@@ -109,10 +109,11 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     (x, z, measuring), gathered, ending = carry
     loop, t = realization.loop, instant(k, dt)
     decision = realization.decide(t, x, z, measuring)
-    if accumulators:
-        signals = realization.signals(t, x, z, decision)
-        gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
     h = dt / substeps
+    if accumulators:
+        # Of the first stage, whose acceleration is then computed once; where the load jumps, it has jumped.
+        signals = realization.signals(first_stage(t, h), x, z, decision)
+        gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
     motion = lambda t, x: realization.motion(t, x, decision.applied)
     if substeps == 1:
         new_x = integrate(motion, t, x, h)

@@ -15,14 +15,19 @@ _INWARD = 1e-9
 Field = Callable[[Number, PyTree], PyTree]
 
 
+def first_stage(t: Number, dt: Number) -> Number:
+    """Time of the first stage of a step."""
+    return t + _INWARD * dt
+
+
 def euler(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:
     """Explicit Euler step y(t) -> y(t + dt) of dy/dt = field(t, y); order 1."""
-    return _move(y, field(t + _INWARD * dt, y), dt)
+    return _move(y, field(first_stage(t, dt), y), dt)
 
 
 def rk4(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:
     """Classical Runge-Kutta step y(t) -> y(t + dt) of dy/dt = field(t, y); order 4."""
-    k1 = field(t + _INWARD * dt, y)
+    k1 = field(first_stage(t, dt), y)
     k2 = field(t + dt / 2, _move(y, k1, dt / 2))
     k3 = field(t + dt / 2, _move(y, k2, dt / 2))
     k4 = field(t + dt - _INWARD * dt, _move(y, k3, dt))
