@@ -11,8 +11,8 @@ import shutil
 import malformed
 import pytest
 
-from undertow.cli import campaign, simulate
-from undertow.report.figures.writing import Saved
+from undertow.cli import campaign
+from undertow.report import drawing
 
 DONE, RUN_FAILED, BAD_INPUT = 0, 1, 2
 BEGIN = int(os.environ.get("UNDERTOW_FUZZ_SEED", 0)) * 1_000_000
@@ -22,7 +22,7 @@ FEW, MANY = 6, 1500
 @pytest.fixture
 def undrawn(monkeypatch, tmp_path):
     """Drawing takes most of the time of a short run, and has tests of its own. Files that examples name are there."""
-    monkeypatch.setattr(simulate, "save_all", lambda plots, folder, pdf: Saved({}, []))
+    monkeypatch.setattr(drawing, "_draw", lambda run, width: drawing.Drawn({}, {}, []))
     monkeypatch.setattr(campaign, "write_campaign", lambda title, results, found, folder, pdf: (folder, []))
     for name in ("d.csv", "my_rov.yaml"):
         shutil.copy(malformed.EXAMPLES / name, tmp_path / name)

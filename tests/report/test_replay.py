@@ -15,11 +15,13 @@ from undertow.disturbances.adding import Together
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.report import run_page
+from undertow.report.drawing import Drawn
 from undertow.report.replay import replay_section, trials_again
 from undertow.report.replay.recomputed import thrust_along, thrust_limits
 from undertow.report.replay.replay_data import hull_size, packed, page_data, replay_of
 from undertow.report.replay.trials_again import replays_of_trials
 from undertow.report.replay.video import _Scenes, check_video
+from undertow.report.run_figures import LARGE
 from undertow.report.run_page import Shown, write_run_page
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
@@ -148,7 +150,7 @@ def test_several_runs_have_labels_and_colours_of_their_own(two_minutes):
 
 
 def test_page_of_two_minutes_is_small_and_loads_nothing(run, two_minutes, tmp_path):
-    pictures = {f"figure{number}": "x" * run_page._LARGE for number in range(6)}
+    pictures = {f"figure{number}": "x" * LARGE for number in range(6)}
     write_run_page(tmp_path / "run.html", run, Shown(pictures, two_minutes, []))
     page = (tmp_path / "run.html").read_text()
     assert len(page) < 2_000_000
@@ -206,8 +208,7 @@ def test_failed_trials_leave_the_others(trials, monkeypatch):
 
 def test_failed_replay_is_a_sentence(run, loop, monkeypatch):
     monkeypatch.setattr(run_page, "replay_of", lambda run, loop: 1 / 0)
-    monkeypatch.setattr(run_page, "run_plots", lambda run: {})
-    shown = run_page.shown(run, loop)
+    shown = run_page.shown(run, loop, Drawn({}, {}, []))
     assert shown.replay is None and "the replay could not be made" in shown.failures[0]
 
 

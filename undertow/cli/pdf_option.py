@@ -1,7 +1,8 @@
 """Option `--pdf` of the commands that write figures."""
 
 from undertow.core import checks
-from undertow.report.figures.writing import PDF_WIDTHS
+
+PDF_WIDTHS = ("wide", "one-column")  # as on the page, or rearranged for one column of a printed page
 
 
 def check_pdf(width: str | None) -> None:

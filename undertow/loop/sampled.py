@@ -112,7 +112,7 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     h = dt / substeps
     if accumulators:
         # Of the first stage, whose acceleration is then computed once; where the load jumps, it has jumped.
-        signals = realization.signals(first_stage(t, h), x, z, decision)
+        signals = realization.signals(jnp.asarray(first_stage(t, h)), x, z, decision)
         gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
     motion = lambda t, x: realization.motion(t, x, decision.applied)
     if substeps == 1:

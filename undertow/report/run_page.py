@@ -1,19 +1,15 @@
 """The page of one run: status, replay, metrics, certificate, figures and scenario, in one file that opens anywhere."""
 
-import io
 import json
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
-from PIL import Image
 
 from undertow.analysis.success import Success
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.report.figures.run import run_plots
-from undertow.report.figures.writing import Saved, save_all
+from undertow.report.drawing import Drawn
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text
 from undertow.report.replay.replay_data import Replay, replay_of
@@ -21,8 +17,6 @@ from undertow.report.replay.replay_section import not_made, replay_looks, replay
 from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
 from undertow.scenario.finished_run import certificate_of, metrics_of, window_of
 
-# Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
-_LARGE, _COLOURS = 80_000, 48
 _DIGITS = 4
 
 _CAPTIONS = {
@@ -43,36 +37,21 @@ class Shown(NamedTuple):
     failures: list[str]  # a sentence for each part that could not be made
 
 
-def shown(run: xr.Dataset, loop: ClosedLoop, saved: Saved | None = None) -> Shown:
+def shown(run: xr.Dataset, loop: ClosedLoop, drawn: Drawn) -> Shown:
     """What the page and the video of a run show. A failed part affects neither the others nor the results.
 
     Args:
         run: dataset of the run.
         loop: the closed loop that was run.
-        saved: the figures of the run, where they have been written; None to make them here.
+        drawn: its figures.
     """
-    if saved is None:
-        with tempfile.TemporaryDirectory() as folder:
-            return shown(run, loop, save_all(lambda: run_plots(run), Path(folder)))
-    figures = {name: _picture(vector) for name, vector in saved.vectors.items()}
-    failures = list(saved.failures)
+    failures = list(drawn.failures)
     try:
         replay = replay_of(run, loop)
     except Exception as error:  # a user's part may run and yet not be differentiable
         replay = None
         failures.append(not_made(error))
-    return Shown(figures, replay, failures)
-
-
-def _picture(vector: Path) -> str | bytes:
-    """A figure for the page: the SVG, or the PNG beside it in few colours where the SVG is large."""
-    if vector.stat().st_size <= _LARGE:
-        return vector.read_text(encoding="utf-8")
-    data = io.BytesIO()
-    with Image.open(vector.with_suffix(".png")) as image:
-        few = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-        few.save(data, "PNG", optimize=True)
-    return data.getvalue()
+    return Shown(drawn.pictures, replay, failures)
 
 
 def write_run_page(path: Path, run: xr.Dataset, shown: Shown, predicted: Mapping[str, float] | None = None) -> None:

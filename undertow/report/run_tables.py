@@ -3,11 +3,13 @@
 from collections.abc import Mapping, Sequence
 from math import isinf
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from undertow.analysis.linearization.response import Comparison
 from undertow.analysis.metrics import for_people, infinite
 from undertow.core.metric import Metric
+
+if TYPE_CHECKING:  # it loads SciPy, which a run does not need
+    from undertow.analysis.linearization.response import Comparison
 
 
 class RunTable(NamedTuple):
@@ -40,7 +42,7 @@ def metrics_rows(
 
 
 def prediction_rows(
-    compared: Sequence[Comparison], window: tuple[float, float] | None, known: Mapping[str, Metric]
+    compared: "Sequence[Comparison]", window: tuple[float, float] | None, known: Mapping[str, Metric]
 ) -> RunTable:
     """Predicted and measured metrics of the steady window, and by how much they differ."""
     rows = []

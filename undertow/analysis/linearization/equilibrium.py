@@ -6,6 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy.linalg
 from jaxtyping import Array
 
 from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
@@ -67,7 +68,7 @@ class Balance(NamedTuple):
                 break
             scale = np.abs(jacobian).max(axis=1, keepdims=True)
             scale[scale < _ROUNDING * scale.max()] = 1.0  # scaled up, rounding errors would decide the step
-            step = np.split(-np.linalg.lstsq(jacobian / scale, residual / scale[:, 0], rcond=1e-11)[0], ends)
+            step = np.split(-_smallest_solution(jacobian / scale, residual / scale[:, 0]), ends)
             found, trial = (residual, jacobian, np.inf), at
             for length in _LENGTHS:
                 there = at | {name: at[name] + length * part for name, part in zip(unknown, step, strict=True)}
@@ -80,6 +81,12 @@ class Balance(NamedTuple):
                 break
             at, (residual, jacobian, size) = trial, found
         return at
+
+
+def _smallest_solution(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Least squares, by orthogonal factors: several times as fast as by singular values."""
+    found = scipy.linalg.lstsq(matrix, right, cond=1e-11, lapack_driver="gelsy", check_finite=False)
+    return np.asarray(found[0])
 
 
 class Equilibrium(NamedTuple):

@@ -24,10 +24,8 @@ _SETTINGS = {"svg.hashsalt": "undertow", "svg.fonttype": "path", "pdf.fonttype":
 _WRITING = threading.Lock()
 
 _PATH = re.compile(r'( d=")([^"]+)(")')
-_DIGITS = re.compile(r"(\.\d\d)\d+")
+_DIGITS = re.compile(r"(?<=\.\d\d)\d+")
 
-
-PDF_WIDTHS = ("wide", "one-column")  # as on the page, or rearranged for one column of a printed page
 
 Plots = Mapping[str, Callable[[], Figure]]  # functions that make the figures, by name
 
@@ -45,7 +43,7 @@ def svg(figure: Figure) -> str:
     with _WRITING, matplotlib.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType] - keys of Matplotlib
         FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": "undertow"})
     # A hundredth of a point is finer than any printer; further digits would be most of the file.
-    return _PATH.sub(lambda m: m[1] + _DIGITS.sub(r"\1", m[2]) + m[3], text.getvalue())
+    return _PATH.sub(lambda m: m[1] + _DIGITS.sub("", m[2]) + m[3], text.getvalue())
 
 
 def png(figure: Figure) -> bytes:
@@ -68,21 +66,50 @@ def pdf(figure: Figure) -> bytes:
     return data.getvalue()
 
 
-def save(figure: Figure, folder: Path, name: str, width: str | None = None) -> tuple[Path, Path]:
-    """Write `name.svg` and `name.png` into a folder, which is made if need be; and `name.pdf` where a width is given.
+def files_of(figure: Figure, name: str, width: str | None = None) -> dict[str, bytes]:
+    """The files of a figure by their names: `name.svg` and `name.png`, and `name.pdf` where a width is given.
 
     A PDF of one column rearranges the figure itself.
+    """
+    files = {f"{name}.svg": svg(figure).encode(), f"{name}.png": png(figure)}
+    if width is not None:
+        files[f"{name}.pdf"] = pdf(one_column(figure) if width == "one-column" else figure)
+    return files
+
+
+def save(figure: Figure, folder: Path, name: str, width: str | None = None) -> tuple[Path, Path]:
+    """Write `name.svg` and `name.png` into a folder, which is made if need be; and `name.pdf` where a width is given.
 
     Raises:
         OSError: the folder cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    vector, raster = folder / f"{name}.svg", folder / f"{name}.png"
-    vector.write_text(svg(figure), encoding="utf-8")
-    raster.write_bytes(png(figure))
-    if width is not None:
-        (folder / f"{name}.pdf").write_bytes(pdf(one_column(figure) if width == "one-column" else figure))
-    return vector, raster
+    for file, data in files_of(figure, name, width).items():
+        (folder / file).write_bytes(data)
+    return folder / f"{name}.svg", folder / f"{name}.png"
+
+
+def make_all(plots: Callable[[], Plots], put: Callable[[str, Figure], None]) -> list[str]:
+    """Make figures one by one. A failed figure affects neither the others nor the results.
+
+    Args:
+        plots: gives the functions that make the figures, by name.
+        put: receives the name and the figure.
+
+    Returns:
+        A sentence for each failed figure.
+    """
+    failures: list[str] = []
+    try:
+        makers = plots()
+    except Exception as error:  # matplotlib and xarray raise many kinds of errors for unusual numbers
+        return [f"the figures could not be made ({python_says(error)}); the results are complete"]
+    for name, make in makers.items():
+        try:
+            put(name, make())
+        except Exception as error:
+            failures.append(f"figure `{name}` could not be made ({python_says(error)}); the results are complete")
+    return failures
 
 
 def save_all(plots: Callable[[], Plots], folder: Path, width: str | None = None) -> Saved:
@@ -93,15 +120,10 @@ def save_all(plots: Callable[[], Plots], folder: Path, width: str | None = None)
         folder: created if missing.
         width: of PDF files; None for none.
     """
-    saved = Saved({}, [])
-    try:
-        makers = plots()
-    except Exception as error:  # matplotlib and xarray raise many kinds of errors for unusual numbers
-        saved.failures.append(f"the figures could not be made ({python_says(error)}); the results are complete")
-        return saved
-    for name, make in makers.items():
-        try:
-            saved.vectors[name], _ = save(make(), folder, name, width)
-        except Exception as error:
-            saved.failures.append(f"figure `{name}` could not be made ({python_says(error)}); the results are complete")
-    return saved
+    vectors: dict[str, Path] = {}
+
+    def put(name: str, figure: Figure) -> None:
+        vectors[name], _ = save(figure, folder, name, width)
+
+    failures = make_all(plots, put)
+    return Saved(vectors, failures)

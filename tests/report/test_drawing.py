@@ -1,0 +1,73 @@
+"""Figures that a process of their own draws, whatever becomes of it."""
+
+import pickle
+import subprocess
+import sys
+
+import pytest
+
+from undertow.report.drawing import DrawingProcess, Drawn, drawing_process
+from undertow.report.run_figures import drawn
+
+# Draws a run as the command does, and says whether this process needed matplotlib.
+ELSEWHERE = """
+import pickle, sys
+from pathlib import Path
+from undertow.report.drawing import drawing_process
+with drawing_process() as drawing:
+    drawing.draw(Path(sys.argv[1]), "wide")
+    {meanwhile}
+    found = drawing.drawn()
+pickle.dump((found, "matplotlib" in sys.modules), open(sys.argv[2], "wb"))
+"""
+
+
+@pytest.fixture(scope="module")
+def here(runs):
+    return drawn(runs["rafc"], "wide")
+
+
+def elsewhere(run, folder, meanwhile="pass"):
+    run.to_netcdf(folder / "run.nc", engine="netcdf4")
+    command = [sys.executable, "-P", "-c", ELSEWHERE.format(meanwhile=meanwhile), folder / "run.nc", folder / "found"]
+    subprocess.run(command, check=True, cwd=folder)
+    return pickle.loads((folder / "found").read_bytes())
+
+
+def test_the_same_files_as_here(runs, here, tmp_path):
+    (tmp_path / "matplotlib.py").write_text("raise SystemExit('the current folder must not be searched')")
+    found, loaded = elsewhere(runs["rafc"], tmp_path)
+    assert not loaded and found == here
+    assert set(here.pictures) == {name.removesuffix(".pdf") for name in here.files if name.endswith(".pdf")}
+    assert {type(picture) for picture in here.pictures.values()} == {str, bytes}
+
+
+def test_drawn_here_where_the_process_was_killed(runs, here, tmp_path):
+    found, loaded = elsewhere(runs["rafc"], tmp_path, "drawing._process.kill()")
+    assert loaded and found == here
+
+
+def test_a_failed_figure_is_a_sentence(monkeypatch, runs):
+    from undertow.report import run_figures
+
+    monkeypatch.setattr(run_figures, "run_plots", lambda run: {"error": lambda: 1 / 0})
+    found = drawn(runs["rafc"])
+    assert found.files == found.pictures == {} and found.failures[0].startswith("figure `error` could not be made (")
+
+
+def test_files_are_written(tmp_path):
+    Drawn({"a.svg": b"<svg/>"}, {}, []).write(tmp_path / "figures")
+    assert (tmp_path / "figures" / "a.svg").read_bytes() == b"<svg/>"
+
+
+def test_no_process_where_matplotlib_is_loaded(tmp_path):
+    with drawing_process() as drawing:
+        assert drawing._process is None
+        drawing.draw(tmp_path / "missing.nc", None)
+        with pytest.raises(OSError, match=r"missing\.nc"):
+            drawing.drawn()
+
+
+def test_draw_comes_first():
+    with pytest.raises(AssertionError, match="first"):
+        DrawingProcess(None).drawn()

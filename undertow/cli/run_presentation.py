@@ -1,0 +1,129 @@
+"""What `simulate` adds when the results are written: figures, page, and the prediction beside the run."""
+
+import contextlib
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+
+from undertow.analysis.linearization.response import compare_metrics
+from undertow.cli.exit_codes import warn_of
+from undertow.cli.results_folder import Draft
+from undertow.cli.stages import stage
+from undertow.cli.tables import terminal_table
+from undertow.core.user_code import python_says
+from undertow.prediction.operating_point import operating_point, predicted
+from undertow.report.drawing import DrawingProcess
+from undertow.report.replay.replay_data import Replay
+from undertow.report.run_page import shown, write_run_page
+from undertow.report.run_tables import prediction_rows
+from undertow.scenario.build import Built, in_its_precision
+from undertow.scenario.execute import Executed, write_metrics
+from undertow.scenario.finished_run import metrics_of
+
+# A measured metric that departs from the predicted one by more than this share is reported.
+_DEPARTS = 0.10
+
+# Peak metrics depend on single moments: shown, not compared.
+_PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
+
+# Measured numbers below this share of the largest predicted one count as zero.
+_NOTHING = 1e-9
+
+
+class PredictedMetrics(NamedTuple):
+    """Metrics of the steady window from the linearised loop, or the reason why there are none."""
+
+    metrics: dict[str, float] | None
+    why_not: str
+
+
+def present(
+    executed: Executed, drawing: DrawingProcess, draft: Draft, folder: Path, console: Console, prediction: bool
+) -> Replay | None:
+    """Write figures, page and prediction of a run.
+
+    Args:
+        executed: the run.
+        drawing: draws its figures.
+        draft: of the results.
+        folder: of the results, as the user knows it.
+        console: for what is printed.
+        prediction: whether the metrics are predicted too.
+
+    Returns:
+        The replay, for a video; None for a plant that is no vehicle.
+    """
+    page = draft.path / "run.html"
+    with _predicting(executed.built, prediction) as predicting:
+        with stage(console, "figures and page"):
+            drawn = drawing.drawn()
+            drawn.write(draft.path / "figures")
+            looks = shown(executed.dataset, executed.built.closed_loop, drawn)
+            warn_of(looks.failures)
+            write_run_page(page, executed.dataset, looks)
+        draft.publish()  # nobody waits for the prediction, which is added to the page
+        console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
+        if predicting is not None:
+            with stage(console, "prediction"):
+                predicted = predicting.result()
+            write_metrics(executed, draft.path, in_results(predicted))
+            write_run_page(page, executed.dataset, looks, predicted.metrics)
+            draft.publish()
+            _print_prediction(predicted, executed, console)
+    return looks.replay
+
+
+@contextlib.contextmanager
+def _predicting(built: Built, enabled: bool) -> Iterator[Future[PredictedMetrics] | None]:
+    """The prediction of a scenario, made in another thread meanwhile; None where it is left out."""
+    if not enabled:
+        yield None
+        return
+    with ThreadPoolExecutor(1) as other:
+        yield other.submit(_predict, built)
+
+
+def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
+    """One sentence that compares the run with its prediction."""
+    if predicted.metrics is None:
+        return f"No prediction: {predicted.why_not}"
+    if executed.steady is None:
+        return "The prediction is for the steady window, which the run did not reach"
+    zero = _NOTHING * max(predicted.metrics.values())
+    compared = [one for one in compare_metrics(predicted.metrics, executed.steady) if one.measured > zero]
+    departing = [one for one in compared if one.name not in _PEAKS and one.departure > _DEPARTS]
+    if not departing:
+        return "The run agrees with the prediction: no metric departs by more than 10 %"
+    named = ", ".join(f"{one.name} by {100 * one.departure:.0f} %" for one in departing)
+    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed.steady)}"
+
+
+def in_results(predicted: PredictedMetrics) -> dict[str, Any]:
+    """Entries of metrics.json."""
+    return {"predicted": predicted.metrics} | ({"not_predicted": predicted.why_not} if predicted.why_not else {})
+
+
+@in_its_precision
+def _predict(built: Built) -> PredictedMetrics:
+    try:
+        return PredictedMetrics(*predicted(operating_point(built)))
+    except Exception as error:  # a user's part may run and yet not be differentiable
+        return PredictedMetrics(None, f"this loop cannot be linearised: {python_says(error)}")
+
+
+def _because(steady: dict[str, Any]) -> str:
+    limited = steady.get("saturated_fraction", 0.0)
+    if limited > 0:
+        return f". Actuators were saturated {limited:.1%} of the time, which the linear model does not capture"
+    return ". Nonlinear effects matter here: large motions, dead zones, or motors far from their mean speed"
+
+
+def _print_prediction(predicted: PredictedMetrics, executed: Executed, console: Console) -> None:
+    if predicted.metrics and executed.steady:
+        known = metrics_of(executed.dataset)
+        compared = [one for one in compare_metrics(predicted.metrics, executed.steady) if one.name in known]
+        console.print(terminal_table(prediction_rows(compared, executed.built.window(), known)))
+    console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)

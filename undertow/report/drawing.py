@@ -1,0 +1,117 @@
+"""Figures of a run, drawn by a process of their own while this one goes on.
+
+Starting matplotlib takes as long as the start of JAX, and drawing as long as the prediction; a process that is started
+with the command does both on another core.
+"""
+
+import contextlib
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+
+class Drawn(NamedTuple):
+    """Figures of a run.
+
+    Attributes:
+        files: what the files hold, by their names.
+        pictures: what the page shows: SVG as text or PNG as bytes, by the name of the figure.
+        failures: a sentence for each figure that could not be made.
+    """
+
+    files: Mapping[str, bytes]
+    pictures: Mapping[str, str | bytes]
+    failures: list[str]
+
+    def write(self, folder: Path) -> None:
+        """Write the files into a folder, which is made if need be.
+
+        Raises:
+            OSError: the folder cannot be written.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, data in self.files.items():
+            (folder / name).write_bytes(data)
+
+
+class DrawingProcess:
+    """A process that draws one run.
+
+    Args:
+        process: runs `serve`; None where figures are drawn by this process.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes] | None):
+        self._process = process
+        self._asked: tuple[Path, str | None] | None = None
+
+    def draw(self, run: Path, width: str | None) -> None:
+        """Begin to draw the run in a file `run.nc`, with PDF files where a width is given."""
+        self._asked = run, width
+        if self._process is not None and self._process.stdin is not None:
+            with contextlib.suppress(OSError):  # it has ended; `drawn` then draws here
+                self._process.stdin.write(pickle.dumps(self._asked))
+                self._process.stdin.close()
+
+    def drawn(self) -> Drawn:
+        """Wait for the figures; drawn here where the process cannot.
+
+        Raises:
+            OSError: the file of the run cannot be read.
+        """
+        assert self._asked is not None, "`draw` comes first"
+        if self._process is not None and self._process.stdout is not None:
+            data = self._process.stdout.read()
+            if self._process.wait() == 0 and data:
+                return pickle.loads(data)  # written by our own process
+        return _draw(*self._asked)
+
+
+@contextlib.contextmanager
+def drawing_process() -> Iterator[DrawingProcess]:
+    """A process that has matplotlib ready when the run has ended; this one where matplotlib is loaded here already."""
+    if "matplotlib" in sys.modules or not sys.executable:
+        yield DrawingProcess(None)
+        return
+    # The same search path, but without the current folder in front, where a file may have the name of a module. Ctrl-C
+    # ends this process, which ends the other one.
+    command = f"import sys; sys.path[:] = {sys.path!r}; from undertow.report.drawing import serve; serve()"
+    pipe = subprocess.PIPE
+    try:
+        process = subprocess.Popen([sys.executable, "-c", command], stdin=pipe, stdout=pipe, start_new_session=True)
+    except OSError:
+        yield DrawingProcess(None)
+        return
+    with process:  # closes the pipes and waits
+        try:
+            yield DrawingProcess(process)
+        finally:
+            process.kill()
+
+
+def serve() -> None:
+    """Draw the run whose file standard input names, and write the figures to standard output.
+
+    Whatever else is printed goes to standard error.
+    """
+    answer = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    from undertow.report import run_figures as run_figures  # before there is anything to do
+
+    asked = sys.stdin.buffer.read()
+    if asked:
+        pickle.dump(_draw(*pickle.loads(asked)), answer)
+        answer.close()
+
+
+def _draw(run: Path, width: str | None) -> Drawn:
+    import xarray as xr
+
+    from undertow.report.run_figures import drawn
+
+    with xr.open_dataset(run) as dataset:
+        return drawn(dataset.load(), width)

@@ -1,0 +1,43 @@
+"""Figures of one run: their files, and what its page shows of them."""
+
+import io
+
+import xarray as xr
+from PIL import Image
+
+from undertow.report.drawing import Drawn
+from undertow.report.figures.run import run_plots
+from undertow.report.figures.writing import files_of, make_all
+
+# Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
+LARGE, _COLOURS = 80_000, 48
+
+
+def drawn(run: xr.Dataset, width: str | None = None) -> Drawn:
+    """Figures of a run. A failed figure affects neither the others nor the results.
+
+    Args:
+        run: dataset of the run.
+        width: of PDF files; None for none.
+    """
+    files: dict[str, bytes] = {}
+    pictures: dict[str, str | bytes] = {}
+
+    def put(name, figure) -> None:
+        made = files_of(figure, name, width)
+        pictures[name] = _picture(made[f"{name}.svg"], made[f"{name}.png"])
+        files.update(made)
+
+    failures = make_all(lambda: run_plots(run), put)
+    return Drawn(files, pictures, failures)
+
+
+def _picture(vector: bytes, raster: bytes) -> str | bytes:
+    """A figure for the page: the SVG, or the PNG in few colours where the SVG is large."""
+    if len(vector) <= LARGE:
+        return vector.decode()
+    data = io.BytesIO()
+    with Image.open(io.BytesIO(raster)) as image:
+        few = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        few.save(data, "PNG", compress_level=6)
+    return data.getvalue()
