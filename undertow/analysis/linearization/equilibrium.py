@@ -86,6 +86,7 @@ class Balance(NamedTuple):
 def _smallest_solution(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Least squares, by orthogonal factors: several times as fast as by singular values."""
     found = scipy.linalg.lstsq(matrix, right, cond=1e-11, lapack_driver="gelsy", check_finite=False)
+    assert found is not None
     return np.asarray(found[0])
 
 
