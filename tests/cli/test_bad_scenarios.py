@@ -193,6 +193,12 @@ MISTAKES = {
         "steady: {start: 5, stop: 2}",
         "`steady.stop` must be later than steady.start (5 s), but is 2 s (s.yaml, line 11)",
     ),
+    "every step of one ODE": (
+        "record: 1e-2}",
+        "record: 1e-2, kind: continuous}\nsteady: {every_step: true}",
+        "`steady.every_step` must be false when `loop.kind` is continuous, but is true (s.yaml, line 10). "
+        "A continuous loop has no control steps: `loop.record` sets the times that count",
+    ),
     "negative seed": ("seed: 3", "seed: -1", "`seed` must be greater than or equal to 0, but is -1 (s.yaml, line 11)"),
     "short initial state": (
         "position: [0, 0, 0, 0, 0, 0]",

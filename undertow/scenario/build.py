@@ -168,7 +168,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
             continuous.check(loop)
         check_times(scenario.loop)
     with within("steady"):
-        check_window(scenario.steady, scenario.loop.duration)
+        check_window(scenario.steady, scenario.loop)
     with within("initial"):
         check_start(loop, scenario.initial)
     part_cache.check_once(loop, lambda: check_fit(loop, own_parts(scenario, text.folder)))

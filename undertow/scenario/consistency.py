@@ -56,13 +56,16 @@ def check_times(loop: Loop) -> None:
         raise BadInput("record", must, f"{loop.record:g} s", hint=f"Take {near} s")
 
 
-def check_window(window: Window, duration: float) -> None:
-    """Check that the steady window has a length.
+def check_window(window: Window, loop: Loop) -> None:
+    """Check that the steady window has a length, and that the loop has what it asks for.
 
     Raises:
-        BadInput: it has none.
+        BadInput: one of them does not hold.
     """
-    start, stop = window.of_run(duration)
+    if window.every_step and loop.kind == "continuous":
+        hint = "A continuous loop has no control steps: `loop.record` sets the times that count"
+        raise BadInput("every_step", "be false when `loop.kind` is continuous", "true", hint=hint)
+    start, stop = window.of_run(loop.duration)
     if not start < stop:
         raise BadInput("stop", f"be later than steady.start ({start:g} s)", f"{stop:g} s")
 
