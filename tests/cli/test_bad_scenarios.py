@@ -225,6 +225,21 @@ MISTAKES = {
         "navigation: {kind: white_noise, velocity: -1}",
         "`navigation.velocity` must be zero or positive, but is -1 (s.yaml, line 11)",
     ),
+    "noise of the wrong size": (
+        "seed: 3",
+        "navigation: {kind: white_noise, velocity: [0.1, 0.1, 0.1, 0.1, 0.1]}",
+        "`navigation.velocity` must be one number, or 6 of them, one per axis, but is of shape (5,) (s.yaml, line 11)",
+    ),
+    "noise that the rule for gains needs, of the wrong size": (
+        "  feedback: [1, 2]\n  weight: [[10, 0], [0, 10]]",
+        "  preset: robust\nnavigation: {kind: white_noise, velocity: [0.1, 0.1]}",
+        "`navigation.velocity` must be one number, or 6 of them, one per axis, but is of shape (2,) (s.yaml, line 6)",
+    ),
+    "bias of the wrong size": (
+        "seed: 3",
+        "navigation: {kind: degraded, velocity_bias: [0.1, 0.1]}",
+        "`navigation.velocity_bias` must be one number, or 6 of them, one per axis, but is of shape (2,) (s.yaml, line 11)",
+    ),
     "two sources of samples": (
         "kind: u1",
         "kind: table, file: d.csv, csv: t",

@@ -8,9 +8,11 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
 
 from undertow.core import checks
-from undertow.core.contracts import Load, Target
+from undertow.core.contracts import AbstractNavigation, AbstractPlant, Load, Target
 from undertow.core.errors import Advice, BadInput, advice, joined, within
 from undertow.core.returned import check_state, form
 from undertow.core.signals import check_declared
@@ -104,6 +106,27 @@ def check_start(loop: ClosedLoop, start: Initial) -> None:
         if value is not None:
             checks.length(key, value, len(loop.plant.outputs), ", ".join(loop.plant.outputs))
             checks.finite(key, value)
+
+
+def check_noise(navigation: AbstractNavigation, noise: ArrayLike, plant: AbstractPlant, own: Mapping[str, str]) -> None:
+    """Check that the noise of measured velocities is one number or one per output, before a controller is made for it.
+
+    Args:
+        navigation: navigation filter.
+        noise: its standard deviation of the velocities.
+        plant: of the same loop.
+        own: as for `check_fit`.
+
+    Raises:
+        BadInput: it is not; the error names the option that is wrong where the filter checks its options.
+    """
+    axes = len(plant.outputs)
+    if np.shape(noise) in ((), (axes,)):
+        return
+    with _part("navigation", own) as traced:
+        truth = traced(lambda: plant.output(jnp.zeros(()), plant.initial_state()))
+        traced(navigation.init, traced(navigation.realize, jax.random.PRNGKey(0)), truth)
+        checks.per_axis("velocity_noise", noise, axes)
 
 
 def check_fit(loop: ClosedLoop, own: Mapping[str, str] = MappingProxyType({})) -> None:
