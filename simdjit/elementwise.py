@@ -125,9 +125,15 @@ def _convert(x: Scalar, new_dtype: Any) -> Scalar:
 
 
 def _reread(x: Scalar, new_dtype: Any) -> Scalar:
-    if np.dtype(x.type).itemsize != np.dtype(new_dtype).itemsize:
-        raise Unsupported(f"bits of {x.type} as {new_dtype}")
-    return x.to("bits", str(new_dtype))
+    """Whatever is no number has the same bits: those that it is given differ from instruction to instruction, and so
+    from one number of lanes to another."""
+    dtype = str(new_dtype)
+    if np.dtype(x.type).itemsize != np.dtype(dtype).itemsize:
+        raise Unsupported(f"bits of {x.type} as {dtype}")
+    bits = x.to("bits", dtype)
+    if not x.type.startswith("float") or dtype == x.type:
+        return bits
+    return where(x.apply("ne", x), int(np.array(np.nan, x.type).view(dtype)), bits)
 
 
 def _integer_power(x: Scalar, y: int) -> Scalar:

@@ -214,6 +214,21 @@ def test_shifts_and_conversions_beyond_the_last_bit(in_lanes, dtype):
     np.testing.assert_array_equal(alone, wanted)
 
 
+@pytest.mark.parametrize("constant", [(), (0,)])
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_what_is_no_number_has_no_sign(in_lanes, dtype, constant):
+    """Which sign an instruction gives it is left open: it must not come through, whether folded or computed."""
+    whole = dtype.replace("float", "int")
+    read = lambda x: (jnp.signbit(x), jnp.copysign(2, x), jax.lax.bitcast_convert_type(x, whole))
+    numbers = np.array([np.nan, -3.0], dtype)
+    for nan in (np.nan, -np.nan):
+        given = np.array([[nan, -3.0]] * 2, dtype)
+        for lanes in (0, 1):
+            found = in_lanes(read, constant=constant, lanes=lanes)(given)
+            for one, wanted in zip(found, ([False, True], [2, -2], numbers.view(whole)), strict=True):
+                np.testing.assert_array_equal(one, [wanted] * 2)
+
+
 def test_the_first_that_is_no_number_is_extreme(in_lanes):
     rows = np.array([[1.0, np.nan, 3.0, np.nan, 5.0], [2.0, 1.0, 2.0, 0.0, 0.0]])
     np.testing.assert_array_equal(in_lanes(jnp.argmax)(rows), [1, 0])

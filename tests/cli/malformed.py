@@ -37,7 +37,7 @@ _KEYS = (
 _EXTRA = {
     "initial": {"position": [0.1], "velocity": [0.0]},
     "steady": {"start": 0.01, "stop": 0.02, "every_step": True},
-    "navigation": {"kind": "white_noise", "position": 0.01, "velocity": [0.01]},
+    "navigation": {"kind": "white_noise", "position": 0.01, "velocity": 0.01},
     "seed": 3,
     "model": {"speed_sensor": False},
 }

@@ -193,6 +193,12 @@ MISTAKES = {
         "steady: {start: 5, stop: 2}",
         "`steady.stop` must be later than steady.start (5 s), but is 2 s (s.yaml, line 11)",
     ),
+    "every step of one ODE": (
+        "record: 1e-2}",
+        "record: 1e-2, kind: continuous}\nsteady: {every_step: true}",
+        "`steady.every_step` must be false when `loop.kind` is continuous, but is true (s.yaml, line 10). "
+        "A continuous loop has no control steps: `loop.record` sets the times that count",
+    ),
     "negative seed": ("seed: 3", "seed: -1", "`seed` must be greater than or equal to 0, but is -1 (s.yaml, line 11)"),
     "short initial state": (
         "position: [0, 0, 0, 0, 0, 0]",
@@ -218,6 +224,21 @@ MISTAKES = {
         "seed: 3",
         "navigation: {kind: white_noise, velocity: -1}",
         "`navigation.velocity` must be zero or positive, but is -1 (s.yaml, line 11)",
+    ),
+    "noise of the wrong size": (
+        "seed: 3",
+        "navigation: {kind: white_noise, velocity: [0.1, 0.1, 0.1, 0.1, 0.1]}",
+        "`navigation.velocity` must be one number, or 6 of them, one per axis, but is of shape (5,) (s.yaml, line 11)",
+    ),
+    "noise that the rule for gains needs, of the wrong size": (
+        "  feedback: [1, 2]\n  weight: [[10, 0], [0, 10]]",
+        "  preset: robust\nnavigation: {kind: white_noise, velocity: [0.1, 0.1]}",
+        "`navigation.velocity` must be one number, or 6 of them, one per axis, but is of shape (2,) (s.yaml, line 6)",
+    ),
+    "bias of the wrong size": (
+        "seed: 3",
+        "navigation: {kind: degraded, velocity_bias: [0.1, 0.1]}",
+        "`navigation.velocity_bias` must be one number, or 6 of them, one per axis, but is of shape (2,) (s.yaml, line 11)",
     ),
     "two sources of samples": (
         "kind: u1",

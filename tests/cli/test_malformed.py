@@ -12,18 +12,20 @@ import malformed
 import pytest
 
 from undertow.cli import campaign
+from undertow.core.status import Status
 from undertow.report import drawing
 
 DONE, RUN_FAILED, BAD_INPUT = 0, 1, 2
 BEGIN = int(os.environ.get("UNDERTOW_FUZZ_SEED", 0)) * 1_000_000
 FEW, MANY = 6, 1500
+FAILED = [status.word for status in Status if status is not Status.OK]
 
 
 @pytest.fixture
 def undrawn(monkeypatch, tmp_path):
     """Drawing takes most of the time of a short run, and has tests of its own. Files that examples name are there."""
     monkeypatch.setattr(drawing, "_draw", lambda run, width: drawing.Drawn({}, {}, []))
-    monkeypatch.setattr(campaign, "write_campaign", lambda title, results, found, folder, pdf: (folder, []))
+    monkeypatch.setattr(campaign, "write_campaign", lambda title, results, found, folder, pdf, replays: (folder, []))
     for name in ("d.csv", "my_rov.yaml"):
         shutil.copy(malformed.EXAMPLES / name, tmp_path / name)
 
@@ -32,7 +34,7 @@ def one_line(said):
     """A documented end, and one line that says why it is not a good one; that of a run or a check may be in its table."""
     complaints = [line for line in said.err.splitlines() if not line.startswith("Advice: ")]
     assert said.code in (DONE, RUN_FAILED, BAD_INPUT), said
-    told = "not_finite" in said.out or "diverged" in said.out or "1 error" in said.out or " errors" in said.out
+    told = any(words in said.out for words in (*FAILED, "1 error", " errors"))
     assert len(complaints) in ((0,) if said.code == DONE else (0, 1) if told else (1,)), said
     assert all(line.startswith("Error: ") and len(line) < 2000 for line in complaints), said
 

@@ -173,6 +173,7 @@ ADVICE = {
     "above the surface": ("s.yaml", "[0.3, 0, 0]}", "[0.3, 0, 0]}\n  - {kind: waves, depth: 0.5}\ninitial: {position: [0, 0, -2, 0, 0, 0]}", ["down = -2 m", "down = -0.5 m", "positive downward"]),
     "current": ("s.yaml", "[0.3, 0, 0]", "[4, 3, 0]", ["current is 5 m/s", "(s.yaml, line 6)", "at most 1.32", "drifts away"]),
     "too far": ("s.yaml", "[2, 0, 1,", "[300, 0, 1,", ["300 m from the start", "(s.yaml, line 5)", "at most 1.32", "`loop.duration` more than 20 s"]),
+    "beyond all squares": ("s.yaml", "[2, 0, 1,", "[1e200, 0, 1,", ["1e+200 m from the start", "at most 1.32", "`loop.duration` more than 20 s"]),
     "step": ("s.yaml", "[2, 0, 1,", "[25, 0, 1,", ["25.02 m from the vehicle", "at most 1.32", "`settling`"]),
     "too fast": ("s.yaml", SETPOINT, "{kind: circle, radius: 20, period: 20}", ["6.28 m/s", "at most 1.32"]),
     "waypoints in time": ("s.yaml", SETPOINT, WAYPOINTS, ["ends at 20 s", "(s.yaml, line 9)", "at 80 s", "`loop.duration`"]),

@@ -98,7 +98,7 @@ def test_a_gap_costs_what_the_load_changes_meanwhile(law, back_end):
     assert later.max() <= 3 * allowed, "and it is taken back afterwards"
     np.testing.assert_array_equal(missed.signals["position"][:begin], sound.signals["position"][:begin])
     if law == "robust":  # what it has learnt stays what it was
-        learnt = missed.signals["estimate"][begin : begin + steps]
+        learnt = np.asarray(missed.signals["estimate"])[begin : begin + steps]
         assert np.abs(learnt - learnt[0]).max() < 0.05 * AMPLITUDE
 
 

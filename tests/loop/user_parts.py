@@ -61,7 +61,8 @@ class PredictiveControl(AbstractController):
 
     def command(self, z, y, r):
         dt, size = 0.02, 10
-        reach = jnp.tril(jnp.ones((size, size))) * dt * dt * (jnp.arange(size)[:, None] - jnp.arange(size) + 0.5)
+        k = jnp.arange(size)
+        reach = jnp.tril(jnp.ones((size, size))) * dt * dt * (k[:, None] - k[None, :] + 0.5)
         free = y.position[0] - r.position[0] + dt * jnp.arange(1, size + 1) * (y.velocity[0] - r.velocity[0])
         hessian, linear = reach.T @ reach + 1e-7 * jnp.eye(size), reach.T @ free
         pace = 1.0 / jnp.trace(hessian)

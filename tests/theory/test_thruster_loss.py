@@ -91,7 +91,7 @@ class LosesEffect(AbstractPlant):
 
     def _now(self, t):
         left = jnp.where(t >= self.when, self.left, 1.0)
-        return eqx.tree_at(lambda v: v.thruster_matrix, self.vehicle, self.vehicle.thruster_matrix * left)
+        return eqx.tree_at(lambda v: v.thruster_matrix, self.vehicle, self.vehicle.thruster_matrix * left[None, :])
 
     def initial_state(self, position=None, velocity=None):
         return self.vehicle.initial_state(position, velocity)

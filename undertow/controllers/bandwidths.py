@@ -110,6 +110,8 @@ def axes_of(model: Model, sampling_time: float, delay: float, velocity_noise, lo
     checks.not_negative("velocity_noise", velocity_noise, "m/s, rad/s")
     checks.positive("load_rate", load_rate)
     axes = len(model.coordinates.angles)
+    checks.per_axis("velocity_noise", velocity_noise, axes)
+    checks.per_axis("load_rate", load_rate, axes)
     with jax.ensure_compile_time_eval():  # bandwidths are numbers even where a law is made inside a compiled function
         still = as_array(np.zeros(axes))
         lag, max_bandwidth, forces = _actuation(model, still, as_array(_FASTEST / sampling_time))

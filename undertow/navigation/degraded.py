@@ -42,6 +42,10 @@ class Degraded(AbstractNavigation):
         return self.velocity.noise * jnp.sqrt(self.velocity.period / dt)
 
     def init(self, realization, truth: Measurement) -> DegradedState:
+        for name, sampling in (("position", self.position), ("velocity", self.velocity)):
+            given = {"noise": sampling.noise, "bias": getattr(self, f"{name}_bias"), "resolution": sampling.resolution}
+            for error, value in given.items():
+                checks.per_axis(f"{name}_{error}", value, len(truth.position))
         none = jnp.zeros_like(truth.position)
         held = (truth.position, truth.velocity)
         return DegradedState(self.position.init(none, none), self.velocity.init(none, none), held)
@@ -83,7 +87,7 @@ def degraded(
         sampling_time: that of the loop, s; a scenario sets it.
 
     Raises:
-        BadInput: a value is out of its range.
+        BadInput: a value is out of its range; at the start of a run, not one number or one per output.
     """
     checks.positive("sampling_time", sampling_time, "s")
     period = sampling_time if period is None else period

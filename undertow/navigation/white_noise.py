@@ -16,7 +16,7 @@ class WhiteNoise(AbstractInformedNavigation):
     """Independent Gaussian errors, new at every sample of the control loop; their key comes from the sample's number.
 
     Raises:
-        BadInput: a standard deviation negative.
+        BadInput: a standard deviation negative; at the start of a run, not one number or one per output.
     """
 
     position: Float[Param, "..."] = param("m, rad", "standard deviation on position")
@@ -39,6 +39,8 @@ class WhiteNoise(AbstractInformedNavigation):
 
     def init(self, realization, truth) -> Int[Array, ""]:
         """Samples so far."""
+        for name in ("position", "velocity"):
+            checks.per_axis(name, getattr(self, name), len(truth.position))
         return jnp.zeros((), dtype=int)
 
     def measure(self, realization, state, t, truth: Measurement):

@@ -23,7 +23,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.observer import Navigation
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
-from undertow.scenario.consistency import check_fit, check_start, check_times, check_window, rounded_times
+from undertow.scenario.consistency import check_fit, check_noise, check_start, check_times, check_window, rounded_times
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
@@ -159,6 +159,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     noise = isinstance(navigation, AbstractInformedNavigation) and _velocity_noise(
         navigation, as_array(scenario.loop.dt)
     )
+    check_noise(navigation, noise, plant, own_parts(scenario, text.folder))
     context["velocity_noise"] = np.asarray(noise, dtype=float).tolist()
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
@@ -168,7 +169,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
             continuous.check(loop)
         check_times(scenario.loop)
     with within("steady"):
-        check_window(scenario.steady, scenario.loop.duration)
+        check_window(scenario.steady, scenario.loop)
     with within("initial"):
         check_start(loop, scenario.initial)
     part_cache.check_once(loop, lambda: check_fit(loop, own_parts(scenario, text.folder)))

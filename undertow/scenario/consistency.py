@@ -8,9 +8,11 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
 
 from undertow.core import checks
-from undertow.core.contracts import Load, Target
+from undertow.core.contracts import AbstractNavigation, AbstractPlant, Load, Target
 from undertow.core.errors import Advice, BadInput, advice, joined, within
 from undertow.core.returned import check_state, form
 from undertow.core.signals import check_declared
@@ -56,13 +58,16 @@ def check_times(loop: Loop) -> None:
         raise BadInput("record", must, f"{loop.record:g} s", hint=f"Take {near} s")
 
 
-def check_window(window: Window, duration: float) -> None:
-    """Check that the steady window has a length.
+def check_window(window: Window, loop: Loop) -> None:
+    """Check that the steady window has a length, and that the loop has what it asks for.
 
     Raises:
-        BadInput: it has none.
+        BadInput: one of them does not hold.
     """
-    start, stop = window.of_run(duration)
+    if window.every_step and loop.kind == "continuous":
+        hint = "A continuous loop has no control steps: `loop.record` sets the times that count"
+        raise BadInput("every_step", "be false when `loop.kind` is continuous", "true", hint=hint)
+    start, stop = window.of_run(loop.duration)
     if not start < stop:
         raise BadInput("stop", f"be later than steady.start ({start:g} s)", f"{stop:g} s")
 
@@ -101,6 +106,27 @@ def check_start(loop: ClosedLoop, start: Initial) -> None:
         if value is not None:
             checks.length(key, value, len(loop.plant.outputs), ", ".join(loop.plant.outputs))
             checks.finite(key, value)
+
+
+def check_noise(navigation: AbstractNavigation, noise: ArrayLike, plant: AbstractPlant, own: Mapping[str, str]) -> None:
+    """Check that the noise of measured velocities is one number or one per output, before a controller is made for it.
+
+    Args:
+        navigation: navigation filter.
+        noise: its standard deviation of the velocities.
+        plant: of the same loop.
+        own: as for `check_fit`.
+
+    Raises:
+        BadInput: it is not; the error names the option that is wrong where the filter checks its options.
+    """
+    axes = len(plant.outputs)
+    if np.shape(noise) in ((), (axes,)):
+        return
+    with _part("navigation", own) as traced:
+        truth = traced(lambda: plant.output(jnp.zeros(()), plant.initial_state()))
+        traced(navigation.init, traced(navigation.realize, jax.random.PRNGKey(0)), truth)
+        checks.per_axis("velocity_noise", noise, axes)
 
 
 def check_fit(loop: ClosedLoop, own: Mapping[str, str] = MappingProxyType({})) -> None:

@@ -43,6 +43,7 @@ class Motion(NamedTuple):
     start: Float[np.ndarray, " n"]  # position of the plant at t = 0
 
 
+@np.errstate(over="ignore", invalid="ignore")  # numbers near the largest double may be among those that are not meant
 def plausibility(loop: ClosedLoop, duration: float, start: list[float] | None) -> tuple[Advice, ...]:
     """Advice for each thing that is surely not meant.
 
@@ -128,7 +129,8 @@ def _thrusts(plant: HybridVehicle) -> tuple[Float[np.ndarray, " m"], Float[np.nd
 
 
 def _size(vector: Float[np.ndarray, " k"]) -> float:
-    return float(np.linalg.norm(vector))
+    """Euclidean norm, also of entries whose squares are too large for a double."""
+    return float(np.hypot.reduce(vector))
 
 
 def _angles(loop: ClosedLoop, desired: Motion):
@@ -208,10 +210,9 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
         )
         yield advice("disturbance", says, "1 knot is 0.514 m/s")
         return
-    speed = float(np.linalg.norm(desired.velocity[:, :3], axis=1).max())
+    speed = float(np.hypot.reduce(desired.velocity[:, :3], axis=1).max())
     duration, way = float(desired.time[-1]), desired.position[:, :3] - desired.start[:3]
-    far = float(np.linalg.norm(way[-1]))
-    step = float(np.linalg.norm(way[0]))
+    far, step = _size(way[-1]), _size(way[0])
     if speed > _SPARE * (top + drift):
         yield advice("reference", f"`reference` moves at up to {speed:.3g} m/s, but {most}", "Make it slower")
     elif far > _SPARE * (top + drift) * duration:
