@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from simdjit.calls import ARGUMENT, FORMULAS
-from simdjit.graph import I64, Graph, Node, Region
+from simdjit.graph import I64, Graph, Node, Operation, Region
 from simdjit.instructions import SLOT, Emitter, Table
+from simdjit.matrix_loop import emit
 from simdjit.scalar import Scalar
 
 STEP = "step"
@@ -152,8 +153,13 @@ def _function(name: str, dtype: str, emitter: Emitter) -> str:
 def operations(graph: Graph, sections: Sections) -> int:
     """Operations of one step of one run, those inside a loop counted once; an elementary function counts as one."""
     fixed, needed = _fixed(graph), graph.needed(sections.step)
-    worked = lambda node: graph.operations[node].name not in ("constant", "input", "region", "result")
-    return sum(needed[node] and not same and worked(node) for node, same in enumerate(fixed))
+    return sum(_work(graph.operations[node]) for node, same in enumerate(fixed) if needed[node] and not same)
+
+
+def _work(operation: Operation) -> int:
+    if operation.name == "product":
+        return operation.detail.operations
+    return operation.name not in ("constant", "input", "region", "result", "part")
 
 
 def _fixed(graph: Graph) -> list[bool]:
@@ -202,8 +208,14 @@ class Section:
                 self._results[node] = self._region(node, graph.regions[detail], detail)
             elif name == "result":
                 self._values[node] = self._results[operands[0]][detail]
+            elif name == "product":
+                one, other = (self._tables[operand] for operand in operands)
+                self._tables[node] = emit(self._emitter, one, other, detail, graph.types[node], f"{self._letter}{node}")
+            elif name == "part":
+                self._values[node] = f"%{self._letter}{node}"
+                self._emitter.at(self._tables[operands[0]], str(detail), graph.types[node], self._values[node])
             elif name == "table":
-                table = self._emitter.stored(operands)
+                table = self._whole_product(operands) or self._emitter.stored(operands)
                 if table is None:
                     values = [self.value(operand) for operand in operands]
                     table = self._emitter.table(operands, values, f"%{self._letter}{node}")
@@ -217,8 +229,18 @@ class Section:
                 self._emitter.operation(node, known, f"%{self._letter}{node}")
                 self._values[node] = f"%{self._letter}{node}"
         for node in nodes:
-            if graph.operations[node].name not in ("region", "table"):
+            if graph.operations[node].name not in ("region", "table", "product"):
                 self.value(node)
+
+    def _whole_product(self, entries: Sequence[Node]) -> Table | None:
+        """Where the results of a product lie, if that is what the entries are."""
+        operations = self._emitter.graph.operations
+        first = operations[entries[0]]
+        if first.name != "part":
+            return None
+        made = operations[first.operands[0]].detail
+        same = [operations[node] == first._replace(detail=i) for i, node in enumerate(entries)]
+        return self._tables[first.operands[0]] if all(same) and len(same) == made.rows * made.columns else None
 
     def value(self, node: Node) -> str:
         """Name of a node; fetched when it is a constant or lies in memory."""

@@ -197,15 +197,44 @@ class Emitter:
             texts = ", ".join(f"{_TYPES[dtype]} {self._number(graph.value(node), dtype)}" for node in entries)
             self.constants.append(f"{label} = internal constant [{len(entries)} x {_TYPES[dtype]}] [{texts}]")
             return Table(label, 0, size, 0)
-        room = f"{name}room"
-        self.rooms.append(f"  {room} = alloca [{len(entries)} x {self.vector(dtype)}], align {size * self.width}")
+        table = self.room(name, len(entries), dtype)
         for i, value in enumerate(values):
-            self.line(f"getelementptr i8, ptr {room}, i64 {i * size * self.width}", f"{name}p{i}")
-            self.lines.append(f"  store {self.vector(dtype)} {value}, ptr {name}p{i}, align {size * self.width}")
-        return Table(room, 0, size * self.width, size)
+            self.put(value, table, str(i), dtype, f"{name}p{i}")
+        return table
+
+    def room(self, name: str, entries: int, dtype: str) -> Table:
+        """Room for so many entries of every lane."""
+        size = np.dtype(dtype).itemsize
+        self.rooms.append(f"  {name}room = alloca [{entries} x {self.vector(dtype)}], align {size * self.width}")
+        return Table(f"{name}room", 0, size * self.width, size)
+
+    def put(self, value: str, table: Table, place: str, dtype: str, name: str) -> None:
+        """Put a value into a room, at a place that is the same for all lanes."""
+        self.line(f"mul i64 {place}, {table.step}", f"{name}m")
+        self.line(f"getelementptr i8, ptr {table.base}, i64 {name}m", f"{name}a")
+        self.lines.append(f"  store {self.vector(dtype)} {value}, ptr {name}a, align {table.step}")
+
+    def at(self, table: Table, place: str, dtype: str, name: str) -> None:
+        """What stands in a table at a place that is the same for all lanes."""
+        kind, size = self.vector(dtype), np.dtype(dtype).itemsize
+        self.line(f"mul i64 {place}, {table.step}", f"{name}m")
+        self.line(f"add i64 {name}m, {table.first}", f"{name}f")
+        self.line(f"getelementptr i8, ptr {table.base}, i64 {name}f", f"{name}a")
+        if table.apart:
+            self.line(f"load {kind}, ptr {name}a, align {size * self.width}", name)
+        else:
+            self.line(f"load {_TYPES[dtype]}, ptr {name}a, align {size}", f"{name}l")
+            self.splat(f"{name}l", dtype, name)
+
+    def everywhere(self, value: float, dtype: str) -> str:
+        """A number, the same in every lane."""
+        return f"splat ({_TYPES[dtype]} {self._number(value, dtype)})"
 
     def stored(self, entries: Sequence[Node]) -> Table | None:
-        """Where entries lie one after another among a program's numbers or its carry; None where they do not."""
+        """Where entries lie one after another among a program's numbers or its carry; None where they do not.
+
+        Only the slots of a vector are aligned like one; a thread finds its own number in each.
+        """
         found = [self.graph.operations[node] for node in entries]
         if any(one.name != "input" or one.detail[0] not in ("number", "carry") for one in found):
             return None
@@ -254,8 +283,7 @@ class Emitter:
 
     def constant(self, node: Node) -> str:
         """A constant, the same in every lane."""
-        value, dtype = self.graph.value(node), self.graph.types[node]
-        return f"splat ({_TYPES[dtype]} {self._number(value, dtype)})"
+        return self.everywhere(self.graph.value(node), self.graph.types[node])
 
     @staticmethod
     def _number(value: Any, dtype: str) -> str:

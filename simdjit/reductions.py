@@ -8,6 +8,7 @@ import numpy as np
 
 from simdjit import elementwise
 from simdjit.graph import BOOL, Graph, Node, Nodes, Unsupported, filled
+from simdjit.matrix_loop import FROM, product
 from simdjit.rules import Equation, rule
 from simdjit.scalar import Scalar, where
 
@@ -86,6 +87,11 @@ def _dot(equation: Equation, one: Nodes, other: Nodes) -> Nodes:
 
     left, right = rows(one, left_axes, left_batch), rows(other, right_axes, right_batch)
     add, times = (partial(graph.apply, name) for name in ("add", "mul"))
+    useful = lambda a, b: graph.value(a) != 0 and graph.value(b) != 0
+    ones, others = left[0], right[0]
+    if sum(useful(a, b) for row in ones for column in others for a, b in zip(row, column, strict=True)) >= FROM:
+        pairs = zip(left, right, strict=True)
+        return filled(equation.shape, [node for several, many in pairs for node in product(graph, several, many)])
     sums = [
         reduce(add, [times(a, b) for a, b in zip(ones, others, strict=True)] or [equation.constant(0)])
         for several, many in zip(left, right, strict=True)
