@@ -28,6 +28,8 @@ def prepare() -> None:
     # Or XLA says on the terminal that compiling is slow, and asks for a bug report.
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     os.environ.setdefault("JAX_ENABLE_X64", "1")
+    # Matrices here have at most some hundred rows; threads that wait for each other made them ten times as slow.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _compile_loops_whole()
     _keep_xla_code()
     gc.set_threshold(_YOUNG, _MIDDLE, _OLD)

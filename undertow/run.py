@@ -81,7 +81,7 @@ class Run:
         from undertow.report.run_figures import drawn
         from undertow.report.run_page import shown, write_run_page
 
-        parts = shown(self.dataset, self.loop, drawn(self.dataset))
+        parts = shown(self.dataset, self.loop, lambda: drawn(self.dataset))
         write_run_page(Path(path), self.dataset, parts)
         for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)

@@ -208,7 +208,7 @@ def test_failed_trials_leave_the_others(trials, monkeypatch):
 
 def test_failed_replay_is_a_sentence(run, loop, monkeypatch):
     monkeypatch.setattr(run_page, "replay_of", lambda run, loop: 1 / 0)
-    shown = run_page.shown(run, loop, Drawn({}, {}, []))
+    shown = run_page.shown(run, loop, lambda: Drawn({}, {}, []))
     assert shown.replay is None and "the replay could not be made" in shown.failures[0]
 
 

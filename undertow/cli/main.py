@@ -407,7 +407,9 @@ def main() -> None:
     remember_interrupts()
     prepare()
     code = run(sys.argv[1:])
-    if threading.active_count() > 1:  # a thread in compiled code, or compiling, cannot be stopped otherwise
+    # A thread in compiled code, or compiling, cannot be stopped otherwise; and JAX would clear its caches for a quarter
+    # of a second. A profiler writes its findings on the usual way out.
+    if threading.active_count() > 1 or sys.getprofile() is None:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

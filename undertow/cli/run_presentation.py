@@ -15,7 +15,7 @@ from undertow.cli.stages import stage
 from undertow.cli.tables import terminal_table
 from undertow.core.user_code import python_says
 from undertow.prediction.operating_point import operating_point, predicted
-from undertow.report.drawing import DrawingProcess
+from undertow.report.drawing import DrawingProcess, Drawn
 from undertow.report.replay.replay_data import Replay
 from undertow.report.run_page import shown, write_run_page
 from undertow.report.run_tables import prediction_rows
@@ -59,9 +59,7 @@ def present(
     page = draft.path / "run.html"
     with _predicting(executed.built, prediction) as predicting:
         with stage(console, "figures and page"):
-            drawn = drawing.drawn()
-            drawn.write(draft.path / "figures")
-            looks = shown(executed.dataset, executed.built.closed_loop, drawn)
+            looks = shown(executed.dataset, executed.built.closed_loop, lambda: _written(drawing, draft))
             warn_of(looks.failures)
             write_run_page(page, executed.dataset, looks)
         draft.publish()  # nobody waits for the prediction, which is added to the page
@@ -74,6 +72,13 @@ def present(
             draft.publish()
             _print_prediction(predicted, executed, console)
     return looks.replay
+
+
+def _written(drawing: DrawingProcess, draft: Draft) -> Drawn:
+    """The figures, once their files are written."""
+    drawn = drawing.drawn()
+    drawn.write(draft.path / "figures")
+    return drawn
 
 
 @contextlib.contextmanager

@@ -1,7 +1,7 @@
 """The page of one run: status, replay, metrics, certificate, figures and scenario, in one file that opens anywhere."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -37,21 +37,22 @@ class Shown(NamedTuple):
     failures: list[str]  # a sentence for each part that could not be made
 
 
-def shown(run: xr.Dataset, loop: ClosedLoop, drawn: Drawn) -> Shown:
+def shown(run: xr.Dataset, loop: ClosedLoop, drawn: Callable[[], Drawn]) -> Shown:
     """What the page and the video of a run show. A failed part affects neither the others nor the results.
 
     Args:
         run: dataset of the run.
         loop: the closed loop that was run.
-        drawn: its figures.
+        drawn: gives its figures; called last, as another process may still be drawing.
     """
-    failures = list(drawn.failures)
+    failures: list[str] = []
     try:
         replay = replay_of(run, loop)
     except Exception as error:  # a user's part may run and yet not be differentiable
         replay = None
         failures.append(not_made(error))
-    return Shown(drawn.pictures, replay, failures)
+    figures = drawn()
+    return Shown(figures.pictures, replay, [*figures.failures, *failures])
 
 
 def write_run_page(path: Path, run: xr.Dataset, shown: Shown, predicted: Mapping[str, float] | None = None) -> None:
