@@ -14,6 +14,9 @@ from pathlib import Path
 # raised, one step of the closed loop takes a quarter of the time.
 _ONE_FUNCTION_PER_LOOP = "xla_cpu_small_while_loop_byte_threshold=100000000"
 
+# LLVM's first level compiles in four fifths of the time of its third one, and the code is as fast.
+_OPTIMIZATION = 1
+
 _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 # Objects before the youngest are looked through. Tracing makes millions that live: Python's 700 cost half a second.
@@ -30,16 +33,17 @@ def prepare() -> None:
     os.environ.setdefault("JAX_ENABLE_X64", "1")
     # Matrices here have at most some hundred rows; threads that wait for each other made them ten times as slow.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    _compile_loops_whole()
+    _set_xla_flags()
     _keep_xla_code()
     gc.set_threshold(_YOUNG, _MIDDLE, _OLD)
     atexit.register(gc.freeze)  # or Python looks through everything once more before it goes: half a second
 
 
-def _compile_loops_whole() -> None:
+def _set_xla_flags() -> None:
     flags = os.environ.get("XLA_FLAGS", "")
-    if "xla_backend_extra_options" not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_extra_options={_ONE_FUNCTION_PER_LOOP}".strip()
+    ours = {"xla_backend_extra_options": _ONE_FUNCTION_PER_LOOP, "xla_backend_optimization_level": _OPTIMIZATION}
+    further = [f"--{flag}={value}" for flag, value in ours.items() if flag not in flags]
+    os.environ["XLA_FLAGS"] = " ".join([flags, *further]).strip()
 
 
 def _keep_xla_code() -> None:
