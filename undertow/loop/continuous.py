@@ -95,7 +95,8 @@ def simulate(
         raise BadInput("dt", f"be positive and at most one record ({record_step:g} s)", f"{dt:g} s")
     every = round(record_step / dt)
     dt = record_step / every
-    return _run(loop, key, start, jnp.asarray(dt, dtype=float), (round(duration / dt), every))
+    outcome = _run(loop, key, start, jnp.asarray(dt, dtype=float), (round(duration / dt), every))
+    return outcome if int(outcome.status) == int(Status.OK) else _explained(loop, key, outcome, outcome.ended - dt, dt)
 
 
 def check(loop: ClosedLoop) -> None:
@@ -126,8 +127,15 @@ def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, in
     (final, ending), (time, samples) = record(
         realization, control_step, (realization.start(*start), going()), dt, steps, every
     )
-    ending = blamed(ending, realization, ending.time - dt, final, dt)  # start of the step that failed
     return Outcome(time, samples, (), final, *ending.until(instant(steps, dt)))
+
+
+@eqx.filter_jit
+def _explained(loop: ClosedLoop, key, outcome: Outcome, t: Float[Array, ""], dt: Any) -> Outcome:
+    """A failed run with its cause: a step of dt (s) that began at t. Few runs have to wait until this is compiled."""
+    ending = Ending(outcome.status, outcome.ended, outcome.input)
+    ending = blamed(ending, loop.realize(key), t, outcome.final, dt)
+    return outcome._replace(status=ending.status, ended=ending.time, input=ending.input)
 
 
 _MAX_STEPS = 2**20

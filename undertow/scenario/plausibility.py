@@ -120,12 +120,20 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
 
 def _thrusts(plant: HybridVehicle) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]] | None:
     """Lowest and highest steady thrusts, N; None where there is no limit, or none is known."""
+    found = _steady_range(plant)
+    if found is None:
+        return None
+    low, high = (np.asarray(limit, dtype=float) for limit in found)
+    return (low, high) if np.isfinite(low).all() and np.isfinite(high).all() else None
+
+
+@eqx.filter_jit
+def _steady_range(plant: HybridVehicle):
     actuators = plant.thruster.actuator_model(plant.inputs(), False)
     if actuators.time_constant() is None:  # the steady force is unknown, too
         return None
     held = actuators.quasi_static()
-    low, high = (np.asarray(limit, dtype=float) for limit in held.range(held.init(), jnp.ones(())))
-    return (low, high) if np.isfinite(low).all() and np.isfinite(high).all() else None
+    return held.range(held.init(), jnp.ones(()))
 
 
 def _size(vector: Float[np.ndarray, " k"]) -> float:

@@ -68,18 +68,23 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     still = jnp.zeros_like(y_rest.position)
     scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)  # outputs -> axes of the law, at rest
 
-    def look(measuring, k):
-        t = k * dt
+    times = jnp.arange(steps, dtype=float) * dt
+
+    def along(t):
         r = loop.reference.at(t)
         x = plant.initial_state(r.position, r.velocity)
-        truth = plant.output(t, x)
+        return plant.output(t, x), jnp.linalg.solve(scale, unknown(t, x, realization.load(t, x)) - at_rest)
+
+    truths, loads = jax.vmap(along)(times)
+
+    def look(measuring, now):
+        t, truth = now
         y, measuring = loop.navigation.measure(realization.navigation_realization, measuring, t, truth)
         wrong = jnp.concatenate([coordinates.difference(y.position, truth.position), y.velocity - truth.velocity])
-        wrong = jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
-        return measuring, (jnp.linalg.solve(scale, unknown(t, x, realization.load(t, x)) - at_rest), wrong)
+        return measuring, jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
 
     start = loop.reference.at(zero)
     measuring = loop.navigation.init(
         realization.navigation_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
     )
-    return jax.lax.scan(look, measuring, jnp.arange(steps, dtype=float))[1]
+    return loads, jax.lax.scan(look, measuring, (times, truths))[1]

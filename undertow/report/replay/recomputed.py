@@ -39,7 +39,7 @@ def thrust_along(thruster: AbstractThruster, inputs: Series, step: float) -> Ser
         block = jnp.asarray(padded[first : first + _CHUNK + 1])
         state, thrust = _thrust_of_chunk(thruster, state, block[:-1], block[1:], dt)
         parts.append(np.asarray(thrust))
-    last = np.asarray(_broadcast(thruster.thrust(state, jnp.asarray(padded[-1])), jnp.asarray(padded[-1])))
+    last = np.asarray(_thrust(thruster, state, jnp.asarray(padded[-1])))
     return np.concatenate([*parts, last[None]])[: len(inputs)]
 
 
@@ -57,7 +57,7 @@ def _thrust_of_chunk(thruster: AbstractThruster, state: Any, inputs: Array, next
     def record(flat, between):
         u, after = between
         shares = (jnp.arange(_SUBSTEPS, dtype=u.dtype) + 0.5) / _SUBSTEPS
-        thrust = _broadcast(thruster.thrust(unravel(flat), u), u)
+        thrust = _thrust(thruster, unravel(flat), u)
         if flat.size:
             flat, _ = jax.lax.scan(substep, flat, u[None, :] + shares[:, None] * (after - u)[None, :])
         return flat, thrust
@@ -66,8 +66,9 @@ def _thrust_of_chunk(thruster: AbstractThruster, state: Any, inputs: Array, next
     return unravel(final), thrust
 
 
-def _broadcast(thrust: Array, u: Array) -> Array:
-    return jnp.broadcast_to(thrust, u.shape).astype(u.dtype)
+@eqx.filter_jit
+def _thrust(thruster: AbstractThruster, state: Any, u: Array) -> Array:
+    return jnp.broadcast_to(thruster.thrust(state, u), u.shape).astype(u.dtype)
 
 
 def thrust_limits(thruster: AbstractThruster, count: int) -> Series:

@@ -184,9 +184,12 @@ def _norm(values: np.ndarray) -> np.ndarray:
     return np.sqrt((values**2).sum(-1))
 
 
+_quaternions = jax.jit(jax.vmap(quaternion_from_euler))
+
+
 def _attitude(angles: np.ndarray) -> np.ndarray:
     """Quaternions of (roll, pitch, yaw), each on the side of the one before, so that between them is the short way."""
-    found = np.asarray(jax.vmap(quaternion_from_euler)(jnp.asarray(angles)))
+    found = np.asarray(_quaternions(jnp.asarray(angles)))
     turned = np.where((found[1:] * found[:-1]).sum(-1) < 0, -1.0, 1.0)
     return found * np.concatenate([[1.0], np.cumprod(turned)])[:, None]
 
