@@ -78,10 +78,10 @@ class Run:
         Raises:
             OSError: the file cannot be written.
         """
-        from undertow.report.run_figures import drawn
+        from undertow.report.run_figures import plotted
         from undertow.report.run_page import shown, write_run_page
 
-        parts = shown(self.dataset, self.loop, lambda: drawn(self.dataset))
+        parts = shown(self.dataset, self.loop, lambda: plotted(self.dataset))
         write_run_page(Path(path), self.dataset, parts)
         for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)

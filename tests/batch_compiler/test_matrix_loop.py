@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from batch_compiler.emulated_gpu import EmulatedGpu
 
+import simdjit
 from simdjit import Driver, Loop, matrix_loop, nvidia
 
 RUNS = 11
@@ -32,15 +33,16 @@ def test_sums_in_order(in_lanes, sides, dtype):
     np.testing.assert_array_equal(in_lanes(jnp.matmul)(one, other), in_order(one, other))
 
 
-def test_a_loop_is_used_and_has_the_bits_of_what_is_written_out(in_lanes, monkeypatch):
+def test_a_loop_is_used_and_has_the_bits_of_what_is_written_out(monkeypatch, tmp_path):
     one, other = matrices((20, 20), (20, 20))
     asked = []
+    compiled = lambda folder: simdjit.compile(jnp.matmul, one[0], other[0], cache=tmp_path / folder)
     product = matrix_loop.product
     monkeypatch.setattr("simdjit.reductions.product", lambda *given: asked.append(given) or product(*given))
-    found = in_lanes(jnp.matmul)(one, other)
+    found = compiled("loop")(one, other)
     assert len(asked) == 1
     monkeypatch.setattr("simdjit.reductions.FROM", 10**9)
-    np.testing.assert_array_equal(in_lanes(jnp.matmul)(one, other), found)
+    np.testing.assert_array_equal(compiled("written out")(one, other), found)
     assert len(asked) == 1
 
 

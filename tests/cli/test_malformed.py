@@ -13,7 +13,7 @@ import pytest
 
 from undertow.cli import campaign
 from undertow.core.status import Status
-from undertow.report import drawing
+from undertow.report import plotting
 
 DONE, RUN_FAILED, BAD_INPUT = 0, 1, 2
 BEGIN = int(os.environ.get("UNDERTOW_FUZZ_SEED", 0)) * 1_000_000
@@ -24,7 +24,7 @@ FAILED = [status.word for status in Status if status is not Status.OK]
 @pytest.fixture
 def undrawn(monkeypatch, tmp_path):
     """Drawing takes most of the time of a short run, and has tests of its own. Files that examples name are there."""
-    monkeypatch.setattr(drawing, "_draw", lambda run, width: drawing.Drawn({}, {}, []))
+    monkeypatch.setattr(plotting, "_plot", lambda run, width: plotting.Plotted({}, {}, []))
     monkeypatch.setattr(campaign, "write_campaign", lambda title, results, found, folder, pdf, replays: (folder, []))
     for name in ("d.csv", "my_rov.yaml"):
         shutil.copy(malformed.EXAMPLES / name, tmp_path / name)

@@ -15,7 +15,7 @@ from undertow.disturbances.adding import Together
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.report import run_page
-from undertow.report.drawing import Drawn
+from undertow.report.plotting import Plotted
 from undertow.report.replay import replay_section, trials_again
 from undertow.report.replay.recomputed import thrust_along, thrust_limits
 from undertow.report.replay.replay_data import hull_size, packed, page_data, replay_of
@@ -208,7 +208,7 @@ def test_failed_trials_leave_the_others(trials, monkeypatch):
 
 def test_failed_replay_is_a_sentence(run, loop, monkeypatch):
     monkeypatch.setattr(run_page, "replay_of", lambda run, loop: 1 / 0)
-    shown = run_page.shown(run, loop, lambda: Drawn({}, {}, []))
+    shown = run_page.shown(run, loop, lambda: Plotted({}, {}, []))
     assert shown.replay is None and "the replay could not be made" in shown.failures[0]
 
 

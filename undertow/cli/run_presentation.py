@@ -15,7 +15,7 @@ from undertow.cli.stages import stage
 from undertow.cli.tables import terminal_table
 from undertow.core.user_code import python_says
 from undertow.prediction.operating_point import operating_point, predicted
-from undertow.report.drawing import DrawingProcess, Drawn
+from undertow.report.plotting import Plotted, PlottingProcess
 from undertow.report.replay.replay_data import Replay
 from undertow.report.run_page import shown, write_run_page
 from undertow.report.run_tables import prediction_rows
@@ -41,13 +41,13 @@ class PredictedMetrics(NamedTuple):
 
 
 def present(
-    executed: Executed, drawing: DrawingProcess, draft: Draft, folder: Path, console: Console, prediction: bool
+    executed: Executed, plotting: PlottingProcess, draft: Draft, folder: Path, console: Console, prediction: bool
 ) -> Replay | None:
     """Write figures, page and prediction of a run.
 
     Args:
         executed: the run.
-        drawing: draws its figures.
+        plotting: plots its figures.
         draft: of the results.
         folder: of the results, as the user knows it.
         console: for what is printed.
@@ -59,7 +59,7 @@ def present(
     page = draft.path / "run.html"
     with _predicting(executed.built, prediction) as predicting:
         with stage(console, "figures and page"):
-            looks = shown(executed.dataset, executed.built.closed_loop, lambda: _written(drawing, draft))
+            looks = shown(executed.dataset, executed.built.closed_loop, lambda: _written(plotting, draft))
             warn_of(looks.failures)
             write_run_page(page, executed.dataset, looks)
         draft.publish()  # nobody waits for the prediction, which is added to the page
@@ -74,11 +74,11 @@ def present(
     return looks.replay
 
 
-def _written(drawing: DrawingProcess, draft: Draft) -> Drawn:
+def _written(plotting: PlottingProcess, draft: Draft) -> Plotted:
     """The figures, once their files are written."""
-    drawn = drawing.drawn()
-    drawn.write(draft.path / "figures")
-    return drawn
+    plotted = plotting.plotted()
+    plotted.write(draft.path / "figures")
+    return plotted
 
 
 @contextlib.contextmanager

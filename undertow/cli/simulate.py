@@ -14,7 +14,7 @@ from undertow.cli.stages import shares, stage
 from undertow.cli.tables import terminal_table, wide_console
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.report.drawing import drawing_process
+from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows
 from undertow.scenario.build import build, own_parts
 from undertow.scenario.execute import Executed, execute, write
@@ -39,7 +39,7 @@ def simulate(
     with (
         output_folder(out, Path("runs") / scenario.stem) as folder,
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
-        drawing_process() as drawing,
+        plotting_process() as plotting,
     ):
         if video is not None:
             from undertow.report.replay.video import check_video
@@ -49,13 +49,13 @@ def simulate(
         write(executed, draft.path)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
-        drawing.draw(folder / "run.nc", pdf)
+        plotting.plot(folder / "run.nc", pdf)
         _print_results(executed, folder, console)
         code = max(_ending_code(executed), _repetition_code(repetition, console) if repetition else DONE)
         # What only the rest needs is imported now: users read the results meanwhile.
         from undertow.cli.run_presentation import present
 
-        replay = present(executed, drawing, draft, folder, console, prediction)
+        replay = present(executed, plotting, draft, folder, console, prediction)
     if video is not None and replay is not None:
         from undertow.report.replay.video import write_video
 

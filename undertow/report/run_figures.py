@@ -5,15 +5,15 @@ import io
 import xarray as xr
 from PIL import Image
 
-from undertow.report.drawing import Drawn
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import files_of, make_all
+from undertow.report.plotting import Plotted
 
 # Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
 LARGE, _COLOURS = 80_000, 48
 
 
-def drawn(run: xr.Dataset, width: str | None = None) -> Drawn:
+def plotted(run: xr.Dataset, width: str | None = None) -> Plotted:
     """Figures of a run. A failed figure affects neither the others nor the results.
 
     Args:
@@ -29,7 +29,7 @@ def drawn(run: xr.Dataset, width: str | None = None) -> Drawn:
         files.update(made)
 
     failures = make_all(lambda: run_plots(run), put)
-    return Drawn(files, pictures, failures)
+    return Plotted(files, pictures, failures)
 
 
 def _picture(vector: bytes, raster: bytes) -> str | bytes:

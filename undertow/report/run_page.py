@@ -9,9 +9,9 @@ import xarray as xr
 
 from undertow.analysis.success import Success
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.report.drawing import Drawn
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text
+from undertow.report.plotting import Plotted
 from undertow.report.replay.replay_data import Replay, replay_of
 from undertow.report.replay.replay_section import not_made, replay_looks, replay_section
 from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows
@@ -37,13 +37,13 @@ class Shown(NamedTuple):
     failures: list[str]  # a sentence for each part that could not be made
 
 
-def shown(run: xr.Dataset, loop: ClosedLoop, drawn: Callable[[], Drawn]) -> Shown:
+def shown(run: xr.Dataset, loop: ClosedLoop, plotted: Callable[[], Plotted]) -> Shown:
     """What the page and the video of a run show. A failed part affects neither the others nor the results.
 
     Args:
         run: dataset of the run.
         loop: the closed loop that was run.
-        drawn: gives its figures; called last, as another process may still be drawing.
+        plotted: gives its figures; called last, as another process may still be plotting.
     """
     failures: list[str] = []
     try:
@@ -51,7 +51,7 @@ def shown(run: xr.Dataset, loop: ClosedLoop, drawn: Callable[[], Drawn]) -> Show
     except Exception as error:  # a user's part may run and yet not be differentiable
         replay = None
         failures.append(not_made(error))
-    figures = drawn()
+    figures = plotted()
     return Shown(figures.pictures, replay, [*figures.failures, *failures])
 
 

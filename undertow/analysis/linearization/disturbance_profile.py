@@ -75,7 +75,7 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
         x = plant.initial_state(r.position, r.velocity)
         return plant.output(t, x), jnp.linalg.solve(scale, unknown(t, x, realization.load(t, x)) - at_rest)
 
-    truths, loads = jax.vmap(along)(times)
+    outputs, loads = jax.vmap(along)(times)
 
     def look(measuring, now):
         t, truth = now
@@ -87,4 +87,4 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     measuring = loop.navigation.init(
         realization.navigation_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
     )
-    return loads, jax.lax.scan(look, measuring, (times, truths))[1]
+    return loads, jax.lax.scan(look, measuring, (times, outputs))[1]

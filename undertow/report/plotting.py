@@ -1,6 +1,6 @@
-"""Figures of a run, drawn by a process of their own while this one goes on.
+"""Figures of a run, plotted by a process of their own while this one goes on.
 
-Starting matplotlib takes as long as the start of JAX, and drawing as long as the prediction; a process that is started
+Starting matplotlib takes as long as the start of JAX, and plotting as long as the prediction; a process that is started
 with the command does both on another core.
 """
 
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 
-class Drawn(NamedTuple):
+class Plotted(NamedTuple):
     """Figures of a run.
 
     Attributes:
@@ -38,63 +38,63 @@ class Drawn(NamedTuple):
             (folder / name).write_bytes(data)
 
 
-class DrawingProcess:
-    """A process that draws one run.
+class PlottingProcess:
+    """A process that plots one run.
 
     Args:
-        process: runs `serve`; None where figures are drawn by this process.
+        process: runs `serve`; None where figures are plotted by this process.
     """
 
     def __init__(self, process: subprocess.Popen[bytes] | None):
         self._process = process
         self._asked: tuple[Path, str | None] | None = None
 
-    def draw(self, run: Path, width: str | None) -> None:
-        """Begin to draw the run in a file `run.nc`, with PDF files where a width is given."""
+    def plot(self, run: Path, width: str | None) -> None:
+        """Begin to plot the run in a file `run.nc`, with PDF files where a width is given."""
         self._asked = run, width
         if self._process is not None and self._process.stdin is not None:
-            with contextlib.suppress(OSError):  # it has ended; `drawn` then draws here
+            with contextlib.suppress(OSError):  # it has ended; `plotted` then plots here
                 self._process.stdin.write(pickle.dumps(self._asked))
                 self._process.stdin.close()
 
-    def drawn(self) -> Drawn:
-        """Wait for the figures; drawn here where the process cannot.
+    def plotted(self) -> Plotted:
+        """Wait for the figures; plotted here where the process cannot.
 
         Raises:
             OSError: the file of the run cannot be read.
         """
-        assert self._asked is not None, "`draw` comes first"
+        assert self._asked is not None, "`plot` comes first"
         if self._process is not None and self._process.stdout is not None:
             data = self._process.stdout.read()
             if self._process.wait() == 0 and data:
                 return pickle.loads(data)  # written by our own process
-        return _draw(*self._asked)
+        return _plot(*self._asked)
 
 
 @contextlib.contextmanager
-def drawing_process() -> Iterator[DrawingProcess]:
+def plotting_process() -> Iterator[PlottingProcess]:
     """A process that has matplotlib ready when the run has ended; this one where matplotlib is loaded here already."""
     if "matplotlib" in sys.modules or not sys.executable:
-        yield DrawingProcess(None)
+        yield PlottingProcess(None)
         return
     # The same search path, but without the current folder in front, where a file may have the name of a module. Ctrl-C
     # ends this process, which ends the other one.
-    command = f"import sys; sys.path[:] = {sys.path!r}; from undertow.report.drawing import serve; serve()"
+    command = f"import sys; sys.path[:] = {sys.path!r}; from undertow.report.plotting import serve; serve()"
     pipe = subprocess.PIPE
     try:
         process = subprocess.Popen([sys.executable, "-c", command], stdin=pipe, stdout=pipe, start_new_session=True)
     except OSError:
-        yield DrawingProcess(None)
+        yield PlottingProcess(None)
         return
     with process:  # closes the pipes and waits
         try:
-            yield DrawingProcess(process)
+            yield PlottingProcess(process)
         finally:
             process.kill()
 
 
 def serve() -> None:
-    """Draw the run whose file standard input names, and write the figures to standard output.
+    """Plot the run whose file standard input names, and write the figures to standard output.
 
     Whatever else is printed goes to standard error.
     """
@@ -104,14 +104,14 @@ def serve() -> None:
 
     asked = sys.stdin.buffer.read()
     if asked:
-        pickle.dump(_draw(*pickle.loads(asked)), answer)
+        pickle.dump(_plot(*pickle.loads(asked)), answer)
         answer.close()
 
 
-def _draw(run: Path, width: str | None) -> Drawn:
+def _plot(run: Path, width: str | None) -> Plotted:
     import xarray as xr
 
-    from undertow.report.run_figures import drawn
+    from undertow.report.run_figures import plotted
 
     with xr.open_dataset(run) as dataset:
-        return drawn(dataset.load(), width)
+        return plotted(dataset.load(), width)

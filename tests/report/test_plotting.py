@@ -1,4 +1,4 @@
-"""Figures that a process of their own draws, whatever becomes of it."""
+"""Figures that a process of their own plots, whatever becomes of it."""
 
 import pickle
 import subprocess
@@ -6,25 +6,25 @@ import sys
 
 import pytest
 
-from undertow.report.drawing import DrawingProcess, Drawn, drawing_process
-from undertow.report.run_figures import drawn
+from undertow.report.plotting import Plotted, PlottingProcess, plotting_process
+from undertow.report.run_figures import plotted
 
-# Draws a run as the command does, and says whether this process needed matplotlib.
+# Plots a run as the command does, and says whether this process needed matplotlib.
 ELSEWHERE = """
 import pickle, sys
 from pathlib import Path
-from undertow.report.drawing import drawing_process
-with drawing_process() as drawing:
-    drawing.draw(Path(sys.argv[1]), "wide")
+from undertow.report.plotting import plotting_process
+with plotting_process() as plotting:
+    plotting.plot(Path(sys.argv[1]), "wide")
     {meanwhile}
-    found = drawing.drawn()
+    found = plotting.plotted()
 pickle.dump((found, "matplotlib" in sys.modules), open(sys.argv[2], "wb"))
 """
 
 
 @pytest.fixture(scope="module")
 def here(runs):
-    return drawn(runs["rafc"], "wide")
+    return plotted(runs["rafc"], "wide")
 
 
 def elsewhere(run, folder, meanwhile="pass"):
@@ -43,7 +43,7 @@ def test_the_same_files_as_here(runs, here, tmp_path):
 
 
 def test_drawn_here_where_the_process_was_killed(runs, here, tmp_path):
-    found, loaded = elsewhere(runs["rafc"], tmp_path, "drawing._process.kill()")
+    found, loaded = elsewhere(runs["rafc"], tmp_path, "plotting._process.kill()")
     assert loaded and found == here
 
 
@@ -51,23 +51,23 @@ def test_a_failed_figure_is_a_sentence(monkeypatch, runs):
     from undertow.report import run_figures
 
     monkeypatch.setattr(run_figures, "run_plots", lambda run: {"error": lambda: 1 / 0})
-    found = drawn(runs["rafc"])
+    found = plotted(runs["rafc"])
     assert found.files == found.pictures == {} and found.failures[0].startswith("figure `error` could not be made (")
 
 
 def test_files_are_written(tmp_path):
-    Drawn({"a.svg": b"<svg/>"}, {}, []).write(tmp_path / "figures")
+    Plotted({"a.svg": b"<svg/>"}, {}, []).write(tmp_path / "figures")
     assert (tmp_path / "figures" / "a.svg").read_bytes() == b"<svg/>"
 
 
 def test_no_process_where_matplotlib_is_loaded(tmp_path):
-    with drawing_process() as drawing:
-        assert drawing._process is None
-        drawing.draw(tmp_path / "missing.nc", None)
+    with plotting_process() as plotting:
+        assert plotting._process is None
+        plotting.plot(tmp_path / "missing.nc", None)
         with pytest.raises(OSError, match=r"missing\.nc"):
-            drawing.drawn()
+            plotting.plotted()
 
 
 def test_draw_comes_first():
     with pytest.raises(AssertionError, match="first"):
-        DrawingProcess(None).drawn()
+        PlottingProcess(None).plotted()

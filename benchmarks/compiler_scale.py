@@ -1,0 +1,150 @@
+"""How the batch compiler scales: python benchmarks/compiler_scale.py [thrusters|sets|products]
+
+thrusters: BlueROV2 Heavy's body with 8, 16 and 32 T200 under preset `robust` at 100 Hz.
+sets: workload W1 with 5 to 100 fuzzy sets on each axis.
+products: a step X <- A X + B of square matrices with 8 to 48 rows, as a filter of so many states needs it.
+
+Prints JSON: operations per step, seconds to compile, and nanoseconds per step and run in a batch of 64, by simdjit and
+by XLA (`jax.vmap` of the same batch), both with all cores.
+"""
+
+import argparse
+import json
+import math
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from undertow import process_setup
+
+process_setup.prepare()
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from simdjit import Loop
+from undertow.bench import workload
+from undertow.core import runtime
+from undertow.loop.vmap_batch import BatchRunner as VmapBatchRunner
+from undertow.scenario.reading import parse
+
+VEHICLE = Path(__file__).parents[1] / "examples" / "my_rov.yaml"  # BlueROV2 Heavy
+RUNS, STEPS, REPETITIONS = 64, 400, 3
+
+
+def shortest(work: Callable[[], Any]) -> float:
+    """Seconds, of some repetitions after a first one."""
+    work()
+    times = []
+    for _ in range(REPETITIONS):
+        begun = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begun)
+    return min(times)
+
+
+def ring(count: int) -> list[dict[str, Any]]:
+    """Thrusters on two rings: half of them horizontal at 45 degrees to the ring, half of them vertical."""
+    placed = []
+    for i in range(count):
+        turn = 2 * math.pi * (i // 2 + 0.5) / (count // 2)
+        side = math.pi / 4 if i // 2 % 2 else -math.pi / 4
+        across = [math.cos(turn + math.pi / 2 + side), math.sin(turn + math.pi / 2 + side), 0.0]
+        position = [0.25 * math.cos(turn), 0.25 * math.sin(turn), 0.05]
+        placed.append({"position": position, "direction": across if i % 2 else [0.0, 0.0, -1.0]})
+    return placed
+
+
+def scenario_with_thrusters(count: int, folder: Path) -> dict[str, Any]:
+    """BlueROV2 Heavy with other thrusters."""
+    path = folder / f"thrusters{count}.yaml"
+    path.write_text(
+        json.dumps(parse(VEHICLE.read_text("utf-8"), VEHICLE.name, VEHICLE.parent).data | {"thrusters": ring(count)})
+    )
+    plant = {"vehicle": str(path), "thruster": {"kind": "t200", "supply": 16}, "ledger": False}
+    return {
+        "plant": plant,
+        "controller": {"kind": "rcaf", "preset": "robust"},
+        "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 20},
+        "disturbance": {"kind": "current", "velocity": [0.3, 0.2, 0]},
+        "loop": {"kind": "sampled", "dt": 0.01, "duration": STEPS * 0.01, "record": 0.1},
+    }
+
+
+def scenario_with_sets(count: int) -> dict[str, Any]:
+    """Workload W1 with another number of fuzzy sets."""
+    law = {**workload.W1["controller"], "sets": count}
+    return workload.W1 | {"controller": law, "loop": {"kind": "sampled", "duration": STEPS * 1e-3}}
+
+
+def of_scenario(data: dict[str, Any]) -> dict[str, float]:
+    """Figures of a scenario."""
+    with runtime.on_processor():
+        one = workload.workload(data)
+        numbers = workload.several(one.run, RUNS)
+        begun = time.perf_counter()
+        program = workload.batch(one)
+        compiling = time.perf_counter() - begun
+        by_simdjit = on_all_cores(lambda: program.run(numbers))
+        begun = time.perf_counter()
+        other, arrays = VmapBatchRunner(one.run, one.plan, width=RUNS), jax.tree.map(jnp.asarray, numbers)
+        by_xla = shortest(lambda: other.run(arrays))
+        waited = time.perf_counter() - begun - REPETITIONS * by_xla
+    each = 1e9 / (one.steps * RUNS)
+    return figures(program.operations, compiling, by_simdjit * each, waited, by_xla * each)
+
+
+def of_product(size: int, folder: Path) -> dict[str, float]:
+    """Figures of a product of matrices."""
+    chance = np.random.default_rng(0)
+    given = chance.normal(size=(RUNS, size, size)) / size, chance.normal(size=(RUNS, size, size))
+    step = lambda numbers, carry, k: numbers[0] @ carry + numbers[1]
+    begun = time.perf_counter()
+    example = tuple(each[0] for each in given)
+    program = Loop(lambda n: n, lambda n: n[1] * 1.0, step, lambda n, c, k: c[0, 0], example, cache=folder)
+    compiling = time.perf_counter() - begun
+    by_simdjit = on_all_cores(lambda: program.run(given, STEPS))
+    repeated = jax.jit(jax.vmap(lambda *n: jax.lax.fori_loop(0, STEPS, lambda k, c: step(n, c, k), n[1])))
+    begun = time.perf_counter()
+    by_xla = shortest(lambda: jax.block_until_ready(repeated(*given)))
+    waited = time.perf_counter() - begun - REPETITIONS * by_xla
+    each = 1e9 / (STEPS * RUNS)
+    return figures(program.operations, compiling, by_simdjit * each, waited, by_xla * each)
+
+
+def on_all_cores(run: Callable[[], Any]) -> float:
+    """Seconds for one batch where every core runs one."""
+    threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with runtime.workers(threads) as pool:
+        return shortest(lambda: list(pool.map(lambda _: run(), range(threads)))) / threads
+
+
+def figures(operations: int, compiling: float, by_simdjit: float, xla_compiling: float, by_xla: float):
+    found = {"operations": operations, "simdjit_compile_s": compiling, "simdjit_ns": by_simdjit}
+    found |= {"xla_compile_and_first_run_s": xla_compiling, "xla_ns": by_xla}
+    return {key: float(f"{value:.4g}") for key, value in found.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    kinds = ("thrusters", "sets", "products")
+    parser.add_argument("what", nargs="*", choices=[*kinds, []], default=[])
+    asked = parser.parse_args().what or kinds
+    with tempfile.TemporaryDirectory() as name:
+        os.environ["UNDERTOW_CACHE"] = name
+        folder, found = Path(name), {}
+        if "thrusters" in asked:
+            found["thrusters"] = {n: of_scenario(scenario_with_thrusters(n, folder)) for n in (8, 16, 32)}
+        if "sets" in asked:
+            found["sets"] = {n: of_scenario(scenario_with_sets(n)) for n in (5, 20, 50, 100)}
+        if "products" in asked:
+            found["products"] = {n: of_product(n, folder) for n in (8, 12, 15, 16, 24, 32, 48)}
+    print(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()
