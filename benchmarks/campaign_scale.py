@@ -86,12 +86,12 @@ def pieces(trials: int) -> dict:
                 task.build_trial(here.trials, here.part_cache, row) for row in range(i * trials, (i + 1) * trials)
             ]
             found[what] = 1e3 * _shortest(build) / trials
-        columns = task.run(campaign.text, str(campaign.folder), range(256))
+        columns = task.run_trials(campaign.text, str(campaign.folder), range(256))
         before = _peak()
-        task.run(campaign.text, str(campaign.folder), range(_LARGE))
+        task.run_trials(campaign.text, str(campaign.folder), range(_LARGE))
         found["task_KiB_per_trial"] = 1024 * (_peak() - before) / _LARGE
         for rows in (256, 65_536):
-            named = labels(campaign.trials, campaign.first)
+            named = labels(campaign.trials, campaign.first, here.metrics())
             where = Path(name) / f"{rows}.zarr"
             store = Store(where, Layout((), 4 * rows, (rows,)), Identity("", {}), named, {})
             chance = np.random.default_rng(0)  # random numbers cannot be compressed
