@@ -34,8 +34,8 @@ def one_line(said):
     """A documented end, and one line that says why it is not a good one; that of a run or a check may be in its table."""
     complaints = [line for line in said.err.splitlines() if not line.startswith("Advice: ")]
     assert said.code in (DONE, RUN_FAILED, BAD_INPUT), said
-    told = any(words in said.out for words in (*FAILED, "1 error", " errors"))
-    assert len(complaints) in ((0,) if said.code == DONE else (0, 1) if told else (1,)), said
+    shown = any(words in said.out for words in (*FAILED, "1 error", " errors"))
+    assert len(complaints) in ((0,) if said.code == DONE else (0, 1) if shown else (1,)), said
     assert all(line.startswith("Error: ") and len(line) < 2000 for line in complaints), said
 
 
