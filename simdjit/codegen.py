@@ -153,7 +153,10 @@ def _function(name: str, dtype: str, emitter: Emitter) -> str:
 def operations(graph: Graph, sections: Sections) -> int:
     """Operations of one step of one run, those inside a loop counted once; an elementary function counts as one."""
     fixed, needed = _fixed(graph), graph.needed(sections.step)
-    return sum(_work(graph.operations[node]) for node, same in enumerate(fixed) if needed[node] and not same)
+    # What happens inside a region is done in every step where the region is, though its own inputs are no carry.
+    outermost = {detail: node for node, (name, _, detail) in enumerate(graph.operations) if name == "region"}
+    same = lambda node: fixed[node if graph.homes[node] is None else outermost[graph.around(graph.homes[node])]]
+    return sum(_work(graph.operations[node]) for node, wanted in enumerate(needed) if wanted and not same(node))
 
 
 def _work(operation: Operation) -> int:

@@ -160,6 +160,11 @@ class Graph:
         homes = {self.homes[node] for node in nodes}
         return max(homes, key=self._depth, default=None)
 
+    def around(self, region: int) -> int:
+        """The outermost region around a region."""
+        parent = self.parents[region]
+        return region if parent is None else self.around(parent)
+
     def inside(self, node: Node, region: int) -> bool:
         """Whether a node depends on what happens in a region."""
         home = self.homes[node]
