@@ -73,8 +73,9 @@ class Loop:
         lanes = nvidia.LANES if driver else lanes or simd_width(8 * np.dtype(number.dtype).itemsize)
         head = nvidia.THREADS if driver else VECTORS
         traced = (prepared, begun, self._step, self._record)
-        made = lambda: _lowered(self._prologue, traced, number.dtype, lanes, head)
-        name = fingerprint([one.closed for one in traced], self._prologue.constants, lanes, bool(driver))
+        beside = simd_width(64) if lanes == 1 and not driver else 1
+        made = lambda: _lowered(self._prologue, traced, number.dtype, lanes, head, beside)
+        name = fingerprint([one.closed for one in traced], self._prologue.constants, lanes, beside, bool(driver))
         program = Program.read(cached(name, ".ll", lambda: made().written(), cache)) if name else made()
         if program.prologue_lacks and not self._prologue.lacking:
             self._prologue.leave_to_xla(program.prologue_lacks)
@@ -128,7 +129,7 @@ class Program(NamedTuple):
 
 
 def _lowered(
-    prologue: Prologue, traced: tuple[Traced, Traced, Traced, Traced], number: Any, lanes: int, head: Head
+    prologue: Prologue, traced: tuple[Traced, Traced, Traced, Traced], number: Any, lanes: int, head: Head, beside: int
 ) -> Program:
     """The program of traced functions: prepare, start, step and record."""
     _, begun, step, record = traced
@@ -139,4 +140,4 @@ def _lowered(
     given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
     stepped, recorded = (evaluate(graph, one.closed, given, _MOST) for one in (step, record))
     sections = Sections(*map(flat, (first, stepped, recorded)))
-    return Program(assembly(graph, sections, lanes, head), operations(graph, sections), prologue.lacking)
+    return Program(assembly(graph, sections, lanes, head, beside), operations(graph, sections), prologue.lacking)
