@@ -80,7 +80,9 @@ class Loop:
         if program.prologue_lacks and not self._prologue.lacking:
             self._prologue.leave_to_xla(program.prologue_lacks)
         self.operations = program.operations
-        self._code = nvidia.Kernel(program.assembly, driver, cache) if driver else Code(program.assembly, cache)
+        self._code = (
+            nvidia.Kernel(program.assembly, driver, cache) if driver else Code(program.assembly, cache, lanes > 1)
+        )
         several = (self._prologue.inputs, begun.leaves, self._record.leaves)
         self._numbers_layout, self._carry_layout, self._record_layout = (Layout(leaves, lanes) for leaves in several)
 
