@@ -51,6 +51,10 @@ class Layout:
             found.append(rows[:runs].astype(kind, order="C"))
         return found
 
+    def views(self, memory: np.ndarray) -> list[np.ndarray]:
+        """The arrays of the first run themselves, not copies: writing into them writes into the memory."""
+        return [self._slots(memory, i)[0, 0, :, 0].reshape(shape) for i, shape in enumerate(self._shapes)]
+
     def _slots(self, memory: np.ndarray, i: int) -> np.ndarray:
         """Slots of one array as numbers, (groups, rows, slots, lanes); truths are whole numbers there."""
         kind = np.dtype(np.int64) if self._types[i].kind == "b" else self._types[i]

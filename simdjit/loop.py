@@ -106,6 +106,26 @@ class Loop:
         final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
         return self._step.whole(final), self._record.whole(self._record_layout.unpacked(series, runs))
 
+    def kept(self) -> tuple[Callable[[], None], list[np.ndarray], list[np.ndarray]]:
+        """What records one instant of one run again and again, in memory that is kept.
+
+        Returns:
+            The function; the numbers that it reads, and what it records, as arrays in that memory.
+
+        Raises:
+            Unsupported: XLA computes what comes before the first step, or a GPU the steps.
+        """
+        if self._prologue.lacking or not isinstance(self._code, Code):
+            raise Unsupported(self._prologue.lacking or "a GPU that computes one step of one run")
+        given, carry, series = (
+            layout.memory(1) for layout in (self._numbers_layout, self._carry_layout, self._record_layout)
+        )
+        return (
+            self._code.repeated(given, carry, series),
+            self._numbers_layout.views(given),
+            self._record_layout.views(series),
+        )
+
 
 class Program(NamedTuple):
     """What is kept of a program, so that nobody needs to lower it again.

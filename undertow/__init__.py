@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from undertow import sensors as sensors
     from undertow import thrusters as thrusters
     from undertow import vehicles as vehicles
+    from undertow.autopilot.autopilot import Autopilot as Autopilot
     from undertow.comparison.comparison import Comparison as Comparison
     from undertow.comparison.comparison import compare as compare
     from undertow.controllers.rcaf import rcaf as rcaf
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 # Public name -> module; packages of parts stand for themselves.
 _HOMES = {
+    "Autopilot": "undertow.autopilot.autopilot",
     "BadInput": "undertow.core.errors",
     "Comparison": "undertow.comparison.comparison",
     "HybridVehicle": "undertow.plants.hybrid_vehicle",

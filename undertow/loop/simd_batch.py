@@ -7,6 +7,7 @@ This is the only module that imports `simdjit`, which is optional: without it ev
 campaign/batch_runner.py for a campaign.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
@@ -62,6 +63,19 @@ def simd_width(bits: int) -> int:
     import simdjit
 
     return simdjit.simd_width(bits)
+
+
+def kept_step(function: Callable, numbers: Any, state: Any, inputs: Any) -> Any:
+    """`simdjit.Step`: one step of one run, called by somebody else's clock.
+
+    Raises:
+        Unsupported: the function uses an operation that the batch compiler lacks, or there is no batch compiler.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    from simdjit import Step
+
+    return Step(function, numbers, state, inputs, cache_folder() / "native")
 
 
 class Run(NamedTuple):

@@ -1,0 +1,356 @@
+"""One compiled controller, stepped by somebody else's clock."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.autopilot.clock import Clock
+from undertow.autopilot.measured_motion import Format, Motion
+from undertow.autopilot.output import output_of
+from undertow.autopilot.saved_state import packed, unpacked
+from undertow.core import checks, runtime
+from undertow.core.arrays import in_present_precision
+from undertow.core.contracts import Target, starting_at
+from undertow.core.errors import BadInput
+from undertow.core.signals import Signal
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.controller_step import first_step, next_step
+from undertow.loop.stepped import Step
+from undertow.power.esc import ESC
+from undertow.scenario.build import build
+from undertow.scenario.reading import from_data, read
+
+
+class Autopilot:
+    """A controller that is called once per sampling time, by whoever owns the clock. NumPy goes in and comes out.
+
+        autopilot = ut.Autopilot("bluerov2_heavy.yaml", attitude="quaternion")
+        autopilot.start(position, velocity, quaternion)
+        while True:
+            volts = autopilot.step(position, velocity, quaternion, target=[2, 1, 1, 0, 0, 0.5])
+
+    It is compiled when it is made; no step compiles anything. A step takes microseconds where the batch compiler knows
+    the controller, and some hundred where it does not (`backend`). The same measurements give the same bits as in
+    `undertow simulate`.
+
+    Steps come when they come: `dt` is the time since the last one. A step is late from 1.5 sampling times on; from 5 on
+    it is missed, and the law advances by 5 sampling times only. With `dt` zero, negative or not finite the last output
+    is repeated. `counts` says how often each happened.
+
+    Entries of a measurement that are not finite are replaced by those that the law's model expects.
+
+    Args:
+        scenario: a .yaml file or an earlier run.nc, the same as a mapping, or a closed loop made of parts.
+        sampling_time: s; None for that of the scenario. A closed loop needs one.
+        attitude: format of measured attitudes, `euler` (roll, pitch, yaw) or `quaternion` (w, x, y, z, body -> world).
+        velocity: format of measured velocities: `body`, `world` or `rates`, see `measured_motion.Format`.
+        output: what the vehicle takes: `input`, `newtons`, `pulses` or `wrench`, see `output.Output`.
+        esc: speed controllers for `pulses`; None for usual ones.
+        blend: time constant, s, with which the output turns from that before the start into that of the law.
+        allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
+
+    Attributes:
+        sampling_time: s.
+        unit: of the output.
+        backend: `simd` or `xla`.
+
+    Raises:
+        BadInput: something given cannot be used.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Path | Mapping[str, Any] | ClosedLoop,
+        *,
+        sampling_time: float | None = None,
+        attitude: str = "euler",
+        velocity: str = "body",
+        output: str = "input",
+        esc: ESC | None = None,
+        blend: float = 1.0,
+        allow_code: bool = False,
+    ):
+        loop, precision, usual = _given(scenario, allow_code)
+        period = usual if sampling_time is None else sampling_time
+        if period is None:
+            raise BadInput("sampling_time", "be given with a closed loop made of parts")
+        checks.positive("sampling_time", period, "s")
+        checks.positive("blend", blend, "s")
+        form = Format(attitude, velocity)
+        form.check()
+        self._loop, self._precision, self.sampling_time, self._blend = loop, precision, float(period), float(blend)
+        conversion = output_of(output, loop.plant, loop.controller, esc)
+        self.unit = conversion.unit
+        with runtime.on_processor(), runtime.in_precision(precision):
+            truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state())
+            self._form = None if truth.body is None else form
+            self._compile(conversion, jax.tree.map(np.asarray, truth.actuator))
+        self._clock = Clock(self.sampling_time)
+        self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
+        self._blended, self._started = np.zeros((), dtype=bool), np.zeros((), dtype=bool)
+
+    def _compile(self, conversion: Any, actuator: Any) -> None:
+        loop, kind = self._loop, jax.dtypes.canonicalize_dtype(float)
+        zero: Any = np.zeros(len(loop.plant.outputs))
+        inputs, time = np.zeros(loop.plant.inputs()), np.zeros(())
+        upright = np.array([1.0, 0.0, 0.0, 0.0] if self._form and self._form.attitude == "quaternion" else [0.0] * 3)
+        motion = Motion(zero, np.zeros(0), zero) if self._form is None else Motion(np.zeros(3), upright, np.zeros(6))
+        example = jax.tree.map(lambda leaf: np.asarray(leaf, kind), (motion, actuator, Target(zero, zero, zero)))
+        inputs, time = inputs.astype(kind), time.astype(kind)
+
+        def measured(law, motion, actuator):
+            return motion.measurement(law.model.coordinates, self._form, actuator)
+
+        def begin(law, _, given):
+            return (), first_step(law, measured(law, *given[:2]), given[2])
+
+        def go_on(law, memory, given):
+            motion, actuator, target, applied, dt = given
+            return next_step(law, memory, measured(law, motion, actuator), target, applied, dt)
+
+        self._begin = _step(begin, loop.controller, (), example)
+        memory = self._begin.outputs[0]
+        self._go_on = _step(go_on, loop.controller, memory, (*example, inputs, time + self.sampling_time))
+        self._convert = _step(lambda output, _, u: ((), output.of(u)), conversion, (), inputs)
+        self._at = _step(lambda reference, _, t: ((), reference.at(t)), starting_at(loop.reference, zero), (), time)
+        self.backend = self._go_on.backend
+
+    def start(
+        self,
+        position: Any,
+        velocity: Any,
+        attitude: Any = (),
+        *,
+        target: Any = None,
+        applied: Any = None,
+        propellers: Any = None,
+    ) -> np.ndarray:
+        """The first step, which sets all states of the controller.
+
+        Args:
+            position: m, north, east, down; or all outputs of a plant that is no vehicle.
+            velocity: in the format of this autopilot; the rates of the outputs of another plant.
+            attitude: in the format of this autopilot; nothing for another plant.
+            target: outputs to reach, or (outputs, rates, accelerations); None for the scenario's reference, which then
+                begins here.
+            applied: input that has been applied so far, in the unit of the plant's input: the output begins there, and
+                turns into the law's. None for the law's at once.
+            propellers: speeds, rad/s, or (speeds, accelerations), of thrusters that report them; None at rest.
+
+        Returns:
+            The output, one entry per actuator, or six of a wrench.
+
+        Raises:
+            BadInput: a shape is wrong, or a number is not finite.
+        """
+        motion = self._motion(position, velocity, attitude)
+        for name, value in zip(Motion._fields, motion, strict=True):
+            checks.finite(name, value)
+        before = self._command if applied is None else self._input(applied)
+        report = self._report(propellers, 0.0)
+        for value in jax.tree.leaves(report):
+            checks.finite("propellers", value)
+        _put(self._begin.inputs, (motion, report, self._target(target)))
+        self._begin()
+        self._clock.begin()
+        if target is None:  # the reference begins here
+            self._place_reference(self._begin.outputs[0].y.position)
+            _put(self._begin.inputs[2], self._target(None))
+            self._begin()
+        _put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
+        self._before[...], self._blended[...], self._started[...] = before, applied is not None, True
+        return self._answered()
+
+    def step(
+        self,
+        position: Any,
+        velocity: Any,
+        attitude: Any = (),
+        *,
+        target: Any = None,
+        applied: Any = None,
+        propellers: Any = None,
+        dt: float | None = None,
+    ) -> np.ndarray:
+        """One control step.
+
+        Args:
+            position: as for `start`; entries that are not finite were not measured, likewise below.
+            velocity: as for `start`.
+            attitude: as for `start`.
+            target: as for `start`.
+            applied: input applied since the last step, in the unit of the plant's input; None for the commanded one.
+            propellers: as for `start`; None where they were not measured.
+            dt: time since the last step, s; None for the sampling time.
+
+        Returns:
+            The output.
+
+        Raises:
+            BadInput: a shape is wrong, a target or an applied input is not finite, or `start` was not called.
+        """
+        self._check_started("step")
+        motion = self._motion(position, velocity, attitude)
+        given = self._command if applied is None else self._input(applied)
+        report = self._report(propellers, np.nan)
+        wanted = None if target is None else self._target(target)
+        passed = self._clock.passed(dt)
+        if not passed:
+            return self._convert.outputs.copy()
+        _put(self._go_on.inputs, (motion, report, wanted or self._target(None), given, passed))
+        self._go_on()
+        return self._answered()
+
+    def save(self) -> bytes:
+        """The state: law, time, counts, output. An autopilot that is made alike goes on from it with the same bits.
+
+        Raises:
+            BadInput: `start` was not called.
+        """
+        self._check_started("save")
+        return packed(self._identity(), self._kept())
+
+    def restore(self, state: bytes) -> None:
+        """Go on from a state that `save` gave.
+
+        Raises:
+            BadInput: it is damaged, or of another controller; everything stays as it was.
+        """
+        for place, value in zip(self._kept(), unpacked(state, self._identity(), self._kept()), strict=True):
+            place[...] = value
+
+    def _kept(self) -> list[np.ndarray]:
+        """Everything that changes from step to step."""
+        steps = self._go_on.state, self._go_on.outputs, self._at.numbers, self._convert.outputs
+        own = self._command, self._before, self._blended, self._started, self._clock.numbers
+        return [*jax.tree.leaves(steps), *own]
+
+    def _identity(self) -> bytes:
+        """What states have in common that may be exchanged: structure and numbers of the controller, and formats."""
+        numbers = jax.tree.leaves((self._go_on.numbers, self._convert.numbers))
+        forms = jax.tree.structure((self._go_on.state, self._go_on.outputs)), self._form, self.unit, self.sampling_time
+        return repr(forms).encode() + b"".join(number.tobytes() for number in numbers)
+
+    def _check_started(self, method: str) -> None:
+        if not self._started:
+            raise BadInput("start", f"be called before `{method}`", "not")
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Steps after the first one, and those of them that were late, missed or repeated."""
+        return self._clock.counts
+
+    def signals(self) -> dict[str, np.ndarray]:
+        """Values of the signals of the last step: those that the law declares, and `command`, its input.
+
+        Raises:
+            BadInput: `start` was not called.
+        """
+        self._check_started("signals")
+        answer = self._go_on.outputs
+        return {"command": answer.command.copy()} | {name: value.copy() for name, value in answer.signals.items()}
+
+    def declared_signals(self) -> dict[str, Signal]:
+        """Unit and meaning of the signals, by name."""
+        command = Signal(("actuator",), self._loop.plant.input_unit, "input that the law commands")
+        return {"command": command} | self._loop.controller.signals()
+
+    def _motion(self, position: Any, velocity: Any, attitude: Any) -> Motion:
+        shapes = map(np.shape, self._begin.inputs[0])
+        given = zip(Motion._fields, (position, attitude, velocity), shapes, strict=True)
+        return Motion(*(_numbers(name, value, shape) for name, value, shape in given))
+
+    def _report(self, propellers: Any, missing: float) -> Any:
+        """What the propellers report, of the form that the plant has; `missing` stands for everything not given."""
+        places, form = jax.tree.flatten(self._begin.inputs[1])
+        if propellers is None:
+            return jax.tree.unflatten(form, [np.full(place.shape, missing) for place in places])
+        parts = propellers if isinstance(propellers, tuple) else (propellers,)
+        if not places:
+            raise BadInput("propellers", "be left out: the actuators of this plant report nothing", "given")
+        if len(parts) != len(places):
+            must = "be the speeds alone" if len(places) == 1 else "be (speeds, accelerations)"
+            raise BadInput("propellers", must, f"{len(parts)} parts")
+        found = [_numbers("propellers", part, place.shape) for part, place in zip(parts, places, strict=True)]
+        return jax.tree.unflatten(form, found)
+
+    def _target(self, target: Any) -> Target:
+        """The target as given, or of the scenario's reference now."""
+        if target is None:
+            self._at.inputs[...] = self._clock.time
+            self._at()
+            return self._at.outputs
+        shape = np.shape(self._begin.inputs[2].position)
+        parts = target if np.ndim(target) == 2 or isinstance(target, tuple) else (target,)
+        if len(parts) > 3:
+            raise BadInput("target", "be outputs, or (outputs, rates, accelerations)", f"{len(parts)} parts")
+        found: list[Any] = [_numbers("target", part, shape) for part in parts]
+        for part in found:
+            checks.finite("target", part)
+        return Target(*found, *[np.zeros(shape)] * (3 - len(found)))
+
+    def _place_reference(self, position: np.ndarray) -> None:
+        with runtime.on_processor(), runtime.in_precision(self._precision):
+            placed = in_present_precision(starting_at(self._loop.reference, jnp.asarray(position)))
+        _put(self._at.numbers, eqx.filter(placed, eqx.is_array))
+
+    def _input(self, applied: Any) -> np.ndarray:
+        found = _numbers("applied", applied, self._command.shape)
+        checks.finite("applied", found)
+        return found
+
+    def _answered(self) -> np.ndarray:
+        """The output for the law's command; a command that is not finite leaves the output as it was."""
+        command = self._go_on.outputs.command
+        if np.isfinite(command).all():
+            share = np.exp(-self._clock.time / self._blend) if self._blended else 0.0
+            self._command[...] = share * self._before + (1 - share) * command if share else command
+        self._convert.inputs[...] = self._command
+        self._convert()
+        return self._convert.outputs.copy()
+
+
+def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | None]:
+    """Closed loop, precision and sampling time of what an autopilot is made from."""
+    if isinstance(scenario, ClosedLoop):
+        return scenario, "float64", None
+    text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
+    built = build(text)
+    if built.scenario.loop.kind != "sampled":
+        raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
+    return built.closed_loop, built.scenario.precision, built.scenario.loop.dt
+
+
+def _step(function: Callable, part: Any, state: Any, inputs: Any) -> Step:
+    """A step whose numbers are those of a part: function(part, state, inputs) -> (state, outputs)."""
+    numbers, rest = eqx.partition(part, eqx.is_array)
+    return Step(
+        lambda numbers, state, inputs: function(eqx.combine(numbers, rest), state, inputs), numbers, state, inputs
+    )
+
+
+def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """A value as numbers of a shape.
+
+    Raises:
+        BadInput: it has another one, or holds something else.
+    """
+    try:
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise BadInput(name, "be numbers", repr(value)) from None
+    if found.shape != shape:
+        raise BadInput(name, f"have shape {shape}", f"of shape {found.shape}")
+    return found
+
+
+def _put(places: Any, values: Any) -> None:
+    """Write the arrays of a tree into those of another."""
+    for place, value in zip(jax.tree.leaves(places), jax.tree.leaves(values), strict=True):
+        if place is not value:
+            place[...] = value

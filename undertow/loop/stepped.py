@@ -1,0 +1,56 @@
+"""One compiled step that keeps its numbers and its state: by the batch compiler where it can, otherwise by XLA."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+from undertow.loop.simd_batch import Unsupported, kept_step
+
+
+class Step:
+    """A function (numbers, state, inputs) -> (state, outputs), compiled for one run.
+
+    Write into the arrays of `inputs`, call, and read those of `outputs`. Two threads may not call the same step.
+
+    Args:
+        function: of three trees of arrays; its state has the types of the one that it gets.
+        numbers: what does not change from call to call.
+        state: before the first call.
+        inputs: examples of what changes.
+
+    Attributes:
+        backend: `simd` or `xla`, as in scenarios.
+        numbers, state, inputs, outputs: trees of NumPy arrays, to be written into or read.
+    """
+
+    def __init__(self, function: Callable, numbers: Any, state: Any, inputs: Any):
+        try:
+            self._step: Any = kept_step(function, numbers, state, inputs)
+            self.backend = "simd"
+        except Unsupported:
+            self._step = _ByXla(function, numbers, state, inputs)
+            self.backend = "xla"
+        self.numbers, self.state, self.inputs = self._step.numbers, self._step.state, self._step.inputs
+        self.outputs = self._step.outputs
+
+    def __call__(self) -> None:
+        """Take the step: the outputs and the new state follow from the inputs, the numbers and the old state."""
+        self._step()
+
+
+class _ByXla:
+    """The same by XLA, in arrays that are copied to and fro; a call takes a tenth of a millisecond or more."""
+
+    def __init__(self, function: Callable, numbers: Any, state: Any, inputs: Any):
+        own = lambda tree: jax.tree.map(lambda leaf: np.array(leaf), tree)
+        self.numbers, self.state, self.inputs = own(numbers), own(state), own(inputs)
+        self._function = jax.jit(function).lower(self.numbers, self.state, self.inputs).compile()
+        _, found = self._function(self.numbers, self.state, self.inputs)
+        self.outputs = own(found)
+
+    def __call__(self) -> None:
+        found = self._function(self.numbers, self.state, self.inputs)
+        for place, value in zip(jax.tree.leaves((self.state, self.outputs)), jax.tree.leaves(found), strict=True):
+            place[...] = value
