@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.autopilot.clock import Clock
+from undertow.autopilot.functions import Functions
 from undertow.autopilot.measured_motion import Format, Motion
 from undertow.autopilot.output import output_of
 from undertow.autopilot.saved_state import packed, unpacked
@@ -19,7 +20,6 @@ from undertow.core.contracts import Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.controller_step import first_step, next_step
 from undertow.loop.stepped import Step
 from undertow.power.esc import ESC
 from undertow.scenario.build import build
@@ -87,37 +87,18 @@ class Autopilot:
         conversion = output_of(output, loop.plant, loop.controller, esc)
         self.unit = conversion.unit
         with runtime.on_processor(), runtime.in_precision(precision):
-            truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state())
-            self._form = None if truth.body is None else form
-            self._compile(conversion, jax.tree.map(np.asarray, truth.actuator))
+            self._compile(Functions(loop, form, conversion))
         self._clock = Clock(self.sampling_time)
         self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
         self._blended, self._started = np.zeros((), dtype=bool), np.zeros((), dtype=bool)
 
-    def _compile(self, conversion: Any, actuator: Any) -> None:
-        loop, kind = self._loop, jax.dtypes.canonicalize_dtype(float)
-        zero: Any = np.zeros(len(loop.plant.outputs))
-        inputs, time = np.zeros(loop.plant.inputs()), np.zeros(())
-        upright = np.array([1.0, 0.0, 0.0, 0.0] if self._form and self._form.attitude == "quaternion" else [0.0] * 3)
-        motion = Motion(zero, np.zeros(0), zero) if self._form is None else Motion(np.zeros(3), upright, np.zeros(6))
-        example = jax.tree.map(lambda leaf: np.asarray(leaf, kind), (motion, actuator, Target(zero, zero, zero)))
-        inputs, time = inputs.astype(kind), time.astype(kind)
-
-        def measured(law, motion, actuator):
-            return motion.measurement(law.model.coordinates, self._form, actuator)
-
-        def begin(law, _, given):
-            return (), first_step(law, measured(law, *given[:2]), given[2])
-
-        def go_on(law, memory, given):
-            motion, actuator, target, applied, dt = given
-            return next_step(law, memory, measured(law, motion, actuator), target, applied, dt)
-
-        self._begin = _step(begin, loop.controller, (), example)
-        memory = self._begin.outputs[0]
-        self._go_on = _step(go_on, loop.controller, memory, (*example, inputs, time + self.sampling_time))
-        self._convert = _step(lambda output, _, u: ((), output.of(u)), conversion, (), inputs)
-        self._at = _step(lambda reference, _, t: ((), reference.at(t)), starting_at(loop.reference, zero), (), time)
+    def _compile(self, of: Functions) -> None:
+        self._form, zero = of.form, jnp.zeros(len(self._loop.plant.outputs))
+        self._begin = _step(lambda law, _, given: ((), of.first(law, given)), of.controller, (), of.given)
+        memory, going = self._begin.outputs[0], (of.given, of.applied, of.time + self.sampling_time)
+        self._go_on = _step(lambda law, memory, given: of.following(law, memory, *given), of.controller, memory, going)
+        self._convert = _step(lambda output, _, u: ((), output.of(u)), of.output, (), of.applied)
+        self._at = _step(lambda reference, _, t: ((), reference.at(t)), starting_at(of.reference, zero), (), of.time)
         self.backend = self._go_on.backend
 
     def start(
@@ -160,7 +141,7 @@ class Autopilot:
         self._clock.begin()
         if target is None:  # the reference begins here
             self._place_reference(self._begin.outputs[0].y.position)
-            _put(self._begin.inputs[2], self._target(None))
+            _put(self._begin.inputs.target, self._target(None))
             self._begin()
         _put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
         self._before[...], self._blended[...], self._started[...] = before, applied is not None, True
@@ -261,13 +242,13 @@ class Autopilot:
         return {"command": command} | self._loop.controller.signals()
 
     def _motion(self, position: Any, velocity: Any, attitude: Any) -> Motion:
-        shapes = map(np.shape, self._begin.inputs[0])
+        shapes = map(np.shape, self._begin.inputs.motion)
         given = zip(Motion._fields, (position, attitude, velocity), shapes, strict=True)
         return Motion(*(_numbers(name, value, shape) for name, value, shape in given))
 
     def _report(self, propellers: Any, missing: float) -> Any:
         """What the propellers report, of the form that the plant has; `missing` stands for everything not given."""
-        places, form = jax.tree.flatten(self._begin.inputs[1])
+        places, form = jax.tree.flatten(self._begin.inputs.actuator)
         if propellers is None:
             return jax.tree.unflatten(form, [np.full(place.shape, missing) for place in places])
         parts = propellers if isinstance(propellers, tuple) else (propellers,)
@@ -285,7 +266,7 @@ class Autopilot:
             self._at.inputs[...] = self._clock.time
             self._at()
             return self._at.outputs
-        shape = np.shape(self._begin.inputs[2].position)
+        shape = np.shape(self._begin.inputs.target.position)
         parts = target if np.ndim(target) == 2 or isinstance(target, tuple) else (target,)
         if len(parts) > 3:
             raise BadInput("target", "be outputs, or (outputs, rates, accelerations)", f"{len(parts)} parts")
