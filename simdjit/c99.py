@@ -69,7 +69,7 @@ class Source:
         arguments: tuple,
         read: Sequence[str],
         write: Sequence[str],
-        *idle: str,
+        idle: Sequence[str] = (),
     ) -> None:
         """A function of one run.
 
@@ -87,12 +87,11 @@ class Source:
         traced, graph = Traced(function, *arguments), Graph()
         given = inputs(graph, "number", jax.tree.leaves(arguments))
         results = flat(evaluate(graph, traced.closed, given))
-        body = _Body(self, graph, lambda detail: read[detail[1]])
+        body = _Body(self, graph, lambda detail: str(read[detail[1]]))
+        body.lines = [f"(void){name};" for name in idle]
         body.do([node for node, wanted in enumerate(graph.needed(results)) if wanted], None)
         stores = [f"{target} = {body.value(node)};" for node, target in zip(results, write, strict=True)]
-        self.functions.append(
-            "\n".join([f"{signature} {{", *_indented([*(f"(void){one};" for one in idle), *body.lines, *stores]), "}"])
-        )
+        self.functions.append("\n".join([f"{signature} {{", *_indented([*body.lines, *stores]), "}"]))
 
     def helper(self, name: str, text: Callable[[], str]) -> str:
         """The name of a function that is written once."""

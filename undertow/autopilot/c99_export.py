@@ -131,7 +131,7 @@ class _Export:
         self._source.add(f"void {name}_start({arguments})", start, (of.given,), first, both)
         self._source.add(f"void {name}_step({arguments})", step, later, [*state, *given], both)
         signature = f"void {name}_reference({kind} t, {name}_target *target)"
-        self._source.add(signature, reference.at, (of.time,), ["t"], _places("target", self._targets), "t")
+        self._source.add(signature, reference.at, (of.time,), ["t"], _places("target", self._targets), ("t",))
         files = {f"{name}.h": self._header(kind), f"{name}.c": self._text()}
         return Exported(files)
 
