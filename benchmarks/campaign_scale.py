@@ -27,6 +27,7 @@ from undertow import process_setup
 process_setup.prepare()
 
 from undertow.campaign import task
+from undertow.campaign.build_trials import build_trials
 from undertow.campaign.columns import labels
 from undertow.campaign.executors import by_dask, cluster, in_threads
 from undertow.campaign.fingerprint import Identity
@@ -82,9 +83,11 @@ def pieces(trials: int) -> dict:
         for what, vary in (("build_start_and_gain_ms", VARY), ("build_mass_ms", HEAVIER)):
             campaign = prepared(Path(name), _LARGE, 1.0, 256, vary)
             here = task.site(campaign.text, str(campaign.folder))
-            build = lambda i, here=here: [
-                task.build_trial(here.trials, here.part_cache, row) for row in range(i * trials, (i + 1) * trials)
-            ]
+
+            def build(i, here=here):
+                rows = np.arange(i * trials, (i + 1) * trials)
+                return list(build_trials(here.trials, here.part_cache, rows, here.trials.sampled(rows), here.traceable))
+
             found[what] = 1e3 * _shortest(build) / trials
         columns = task.run_trials(campaign.text, str(campaign.folder), range(256))
         before = _peak()
@@ -155,7 +158,7 @@ def dask(trials: int) -> dict:
     }
 
 
-MEASURED = {"memory": (memory, 100_000), "dask": (dask, 1_000), "pieces": (pieces, 500)}  # and trials unless given
+MEASURED = {"memory": (memory, 100_000), "dask": (dask, 1_000), "pieces": (pieces, 1000)}  # and trials unless given
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
