@@ -79,7 +79,7 @@ def batch() -> list[tuple[str, ...]]:
     speed = result("-m", "undertow.cli.main", "bench", "--json")
     scaling = benchmark("compiler_scale.py")
     numpy = speed["numpy_ns"]
-    rows = [("W1, plain NumPy", "", "", f"{thousands(numpy)} ns", "1")]
+    rows: list[tuple[str, ...]] = [("W1, plain NumPy", "", "", f"{thousands(numpy)} ns", "1")]
     named = {
         "W1, one run, by XLA": ("single_xla_ns", "single_xla_compile_s", ""),
         "W1, one run": ("single_ns", "single_compile_s", "operations"),
