@@ -16,10 +16,8 @@ from typing import Any
 from undertow import process_setup
 
 process_setup.prepare()
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, list(os.sched_getaffinity(0))[:1])
 
-import compiler_scale
+import compiler_scale  # on one core
 import jax
 import jax.numpy as jnp
 import numpy as np
