@@ -21,11 +21,12 @@ class Code:
     Args:
         assembly: LLVM's, with a function `run`.
         cache: folder of compiled code; None for the default.
+        sparing: order instructions so that few registers are needed, rather than so that none waits for another one.
     """
 
-    def __init__(self, assembly: str, cache: Path | None = None):
+    def __init__(self, assembly: str, cache: Path | None = None, sparing: bool = False):
         self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
-        self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly, cache)))
+        self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly, cache, sparing)))
         self._engine.finalize_object()
         self._run: Callable[..., None] = _SIGNATURE(self._engine.get_function_address("run"))
 
@@ -64,6 +65,24 @@ def parsed(assembly: str) -> binding.ModuleRef:
     return module
 
 
-def _object(assembly: str, cache: Path | None) -> bytes:
-    key = (assembly, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten(), binding.llvm_version_info)
-    return cached(key, ".o", lambda: _target().emit_object(parsed(assembly)), cache)
+def _object(assembly: str, cache: Path | None, sparing: bool) -> bytes:
+    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten(), binding.llvm_version_info
+    return cached((assembly, *processor, sparing), ".o", lambda: _compiled(assembly, sparing), cache)
+
+
+# LLVM's list scheduling that reduces registers, bottom up. In long programs most numbers lie in memory, and this order
+# leaves fewer of them there: a step with 100 fuzzy sets takes a sixth to a third less (benchmarks/compiler_scale.py).
+# LLVM ends the process at a switch that it does not know, so a later one is left as it is.
+_SPARING, _USUAL = "-pre-RA-sched=list-burr", "-pre-RA-sched=default"
+_LAST_KNOWN = 22
+
+
+def _compiled(assembly: str, sparing: bool) -> bytes:
+    module, target = parsed(assembly), _target()
+    if not sparing or binding.llvm_version_info[0] > _LAST_KNOWN:
+        return target.emit_object(module)
+    binding.set_option("simdjit", _SPARING)  # of the whole process, so it is set back at once
+    try:
+        return target.emit_object(module)
+    finally:
+        binding.set_option("simdjit", _USUAL)

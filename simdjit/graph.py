@@ -23,7 +23,8 @@ BOOL, F64, F32, I64, U64, U32 = "bool", "float64", "float32", "int64", "uint64",
 # What numbers can be.
 TYPES = (BOOL, F64, F32, I64, "int32", U64, U32)
 
-_EITHER_WAY = ("add", "mul", "and", "or", "xor", "eq", "ne")
+# Operations whose two operands may change places.
+COMMUTATIVE = ("add", "mul", "and", "or", "xor", "eq", "ne")
 
 
 class Operation(NamedTuple):
@@ -122,7 +123,7 @@ class Graph:
         for node in nodes[name == "select" :]:
             assert types[node] == kind, (name, dtype)
         dtype = dtype or (BOOL if name in COMPARISONS else kind)
-        if name in _EITHER_WAY and nodes[0] > nodes[1]:
+        if name in COMMUTATIVE and nodes[0] > nodes[1]:
             nodes = nodes[::-1]
         values = [numbers[node] for node in nodes]
         for value in values:
@@ -159,6 +160,11 @@ class Graph:
         """The home of what is made of some nodes."""
         homes = {self.homes[node] for node in nodes}
         return max(homes, key=self._depth, default=None)
+
+    def around(self, region: int) -> int:
+        """The outermost region around a region."""
+        parent = self.parents[region]
+        return region if parent is None else self.around(parent)
 
     def inside(self, node: Node, region: int) -> bool:
         """Whether a node depends on what happens in a region."""

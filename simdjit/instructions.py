@@ -83,7 +83,7 @@ class Emitter:
         lines: so far.
         functions: declarations of what they call, of LLVM's.
         constants, rooms: what they need besides: tables of constants, and room for tables.
-        called: names and types of functions of `calls`.
+        called: names, types and widths of functions of `calls`.
         block: the one that the lines are in.
     """
 
@@ -93,7 +93,7 @@ class Emitter:
         self.functions: set[str] = set()
         self.constants: list[str] = []
         self.rooms: list[str] = []
-        self.called: set[tuple[str, str]] = set()
+        self.called: set[tuple[str, str, int]] = set()
         self.block = "begin"
 
     def vector(self, dtype: str) -> str:
@@ -166,9 +166,9 @@ class Emitter:
         what, given, _ = self.graph.operations[node]
         dtype, before = self.graph.types[node], self.graph.types[given[-1]]
         if what == "call":
-            self.called.add((self.graph.operations[node].detail, dtype))
-            kind = self.vector(dtype)
-            self.line(f"call {kind} @{self.graph.operations[node].detail}.{dtype}({kind} {operands[0]})", name)
+            called, kind = self.graph.operations[node].detail, self.vector(dtype)
+            self.called.add((called, dtype, self.width))
+            self.line(f"call {kind} @{called}.{dtype}.{self.width}({kind} {operands[0]})", name)
         elif what == "select":
             self.choice(operands[0], operands[1], operands[2], dtype, name)
         elif what == "bits":
@@ -284,6 +284,31 @@ class Emitter:
     def constant(self, node: Node) -> str:
         """A constant, the same in every lane."""
         return self.everywhere(self.graph.value(node), self.graph.types[node])
+
+    def listed(self, numbers: Sequence[Any], dtype: str, width: int) -> str:
+        """Constants, one per lane; the last one fills what is left."""
+        filled = [*numbers, *[numbers[-1]] * (width - len(numbers))]
+        return "<" + ", ".join(f"{_TYPES[dtype]} {self._number(number, dtype)}" for number in filled) + ">"
+
+    def spread(self, value: str, dtype: str, width: int, name: str) -> str:
+        """A number of a single run in every lane."""
+        kind = f"<1 x {_TYPES[dtype]}>"
+        return self.line(f"shufflevector {kind} {value}, {kind} poison, <{width} x i32> zeroinitializer", name)
+
+    def gathered(self, values: Sequence[str], dtype: str, width: int, name: str) -> str:
+        """Numbers of a single run, one per lane; the last one fills what is left."""
+        one, kind = _TYPES[dtype], f"<{width} x {_TYPES[dtype]}>"
+        vector = self.spread(values[-1], dtype, width, f"{name}s") if len(values) < width else "poison"
+        for lane, value in enumerate(values):
+            self.line(f"extractelement <1 x {one}> {value}, i64 0", f"{name}e{lane}")
+            last = name if lane == len(values) - 1 else f"{name}i{lane}"
+            vector = self.line(f"insertelement {kind} {vector}, {one} {name}e{lane}, i64 {lane}", last)
+        return vector
+
+    def taken_out(self, vector: str, lane: int, width: int, dtype: str, name: str) -> str:
+        """The number in one lane."""
+        kind = f"<{width} x {_TYPES[dtype]}>"
+        return self.line(f"shufflevector {kind} {vector}, {kind} poison, <1 x i32> <i32 {lane}>", name)
 
     @staticmethod
     def _number(value: Any, dtype: str) -> str:

@@ -14,30 +14,51 @@ solve = jax.jit(box_minimum)
 
 
 def problem(n, tightness):
-    a = RNG.normal(size=(n + 3, n))
-    b = 3 * RNG.normal(size=n + 3)
+    d = RNG.uniform(0.1, 2.0, n)
+    f = RNG.normal(size=(n + 3, n))
+    f[RNG.integers(1, n + 4) :] = 0.0  # often fewer rows than variables
+    c = 3 * RNG.normal(size=n)
     low = -tightness * RNG.uniform(0.1, 1.0, n)
     high = tightness * RNG.uniform(0.1, 1.0, n)
-    return a, b, low, high
+    return d, f, c, low, high
+
+
+def by_least_squares(d, f, c, low, high):
+    """The same problem as |A x - b|^2 with A = [F; sqrt D], by SciPy."""
+    a = np.concatenate([f, np.diag(np.sqrt(d))])
+    b = np.concatenate([np.zeros(len(f)), c / np.sqrt(d)])
+    return lsq_linear(a, b, (low, high), method="bvls", tol=1e-14, max_iter=1000).x
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 9, 12])
 @pytest.mark.parametrize("tightness", [0.1, 1.0, 10.0])
 def test_agrees_with_bounded_least_squares(n, tightness):
     for _ in range(40):
-        a, b, low, high = problem(n, tightness)
-        expected = lsq_linear(a, b, (low, high), method="bvls", tol=1e-14).x
-        np.testing.assert_allclose(solve(a.T @ a, a.T @ b, low, high), expected, rtol=1e-8, atol=1e-9)
+        given = problem(n, tightness)
+        np.testing.assert_allclose(solve(*given), by_least_squares(*given), rtol=1e-8, atol=1e-9)
+
+
+@pytest.mark.parametrize("weight", [1.0, 1e6])
+@pytest.mark.parametrize("n", [8, 32])
+def test_allocations_of_many_thrusters(n, weight):
+    """As thruster_allocation.py poses them: little weight on each of many variables, much on few combinations."""
+    for _ in range(10):
+        f = np.sqrt(weight) * RNG.normal(size=(6, n + 1))
+        d, c = np.full(n + 1, 1e-6), np.zeros(n + 1)
+        d[n] = c[n] = 1.0
+        low, high = -RNG.uniform(0.02, 0.2, n + 1), RNG.uniform(0.02, 0.2, n + 1)
+        low[n], high[n] = 0.0, 1.0
+        given = d, f, c, low, high
+        np.testing.assert_allclose(solve(*given), by_least_squares(*given), rtol=1e-7, atol=1e-8)
 
 
 @pytest.mark.parametrize("count", [1_000, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_optimality_of_many(count):
     """Inside: no slope. At a bound: the slope points outwards. That is all there is for a convex function."""
     problems = [problem(9, 10.0 ** RNG.uniform(-2, 1)) for _ in range(count)]
-    a, b, low, high = (np.stack(parts) for parts in zip(*problems, strict=True))
-    h, c = np.einsum("kij,kil->kjl", a, a), np.einsum("kij,ki->kj", a, b)
-    x = np.asarray(jax.jit(jax.vmap(box_minimum))(h, c, low, high))
-    slope = np.einsum("kij,kj->ki", h, x) - c
+    d, f, c, low, high = (np.stack(parts) for parts in zip(*problems, strict=True))
+    x = np.asarray(jax.jit(jax.vmap(box_minimum))(d, f, c, low, high))
+    slope = d * x + np.einsum("kij,kil,kl->kj", f, f, x) - c
     assert ((x >= low) & (x <= high)).all()
     inside = (x > low) & (x < high)
     size = np.abs(c).max(1, keepdims=True)
@@ -47,16 +68,16 @@ def test_optimality_of_many(count):
 
 
 def test_a_box_without_an_inside_is_its_point():
-    a, b, low, _ = problem(4, 1.0)
-    np.testing.assert_array_equal(solve(a.T @ a, a.T @ b, low, low), low)
+    d, f, c, low, _ = problem(4, 1.0)
+    np.testing.assert_array_equal(solve(d, f, c, low, low), low)
 
 
 def test_a_variable_may_be_held():
-    a, b, low, high = problem(4, 5.0)
+    d, f, c, low, high = problem(4, 5.0)
     low[2] = high[2] = 0.7
     rest = [0, 1, 3]
-    expected = lsq_linear(a[:, rest], b - 0.7 * a[:, 2], (low[rest], high[rest]), method="bvls", tol=1e-14).x
-    found = solve(a.T @ a, a.T @ b, low, high)
+    expected = by_least_squares(d[rest], f[:, rest], c[rest] - 0.7 * f[:, rest].T @ f[:, 2], low[rest], high[rest])
+    found = solve(d, f, c, low, high)
     np.testing.assert_allclose(np.asarray(found)[rest], expected, rtol=1e-8, atol=1e-9)
     assert float(found[2]) == 0.7
 
@@ -64,8 +85,7 @@ def test_a_variable_may_be_held():
 @pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
 def test_derivatives_are_those_of_small_changes(mode):
     """Away from a change of the active set, which random problems do not meet."""
-    a, b, low, high = problem(6, 1.0)
-    arguments = tuple(map(jnp.asarray, (a.T @ a, a.T @ b, low, high)))
+    arguments = tuple(map(jnp.asarray, problem(6, 1.0)))
     for i, value in enumerate(arguments):
         found = np.asarray(jax.jit(mode(box_minimum, argnums=i))(*arguments)).reshape(6, -1)
         for k in range(0, value.size, 5):

@@ -7,12 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.estimation import FuzzySystem, gaussian_sets
 from undertow.estimation.fuzzy_system import even_memberships, is_even, memberships
 
 EPSILON = np.finfo(float).eps
-LAYOUTS = [(1, None), (2, None), (3, None), (3, 0.5), (5, None), (5, 0.25), (7, None), (7, 1.0), (15, None)]
+LAYOUTS = [(1, None), (2, None), (3, None), (3, 0.5), (5, None), (5, 0.25), (7, None), (7, 1.0), (15, None), (25, None)]
+LAYOUTS += [(26, None), (27, 0.04), (50, None), (51, 0.5), (100, None)]  # with several exponentials
 UNEVEN = FuzzySystem(np.array([[-2.0, -0.3, 0.1, 1.5]]), np.array([[1.0, 0.2, 0.4, 0.7]]))
 EVEN = {(count, width): gaussian_sets(count, (0.3,), width) for count, width in LAYOUTS}
 SYSTEMS = {**EVEN, "uneven": UNEVEN}
@@ -77,6 +79,16 @@ def test_quick_way_is_taken_only_where_it_holds():
     assert not is_even(np.array([1.0, 0.0, -1.0]), np.ones(3))
     assert not gaussian_sets(51, (1.0,), 0.01).evenly_spaced  # exp(4e4) would overflow
     assert np.isfinite(basis(gaussian_sets(51, (1.0,), 0.01), np.linspace(-2, 2, 101))).all()
+
+
+@pytest.mark.parametrize("count", [5, 9, 20, 50])
+def test_single_precision(count):
+    with runtime.in_precision("float32"):
+        system = gaussian_sets(count)
+        x = np.linspace(-2, 2, 101, dtype=np.float32)
+        found = np.asarray(jax.jit(FuzzySystem.basis)(system, x[:, None]))
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, direct(gaussian_sets(count), x.astype(float)), rtol=0, atol=3e-6)
 
 
 @settings(max_examples=30, deadline=None)

@@ -70,6 +70,8 @@ def test_operations_are_counted():
     )
     assert program(lambda known, carry, k: carry * 2.5 + known).operations == 6
     assert program(lambda known, carry, k: carry + jnp.sin(known)).operations == 3, "sin(known) is done before"
+    halved = lambda known, carry, k: jax.lax.while_loop(lambda x: x[0] > known[0], lambda x: x * 0.5, carry)
+    assert program(halved).operations == 4, "one round of the loop: three products and the test"
     assert workload.batch(short(W1, 1), width=1).operations > 2_000
 
 

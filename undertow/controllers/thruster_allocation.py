@@ -45,12 +45,12 @@ def _programme(effect, forces, low, high, direction) -> Float[Array, " m"]:
     size = jnp.sqrt((desired**2).sum())
     size = jnp.where(size > 0, size, 1.0)
     scaled = effect * (unit if unit.ndim == 0 else unit[None, :])
-    aside = jnp.concatenate([scaled, -desired[:, None]], axis=1) / size
+    # Weight and departure in one factor, so that the programme's matrix is a diagonal one and its square.
+    factor = jnp.sqrt(direction) * jnp.concatenate([scaled, -desired[:, None]], axis=1) / size
     m = forces.shape[0]
     use = jnp.full(m + 1, _USE).at[m].set(1.0)
-    matrix = direction * aside.T @ aside + jnp.diag(use)
     linear = jnp.zeros(m + 1).at[m].set(1.0)
     least = jnp.concatenate([jnp.broadcast_to(low, (m,)) / unit, jnp.zeros(1)])
     most = jnp.concatenate([jnp.broadcast_to(high, (m,)) / unit, jnp.ones(1)])
-    found = box_minimum(matrix, linear, least, most)
+    found = box_minimum(use, factor, linear, least, most)
     return unit * found[:m]

@@ -10,8 +10,13 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 
-# Largest exponent that `even_memberships` may meet inside the grid; exp overflows at 709.
-_LARGEST_EXPONENT = 600.0
+# Largest exponent that `even_memberships` may meet inside the grid; exp overflows at 709, in single precision at 88.
+_LARGEST_EXPONENT, _LARGEST_SINGLE = 600.0, 75.0
+
+# Sets up to which one exponential per input will do; with more of them, every 12th set has one of its own, and the
+# 6 sets on either side of it follow. Widest spacing in widths for that: further out, weights below e^-300 are lost.
+_FEW, _APART = 25, 12
+_WIDEST = 2.0
 
 
 def memberships(x: Float[Array, " n"], centres: Float[Array, " M"], widths: Float[Array, " M"]) -> Float[Array, "n M"]:
@@ -22,11 +27,13 @@ def memberships(x: Float[Array, " n"], centres: Float[Array, " M"], widths: Floa
 def even_memberships(
     x: Float[Array, " n"], centres: Float[Array, " M"], widths: Float[Array, " M"]
 ) -> Float[Array, "n M"]:
-    """`memberships` for equal spacing h and width sigma, with one exponential instead of M.
+    """`memberships` for equal spacing h and width sigma, with few exponentials instead of M.
 
     Relative to the outermost set on the side of x, the set j steps further in weighs
     r^j exp(-(j h / sigma)^2) with r = exp(-2 h (distance beyond the outermost centre) / sigma^2).
     """
+    if centres.shape[0] > _FEW:
+        return _by_neighbours(x, centres, widths)
     count = centres.shape[0]
     middle, half = (centres[0] + centres[-1]) / 2, (centres[-1] - centres[0]) / 2
     spacing, width = 2 * half / (count - 1), widths[0]
@@ -41,14 +48,48 @@ def even_memberships(
     return jnp.where((offset >= 0)[:, None], weights[:, ::-1], weights)
 
 
+def _by_neighbours(x, centres, widths):
+    """`even_memberships` of many sets: those beside some of the sets, the anchors, follow from them.
+
+    Relative to an anchor at distance u on either side of x, the set i steps further on weighs
+    r^i exp(-(i h / sigma)^2) with r = exp(2 u h / sigma^2). All are divided by exp(-(d / sigma)^2), where d is the
+    distance of x from the grid, so that the outermost set weighs 1 for x beyond it.
+    """
+    count, width = centres.shape[0], widths[0]
+    anchors = np.round(np.linspace(0, count - 1, -(-(count - 1) // _APART) + 1)).astype(int)
+    nearest = np.abs(np.arange(count)[:, None] - anchors).argmin(1)
+    steps = np.arange(count) - anchors[nearest]
+    most = int(np.abs(steps).max())
+    middle, half = (centres[0] + centres[-1]) / 2, (centres[-1] - centres[0]) / 2
+    spacing, offset = 2 * half / (count - 1) / width, (x - middle) / width
+    inside = jnp.clip(offset, -half / width, half / width)
+    beyond = offset - inside
+    away = inside[:, None] - ((centres[anchors] - middle) / width)[None, :]
+    anchor = jnp.exp(-jnp.abs(away) * (jnp.abs(away) + 2 * jnp.abs(beyond)[:, None]))
+    # Where the ratio is limited the anchor weighs nothing.
+    limit = _LARGEST_EXPONENT / most
+    ratio = jnp.exp(jnp.clip(2 * spacing * (away + beyond[:, None]), -limit, limit))
+    powers = [anchor] * (2 * most + 1)
+    inverse = 1 / ratio
+    for i in range(1, most + 1):
+        powers[most + i] = powers[most + i - 1] * ratio
+        powers[most - i] = powers[most - i + 1] * inverse
+    falling = jnp.exp(-((jnp.asarray(steps, dtype=centres.dtype) * spacing) ** 2))
+    weights = falling[None, :] * jnp.stack(powers, 0)[most + steps, :, nearest].T
+    return weights * (1 / weights.sum(-1, keepdims=True))
+
+
 def is_even(centres: np.ndarray, widths: np.ndarray) -> bool:
-    """Whether `even_memberships` applies: equal spacing and widths, and no overflow inside the grid."""
+    """Whether `even_memberships` applies: equal spacing and widths, and no overflow."""
     count = len(centres)
     if count < 2 or np.any(np.diff(centres) <= 0):
         return False
     steps = np.diff(centres)
     even = np.allclose(steps, steps[0], rtol=1e-12) and np.allclose(widths, widths[0], rtol=1e-12)
-    return bool(even and ((count - 1) * steps[0] / widths[0]) ** 2 < _LARGEST_EXPONENT)
+    spacing, double = steps[0] / widths[0], jnp.result_type(float) == jnp.float64
+    if count > _FEW:
+        return bool(even and double and spacing < _WIDEST)
+    return bool(even and ((count - 1) * spacing) ** 2 < (_LARGEST_EXPONENT if double else _LARGEST_SINGLE))
 
 
 class FuzzySystem(eqx.Module):

@@ -64,6 +64,11 @@ def simd_width(bits: int) -> int:
     return simdjit.simd_width(bits)
 
 
+# Steps of all runs together for which a program must be worth its compile time, say 100 runs of 10 000 steps. The
+# number is the same for a campaign and for a trial that is repeated alone, so that both have the same bits.
+_PLANNED = 1_000_000
+
+
 class Run(NamedTuple):
     """What may differ between runs of one kind: the arrays of these trees; the rest is the same for all."""
 
@@ -107,7 +112,8 @@ class BatchRunner:
         driver: that of the GPU; None for this processor.
 
     Raises:
-        Unsupported: a part uses an operation that the batch compiler lacks, or there is no batch compiler.
+        Unsupported: a part uses an operation that the batch compiler lacks, XLA would take less time by estimate, or
+            there is no batch compiler.
         OSError: the driver of the GPU fails.
     """
 
@@ -138,7 +144,7 @@ class BatchRunner:
             return t, {name: signals[name] for name in plan.signals}
 
         cache = cache_folder() / "native"
-        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache)
+        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache, _PLANNED)
 
     @property
     def operations(self) -> int:
