@@ -1,6 +1,7 @@
-"""The sampled loop as SIMD batches: many runs of one kind at once, by the batch compiler.
+"""Both loops as SIMD batches: many runs of one kind at once, by the batch compiler.
 
-Results equal those of `sampled.simulate` to rounding; their bits depend neither on the machine nor on the other runs.
+Results equal those of `sampled.simulate`, or of `continuous.simulate` with fixed steps, to rounding; their bits depend
+neither on the machine nor on the other runs.
 
 This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
 `unavailable` says why. What is unsupported runs by XLA: scenario/execute.py falls back for a run,
@@ -17,7 +18,7 @@ from jaxtyping import Float, PRNGKeyArray
 
 from undertow.core.contracts import Outputs
 from undertow.core.status import Status
-from undertow.loop import sampled
+from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.loop.recording import instant
@@ -82,14 +83,17 @@ class Plan(NamedTuple):
         every: steps per record; 0 for none.
         signals: names of those that are recorded.
         method, substeps: integration of the plant within one control step.
+        continuous: whether plant and controller are integrated together, with `steps` of the classical Runge-Kutta
+            method; nothing is accumulated.
     """
 
     steps: int
     dt: float
     every: int
     signals: tuple[str, ...]
-    method: str
-    substeps: int
+    method: str = "rk4"
+    substeps: int = 1
+    continuous: bool = False
 
     def times(self) -> Float[np.ndarray, " records"]:
         """Times of the records, s."""
@@ -126,10 +130,14 @@ class BatchRunner:
 
         def start(known):
             realization, accumulators, at = known
+            if plan.continuous:
+                return continuous.begin(realization, at)
             return sampled.begin(realization, at, accumulators)
 
         def control_step(known, carry, k):
             realization, accumulators, _ = known
+            if plan.continuous:
+                return continuous.step(realization, jnp.asarray(dt), carry, k)
             return sampled.control_step(realization, accumulators, jnp.asarray(dt), integrate, plan.substeps, carry, k)
 
         def record(known, carry, k):
@@ -180,11 +188,42 @@ def simulate(
     steps, loop = sampled.steps_of(duration, dt, record_every), loop.starting_at(position)
     start = loop.outputs_at_start(position, velocity)
     run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
+    return _alone(run, Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps))
+
+
+def integrate(
+    loop: ClosedLoop,
+    *,
+    duration: float,
+    record_step: float = 1e-2,
+    key: PRNGKeyArray | None = None,
+    position: Any = None,
+    velocity: Any = None,
+    dt: float = 1e-3,
+) -> Outcome:
+    """One run of plant and law as one ODE; arguments, result and errors of `continuous.simulate` with fixed steps.
+
+    Raises:
+        Unsupported: as of `simulate`.
+    """
+    continuous.check(loop)
+    loop, _ = loop.starting_at(position), continuous.records_of(duration, record_step)
+    steps, every, dt = continuous.grid_of(duration, record_step, dt)
+    start = loop.outputs_at_start(position, velocity)
+    run = Run(loop, (), start, jax.random.PRNGKey(0) if key is None else key)
+    outcome = _alone(run, Plan(steps, dt, every, tuple(loop.signals()), continuous=True))
+    return continuous.explained(loop, run.key, outcome, dt)
+
+
+def _alone(run: Run, plan: Plan) -> Outcome:
     arrays = eqx.filter(run, eqx.is_array)
-    plan = Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps)
     batch = BatchRunner(run, plan, [_decides(leaf) for leaf in jax.tree.leaves(arrays)], width=1)
-    outcome = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
-    return jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, outcome)
+    return outcome_of(batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays)), 0)
+
+
+def outcome_of(several: Outcome, run: int) -> Outcome:
+    """The outcome of one run of a batch."""
+    return jax.tree.map(lambda leaf: leaf[run] if isinstance(leaf, np.ndarray) else leaf, several)
 
 
 def _decides(leaf: Any) -> bool:

@@ -1,7 +1,7 @@
-"""Running named scenarios: one by one, each saved for repetition, or in batches of one program."""
+"""Running named scenarios in batches of one program: with everything that is recorded, or for metrics alone."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,18 +13,20 @@ import numpy as np
 from undertow.analysis.metrics import Gathered, accumulators, results
 from undertow.campaign.batch_runner import leaves, planned, run_of
 from undertow.campaign.campaign_schema import Series
-from undertow.core.runtime import double_outside_runs
+from undertow.core.runtime import double_outside_runs, on_processor
 from undertow.core.status import Status
+from undertow.loop import continuous
 from undertow.loop.outcome import Outcome
-from undertow.loop.simd_batch import BatchRunner, Plan, Run, simd_width
+from undertow.loop.simd_batch import BatchRunner, Plan, Run, Unsupported, outcome_of, simd_width
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import Built, build
-from undertow.scenario.execute import Executed, execute, save
+from undertow.scenario.execute import Executed, execute, finished, gathered_of, save
 from undertow.scenario.part_cache import PartCache, structure
 from undertow.scenario.reading import dump
 
 Scenarios = Mapping[str, dict[str, Any]]
 Window = tuple[float, float]  # s
+_Runs = dict[str, tuple[Run, int]]  # by name, with their numbers of steps
 Progress = Callable[[str, float], None]
 
 
@@ -42,8 +44,12 @@ def two_at_once() -> Iterator[Executor]:
             raise
 
 
-def run_all(scenarios: Scenarios, folder: Path, progress: Progress) -> dict[str, Executed]:
-    """Run named scenarios; writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
+def run_all(
+    scenarios: Scenarios, folder: Path, progress: Progress = lambda message, share: None
+) -> dict[str, Executed]:
+    """Run named scenarios with everything that is recorded of them, those of equal programs in one batch.
+
+    Writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
 
     Args:
         scenarios: name -> scenario.
@@ -52,12 +58,19 @@ def run_all(scenarios: Scenarios, folder: Path, progress: Progress) -> dict[str,
     """
     write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)
-    found = {}
-    for name, scenario in scenarios.items():
-        progress(f"running {name}", len(found) / len(scenarios))
-        found[name] = execute(scenario)
-        save(found[name].dataset, folder / "runs" / f"{name}.nc")
-    return found
+    built, found = _built(scenarios), {}
+    alone = {name: one for name, one in built.items() if one.scenario.loop.method == "adaptive"}
+    groups = _groups({name: one for name, one in built.items() if name not in alone}, _whole)
+    with two_at_once() as pool:
+        # What XLA compiles takes longest; it is begun first.
+        tasks = [pool.submit(lambda name=name, one=one: {name: execute(one)}) for name, one in alone.items()]
+        tasks += [pool.submit(_executed, plan, runs, built) for plan, runs in groups]
+        for task in as_completed(tasks):
+            for name, one in task.result().items():
+                found[name] = one
+                save(one.dataset, folder / "runs" / f"{name}.nc")
+                progress(f"ran {name}", len(found) / len(scenarios))
+    return {name: found[name] for name in scenarios}
 
 
 def write_all(scenarios: Scenarios, folder: Path) -> None:
@@ -106,14 +119,13 @@ def start(
     Returns:
         Function that waits for the results; it raises Unsupported where the batch compiler lacks an operation.
     """
-    part_cache = PartCache()
-    built = {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
-    groups: dict[Any, dict[str, tuple[Run, int]]] = {}
-    for name, one in built.items():
-        run = run_of(one)._replace(accumulators=_gathered(one, windows))
-        plan = planned(one, Series(signals=list(signals), every=every))
-        groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
-    pieces = [pool.submit(_together, plan, runs) for (_, plan), runs in groups.items()]
+    built = _built(scenarios)
+    asked = Series(signals=list(signals), every=every)
+    run = lambda one: run_of(one)._replace(accumulators=_gathered(one, windows))
+    pieces = [
+        pool.submit(_together, plan, runs)
+        for plan, runs in _groups(built, lambda one: (run(one), planned(one, asked)))
+    ]
 
     def finished() -> dict[str, BatchResult]:
         ended = {name: one for piece in pieces for name, one in piece.result().items()}
@@ -126,8 +138,48 @@ def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
     return tuple(one for window in windows for one in accumulators(built.closed_loop.plant, (), *window))
 
 
+def _built(scenarios: Scenarios) -> dict[str, Built]:
+    part_cache = PartCache()
+    return {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
+
+
+def _groups(built: Mapping[str, Built], how: Callable[[Built], tuple[Run, Plan]]) -> list[tuple[Plan, _Runs]]:
+    """Runs of equal programs, with their plan; they may differ in the number of steps."""
+    groups: dict[Any, _Runs] = {}
+    for name, one in built.items():
+        run, plan = how(one)
+        groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
+    return [(plan, runs) for (_, plan), runs in groups.items()]
+
+
+def _whole(built: Built) -> tuple[Run, Plan]:
+    """A run as `execute` does it: everything is recorded."""
+    run, loop = run_of(built)._replace(accumulators=gathered_of(built)), built.scenario.loop
+    signals = tuple(built.closed_loop.signals())
+    if loop.kind == "continuous":
+        steps, every, dt = continuous.grid_of(loop.duration, loop.record, loop.dt)
+        return run, Plan(steps, dt, every, signals, continuous=True)
+    return run, planned(built, Series(signals=list(signals), every=loop.record))
+
+
+def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built]) -> dict[str, Executed]:
+    """Runs of one program as `execute` returns them; one by one where the batch compiler lacks an operation."""
+    with on_processor():
+        try:
+            ended = _together(plan, runs)
+        except Unsupported:
+            return {name: execute(built[name]) for name in runs}
+        found = {}
+        for name, (run, _) in runs.items():
+            outcome = ended[name]
+            if plan.continuous:
+                outcome = continuous.explained(run.loop, run.key, outcome, plan.dt)
+            found[name] = finished(built[name], jax.device_get(outcome), {}, run.accumulators)
+        return found
+
+
 @double_outside_runs
-def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Outcome]:
+def _together(plan: Plan, runs: _Runs) -> dict[str, Outcome]:
     """Runs of one program, by name with their numbers of steps; those of one length in one batch."""
     first = next(iter(runs.values()))[0]
     numbers = {name: leaves(run) for name, (run, _) in runs.items()}
@@ -143,7 +195,7 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Outc
         stacked = [np.stack(column) for column in zip(*(numbers[name] for name in names), strict=True)]
         outcome = batch.run(jax.tree.unflatten(tree, stacked), steps)
         for i, name in enumerate(names):
-            found[name] = jax.tree.map(lambda leaf, i=i: leaf[i] if isinstance(leaf, np.ndarray) else leaf, outcome)
+            found[name] = outcome_of(outcome, i)
     return found
 
 
