@@ -123,8 +123,7 @@ def start(
     asked = Series(signals=list(signals), every=every)
     run = lambda one: run_of(one)._replace(accumulators=_gathered(one, windows))
     pieces = [
-        pool.submit(_together, plan, runs)
-        for plan, runs in _groups(built, lambda one: (run(one), planned(one, asked)))
+        pool.submit(_together, plan, runs) for plan, runs in _groups(built, lambda one: (run(one), planned(one, asked)))
     ]
 
     def finished() -> dict[str, BatchResult]:
