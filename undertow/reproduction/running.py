@@ -1,8 +1,6 @@
 """Running named scenarios in batches of one program: with everything that is recorded, or for metrics alone."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +17,7 @@ from undertow.loop import continuous
 from undertow.loop.outcome import Outcome
 from undertow.loop.simd_batch import BatchRunner, Plan, Run, Unsupported, outcome_of, simd_width
 from undertow.reproduction.all_outputs import with_all_outputs
+from undertow.reproduction.side_by_side import Tasks, side_by_side
 from undertow.scenario.build import Built, build
 from undertow.scenario.execute import Executed, execute, finished, gathered_of, save
 from undertow.scenario.part_cache import PartCache, structure
@@ -27,50 +26,37 @@ from undertow.scenario.reading import dump
 Scenarios = Mapping[str, dict[str, Any]]
 Window = tuple[float, float]  # s
 _Runs = dict[str, tuple[Run, int]]  # by name, with their numbers of steps
-Progress = Callable[[str, float], None]
 
 
-@contextmanager
-def two_at_once() -> Iterator[Executor]:
-    """Two threads, which use two cores: compiling and running release Python's lock most of the time.
-
-    An error cancels what has not begun.
-    """
-    with ThreadPoolExecutor(2) as pool:
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def run_all(
-    scenarios: Scenarios, folder: Path, progress: Progress = lambda message, share: None
-) -> dict[str, Executed]:
-    """Run named scenarios with everything that is recorded of them, those of equal programs in one batch.
+def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], dict[str, Executed]]:
+    """Begin to run named scenarios with everything that is recorded of them, those of equal programs in one batch.
 
     Writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
 
     Args:
         scenarios: name -> scenario.
         folder: folder of the results.
-        progress: called with a message and the share done.
+        tasks: where the runs are tasks.
+
+    Returns:
+        Function that waits for the results.
     """
     write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)
-    built, found = _built(scenarios), {}
+    built = _built(scenarios)
     alone = {name: one for name, one in built.items() if one.scenario.loop.method == "adaptive"}
     groups = _groups({name: one for name, one in built.items() if name not in alone}, _whole)
-    with two_at_once() as pool:
-        # What XLA compiles takes longest; it is begun first.
-        tasks = [pool.submit(lambda name=name, one=one: {name: execute(one)}) for name, one in alone.items()]
-        tasks += [pool.submit(_executed, plan, runs, built) for plan, runs in groups]
-        for task in as_completed(tasks):
-            for name, one in task.result().items():
-                found[name] = one
-                save(one.dataset, folder / "runs" / f"{name}.nc")
-                progress(f"ran {name}", len(found) / len(scenarios))
-    return {name: found[name] for name in scenarios}
+    # The adaptive integrator takes longest to compile, and serves all of them.
+    pieces = [tasks.begin("ran adaptive steps", _one_by_one, alone, folder)] if alone else []
+    for plan, runs in groups:
+        own = {name: built[name] for name in runs}
+        pieces.append(tasks.begin(f"ran {_words(runs)}", _executed, plan, runs, own, folder))
+
+    def finished() -> dict[str, Executed]:
+        found = {name: one for piece in pieces for name, one in piece.result().items()}
+        return {name: found[name] for name in scenarios}
+
+    return finished
 
 
 def write_all(scenarios: Scenarios, folder: Path) -> None:
@@ -99,22 +85,22 @@ class BatchResult(NamedTuple):
 def run_batches(
     scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str]
 ) -> dict[str, BatchResult]:
-    """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `start`."""
-    with ThreadPoolExecutor(1) as pool:
-        return start(scenarios, windows, every, signals, pool)()
+    """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `begin_batches`."""
+    with side_by_side(1) as pool:
+        return begin_batches(scenarios, windows, every, signals, Tasks(pool, lambda words, share: None))()
 
 
-def start(
-    scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str], pool: Executor
+def begin_batches(
+    scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str], tasks: Tasks
 ) -> Callable[[], dict[str, BatchResult]]:
-    """Start to run sampled scenarios, one task for each program.
+    """Begin to run sampled scenarios, one task for each program.
 
     Args:
         scenarios: by name; all of them scenarios of the sampled loop.
         windows: windows of the metrics, s.
         every: time between records, s.
         signals: recorded signals.
-        pool: executor of the tasks.
+        tasks: where the batches are tasks.
 
     Returns:
         Function that waits for the results; it raises Unsupported where the batch compiler lacks an operation.
@@ -122,9 +108,8 @@ def start(
     built = _built(scenarios)
     asked = Series(signals=list(signals), every=every)
     run = lambda one: run_of(one)._replace(accumulators=_gathered(one, windows))
-    pieces = [
-        pool.submit(_together, plan, runs) for plan, runs in _groups(built, lambda one: (run(one), planned(one, asked)))
-    ]
+    groups = _groups(built, lambda one: (run(one), planned(one, asked)))
+    pieces = [tasks.begin(f"ran {_words(runs)}", _together, plan, runs) for plan, runs in groups]
 
     def finished() -> dict[str, BatchResult]:
         ended = {name: one for piece in pieces for name, one in piece.result().items()}
@@ -135,6 +120,11 @@ def start(
 
 def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
     return tuple(one for window in windows for one in accumulators(built.closed_loop.plant, (), *window))
+
+
+def _words(runs: Mapping[str, Any]) -> str:
+    """Names of the runs of a batch, in short."""
+    return next(iter(runs)) + (f" and {len(runs) - 1} like it" if len(runs) > 1 else "")
 
 
 def _built(scenarios: Scenarios) -> dict[str, Built]:
@@ -161,20 +151,30 @@ def _whole(built: Built) -> tuple[Run, Plan]:
     return run, planned(built, Series(signals=list(signals), every=loop.record))
 
 
-def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built]) -> dict[str, Executed]:
-    """Runs of one program as `execute` returns them; one by one where the batch compiler lacks an operation."""
+def _one_by_one(built: Mapping[str, Built], folder: Path) -> dict[str, Executed]:
+    """Runs, written to `runs/`."""
+    return {name: _saved(name, execute(one), folder) for name, one in built.items()}
+
+
+def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built], folder: Path) -> dict[str, Executed]:
+    """Runs of one program, written to `runs/`; one by one where the batch compiler lacks an operation."""
     with on_processor():
         try:
             ended = _together(plan, runs)
         except Unsupported:
-            return {name: execute(built[name]) for name in runs}
+            return _one_by_one(built, folder)
         found = {}
         for name, (run, _) in runs.items():
             outcome = ended[name]
             if plan.continuous:
-                outcome = continuous.explained(run.loop, run.key, outcome, plan.dt)
-            found[name] = finished(built[name], jax.device_get(outcome), {}, run.accumulators)
+                outcome = jax.device_get(continuous.explained(run.loop, run.key, outcome, plan.dt))
+            found[name] = _saved(name, finished(built[name], outcome, {}, run.accumulators), folder)
         return found
+
+
+def _saved(name: str, one: Executed, folder: Path) -> Executed:
+    save(one.dataset, folder / "runs" / f"{name}.nc")
+    return one
 
 
 @double_outside_runs
