@@ -138,7 +138,8 @@ class ProgramCache:
         common = self._common(kind, len(leaves(group.first)))
         with self._lock:
             if kind not in self._programs:
-                self._programs[kind] = _program(group.first, kind, [shared is not None for shared in common])
+                constant = [shared is not None for shared in common]
+                self._programs[kind] = _program(group.first, kind, constant, len(group.members))
         count, own = len(group.members), map(np.stack, zip(*group.numbers, strict=True))
         repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
         numbers = [next(own) if shared is None else repeated(shared) for shared in common]
@@ -174,9 +175,9 @@ class ProgramCache:
             return self._shared
 
 
-def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
+def _program(run: Run, kind: _Kind, constant: list[bool], runs: int) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
     if kind.backend == "simd":
         for driver in dict.fromkeys((simd_batch.gpu(), None)):
             with contextlib.suppress(simd_batch.Unsupported):
-                return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver)
+                return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver, runs=runs)
     return vmap_batch.BatchRunner(run, kind.plan)

@@ -8,6 +8,7 @@ This is the only module that imports `simdjit`, which is optional: without it ev
 campaign/batch_runner.py for a campaign.
 """
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
@@ -65,6 +66,10 @@ def simd_width(bits: int) -> int:
     return simdjit.simd_width(bits)
 
 
+# Steps of all runs together from which on a longer program pays: it takes 0.1 s more to compile.
+_FEW = 2_000_000
+
+
 class Run(NamedTuple):
     """What may differ between runs of one kind: the arrays of these trees; the rest is the same for all."""
 
@@ -109,21 +114,32 @@ class BatchRunner:
         constant: which arrays of `run` are equal in all runs, in the order of its leaves; they shorten the program.
         width: runs at once; as many as fit a register unless given.
         driver: that of the GPU; None for this processor.
+        runs: how many it is compiled for, where that is known: few steps are worth a shorter program. Any number can
+            be run, with the same bits.
 
     Raises:
         Unsupported: a part uses an operation that the batch compiler lacks, or there is no batch compiler.
         OSError: the driver of the GPU fails.
     """
 
-    def __init__(self, run: Run, plan: Plan, constant: list[bool], width: int = 0, driver: "Driver | None" = None):
+    def __init__(
+        self,
+        run: Run,
+        plan: Plan,
+        constant: list[bool],
+        width: int = 0,
+        driver: "Driver | None" = None,
+        runs: float = math.inf,
+    ):
         if unavailable():
             raise Unsupported(unavailable())
         from simdjit import Loop
 
         numbers, rest = eqx.partition(run, eqx.is_array)
         self._plan = plan
-        # Of one run the numbers fit the registers, and stages in a loop are faster; the bits are the same.
-        integrate, dt = (COMPACT_METHODS if width == 1 else METHODS)[plan.method], plan.dt
+        # With its stages in a loop a program compiles faster. One run is faster, too; several are slower by a sixth.
+        compact = driver is None and (width == 1 or runs * plan.steps < _FEW)
+        integrate, dt = (COMPACT_METHODS if compact else METHODS)[plan.method], plan.dt
 
         def realize(numbers):
             loop, accumulators, at, key = eqx.combine(numbers, rest)

@@ -43,11 +43,11 @@ def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], 
     """
     write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)
-    built = _built(scenarios)
-    alone = {name: one for name, one in built.items() if one.scenario.loop.method == "adaptive"}
-    groups = _groups({name: one for name, one in built.items() if name not in alone}, _whole)
-    # The adaptive integrator takes longest to compile, and serves all of them.
-    pieces = [tasks.begin("ran adaptive steps", _one_by_one, alone, folder)] if alone else []
+    # The adaptive integrator takes longest to compile, once for all of them: it begins before others are built.
+    alone = {name: one for name, one in scenarios.items() if one["loop"].get("method") == "adaptive"}
+    pieces = [tasks.begin(f"ran {_words(alone)}", _one_by_one, _built(alone), folder)] if alone else []
+    built = _built({name: one for name, one in scenarios.items() if name not in alone})
+    groups = _groups(built, _whole)
     for plan, runs in groups:
         own = {name: built[name] for name in runs}
         pieces.append(tasks.begin(f"ran {_words(runs)}", _executed, plan, runs, own, folder))
@@ -188,7 +188,7 @@ def _together(plan: Plan, runs: _Runs) -> dict[str, Outcome]:
     lengths = {steps: [name for name in runs if runs[name][1] == steps] for _, steps in runs.values()}
     # For one run a program of width one is faster than one of width eight.
     width = min(simd_width(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
-    batch = BatchRunner(first, plan, constant, width)
+    batch = BatchRunner(first, plan._replace(steps=max(lengths)), constant, width, runs=len(runs))
     tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}
     for steps, names in lengths.items():
         stacked = [np.stack(column) for column in zip(*(numbers[name] for name in names), strict=True)]

@@ -65,14 +65,15 @@ class _Process:
 
 
 class _Pool(ThreadPoolExecutor):
-    """A thread for each process: the first computes here, each other one asks its process.
+    """A thread for each process: the last computes here, each other one asks its process.
 
-    Functions are those of modules, and their arguments and results can be pickled.
+    What begins first is computed elsewhere, because this process has further tasks to prepare. Functions are those of
+    modules, and their arguments and results can be pickled.
     """
 
     def __init__(self, processes: list[_Process]):
         places: queue.SimpleQueue[_Process | None] = queue.SimpleQueue()
-        for place in (None, *processes):
+        for place in (*processes, None):
             places.put(place)
         super().__init__(1 + len(processes), initializer=lambda: setattr(_own, "process", places.get()))
 

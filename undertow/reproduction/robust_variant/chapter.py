@@ -26,17 +26,19 @@ def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
     Returns:
         Function that waits for the entries of results.json, and the runs of the fidelity comparison.
     """
-    selected = [one.id for one in ABLATIONS if not (quick and one.long)]
+    selected = [one for one in ABLATIONS if not (quick and one.long)]
     compared = begin_all(fidelity.scenarios(quick), folder, tasks)
-    later = [tasks.begin(f"ablation {name}", ablation, name, quick, folder) for name in selected]
+    # The longest begin first, so that no process waits for the last one.
+    order = sorted(selected, key=study.trials_of, reverse=True)
+    later = {one.id: tasks.begin(f"ablation {one.id}", ablation, one.id, quick, folder) for one in order}
 
     def finished() -> Chapter:
-        runs, found = compared(), [one.result() for one in later]
+        runs, found = compared(), [later[one.id].result() for one in selected]
         rows = fidelity.table(runs, quick)
         results = {
             "quick": quick,
             "seeds": found[0]["variants"][0]["seeds"],
-            "left_out": [one.id for one in ABLATIONS if one.id not in selected],
+            "left_out": [one.id for one in ABLATIONS if one not in selected],
             "fidelity": rows,
             "ablations": found,
             "conclusions": conclusions(rows, found),
