@@ -167,7 +167,10 @@ class BatchRunner:
 
     @property
     def operations(self) -> int:
-        """Arithmetic operations of one step of one run: law, integration of the plant, accumulators."""
+        """Arithmetic operations of one step of one run: law, integration of the plant, accumulators.
+
+        Stages of integration that are a loop are counted once.
+        """
         return self._program.operations
 
     def run(self, numbers: Any, steps: int | None = None) -> Outcome:
