@@ -156,7 +156,8 @@ class ProgramCache:
         common = self._common(kind, len(leaves(group.first)))
         with self._lock:
             if kind not in self._programs:
-                self._programs[kind] = _program(group.first, kind, [shared is not None for shared in common])
+                constant = [shared is not None for shared in common]
+                self._programs[kind] = _program(group.first, kind, constant, sum(map(len, group.members)))
         count = sum(map(len, group.members))
         own = iter([np.concatenate(parts) for parts in zip(*group.numbers, strict=True)])
         repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
@@ -205,9 +206,9 @@ def _differing(batch: Batch, chosen: np.ndarray, common: list[np.ndarray | None]
     return found
 
 
-def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
+def _program(run: Run, kind: _Kind, constant: list[bool], runs: int) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
     if kind.backend == "simd":
         for driver in dict.fromkeys((simd_batch.gpu(), None)):
             with contextlib.suppress(simd_batch.Unsupported):
-                return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver)
+                return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver, runs=runs)
     return vmap_batch.BatchRunner(run, kind.plan)

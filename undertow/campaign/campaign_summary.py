@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import binom, spearmanr
+from scipy.special import bdtr
 
 from undertow.campaign.batch_runner import XLA
 from undertow.campaign.columns import ENDINGS, JUDGEMENTS
@@ -37,7 +37,8 @@ def median_interval(values: np.ndarray, confidence: float = 0.95) -> tuple[float
     with few values the smallest and largest are taken. David and Nagaraja (2003), section 7.1.
     """
     ordered = np.sort(values)
-    rank = max(int(binom.ppf((1 - confidence) / 2, ordered.size, 0.5)), 1)
+    below = bdtr(np.arange(ordered.size // 2 + 1), ordered.size, 0.5)  # probability of at most so many
+    rank = max(int(np.argmax(below >= (1 - confidence) / 2)), 1)
     return float(ordered[rank - 1]), float(ordered[-rank])
 
 
@@ -68,6 +69,8 @@ def correlations(results: Results, realized: Mapping[str, np.ndarray]) -> dict[s
 
 def _correlations(results: Results, columns: Mapping[str, np.ndarray]) -> dict[str, dict[str, float]]:
     """Input -> metric -> rank correlation, for columns with one value per completed trial."""
+    from scipy.stats import spearmanr  # takes as long to import as all else here
+
     found: dict[str, dict[str, float]] = {}
     numbers = results.combinations[results.lasted][:_CORRELATED]
     columns = {key: column[:_CORRELATED] for key, column in columns.items()}

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, UInt32
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from undertow.campaign.campaign_schema import Campaign, Distribution
 from undertow.core.errors import BadInput
@@ -56,6 +55,8 @@ class Samples:
             return np.zeros((self._block, 0))
         if self._campaign.design == "random":
             return np.random.default_rng([seed, _POINTS, block]).random((self._block, dimensions))
+        from scipy.stats import qmc  # takes as long to import as all else here
+
         chance = np.random.default_rng([seed, _POINTS])
         if self._campaign.design == "latin":
             return qmc.LatinHypercube(dimensions, rng=chance).random(self._block)

@@ -63,6 +63,11 @@ def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str
     }
 
 
+def trials_of(ablation: Ablation) -> int:
+    """Number of trials of an ablation."""
+    return sum(read_campaign(_FOLDER / f"{name}.yaml")[0].number for name in ablation.campaigns)
+
+
 def variants(
     path: Path, metrics: tuple[str, ...], quick: bool, folder: Path | None = None
 ) -> Iterator[tuple[str, Variant]]:
