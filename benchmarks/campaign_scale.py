@@ -1,11 +1,11 @@
 """Cost of a campaign: python benchmarks/campaign_scale.py [memory|dask|pieces] [--trials N]
 
 memory: 100 000 trials of workload W1, 1 s each, in this process: memory after a tenth of the tasks and at the end, its
-peak, bytes of the store and time per trial.
+peak, bytes of the store and time per trial; then seconds for summary and page, and the peak with them.
 dask: 1 000 trials of W1, 20 s each, by one worker and by two of a local cluster: the ratio of the times once the
 workers have compiled, the shortest of five each, and whether the stores are the same to the byte.
-pieces: in one thread, milliseconds to build a trial with another start and gain or another mass of the vehicle, and to
-write a task of 256 or 65 536 trials; and the memory per trial while a task runs.
+pieces: in one thread, milliseconds to build a trial among a thousand, with another start and gain or another mass of
+the vehicle, and to build one alone; to write a task of 256 or 65 536 trials; and memory per trial while a task runs.
 
 Prints JSON.
 """
@@ -27,6 +27,8 @@ from undertow import process_setup
 process_setup.prepare()
 
 from undertow.campaign import task
+from undertow.campaign.build_trials import build_trial, build_trials
+from undertow.campaign.campaign_summary import summary
 from undertow.campaign.columns import labels
 from undertow.campaign.executors import by_dask, cluster, in_threads
 from undertow.campaign.fingerprint import Identity
@@ -34,6 +36,8 @@ from undertow.campaign.prepare import prepare
 from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.campaign.store import Store
 from undertow.campaign.store_layout import Layout
+from undertow.campaign.store_results import load
+from undertow.report.campaign_page import write_campaign
 from undertow.reproduction.setup import scenario
 from undertow.scenario.reading import dump
 
@@ -43,14 +47,15 @@ HEAVIER = {"plant.vehicle.mass": {"normal": [125.0, 3.0]}}
 _LARGE = 8192  # trials of the task whose memory is measured
 
 
-def prepared(folder: Path, trials: int, duration: float, chunk: int, vary: dict = VARY):
+def prepared(folder: Path, trials: int, duration: float, chunk: int | None = None, vary: dict | None = None):
     loop = {"kind": "sampled", "duration": duration}
     whole = scenario("W1", fidelity="electromechanical", composite=20.0, loop=loop) | {
         "initial": {"position": [0.0] * 6},
         "steady": {"start": duration / 2},
     }
     path = folder / "campaign.yaml"
-    path.write_text(dump({"scenario": whole, "trials": trials, "chunk": chunk, "vary": vary, "seed": 1}))
+    asked = {"scenario": whole, "trials": trials, "vary": VARY if vary is None else vary, "seed": 1}
+    path.write_text(dump(asked | ({"chunk": chunk} if chunk else {})))
     return prepare(path)
 
 
@@ -58,18 +63,24 @@ def memory(trials: int) -> dict:
     """One process, all of its threads."""
     held, began = [], time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
-        campaign = prepared(Path(name), trials, 1.0, 256)
+        campaign = prepared(Path(name), trials, 1.0)
         executor = lambda function, work: in_threads(function, work, 2)
         run_campaign(campaign, Path(name), executor, lambda tally: held.append((tally.done, _resident())))
         taken = time.perf_counter() - began
+        peak, concluding = _peak(), time.perf_counter()
         size = sum(file.stat().st_size for file in (Path(name) / STORE).rglob("*") if file.is_file())
+        results = load(Path(name))
+        write_campaign("", results, summary(results, campaign.trials), Path(name))
+        concluded = time.perf_counter() - concluding
     tenth = next(mebibytes for done, mebibytes in held if done >= trials / 10)
     return {
         "trials": trials,
         "after_first_tenth_MiB": tenth,
         "at_the_end_MiB": held[-1][1],
         "growth_percent": 100 * (max(mebibytes for done, mebibytes in held if done >= trials / 10) / tenth - 1),
-        "peak_MiB": _peak(),
+        "peak_MiB": peak,
+        "summary_and_page_s": concluded,
+        "peak_with_them_MiB": _peak(),
         "store_bytes_per_trial": size / trials,
         "ms_per_trial": 1e3 * taken / trials,
     }
@@ -82,10 +93,14 @@ def pieces(trials: int) -> dict:
         for what, vary in (("build_start_and_gain_ms", VARY), ("build_mass_ms", HEAVIER)):
             campaign = prepared(Path(name), _LARGE, 1.0, 256, vary)
             here = task.site(campaign.text, str(campaign.folder))
-            build = lambda i, here=here: [
-                task.build_trial(here.trials, here.part_cache, row) for row in range(i * trials, (i + 1) * trials)
-            ]
+
+            def build(i, here=here):
+                rows = np.arange(i * trials, (i + 1) * trials)
+                return list(build_trials(here.trials, here.part_cache, rows, here.trials.sampled(rows), here.traceable))
+
             found[what] = 1e3 * _shortest(build) / trials
+            alone = lambda i, here=here: build_trial(here.trials, here.part_cache, i)
+            found[what.replace("_ms", "_alone_ms")] = 1e3 * _shortest(alone)
         columns = task.run_trials(campaign.text, str(campaign.folder), range(256))
         before = _peak()
         task.run_trials(campaign.text, str(campaign.folder), range(_LARGE))
@@ -93,7 +108,7 @@ def pieces(trials: int) -> dict:
         for rows in (256, 65_536):
             named = labels(campaign.trials, campaign.first, here.metrics())
             where = Path(name) / f"{rows}.zarr"
-            store = Store(where, Layout((), 4 * rows, (rows,)), Identity("", {}), named, {})
+            store = Store(where, Layout((), 4 * rows, (rows,)), Identity("", {}), named, {}, {})
             chance = np.random.default_rng(0)  # random numbers cannot be compressed
             many = {key: chance.normal(size=rows).astype(values.dtype) for key, values in columns.items()}
             found[f"write_{rows}_ms"] = 1e3 * _shortest(lambda i, s=store, m=many: s.write(i, m))
@@ -155,7 +170,7 @@ def dask(trials: int) -> dict:
     }
 
 
-MEASURED = {"memory": (memory, 100_000), "dask": (dask, 1_000), "pieces": (pieces, 500)}  # and trials unless given
+MEASURED = {"memory": (memory, 100_000), "dask": (dask, 1_000), "pieces": (pieces, 1000)}  # and trials unless given
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()

@@ -157,18 +157,25 @@ def _function(name: str, dtype: str, width: int, emitter: Emitter) -> str:
     return "\n".join(lines)
 
 
-def operations(graph: Graph, sections: Sections) -> int:
-    """Operations of one step of one run, those inside a loop counted once; an elementary function counts as one."""
+def operations(graph: Graph, sections: Sections, written: bool = False) -> int:
+    """Operations of one step of one run, those inside a loop counted once; an elementary function counts as one.
+
+    Args:
+        graph: of the program.
+        sections: of it.
+        written: only those that are written out; a product of large matrices is a loop.
+    """
     fixed, needed = _fixed(graph), graph.needed(sections.step)
     # What happens inside a region is done in every step where the region is, though its own inputs are no carry.
     outermost = {detail: node for node, (name, _, detail) in enumerate(graph.operations) if name == "region"}
     same = lambda node: fixed[node if graph.homes[node] is None else outermost[graph.around(graph.homes[node])]]
-    return sum(_work(graph.operations[node]) for node, wanted in enumerate(needed) if wanted and not same(node))
+    done = (graph.operations[node] for node, wanted in enumerate(needed) if wanted and not same(node))
+    return sum(_work(operation, written) for operation in done)
 
 
-def _work(operation: Operation) -> int:
+def _work(operation: Operation, written: bool) -> int:
     if operation.name == "product":
-        return operation.detail.operations
+        return 0 if written else operation.detail.operations
     return operation.name not in ("constant", "input", "region", "result", "part")
 
 

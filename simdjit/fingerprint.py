@@ -33,6 +33,26 @@ def fingerprint(functions: Sequence[ClosedJaxpr], *further: Any) -> str | None:
         return None
 
 
+def fingerprint_of_part(
+    closed: ClosedJaxpr, arguments: Sequence[int], results: Sequence[int], *further: Any
+) -> str | None:
+    """Name of what a traced function computes of some arguments, which all of its equations go by, for some results.
+
+    Args:
+        closed: as JAX traced it.
+        arguments, results: their places.
+        further: as in `fingerprint`.
+    """
+    jaxpr = closed.jaxpr
+    invars, outvars = [jaxpr.invars[i] for i in arguments], [jaxpr.outvars[i] for i in results]
+    try:
+        names = _Names()
+        part = names.equations(jaxpr, invars, outvars)
+        return names.of((_version(), bool(jax.config.jax_threefry_partitionable), part, *closed.consts, *further)).hex()  # pyright: ignore[reportAttributeAccessIssue]
+    except Nameless:
+        return None
+
+
 @functools.cache
 def _version() -> str:
     """Of what makes the program: the compiler's own code, and JAX, whose functions it calls while it lowers."""
@@ -72,10 +92,11 @@ class _Names:
 
     def _body(self, jaxpr: Jaxpr) -> bytes:
         if id(jaxpr) not in self._kept:
-            self._kept[id(jaxpr)] = (jaxpr, self._equations(jaxpr))
+            self._kept[id(jaxpr)] = (jaxpr, self.equations(jaxpr, jaxpr.invars, jaxpr.outvars))
         return self._kept[id(jaxpr)][1]
 
-    def _equations(self, jaxpr: Jaxpr) -> bytes:
+    def equations(self, jaxpr: Jaxpr, arguments: Sequence[Any], wanted: Sequence[Any]) -> bytes:
+        """All equations of a function, of these arguments and for these results."""
         numbers: dict[Any, int] = {}
 
         def new(variables: Sequence[Any]) -> str:
@@ -85,7 +106,7 @@ class _Names:
         def used(variables: Sequence[Any]) -> list[str | bytes]:
             return [_literal(one) if isinstance(one, Literal) else str(numbers[one]) for one in variables]
 
-        parts: list[str | bytes] = [new(jaxpr.invars), new(jaxpr.constvars)]
+        parts: list[str | bytes] = [new(arguments), new(jaxpr.constvars)]
         for equation in jaxpr.eqns:
             name, params = equation.primitive.name, equation.params
             read = parameters_read(name)
@@ -96,7 +117,7 @@ class _Names:
             parts += [part for key in params if key in read for part in (key, self.of(params[key]))]
             parts += [key for key in params if params[key] is not None]
             parts.append(new(equation.outvars))
-        return _digest("jaxpr", *parts, *used(jaxpr.outvars))
+        return _digest("jaxpr", *parts, *used(wanted))
 
 
 def _literal(literal: Literal) -> bytes:

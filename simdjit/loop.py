@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from simdjit import nvidia
+from simdjit import estimate, nvidia
 from simdjit.cache import cached
 from simdjit.codegen import STEP, VECTORS, Head, Sections, assembly, operations
 from simdjit.cpu import Code, simd_width
@@ -19,11 +19,11 @@ from simdjit.cuda import Driver
 from simdjit.fingerprint import fingerprint
 from simdjit.graph import I64, Unsupported, flat
 from simdjit.layout import Layout
-from simdjit.lowering import evaluate
+from simdjit.lowering import TooLong, evaluate
 from simdjit.prologue import Prologue, inputs
 from simdjit.tracing import Traced
 
-# Operations; machine code of a longer program would take minutes to make.
+# Operations; machine code of a longer program would take minutes to make, whatever the estimate for XLA is.
 _MOST = 200_000
 
 
@@ -40,9 +40,11 @@ class Loop:
         lanes: runs at once; as many as fit a register unless given. No result depends on it.
         driver: of the GPU that runs it, as `gpu` finds it; None for this processor. No result depends on it.
         cache: folder of compiled code; None for SIMDJIT_CACHE or the default.
+        planned: steps of all runs together for which the program is made; 0 where it is wanted whatever it costs.
 
     Raises:
-        Unsupported: a function needs something that the compiler has no rule for.
+        Unsupported: a function needs something that the compiler has no rule for, or XLA would take less time for the
+            planned steps, compiling included (see `estimate`).
         OSError: the GPU's driver fails.
     """
 
@@ -57,6 +59,7 @@ class Loop:
         lanes: int = 0,
         driver: Driver | None = None,
         cache: Path | None = None,
+        planned: int = 0,
     ):
         prepared = Traced(prepare, numbers)
         constant = [False] * len(jax.tree.leaves(numbers)) if constant is None else constant
@@ -74,8 +77,10 @@ class Loop:
         head = nvidia.THREADS if driver else VECTORS
         traced = (prepared, begun, self._step, self._record)
         beside = simd_width(64) if lanes == 1 and not driver else 1
-        made = lambda: _lowered(self._prologue, traced, number.dtype, lanes, head, beside)
-        name = fingerprint([one.closed for one in traced], self._prologue.constants, lanes, beside, bool(driver))
+        made = lambda: _lowered(self._prologue, traced, number.dtype, lanes, head, beside, planned)
+        name = fingerprint(
+            [one.closed for one in traced], self._prologue.constants, lanes, beside, bool(driver), planned
+        )
         program = Program.read(cached(name, ".ll", lambda: made().written(), cache)) if name else made()
         if program.prologue_lacks and not self._prologue.lacking:
             self._prologue.leave_to_xla(program.prologue_lacks)
@@ -151,15 +156,28 @@ class Program(NamedTuple):
 
 
 def _lowered(
-    prologue: Prologue, traced: tuple[Traced, Traced, Traced, Traced], number: Any, lanes: int, head: Head, beside: int
+    prologue: Prologue,
+    traced: tuple[Traced, Traced, Traced, Traced],
+    number: Any,
+    lanes: int,
+    head: Head,
+    beside: int,
+    planned: int,
 ) -> Program:
     """The program of traced functions: prepare, start, step and record."""
     _, begun, step, record = traced
     graph, known = prologue.lowered()
-    first = evaluate(graph, begun.closed, known, _MOST)
-    k = graph.input(STEP, I64)
-    k = k if number == I64 else graph.apply("convert", k, dtype=str(number))
-    given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
-    stepped, recorded = (evaluate(graph, one.closed, given, _MOST) for one in (step, record))
+    try:
+        first = evaluate(graph, begun.closed, known, _MOST)
+        k = graph.input(STEP, I64)
+        k = k if number == I64 else graph.apply("convert", k, dtype=str(number))
+        given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
+        stepped, recorded = (evaluate(graph, one.closed, given, _MOST) for one in (step, record))
+    except TooLong as error:
+        seconds = estimate.compiled_here(_MOST).compiling
+        raise Unsupported(f"{error}, which would take more than {seconds:.0f} s to compile") from error
     sections = Sections(*map(flat, (first, stepped, recorded)))
+    written = operations(graph, sections, written=True)
+    if planned and (why := estimate.reason_for_xla(written, step.closed, planned)):
+        raise Unsupported(why)
     return Program(assembly(graph, sections, lanes, head, beside), operations(graph, sections), prologue.lacking)

@@ -11,11 +11,16 @@ import numpy as np
 from jax.extend.core import ClosedJaxpr, Literal
 
 from simdjit import control_flow, elementwise, indexing, linear_algebra, reductions, shapes, sorting, threefry
+from simdjit.estimate import spaced
 from simdjit.graph import Graph, Nodes, Unsupported, filled
 from simdjit.rules import Equation, results, rule
 
 # Modules whose import registers their rules.
 RULES_OF = (control_flow, elementwise, indexing, linear_algebra, reductions, shapes, sorting, threefry)
+
+
+class TooLong(Unsupported):
+    """A function has more operations than are allowed."""
 
 
 def nodes_of(graph: Graph, values: Any) -> Nodes:
@@ -36,7 +41,8 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
         most: operations of the graph.
 
     Raises:
-        Unsupported: it has a primitive without a rule, or too many operations.
+        Unsupported: it has a primitive without a rule.
+        TooLong: it has too many operations.
     """
     known = dict(zip(closed.jaxpr.invars, arguments, strict=True))
     fixed = zip(closed.jaxpr.constvars, closed.consts, strict=True)
@@ -54,7 +60,7 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
         found = results(equation.primitive.name, asked, [read(variable) for variable in equation.invars])
         known |= zip(equation.outvars, found, strict=True)
         if len(graph.operations) > most:
-            raise Unsupported(f"more than {most} operations")
+            raise TooLong(f"more than {spaced(int(most))} operations")
     return [read(variable) for variable in closed.jaxpr.outvars]
 
 

@@ -117,28 +117,29 @@ def _kinds(graph: Graph) -> list[int]:
 
 
 def _signature(graph: Graph, number: int) -> object:
-    """What a region does to its operands; None where it depends on more than those and constants."""
-    region, known = graph.regions[number], {}
-
-    def of(node: Node) -> object:
-        if node in known:
-            return known[node]
+    """What a region does to its operands, line by line; None where it depends on more than those and constants."""
+    region = graph.regions[number]
+    wanted = (region.test, *region.results)
+    names: dict[Node, object] = {node: f"given {i}" for i, node in enumerate(region.inputs)}
+    if any(not graph.inside(node, number) and not _constant(graph, node) for node in wanted):
+        return None
+    lines = []
+    for node in graph.needed_inside(number, wanted):  # operands first
         name, operands, detail = graph.operations[node]
-        if not graph.inside(node, number):
-            constants = operands if name == "table" else (node,)
-            sound = all(graph.value(one) is not None for one in constants)
-            found = ("same", node) if sound else None
-        elif name in ("region", "result", "table", "product", "part"):
-            found = None
-        else:
-            parts = [of(operand) for operand in operands]
-            found = None if None in parts else (name, graph.types[node], detail, *parts)
-        known[node] = found
-        return found
+        if any(not graph.inside(operand, number) and not _constant(graph, operand) for operand in operands):
+            return None
+        if node not in names:
+            if name in ("region", "result", "table", "product", "part"):
+                return None
+            lines.append((name, graph.types[node], detail, *(names.get(operand, -operand) for operand in operands)))
+            names[node] = len(lines)
+    return region.repeats, tuple(lines), tuple(names.get(node, -node) for node in wanted)
 
-    known |= {node: ("given", i) for i, node in enumerate(region.inputs)}
-    parts = [of(node) for node in (region.test, *region.results)]
-    return None if None in parts else (region.repeats, *parts)
+
+def _constant(graph: Graph, node: Node) -> bool:
+    """Whether a node is a constant or a table of constants."""
+    name, operands, _ = graph.operations[node]
+    return graph.value(node) is not None or (name == "table" and all(graph.value(one) is not None for one in operands))
 
 
 def found(graph: Graph, outputs: Sequence[Node], fixed: Sequence[bool], width: int) -> Packs:

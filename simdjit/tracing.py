@@ -43,6 +43,11 @@ class Traced:
         places = {variable: i for i, variable in enumerate(self.closed.jaxpr.invars)}
         return [None if isinstance(out, Literal) else places.get(out) for out in self.closed.jaxpr.outvars]
 
+    def used(self) -> list[int]:
+        """Places of the arguments that any equation goes by."""
+        read = {one for equation in self.closed.jaxpr.eqns for one in equation.invars if not isinstance(one, Literal)}
+        return [i for i, variable in enumerate(self.closed.jaxpr.invars) if variable in read]
+
     def only(self, wanted: list[bool]) -> Callable[..., list[jax.Array]]:
         """The function with some of its results."""
 

@@ -20,7 +20,7 @@ _OPTIMIZATION = 1
 _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 # Objects before the youngest are looked through. Tracing makes millions that live: Python's 700 cost half a second.
-_YOUNG, _MIDDLE, _OLD = 50_000, 20, 100
+_YOUNG, _MIDDLE, _OLD = 1_000_000, 20, 100
 
 
 def prepare() -> None:

@@ -75,6 +75,19 @@ def test_loops_and_branches():
     assert (np.abs(halved) <= 2).all()
 
 
+def test_a_long_chain_inside_a_loop():
+    """Of 1200 sums and squares, each made of the one before."""
+    x = angles(3) % 1.0
+
+    def body(y):
+        for _ in range(600):
+            y = y * y * 0.5 + 0.1
+        return y
+
+    (found,) = same_bits(lambda x: jax.lax.while_loop(lambda y: (y > 0.5).any(), body, x), x)
+    assert (found <= 0.5).all()
+
+
 def test_random_numbers():
     key = np.arange(8, dtype=np.uint32).reshape(4, 2)
     (found,) = same_bits(lambda key: jax.random.normal(key, (11,)), key)

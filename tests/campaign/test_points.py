@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from undertow.campaign.campaign_schema import Distribution, validate
-from undertow.campaign.sampling import Samples, value
+from undertow.campaign.sampling import Samples, quantiles
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
 
@@ -16,7 +16,7 @@ def points(data, rows=None):
     """Of a campaign, one row each; all of them unless told which."""
     asked = validate(from_data(data))
     samples = Samples(asked)
-    return np.array([samples.point(row) for row in rows or range(asked.trials)])
+    return samples.points(np.array(rows or range(asked.trials)))
 
 
 @pytest.mark.parametrize(
@@ -28,15 +28,15 @@ def points(data, rows=None):
     ],
 )
 def test_values_are_quantiles(given, law):
-    for share in (0.0, 0.1, 0.5, 0.99):
-        expected = law.ppf(max(share, 2.0**-53))
-        assert value(Distribution.model_validate(given), share) == pytest.approx(expected, rel=1e-9)
+    shares = np.array([0.0, 0.1, 0.5, 0.99])
+    expected = law.ppf(np.maximum(shares, 2.0**-53))
+    assert quantiles(Distribution.model_validate(given), shares) == pytest.approx(expected, rel=1e-9)
 
 
 def test_choices_are_equally_likely():
     spread = Distribution.model_validate({"choice": ["a", "b", "c"]})
-    shares = np.arange(300) / 300
-    assert [sum(value(spread, share) == one for share in shares) for one in "abc"] == [100, 100, 100]
+    found = quantiles(spread, np.arange(300) / 300)
+    assert [found.count(one) for one in "abc"] == [100, 100, 100]
 
 
 def test_latin_hypercubes_have_one_point_per_stratum(campaign):
@@ -83,7 +83,7 @@ def test_draws_are_a_matter_of_the_seed(campaign, design):
 
 def test_no_two_trials_share_a_seed(campaign):
     samples = Samples(validate(from_data(campaign(trials=10_000))))
-    assert len({samples.seed(row) for row in range(10_000)}) > 9990
+    assert len(np.unique(samples.seeds(np.arange(10_000)))) > 9990
 
 
 @pytest.mark.parametrize(

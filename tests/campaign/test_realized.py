@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 
+from undertow.campaign.build_trials import build_trial
 from undertow.campaign.prepare import prepare
 from undertow.campaign.realized import realized_scalars
-from undertow.campaign.task import build_trial
 from undertow.cli.main import run
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.part_cache import PartCache

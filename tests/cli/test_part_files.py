@@ -89,7 +89,7 @@ def my_bytes():
 def test_a_part_that_simd_lacks_is_reported_once_with_the_reason(undertow, tmp_path):
     (tmp_path / "my_bytes.py").write_text(BYTES)
     (tmp_path / "s.yaml").write_text(SMALL.replace("kind: sinusoid, amplitude: 1", "kind: ./my_bytes.py:my_bytes"))
-    reason = "slower than simd (docs/explanation/simd.md): numbers of type int8."
+    reason = "backend xla instead of simd (docs/explanation/simd.md): numbers of type int8."
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0, said.err
     assert said.err.count(reason) == 1

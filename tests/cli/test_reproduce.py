@@ -1,28 +1,32 @@
 """`undertow reproduce` around the study itself: progress, verdicts, and a folder that appears whole."""
 
+import contextlib
 import json
 
 import pytest
 
 from undertow.cli import reproduce as command
+from undertow.report.reproduction import report
+from undertow.reproduction import reproduce as study
 
 
 @pytest.fixture
 def short_study(monkeypatch):
     """A study that takes no time."""
 
-    def study(folder, quick, progress):
+    def short(folder, quick, progress, pool):
         progress("ran something", 0.5)
         (folder / "runs").mkdir()
         claims = [{"id": "C1", "claim": "It converges.", "verdict": f"holds, quick {quick}"}]
         (folder / "results.json").write_text(json.dumps({"claims": claims}))
 
-    def write(found, folder, pdf):
+    def write(found, folder, pdf, pool):
         (folder / "report.html").write_text("page")
         return folder / "report.html"
 
-    monkeypatch.setattr(command.study, "reproduce", study)
-    monkeypatch.setattr(command, "write", write)
+    monkeypatch.setattr(study, "reproduce", short)
+    monkeypatch.setattr(report, "write", write)
+    monkeypatch.setattr(command, "side_by_side", contextlib.nullcontext)
 
 
 def test_progress_verdicts_and_place_of_the_report(undertow, tmp_path, short_study):
@@ -50,10 +54,10 @@ def test_impossible_folder_is_refused_first(refused, tmp_path):
 
 
 def test_a_report_that_cannot_be_written_costs_no_results(undertow, tmp_path, short_study, monkeypatch):
-    def fail(found, folder, pdf):
+    def fail(found, folder, pdf, pool):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(command, "write", fail)
+    monkeypatch.setattr(report, "write", fail)
     assert undertow("reproduce").code == 4
     assert [path.name for path in tmp_path.iterdir()] == ["reproduction"]
     assert (tmp_path / "reproduction" / "results.json").is_file()

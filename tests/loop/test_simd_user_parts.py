@@ -16,7 +16,7 @@ PARTS = {
     "predictive": {"controller": {"kind": f"{FILE}:predictive"}},
     **{
         by: {"disturbance": {"kind": f"{FILE}:pushed", "by": by}}
-        for by in ("table", "ordered", "spectrum", "chosen", "of_bytes", "by_python", "drawn")
+        for by in ("table", "ordered", "spectrum", "chosen", "of_bytes", "by_python", "drawn", "field")
     },
 }
 
@@ -25,6 +25,7 @@ LEFT = {
     "spectrum": "numbers of type complex128",
     "of_bytes": "numbers of type int8",
     "by_python": "no rule for `pure_callback`",
+    "field": "XLA takes less time by estimate",
 }
 
 
@@ -47,7 +48,8 @@ SLOW = ("network", "table", "ordered", "chosen", "of_bytes", "by_python", "predi
 def test_the_same_figures_and_the_reason_where_it_is_left_to_xla(name):
     with jax.numpy_dtype_promotion("standard"):  # users are not as strict as these tests
         found, wanted = (execute(scenario(name, backend)).dataset for backend in ("simd", "xla"))
-    assert found.attrs.get("left_to_xla") == LEFT.get(name)
+    why = found.attrs.get("left_to_xla")
+    assert why == LEFT.get(name) or (name == "field" and why.startswith(f"{LEFT[name]}: "))
     assert "left_to_xla" not in wanted.attrs
     for signal in ("position", "velocity", "input"):
         here, there = found[signal].values, wanted[signal].values

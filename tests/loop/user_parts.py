@@ -133,6 +133,11 @@ def _of_bytes(t):
     return (jnp.round(3 * jnp.sin(t)).astype(jnp.int8) / jnp.int8(4)).astype(t.dtype)[None]
 
 
+def _field(t):
+    """A field of 1000 harmonics."""
+    return jnp.sin(jnp.arange(1.0, 1001.0) * t).sum()[None] / 100
+
+
 def _by_python(t):
     return jax.pure_callback(lambda t: np.sin(np.asarray(t))[None], jax.ShapeDtypeStruct((1,), t.dtype), t)
 

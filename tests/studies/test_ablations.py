@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import binom
 
 from undertow.analysis.small_signal import gains
+from undertow.campaign.build_trials import build_trial
 from undertow.campaign.campaign_schema import read_campaign
 from undertow.campaign.campaign_summary import median_interval
-from undertow.campaign.task import build_trial
 from undertow.campaign.trials import trials
 from undertow.controllers.presets.paper import paper
 from undertow.controllers.presets.robust import robust

@@ -18,7 +18,6 @@ from undertow.loop.simd_batch import Plan, Run
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.part_cache import structure
-from undertow.scenario.schema import Scenario
 
 _STARTS = ("position", "velocity")
 
@@ -72,6 +71,23 @@ class BatchResult(NamedTuple):
     series: dict[str, np.ndarray]  # (trials, records, ...)
 
 
+class Batch(NamedTuple):
+    """Trials that differ only in numbers."""
+
+    first: Run
+    plan: Plan
+    backend: str
+    precision: str
+    own: list[np.ndarray | None]  # in the order of `leaves`, with a leading axis over trials; None: those of the first
+    trials: int
+
+
+def batch_of(built: Built, asked: Series | None) -> Batch:
+    """One trial and the series that are recorded of it."""
+    run, scenario = run_of(built), built.scenario
+    return Batch(run, planned(built, asked), scenario.loop.backend, scenario.precision, [None] * len(leaves(run)), 1)
+
+
 class _Kind(NamedTuple):
     """Properties that trials of one program share."""
 
@@ -86,8 +102,8 @@ class _Group(NamedTuple):
     """Trials of one kind in a task."""
 
     first: Run
-    members: list[int]  # their indices in the task
-    numbers: list[list[np.ndarray]]  # the numbers that differ between trials
+    members: list[np.ndarray]  # their indices in the task, of each batch
+    numbers: list[list[np.ndarray]]  # the numbers that differ between trials, of each batch
 
 
 class ProgramCache:
@@ -104,25 +120,27 @@ class ProgramCache:
         self._programs: dict[_Kind, Any] = {}
         self._lock = threading.Lock()
 
-    def run(self, built: Iterable[Built], asked: Series | None = None) -> BatchResult:
-        """Run trials in batches of one kind.
+    def run(self, batches: Iterable[Batch], asked: Series | None = None) -> BatchResult:
+        """Run trials, those of one kind together; only the numbers that differ are kept in memory.
 
         Args:
-            built: the trials, sampled loops; only the numbers that differ are kept in memory.
-            asked: series to record.
+            batches: sampled loops; the results are in the order of their trials.
+            asked: series that they record.
         """
         groups: dict[_Kind, _Group] = {}
-        for i, one in enumerate(built):
-            run = run_of(one)
-            numbers = leaves(run)
-            kind = self._kind(run, numbers, planned(one, asked), one.scenario)
-            group = groups.setdefault(kind, _Group(run, [], []))
-            group.members.append(i)
-            pairs = zip(numbers, self._common(kind, len(numbers)), strict=True)
-            # Copies: views would keep JAX's arrays, and those ten times the memory.
-            group.numbers.append([np.array(leaf) for leaf, shared in pairs if shared is None])
+        total = 0
+        for batch in batches:
+            indices, total = np.arange(total, total + batch.trials), total + batch.trials
+            form = structure(batch.first)
+            common = self._commons().get(form)
+            usual = np.zeros(batch.trials, dtype=bool) if common is None else _equal(batch, common)
+            for whether in np.unique(usual):
+                kind, chosen = _Kind(form, batch.plan, bool(whether), batch.backend, batch.precision), usual == whether
+                group = groups.setdefault(kind, _Group(batch.first, [], []))
+                group.members.append(indices[chosen])
+                group.numbers.append(_differing(batch, chosen, self._common(kind, len(batch.own))))
         if not groups:  # no trials: the arrays of one trial, cut to length zero
-            return jax.tree.map(lambda kept: kept[:0], self.run(self._probes()[:1], asked))
+            return jax.tree.map(lambda kept: kept[:0], self.run([batch_of(self._probes()[0], asked)], asked))
         pieces = []
         for kind, group in groups.items():
             with runtime.in_precision(kind.precision):
@@ -131,15 +149,17 @@ class ProgramCache:
         # A law or a plant may have no metric of that name.
         defined = lambda piece, name: piece.metrics.get(name, np.full(len(piece.status), np.nan))
         pieces = [piece._replace(metrics={name: defined(piece, name) for name in names}) for piece in pieces]
-        back = np.argsort([i for group in groups.values() for i in group.members])
+        back = np.argsort(np.concatenate([some for group in groups.values() for some in group.members]))
         return jax.tree.map(lambda *parts: np.concatenate(parts)[back], *pieces)
 
     def _together(self, kind: _Kind, group: _Group) -> BatchResult:
         common = self._common(kind, len(leaves(group.first)))
         with self._lock:
             if kind not in self._programs:
-                self._programs[kind] = _program(group.first, kind, [shared is not None for shared in common])
-        count, own = len(group.members), map(np.stack, zip(*group.numbers, strict=True))
+                constant = [shared is not None for shared in common]
+                self._programs[kind] = _program(group.first, kind, constant, sum(map(len, group.members)))
+        count = sum(map(len, group.members))
+        own = iter([np.concatenate(parts) for parts in zip(*group.numbers, strict=True)])
         repeated = lambda shared: np.broadcast_to(shared, (count, *np.shape(shared)))
         numbers = [next(own) if shared is None else repeated(shared) for shared in common]
         tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
@@ -157,15 +177,6 @@ class ProgramCache:
         found = self._commons().get(kind.structure) if kind.usual else None
         return [None] * count if found is None else found
 
-    def _kind(self, run: Run, numbers: list[Any], plan: Plan, scenario: Scenario) -> _Kind:
-        form = structure(run)
-        common = self._commons().get(form)
-        usual = common is not None and all(
-            shared is None or leaf is shared or np.array_equal(leaf, shared)
-            for leaf, shared in zip(numbers, common, strict=True)
-        )
-        return _Kind(form, plan, usual, scenario.loop.backend, scenario.precision)
-
     def _commons(self) -> dict[Any, list[np.ndarray | None]]:
         """Numbers that all probes of a structure share, by structure; None for numbers that differ."""
         with self._lock:
@@ -174,9 +185,30 @@ class ProgramCache:
             return self._shared
 
 
-def _program(run: Run, kind: _Kind, constant: list[bool]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
+def _equal(batch: Batch, common: list[np.ndarray | None]) -> np.ndarray:
+    """Which trials of a batch have these numbers where they are not None."""
+    same = np.ones(batch.trials, dtype=bool)
+    for shared, own, leaf in zip(common, batch.own, leaves(batch.first), strict=True):
+        if shared is not None and own is not None:
+            same &= (own == shared).reshape(batch.trials, -1).all(1)
+        elif shared is not None and leaf is not shared:
+            same &= np.array_equal(leaf, shared)
+    return same
+
+
+def _differing(batch: Batch, chosen: np.ndarray, common: list[np.ndarray | None]) -> list[np.ndarray]:
+    """Numbers of the chosen trials of a batch that are no constants of their program."""
+    count, found = int(chosen.sum()), []
+    for shared, own, leaf in zip(common, batch.own, leaves(batch.first), strict=True):
+        if shared is None:
+            # Copies: views would keep JAX's arrays, and those ten times the memory.
+            found.append(np.repeat(np.array(leaf)[None], count, axis=0) if own is None else own[chosen])
+    return found
+
+
+def _program(run: Run, kind: _Kind, constant: list[bool], runs: int) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
     if kind.backend == "simd":
         for driver in dict.fromkeys((simd_batch.gpu(), None)):
             with contextlib.suppress(simd_batch.Unsupported):
-                return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver)
+                return simd_batch.BatchRunner(run, kind.plan, constant, driver=driver, runs=runs)
     return vmap_batch.BatchRunner(run, kind.plan)

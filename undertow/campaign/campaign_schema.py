@@ -19,6 +19,9 @@ _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
+# Tasks of a campaign, and trials of the smallest and the largest task, unless `chunk` is given.
+_TASKS, _SMALL, _LARGE = 100, 256, 4096
+
 VARIANT = "variant"  # the axis of `variants`, beside those of `cross`
 
 
@@ -106,7 +109,12 @@ class Campaign(Strict):
     requirements: dict[str, Requirement] = Field(default_factory=dict, description="metric -> bound that it must keep")
     series: Series | None = Field(None, description="signals to record; none by default")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all samples and of the seeds of the trials")
-    chunk: int = Field(256, ge=1, le=100_000, description="trials per task; it does not affect the results")
+    chunk: int | None = Field(
+        None,
+        ge=1,
+        le=100_000,
+        description="trials per task, which does not affect the results; default: a hundredth, from 256 to 4096",
+    )
 
     @field_validator("scenario", mode="before")
     @classmethod
@@ -134,6 +142,11 @@ class Campaign(Strict):
     def keys(self) -> list[str]:
         """Every key path whose value is not that of the scenario in all trials."""
         return [*self.vary, *self.cross, *(key for variant in self.variants.values() for key in variant)]
+
+    @property
+    def trials_per_task(self) -> int:
+        """Trials per task: so many that what is done once per task takes little time, so few that progress is seen."""
+        return self.chunk or min(max(self.number // _TASKS, _SMALL), _LARGE)
 
     @property
     def number(self) -> int:

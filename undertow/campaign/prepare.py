@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.campaign import task as tasks
+from undertow.campaign.build_trials import build_trial
 from undertow.campaign.campaign_schema import Campaign, read_campaign, whole
 from undertow.campaign.requirements import too_few
 from undertow.campaign.task import reasons
@@ -90,7 +91,7 @@ def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Bu
     for row in rows:
         if row in here.probes():
             return row, here.probes()[row]
-    return rows[0], tasks.build_trial(several, here.part_cache, rows[0])
+    return rows[0], build_trial(several, here.part_cache, rows[0])
 
 
 def _check(campaign: Campaign, built: Built, metrics: Mapping[str, Metric]) -> None:

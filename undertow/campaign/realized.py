@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import PRNGKeyArray, PyTree
 
 from undertow.campaign.batch_runner import run_of
-from undertow.campaign.task import build_trial
+from undertow.campaign.build_trials import build_trial
 from undertow.campaign.trials import Trials
 from undertow.core import runtime
 from undertow.core.errors import BadInput

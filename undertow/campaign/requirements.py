@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 import xarray as xr
-from scipy.stats import binomtest
 
 from undertow.campaign.campaign_schema import Campaign, Requirement
 
@@ -16,6 +15,8 @@ def verdict(rows: xr.Dataset, name: str, required: Requirement) -> dict[str, Any
 
     The interval is exact for random samples. Failed trials do not keep the requirement.
     """
+    from scipy.stats import binomtest  # takes long to import, and few campaigns have requirements
+
     kept, count = int((rows[name].values < required.below).sum()), max(1, rows.sizes["trial"])
     interval = binomtest(kept, count).proportion_ci(_CONFIDENCE, method="exact")
     holds = "holds" if interval.low >= required.share else "fails" if interval.high < required.share else "open"

@@ -1,12 +1,12 @@
 """Samples of a campaign: points of the unit cube, their seeds, and the parameter values they stand for."""
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int, UInt32
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from undertow.campaign.campaign_schema import Campaign, Distribution
 from undertow.core.errors import BadInput
@@ -41,15 +41,13 @@ class Samples:
         self._points = functools.lru_cache(_KEPT)(self._make_points)
         self._seeds = functools.lru_cache(_KEPT)(self._make_seeds)
 
-    def point(self, sample: int) -> Float[np.ndarray, " k"]:
-        """Point of a sample, shape (k,), in [0, 1), in the order of `vary`."""
-        block, row = divmod(sample, self._block)
-        return self._points(block)[row]
+    def points(self, samples: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n k"]:
+        """Points of samples, in [0, 1), in the order of `vary`."""
+        return _entries(self._points, self._block, samples)
 
-    def seed(self, sample: int) -> int:
-        """Seed of all random numbers of a sample."""
-        block, row = divmod(sample, _BLOCK)
-        return int(self._seeds(block)[row])
+    def seeds(self, samples: Int[np.ndarray, " n"]) -> UInt32[np.ndarray, " n"]:
+        """Seeds of all random numbers of samples."""
+        return _entries(self._seeds, _BLOCK, samples)
 
     def _make_points(self, block: int) -> Float[np.ndarray, "rows k"]:
         seed, dimensions = self._campaign.seed, len(self._campaign.vary)
@@ -57,6 +55,8 @@ class Samples:
             return np.zeros((self._block, 0))
         if self._campaign.design == "random":
             return np.random.default_rng([seed, _POINTS, block]).random((self._block, dimensions))
+        from scipy.stats import qmc  # takes as long to import as all else here
+
         chance = np.random.default_rng([seed, _POINTS])
         if self._campaign.design == "latin":
             return qmc.LatinHypercube(dimensions, rng=chance).random(self._block)
@@ -69,16 +69,27 @@ class Samples:
         return np.random.default_rng([self._campaign.seed, _SEEDS, block]).integers(0, 2**32, _BLOCK, dtype=np.uint32)
 
 
-def value(spread: Distribution, share: float) -> Any:
-    """Parameter value for a coordinate in [0, 1): the quantile of the distribution."""
+def _entries(made: Callable[[int], np.ndarray], size: int, samples: np.ndarray) -> np.ndarray:
+    """Entries of a sequence that is made in blocks of a size."""
+    blocks, rows = np.divmod(samples, size)
+    whole = made(int(blocks[0]) if len(blocks) else 0)
+    found = np.empty((len(samples), *whole.shape[1:]), dtype=whole.dtype)
+    for block in np.unique(blocks):
+        here = blocks == block
+        found[here] = made(int(block))[rows[here]]
+    return found
+
+
+def quantiles(spread: Distribution, shares: Float[np.ndarray, " n"]) -> list[Any]:
+    """Parameter values for coordinates in [0, 1): the quantiles of the distribution."""
     if spread.uniform is not None:
         low, high = spread.uniform
-        return low + share * (high - low)
+        return (low + shares * (high - low)).tolist()
     if spread.log_uniform is not None:
         low, high = spread.log_uniform
-        return low * (high / low) ** share
+        return [low * (high / low) ** share for share in shares.tolist()]
     if spread.normal is not None:
         mean, deviation = spread.normal
-        return float(mean + deviation * ndtri(np.clip(share, _EDGE, 1 - _EDGE)))
+        return (mean + deviation * ndtri(np.clip(shares, _EDGE, 1 - _EDGE))).tolist()
     choices = spread.choice or []
-    return choices[min(int(share * len(choices)), len(choices) - 1)]
+    return [choices[min(int(share * len(choices)), len(choices) - 1)] for share in shares.tolist()]

@@ -61,9 +61,9 @@ class Layout(NamedTuple):
 
 
 def layout(campaign: Campaign) -> Layout:
-    """Layout of a new store: about `chunk` trials per task, preferably along the samples."""
-    swept = tuple(len(entries) for entries in campaign.axes.values())
-    chunk = [min(campaign.chunk, max(campaign.trials, campaign.chunk // math.prod(swept)))]
+    """Layout of a new store: about so many trials per task as the campaign asks, preferably along the samples."""
+    swept, most = tuple(len(entries) for entries in campaign.axes.values()), campaign.trials_per_task
+    chunk = [min(most, max(campaign.trials, most // math.prod(swept)))]
     for count in reversed(swept):
-        chunk.insert(0, min(count, campaign.chunk // math.prod(chunk)) or 1)
+        chunk.insert(0, min(count, most // math.prod(chunk)) or 1)
     return Layout(swept, campaign.trials, tuple(chunk))

@@ -106,7 +106,8 @@ def load(folder: Path) -> Results:
             if name in group:
                 check_array(group[name], label, (1,) if name == DONE else stored.chunk, path)
         rows = _rows(group, campaign, stored, labels)
-        return Results(campaign, rows.isel(trial=_done(group, campaign, stored, path, labels)), known)
+        done = _done(group, campaign, stored, path, labels)
+        return Results(campaign, rows if done.all() else rows.isel(trial=done), known)
     except (FileNotFoundError, BadInput):
         raise
     except Exception as error:  # zarr raises many kinds of errors for damaged files

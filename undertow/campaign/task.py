@@ -9,16 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.analysis.metrics import gathered_meanings
-from undertow.campaign.batch_runner import ProgramCache
+from undertow.campaign.batch_runner import Batch, ProgramCache
+from undertow.campaign.build_trials import Kind, build_data, build_trial, build_trials, valid_trials
 from undertow.campaign.campaign_schema import read_text
 from undertow.campaign.store_layout import Layout
 from undertow.campaign.trials import Trials, trials, varied_keys
 from undertow.core import runtime
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput
 from undertow.core.metric import Metric
-from undertow.scenario.build import Built, build
+from undertow.scenario.build import Built
 from undertow.scenario.part_cache import PartCache
-from undertow.scenario.reading import Text
 
 # Status of a trial whose scenario cannot be built, in addition to those of `undertow.core.status`.
 INVALID = -1
@@ -33,6 +33,7 @@ class Site(NamedTuple):
     trials: Trials
     part_cache: PartCache
     programs: ProgramCache
+    traceable: dict[Kind, bool]  # see `build_trials`
     probes: Callable[[], dict[int, Built]]  # the valid ones among the first trials of every combination
     alternatives: Callable[[], list[Built]]  # the first trial with each entry of every choice, where valid
 
@@ -49,9 +50,9 @@ def site(text: str, folder: str) -> Site:
     """The campaign of this text in this process; relative paths in it start at the folder."""
     several, part_cache = trials(*read_text(text, Path(folder))), PartCache()
     rows = several.probes()
-    probes = functools.cache(lambda: {rows[place]: built for place, built in _built(several, part_cache, rows)})
+    probes = functools.cache(lambda: {rows[place]: built for place, built in valid_trials(several, part_cache, rows)})
     others = functools.cache(lambda: list(_alternatives(several, part_cache)))
-    return Site(several, part_cache, ProgramCache(lambda: list(probes().values())), probes, others)
+    return Site(several, part_cache, ProgramCache(lambda: list(probes().values())), {}, probes, others)
 
 
 def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
@@ -66,20 +67,21 @@ def run_trials(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndar
 
 
 def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
-    columns = {f"vary:{key}": column for key, column in _columns(here.trials, rows)}
-    columns["trial"] = np.array(rows, dtype=np.uint32)
-    columns["seed"] = np.array([here.trials.seed(row) for row in rows], dtype=np.uint32)
+    trials = np.array(rows, dtype=np.int64)
+    sampled = here.trials.sampled(trials)
+    columns = {f"vary:{key}": column for key, column in _columns(here.trials, sampled)}
+    columns["trial"], columns["seed"] = trials.astype(np.uint32), here.trials.seeds(trials)
     where: list[int] = []
-    criteria: list[dict[str, float]] = []
+    criteria: list[Mapping[str, float]] = []
 
-    def trials_of_task() -> Iterator[Built]:
-        for place, built in _built(here.trials, here.part_cache, rows):
-            where.append(place)
-            judged = built.window()[0] < built.scenario.loop.duration
-            criteria.append(built.resolved["success"] if judged else {})
-            yield built
+    def batches() -> Iterator[Batch]:
+        for found in build_trials(here.trials, here.part_cache, trials, sampled, here.traceable):
+            where.extend(found.places.tolist())
+            judged = found.first.window()[0] < found.first.scenario.loop.duration
+            criteria.extend([found.first.resolved["success"] if judged else {}] * len(found.places))
+            yield found.batch
 
-    result = here.programs.run(trials_of_task(), here.trials.campaign.series)
+    result = here.programs.run(batches(), here.trials.campaign.series)
     scatter = functools.partial(_scatter, len(rows), where)
     columns["status"] = scatter(result.status, INVALID)
     columns["ended"] = scatter(result.ended, np.nan)
@@ -109,38 +111,11 @@ def _success(criteria: Sequence[Mapping[str, float]], metrics: Mapping[str, np.n
     return found
 
 
-def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
-    """One trial, ready to run.
-
-    Raises:
-        BadInput: its scenario cannot be built.
-    """
-    with within(location=several.location, note=f"trial {row}"):
-        return build_data(several, part_cache, several.data(row))
-
-
-def build_data(several: Trials, part_cache: PartCache, data: dict[str, Any]) -> Built:
-    """Build a scenario of the campaign.
-
-    Raises:
-        BadInput: the scenario cannot be built.
-    """
-    return build(Text(data, "", several.scenario.folder, {}), part_cache)
-
-
-def _built(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
-    """Index and trial of each valid row, one at a time: a large task does not keep them all in memory."""
-    for place, row in enumerate(rows):
-        with contextlib.suppress(BadInput):
-            yield place, build_trial(several, part_cache, row)
-
-
-def _columns(several: Trials, rows: Sequence[int]) -> Iterable[tuple[str, np.ndarray]]:
+def _columns(several: Trials, sampled: Mapping[str, list[Any]]) -> Iterable[tuple[str, np.ndarray]]:
     """Sampled values; the index of the choice where they are not numbers."""
-    values = [several.values(row) for row in rows]
     for key, entries in varied_keys(several.campaign):
         pick: Any = float if entries is None else list(entries.values()).index
-        yield key, np.array([pick(one[key]) for one in values], dtype=float)
+        yield key, np.array([pick(value) for value in sampled[key]], dtype=float)
 
 
 def _scatter(count: int, where: list[int], values: np.ndarray, empty: Any) -> np.ndarray:

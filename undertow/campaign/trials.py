@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
+import numpy as np
+from jaxtyping import Int, UInt32
+
 from undertow.campaign.campaign_schema import VARIANT, Campaign
 from undertow.campaign.labels import is_number, words
-from undertow.campaign.sampling import Samples, value
+from undertow.campaign.sampling import Samples, quantiles
 from undertow.core.errors import BadInput, nearest, within
 from undertow.scenario.reading import Text, key_path, read
 from undertow.scenario.schema import Scenario
@@ -33,15 +36,23 @@ class Trials(NamedTuple):
 
     def values(self, trial: int) -> dict[str, Any]:
         """Values that this trial sets in the scenario, by key path."""
-        sample, combination = divmod(trial, len(self.combinations))
-        swept = dict(zip(self.campaign.axes, self.combinations[combination], strict=True))
+        swept = dict(zip(self.campaign.axes, self.combinations[trial % len(self.combinations)], strict=True))
         swept |= swept.pop(VARIANT, {}) if self.campaign.variants else {}
-        sampled = zip(self.campaign.vary.items(), self.samples.point(sample), strict=True)
-        return swept | {key: value(spread, float(share)) for (key, spread), share in sampled}
+        return swept | {key: column[0] for key, column in self.sampled(np.array([trial])).items()}
+
+    def sampled(self, trials: Int[np.ndarray, " n"]) -> dict[str, list[Any]]:
+        """Sampled values of several trials, by key path."""
+        points = self.samples.points(trials // len(self.combinations))
+        spreads = self.campaign.vary.items()
+        return {key: quantiles(spread, shares) for (key, spread), shares in zip(spreads, points.T, strict=True)}
+
+    def seeds(self, trials: Int[np.ndarray, " n"]) -> UInt32[np.ndarray, " n"]:
+        """Seeds of all random numbers of several trials."""
+        return self.samples.seeds(trials // len(self.combinations))
 
     def seed(self, trial: int) -> int:
         """Seed of all random numbers of this trial."""
-        return self.samples.seed(trial // len(self.combinations))
+        return int(self.seeds(np.array([trial]))[0])
 
     def first(self, combination: int) -> list[int]:
         """The trials of a combination that are built before the first run."""

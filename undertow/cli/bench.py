@@ -56,7 +56,7 @@ def bench(as_json: bool, users: bool) -> int:
             compiling += f" (XLA {found[f'{prefix}single_xla_compile_s']:.2g} s)"
         compiling += f", {found[f'{prefix}batch_float64_compile_s']:.2g} s for a batch"
         figures = (
-            f"{found[f'{prefix}operations']} operations per step, "
+            f"{found[f'{prefix}batch_float64_operations']} operations per step, "
             f"rms of all six errors {found[f'{prefix}tracking_rms']:.6f}"
         )
         console.print(f"Compile time: {compiling}; {figures}.", highlight=False)

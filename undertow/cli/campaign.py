@@ -9,12 +9,12 @@ from rich.console import Console
 from rich.table import Table
 
 from undertow.analysis.metrics import for_people
+from undertow.campaign.build_trials import build_trial
 from undertow.campaign.campaign_summary import endings, summary
 from undertow.campaign.executors import check_cluster
 from undertow.campaign.prepare import Prepared, prepare
 from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store_results import Results, load
-from undertow.campaign.task import build_trial
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again

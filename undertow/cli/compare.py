@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from undertow.campaign.build_trials import build_trial
 from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store_results import load
-from undertow.campaign.task import build_trial
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again

@@ -8,8 +8,7 @@ from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
-from undertow.report.reproduction.report import write
-from undertow.reproduction import reproduce as study
+from undertow.reproduction.side_by_side import side_by_side
 
 _WRITTEN = ("report.html", "ablations.html", "results.json", "figures", "runs", "scenarios", "campaigns")
 
@@ -22,11 +21,16 @@ def reproduce(out: Path, quick: bool, pdf: str | None) -> None:
         output_folder(out, out) as folder,
         results_folder(folder, _WRITTEN, "results.json", overwrite=True) as draft,
         shares(console) as progress,
+        side_by_side() as pool,
     ):
-        found = interruptible(lambda: study.reproduce(draft.path, quick, progress))
+        # Imported while the other processes import the same.
+        from undertow.report.reproduction.report import write
+        from undertow.reproduction.reproduce import reproduce as run
+
+        found = interruptible(lambda: run(draft.path, quick, progress, pool))
         progress("figures and report", 0.9)
         draft.publish()  # before the figures, which may fail
-        page = interruptible(lambda: write(found, draft.path, pdf))
+        page = interruptible(lambda: write(found, draft.path, pdf, pool))
     for claim in json.loads((out / "results.json").read_text(encoding="utf-8"))["claims"]:
         line = f"{claim['id']:<4}{claim['verdict']}: {claim['claim']}"
         console.print(line, markup=False, highlight=False, soft_wrap=True)

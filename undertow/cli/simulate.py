@@ -84,8 +84,7 @@ def _print_results(executed: Executed, folder: Path, console: Console) -> None:
     """Print metrics, certificate and how the run ended."""
     if "left_to_xla" in executed.dataset.attrs:
         why = executed.dataset.attrs["left_to_xla"]
-        slower = "the run used backend xla, which is slower than simd (docs/explanation/simd.md)"
-        typer.echo(f"Advice: {slower}: {why}.", err=True)
+        typer.echo(f"Advice: the run used backend xla instead of simd (docs/explanation/simd.md): {why}.", err=True)
     known, window = metrics_of(executed.dataset), executed.built.window()
     certificate = certificate_of(executed.dataset)
     console.print(terminal_table(metrics_rows(executed.steady, executed.whole, window, known)))

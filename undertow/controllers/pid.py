@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
@@ -65,7 +64,7 @@ class PID(AbstractInformedController):
         for name in ("proportional", "integral", "derivative"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
         most = self.proportional * self.derivative
-        if not isinstance(most, Tracer) and np.any(np.asarray(self.integral >= most)):
+        if not checks.assumed(lambda gain, most: (gain < most).all(), self.integral, most):
             worst = np.asarray(self.integral / most).max()
             raise BadInput("integral", "be less than proportional times derivative", f"{worst:g} times that")
 
@@ -180,7 +179,7 @@ def pid(
         proportional, integral, derivative = jnp.moveaxis(jnp.asarray(gains, dtype=float), -1, 0)
     if reference_frequency is None:
         reference_frequency = jnp.minimum(jnp.sqrt(proportional) / 2, 2.0)
-    unfiltered = not isinstance(reference_frequency, Tracer) and not np.any(np.asarray(reference_frequency))
+    unfiltered = not checks.assumed(lambda frequency: (frequency != 0).any(), reference_frequency)
     return PID(
         model=model,
         filter=None if unfiltered else ReferenceFilter(reference_frequency),

@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from undertow.core.runtime import double_outside_runs
 
@@ -41,6 +42,8 @@ def in_present_precision(tree: Any) -> Any:
         if not isinstance(leaf, jax.Array) or not jnp.issubdtype(leaf.dtype, jnp.floating):
             return leaf
         present = jax.dtypes.canonicalize_dtype(float)
-        return leaf if leaf.dtype == present else as_array(np.asarray(leaf))
+        if leaf.dtype == present:
+            return leaf
+        return leaf.astype(present) if isinstance(leaf, Tracer) else as_array(np.asarray(leaf))
 
     return jax.tree.map(converted, tree)

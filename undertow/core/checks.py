@@ -1,26 +1,99 @@
-"""Checks of parameter values at construction. Traced values pass: their numbers were checked before tracing."""
+"""Checks of parameter values at construction.
 
-from typing import Any
+Traced values pass, because their numbers were checked before tracing. Where they were not, as when a campaign traces
+how the numbers of its trials follow from the varied values, the checks are recorded as conditions on traced values.
+"""
 
+import contextlib
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jax.extend.core import get_opaque_trace_state
 
 from undertow.core.errors import BadInput
 
 
+class _Record(NamedTuple):
+    """Conditions on the values of one trace."""
+
+    conditions: list[Any]
+    trace: Any  # JAX's state: functions that are traced within have another, and their values were checked outside
+
+
+_record: ContextVar[_Record | None] = ContextVar("undertow_conditions", default=None)
+
+# Share of the largest eigenvalue by which a recorded matrix has to be definite: LAPACK decides within rounding.
+_CLEARLY = 1e-9
+
+
+class Unknown(Exception):
+    """A constructor needs the number of a traced value."""
+
+
+@contextlib.contextmanager
+def recorded_conditions() -> Iterator[list[Any]]:
+    """Inside, every check of a traced value becomes a condition in this list: a traced boolean."""
+    found = _Record([], get_opaque_trace_state())
+    outside = _record.set(found)
+    try:
+        yield found.conditions
+    finally:
+        _record.reset(outside)
+
+
+def _recorded() -> list[Any] | None:
+    """The list of conditions on values of the present trace; None where none are recorded."""
+    record = _record.get()
+    return record.conditions if record is not None and record.trace == get_opaque_trace_state() else None
+
+
+def traced(*values: Any) -> bool:
+    """Whether some of the values, or of the entries of lists, are traced."""
+    return any(traced(*one) if isinstance(one, list | tuple) else isinstance(one, Tracer) for one in values)
+
+
+def known(*values: Any) -> bool:
+    """Whether a constructor may look at the numbers of values: not while they are traced.
+
+    Raises:
+        Unknown: conditions are recorded, and what the constructor would find out cannot be.
+    """
+    if traced(*values) and _recorded() is not None:
+        raise Unknown
+    return not traced(*values)
+
+
+def assumed(condition: Callable[..., Any], *values: Any) -> bool:
+    """Whether a condition holds of values; one on traced values is taken to hold, and recorded.
+
+    Args:
+        condition: gives one boolean for arrays, of NumPy or traced.
+        values: numbers or arrays.
+    """
+    if not traced(*values):
+        return bool(condition(*map(np.asarray, values)))
+    if (found := _recorded()) is not None:
+        found.append(condition(*map(jnp.asarray, values)))
+    return True
+
+
 def positive(name: str, value: Any, unit: str = "", finite: bool = True) -> None:
     """Check that every entry is > 0, and finite unless `finite` is False."""
-    _each(name, value, lambda x: (x > 0) & (np.isfinite(x) | (not finite)), "be positive", unit)
+    _each(name, value, lambda x: (x > 0) & ((abs(x) < np.inf) | (not finite)), "be positive", unit)
 
 
 def not_negative(name: str, value: Any, unit: str = "", finite: bool = True) -> None:
     """Check that every entry is >= 0, and finite unless `finite` is False."""
-    _each(name, value, lambda x: (x >= 0) & (np.isfinite(x) | (not finite)), "be zero or positive", unit)
+    _each(name, value, lambda x: (x >= 0) & ((abs(x) < np.inf) | (not finite)), "be zero or positive", unit)
 
 
 def finite(name: str, value: Any, unit: str = "") -> None:
     """Check that every entry is finite."""
-    _each(name, value, np.isfinite, "be a finite number", unit)
+    _each(name, value, lambda x: abs(x) < np.inf, "be a finite number", unit)
 
 
 def length(name: str, value: Any, expected: int, what: str) -> None:
@@ -47,9 +120,10 @@ def choice(name: str, value: Any, allowed: tuple[str, ...]) -> None:
 
 def hurwitz(name: str, feedback: Any) -> None:
     """Check that gains (k1, k2), one pair or one per axis, make s^2 + k2 s + k1 stable."""
-    if isinstance(feedback, Tracer):
-        return
     finite(name, feedback)
+    if traced(feedback):
+        assumed(lambda gains: (gains > 0).all(), feedback)
+        return
     for k1, k2 in np.asarray(feedback).reshape(-1, 2):
         if not (k1 > 0 and k2 > 0):
             raise BadInput(
@@ -71,9 +145,10 @@ def positive_definite(name: str, matrix: Any, unit: str = "", whole: str = "", h
         hint: remedy where an eigenvalue is not positive.
     """
     shape = np.shape(matrix)
-    if isinstance(matrix, Tracer):
-        return
     finite(name, matrix, unit)
+    if traced(matrix):
+        assumed(_clearly_definite, matrix)
+        return
     for block in np.asarray(matrix).reshape(-1, *shape[-2:]):
         skew = np.abs(block - block.T).max()
         if skew > 1e-9 * np.abs(block).max():
@@ -86,8 +161,16 @@ def positive_definite(name: str, matrix: Any, unit: str = "", whole: str = "", h
             raise BadInput(name, "be positive definite", f"a matrix with smallest eigenvalue {smallest:.3g}", hint=hint)
 
 
-def _each(name: str, value: Any, good: Any, must: str, unit: str) -> None:
-    if isinstance(value, Tracer):
+def _clearly_definite(matrices: Any) -> Any:
+    """Whether traced matrices are symmetric and positive definite, rounding errors aside."""
+    largest = abs(matrices).max((-2, -1))
+    even = abs(matrices - jnp.swapaxes(matrices, -2, -1)).max((-2, -1)) <= _CLEARLY / 2 * largest
+    return (even & (jnp.linalg.eigvalsh(matrices).min(-1) > _CLEARLY * largest)).all()
+
+
+def _each(name: str, value: Any, good: Callable[[Any], Any], must: str, unit: str) -> None:
+    if traced(value):
+        assumed(lambda numbers: good(numbers).all(), value)
         return
     array = np.asarray(value)
     bad = ~good(array)

@@ -3,7 +3,6 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from undertow.core import checks
@@ -32,7 +31,7 @@ class ParameterError(AbstractDisturbance):
             span = getattr(self, name)
             checks.length(name, span, 2, "lowest, highest")
             checks.not_negative(name, span)
-            if not isinstance(span, Tracer) and np.asarray(span)[0] > np.asarray(span)[1]:
+            if not checks.assumed(lambda span: span[0] <= span[1], span):
                 raise BadInput(name, "be (lowest, highest)", np.asarray(span).tolist())
         checks.positive("mass", self.mass)
 

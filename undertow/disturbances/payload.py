@@ -2,7 +2,6 @@
 
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from undertow.core import checks, contracts
@@ -10,6 +9,8 @@ from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 from undertow.disturbances.adding import with_payload
+
+_LARGEST_GRAVITY = 9.84  # m/s^2, at the poles, rounded up
 
 
 class PickedUp(AbstractDisturbance):
@@ -32,13 +33,11 @@ class PickedUp(AbstractDisturbance):
         checks.finite("weight", self.weight, "N")
         checks.length("point", self.point, 3, "forward, starboard, down")
         checks.finite("point", self.point, "m")
-        if not any(isinstance(value, Tracer) for value in (self.mass, self.weight, self.start, self.stop)):
-            heaviest = 9.84 * float(self.mass)
-            if float(self.weight) > heaviest:
-                got = f"{float(self.weight):g} N in water for {float(self.mass):g} kg"
-                raise BadInput("weight", f"be at most its weight in air ({heaviest:.3g} N)", got)
-            if not float(self.start) < float(self.stop):
-                raise BadInput("stop", f"be later than start ({float(self.start):g} s)", f"{float(self.stop):g} s")
+        if not checks.assumed(lambda weight, mass: weight <= _LARGEST_GRAVITY * mass, self.weight, self.mass):
+            got = f"{float(self.weight):g} N in water for {float(self.mass):g} kg"
+            raise BadInput("weight", f"be at most its weight in air ({_LARGEST_GRAVITY * float(self.mass):.3g} N)", got)
+        if not checks.assumed(lambda start, stop: start < stop, self.start, self.stop):
+            raise BadInput("stop", f"be later than start ({float(self.start):g} s)", f"{float(self.stop):g} s")
 
     def realize(self, key) -> tuple[()]:
         return ()

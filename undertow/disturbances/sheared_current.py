@@ -3,7 +3,6 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from undertow.core import checks
@@ -34,7 +33,7 @@ class ShearedCurrent(AbstractSmoothDisturbance):
             raise BadInput("velocities", f"have {shape[0]} rows (north, east), one per depth", got)
         checks.finite("depths", self.depths, "m")
         checks.finite("velocities", self.velocities, "m/s")
-        if not isinstance(self.depths, Tracer) and not (np.diff(np.asarray(self.depths)) > 0).all():
+        if not checks.assumed(lambda depths: (depths[1:] > depths[:-1]).all(), self.depths):
             raise BadInput("depths", "increase", np.asarray(self.depths).tolist())
 
     def at(self, realization, t, pose, load: Load) -> Load:

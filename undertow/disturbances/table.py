@@ -3,7 +3,6 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from undertow.core import checks
@@ -27,7 +26,7 @@ class Table(AbstractSmoothDisturbance):
         if len(shape) != 2 or shape[0] < 2 or shape[1] < 2:
             raise BadInput("samples", "have two or more rows (t, d1, d2, ...)", f"of shape {shape}")
         checks.finite("samples", self.samples)
-        if not isinstance(self.samples, Tracer):
+        if checks.known(self.samples):
             steps = np.diff(np.asarray(self.samples)[:, 0])
             if not (steps > 0).all():
                 raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")

@@ -1,7 +1,8 @@
 """The continuous loop: plant and law as one ODE, as in the paper."""
 
 import math
-from typing import Any, cast
+from functools import partial
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 import jax
@@ -10,7 +11,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
-from undertow.core.contracts import AbstractContinuousController
+from undertow.core.contracts import AbstractContinuousController, Outputs
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Realization
@@ -79,11 +80,7 @@ def simulate(
         BadInput: duration, record_step or dt not positive, or as `check`.
     """
     check(loop)
-    loop = loop.starting_at(position)
-    # As many records as fit; the rounding error of dividing whole multiples does not count.
-    records = math.floor(duration / record_step * (1 + 1e-9)) if 0 < duration < math.inf and record_step > 0 else 0
-    if records < 1:
-        raise BadInput("duration", f"be at least one record ({record_step:g} s)", f"{duration:g} s")
+    loop, records = loop.starting_at(position), records_of(duration, record_step)
     key = jax.random.PRNGKey(0) if key is None else key
     start = loop.outputs_at_start(position, velocity)
     if tolerances is not None:
@@ -91,12 +88,35 @@ def simulate(
         until = jnp.maximum(times[-1], duration)
         jumps = jnp.asarray([0.0, *loop.disturbance.jumps(duration)])
         return solve(loop, key, start, times, until, jumps, *tolerances)
+    grid = grid_of(duration, record_step, dt)
+    outcome = _run(loop, key, start, jnp.asarray(grid.dt, dtype=float), (grid.steps, grid.every))
+    return explained(loop, key, outcome, grid.dt)
+
+
+class Grid(NamedTuple):
+    """Fixed steps of a run: how many, how many from record to record, and how long (s)."""
+
+    steps: int
+    every: int
+    dt: float
+
+
+def records_of(duration: float, record_step: float) -> int:
+    """Number of records after the first one; for arguments and errors see `simulate`."""
+    # As many as fit; the rounding error of dividing whole multiples does not count.
+    records = math.floor(duration / record_step * (1 + 1e-9)) if 0 < duration < math.inf and record_step > 0 else 0
+    if records < 1:
+        raise BadInput("duration", f"be at least one record ({record_step:g} s)", f"{duration:g} s")
+    return records
+
+
+def grid_of(duration: float, record_step: float, dt: float) -> Grid:
+    """Fixed steps that divide the time between records; for arguments and errors see `simulate`."""
     if not 0 < dt <= record_step * (1 + 1e-9):
         raise BadInput("dt", f"be positive and at most one record ({record_step:g} s)", f"{dt:g} s")
     every = round(record_step / dt)
     dt = record_step / every
-    outcome = _run(loop, key, start, jnp.asarray(dt, dtype=float), (round(duration / dt), every))
-    return outcome if int(outcome.status) == int(Status.OK) else _explained(loop, key, outcome, outcome.ended - dt, dt)
+    return Grid(round(duration / dt), every, dt)
 
 
 def check(loop: ClosedLoop) -> None:
@@ -116,26 +136,39 @@ def check(loop: ClosedLoop) -> None:
 @eqx.filter_jit
 def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, int]) -> Outcome:
     steps, every = plan
-    realization, controller = loop.realize(key), cast(AbstractContinuousController, loop.controller)
-
-    def control_step(carry, k):
-        state, ending = carry
-        t = instant(k, dt)
-        x, z = rk4_compact(lambda s, state: flow(s, state, realization), t, state, dt)
-        return freeze_on_failure(loop, state, (x, controller.project(z)), ending, t, dt)
-
-    (final, ending), (time, samples) = record(
-        realization, control_step, (realization.start(*start), going()), dt, steps, every
-    )
+    realization = loop.realize(key)
+    one = partial(step, realization, dt)
+    (final, _, ending), (time, samples) = record(realization, one, begin(realization, start), dt, steps, every)
     return Outcome(time, samples, (), final, *ending.until(instant(steps, dt)))
 
 
-@eqx.filter_jit
-def _explained(loop: ClosedLoop, key, outcome: Outcome, t: Float[Array, ""], dt: Any) -> Outcome:
-    """A failed run with its cause: a step of dt (s) that began at t. Few runs have to wait until this is compiled."""
+def begin(realization: Realization, start: tuple[Outputs, Outputs]) -> PyTree:
+    """Carry before the first fixed step, of the form of `sampled.begin`: nothing is accumulated."""
+    return realization.start(*start), (), going()
+
+
+def step(realization: Realization, dt: Any, carry, k):
+    """A fixed step of plant and controller together."""
+    state, nothing, ending = carry
+    t, controller = instant(k, dt), cast(AbstractContinuousController, realization.loop.controller)
+    x, z = rk4_compact(lambda s, state: flow(s, state, realization), t, state, dt)
+    state, ending = freeze_on_failure(realization.loop, state, (x, controller.project(z)), ending, t, dt)
+    return state, nothing, ending
+
+
+def explained(loop: ClosedLoop, key: PRNGKeyArray, outcome: Outcome, dt: float) -> Outcome:
+    """A run of fixed steps of dt (s); one that failed with its cause, for which alone that program is compiled."""
+    if int(outcome.status) == int(Status.OK):
+        return outcome
     ending = Ending(outcome.status, outcome.ended, outcome.input)
-    ending = blamed(ending, loop.realize(key), t, outcome.final, dt)
-    return outcome._replace(status=ending.status, ended=ending.time, input=ending.input)
+    status, ended, wrong = _cause(loop, key, ending, outcome.final, jnp.asarray(outcome.ended) - dt, dt)
+    return outcome._replace(status=status, ended=ended, input=wrong)
+
+
+@eqx.filter_jit
+def _cause(loop: ClosedLoop, key, ending: Ending, last: PyTree, t: Float[Array, ""], dt: Any) -> Ending:
+    """The ending of a failed run with its cause: a step of dt (s) from the last valid state, which began at t."""
+    return blamed(ending, loop.realize(key), t, last, dt)
 
 
 _MAX_STEPS = 2**20

@@ -1,12 +1,14 @@
-"""The sampled loop as SIMD batches: many runs of one kind at once, by the batch compiler.
+"""Both loops as SIMD batches: many runs of one kind at once, by the batch compiler.
 
-Results equal those of `sampled.simulate` to rounding; their bits depend neither on the machine nor on the other runs.
+Results equal those of `sampled.simulate`, or of `continuous.simulate` with fixed steps, to rounding; their bits depend
+neither on the machine nor on the other runs.
 
 This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
 `unavailable` says why. What is unsupported runs by XLA: scenario/execute.py falls back for a run,
 campaign/batch_runner.py for a campaign.
 """
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,11 +20,11 @@ from jaxtyping import Float, PRNGKeyArray
 
 from undertow.core.contracts import Outputs
 from undertow.core.status import Status
-from undertow.loop import sampled
+from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.loop.recording import instant
-from undertow.numerics.integrators import METHODS
+from undertow.numerics.integrators import COMPACT_METHODS, METHODS
 from undertow.process_setup import cache_folder
 
 if TYPE_CHECKING:
@@ -65,6 +67,14 @@ def simd_width(bits: int) -> int:
     return simdjit.simd_width(bits)
 
 
+# Steps of all runs together for which a program must be worth its compile time, say 100 runs of 10 000 steps. The
+# number is the same for a campaign and for a trial that is repeated alone, so that both have the same bits.
+_PLANNED = 1_000_000
+
+# Steps of all runs together from which on a longer program pays: it takes 0.1 to 0.3 s more to compile.
+_FEW = 2_000_000
+
+
 def kept_step(function: Callable, numbers: Any, state: Any, inputs: Any) -> Any:
     """`simdjit.Step`: one step of one run, called by somebody else's clock.
 
@@ -96,14 +106,17 @@ class Plan(NamedTuple):
         every: steps per record; 0 for none.
         signals: names of those that are recorded.
         method, substeps: integration of the plant within one control step.
+        continuous: whether plant and controller are integrated together, with `steps` of the classical Runge-Kutta
+            method; nothing is accumulated.
     """
 
     steps: int
     dt: float
     every: int
     signals: tuple[str, ...]
-    method: str
-    substeps: int
+    method: str = "rk4"
+    substeps: int = 1
+    continuous: bool = False
 
     def times(self) -> Float[np.ndarray, " records"]:
         """Times of the records, s."""
@@ -119,20 +132,33 @@ class BatchRunner:
         constant: which arrays of `run` are equal in all runs, in the order of its leaves; they shorten the program.
         width: runs at once; as many as fit a register unless given.
         driver: that of the GPU; None for this processor.
+        runs: how many it is compiled for, where that is known: few steps are worth a shorter program. Any number can
+            be run, with the same bits.
 
     Raises:
-        Unsupported: a part uses an operation that the batch compiler lacks, or there is no batch compiler.
+        Unsupported: a part uses an operation that the batch compiler lacks, XLA would take less time by estimate, or
+            there is no batch compiler.
         OSError: the driver of the GPU fails.
     """
 
-    def __init__(self, run: Run, plan: Plan, constant: list[bool], width: int = 0, driver: "Driver | None" = None):
+    def __init__(
+        self,
+        run: Run,
+        plan: Plan,
+        constant: list[bool],
+        width: int = 0,
+        driver: "Driver | None" = None,
+        runs: float = math.inf,
+    ):
         if unavailable():
             raise Unsupported(unavailable())
         from simdjit import Loop
 
         numbers, rest = eqx.partition(run, eqx.is_array)
         self._plan = plan
-        integrate, dt = METHODS[plan.method], plan.dt
+        # With its stages in a loop a program compiles in nine tenths of the time, and takes up to half as long again.
+        compact = driver is None and (1 if width == 1 else runs) * plan.steps < _FEW
+        integrate, dt = (COMPACT_METHODS if compact else METHODS)[plan.method], plan.dt
 
         def realize(numbers):
             loop, accumulators, at, key = eqx.combine(numbers, rest)
@@ -140,10 +166,14 @@ class BatchRunner:
 
         def start(known):
             realization, accumulators, at = known
+            if plan.continuous:
+                return continuous.begin(realization, at)
             return sampled.begin(realization, at, accumulators)
 
         def control_step(known, carry, k):
             realization, accumulators, _ = known
+            if plan.continuous:
+                return continuous.step(realization, jnp.asarray(dt), carry, k)
             return sampled.control_step(realization, accumulators, jnp.asarray(dt), integrate, plan.substeps, carry, k)
 
         def record(known, carry, k):
@@ -152,11 +182,14 @@ class BatchRunner:
             return t, {name: signals[name] for name in plan.signals}
 
         cache = cache_folder() / "native"
-        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache)
+        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache, _PLANNED)
 
     @property
     def operations(self) -> int:
-        """Arithmetic operations of one step of one run: law, integration of the plant, accumulators."""
+        """Arithmetic operations of one step of one run: law, integration of the plant, accumulators.
+
+        Stages of integration that are a loop are counted once.
+        """
         return self._program.operations
 
     def run(self, numbers: Any, steps: int | None = None) -> Outcome:
@@ -194,11 +227,42 @@ def simulate(
     steps, loop = sampled.steps_of(duration, dt, record_every), loop.starting_at(position)
     start = loop.outputs_at_start(position, velocity)
     run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
+    return _alone(run, Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps))
+
+
+def integrate(
+    loop: ClosedLoop,
+    *,
+    duration: float,
+    record_step: float = 1e-2,
+    key: PRNGKeyArray | None = None,
+    position: Any = None,
+    velocity: Any = None,
+    dt: float = 1e-3,
+) -> Outcome:
+    """One run of plant and law as one ODE; arguments, result and errors of `continuous.simulate` with fixed steps.
+
+    Raises:
+        Unsupported: as of `simulate`.
+    """
+    continuous.check(loop)
+    loop, _ = loop.starting_at(position), continuous.records_of(duration, record_step)
+    steps, every, dt = continuous.grid_of(duration, record_step, dt)
+    start = loop.outputs_at_start(position, velocity)
+    run = Run(loop, (), start, jax.random.PRNGKey(0) if key is None else key)
+    outcome = _alone(run, Plan(steps, dt, every, tuple(loop.signals()), continuous=True))
+    return continuous.explained(loop, run.key, outcome, dt)
+
+
+def _alone(run: Run, plan: Plan) -> Outcome:
     arrays = eqx.filter(run, eqx.is_array)
-    plan = Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps)
     batch = BatchRunner(run, plan, [_decides(leaf) for leaf in jax.tree.leaves(arrays)], width=1)
-    outcome = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
-    return jax.tree.map(lambda leaf: leaf[0] if isinstance(leaf, np.ndarray) else leaf, outcome)
+    return outcome_of(batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays)), 0)
+
+
+def outcome_of(several: Outcome, run: int) -> Outcome:
+    """The outcome of one run of a batch."""
+    return jax.tree.map(lambda leaf: leaf[run] if isinstance(leaf, np.ndarray) else leaf, several)
 
 
 def _decides(leaf: Any) -> bool:

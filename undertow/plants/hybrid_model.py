@@ -11,7 +11,7 @@ from undertow.core.contracts import AbstractCoordinates, AbstractDynamics, Measu
 from undertow.core.coordinates import AbstractOutputCoordinates
 from undertow.core.measurement import BODY_AXES, body_of, measurement_of_outputs
 from undertow.core.status import Status
-from undertow.numerics.linear_algebra import matvec, partial_inverse, pseudo_inverse, regularised_sharp
+from undertow.numerics.linear_algebra import matvec, partial_inverse, printed_inverse, regularised_sharp
 from undertow.numerics.rotations import Kinematics, attitude_error, cross, rotation_from_quaternion, turning_from_euler
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.body import Body
@@ -89,6 +89,7 @@ class HybridDynamics(AbstractDynamics):
     thruster_matrix: Float[Array, "6 N"]
     body_gain: Float[Array, "6 N"]  # M^-1 B alpha
     allocation: Float[Array, "N 6"]  # (B alpha)+
+    wrenches: Float[Array, "6 r"] | None  # orthonormal basis of those that the thrusters can give; None for all
     regularisation: float | None
     rank: int = eqx.field(static=True)
     speed_sensor: bool = eqx.field(static=True)
@@ -114,14 +115,17 @@ class HybridDynamics(AbstractDynamics):
         """V = G# acceleration, Eq. (23).
 
         At rank 6 the inverse has a closed form, G+ = (B alpha)+ M J^-1 with a constant first factor, so that the loop
-        factorises nothing. Below rank 6 it is the Moore-Penrose inverse, and with a regularisation Eq. (27).
+        factorises nothing. Below rank 6 it is the Moore-Penrose inverse of G = H U^T B alpha, which is (B alpha)+ U H+:
+        U is a basis of the wrenches that the thrusters can give, and H = J M^-1 U their accelerations, of full column
+        rank. With a regularisation it is Eq. (27).
         """
         if self.regularisation is not None:
             return matvec(regularised_sharp(self.gain(y), self.regularisation), acceleration)
-        if self.rank < 6:
-            return matvec(pseudo_inverse(self.gain(y)), acceleration)
-        wrench = matvec(self.body.mass_matrix, Kinematics(body_of(y).rotation).to_body(acceleration))
-        return matvec(self.allocation, wrench)
+        kinematics = Kinematics(body_of(y).rotation)
+        if self.wrenches is None:
+            return matvec(self.allocation, matvec(self.body.mass_matrix, kinematics.to_body(acceleration)))
+        effect = jax.vmap(kinematics.to_world, in_axes=1, out_axes=1)(self.body.inverse_mass_matrix @ self.wrenches)
+        return matvec(self.allocation, matvec(self.wrenches, matvec(printed_inverse(effect), acceleration)))
 
 
 class EulerCoordinates(AbstractOutputCoordinates):

@@ -6,9 +6,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.power import ledger as diagnostics
@@ -49,7 +49,8 @@ class HybridPower(eqx.Module):
             if part is not None and thruster.input_unit != "V":
                 hint = "A battery and speed controllers need thrusters commanded in volts, such as t200"
                 raise BadInput(name, f"be left out with a thruster commanded in {thruster.input_unit}", hint=hint)
-        if self.esc is not None and self.battery is None and not _finite(thruster.supply):
+        finite = lambda volts: (abs(volts) < np.inf).all()
+        if self.esc is not None and self.battery is None and not checks.assumed(finite, thruster.supply):
             hint = "Give the thruster a supply, or the vehicle a battery"
             raise BadInput("esc", "have a finite bus voltage", "on an infinite supply", hint=hint)
         if self.ledger and not has_motor(thruster):
@@ -130,7 +131,3 @@ class HybridPower(eqx.Module):
 def has_motor(thruster: AbstractThruster) -> bool:
     """Whether the thruster models its motor, so that a ledger can be kept; traced, not computed."""
     return jax.eval_shape(thruster.powers, thruster.initial_state(1), jnp.zeros(1)) is not None
-
-
-def _finite(value: Any) -> bool:
-    return isinstance(value, Tracer) or bool(np.isfinite(np.asarray(value)).all())

@@ -194,12 +194,21 @@ class HybridVehicle(AbstractPlant):
             thruster_matrix=known.thruster_matrix,
             body_gain=gain,
             allocation=allocation,
+            wrenches=_possible_wrenches(known.thruster_matrix, known.rank()),
             rank=known.rank(),
             regularisation=regularisation,
             speed_sensor=speed_sensor,
             rate_term=rate_term,
         )
         return Model(dynamics, EulerCoordinates(), DirectActuator())
+
+
+def _possible_wrenches(thruster_matrix, rank: int):
+    """Orthonormal basis of the wrenches that thrusters can give; None where they can give any."""
+    if rank == len(BODY_AXES):
+        return None
+    svd = jnp.linalg.svd if isinstance(thruster_matrix, Tracer) else np.linalg.svd
+    return jnp.asarray(svd(thruster_matrix)[0][:, :rank])
 
 
 @jax.jit

@@ -5,8 +5,6 @@ from collections.abc import Callable
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -39,8 +37,7 @@ class Battery(eqx.Module):
         for name in ("full_voltage", "empty_voltage", "capacity"):
             checks.positive(name, getattr(self, name))
         checks.not_negative("resistance", self.resistance, "ohm")
-        traced = any(isinstance(voltage, Tracer) for voltage in (self.full_voltage, self.empty_voltage))
-        if not traced and (np.asarray(self.full_voltage) < np.asarray(self.empty_voltage)).any():
+        if not checks.assumed(lambda empty, full: (empty <= full).all(), self.empty_voltage, self.full_voltage):
             must = f"be at most the full voltage ({float(self.full_voltage):g} V)"
             raise BadInput("empty_voltage", must, f"{float(self.empty_voltage):g} V")
 

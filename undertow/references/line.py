@@ -2,8 +2,6 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from undertow.core import checks
@@ -36,12 +34,11 @@ class Line(AbstractReference):
         checks.positive("speed", self.speed, "m/s")
         checks.positive("ramp", self.ramp, "s")
         checks.choice("heading", self.heading, ("fixed", "along"))
-        if not isinstance(self.goal - self.start, Tracer):
-            way = np.asarray(self.goal - self.start)
-            if not way.any():
-                raise BadInput("goal", "differ from `start`", "the same")
-            if self.heading == "along" and not way[:2].any():
-                raise BadInput("heading", "be fixed when the line is vertical", "along")
+        way = self.goal - self.start
+        if not checks.assumed(lambda way: (way != 0).any(), way):
+            raise BadInput("goal", "differ from `start`", "the same")
+        if self.heading == "along" and not checks.assumed(lambda way: (way[:2] != 0).any(), way):
+            raise BadInput("heading", "be fixed when the line is vertical", "along")
 
     def at(self, t) -> Target:
         way = self.goal - self.start

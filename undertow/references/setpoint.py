@@ -2,7 +2,6 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -85,6 +84,6 @@ def setpoint(position, settling: Number = 0.0, start=None) -> Setpoint:
             step ignores it.
     """
     # Without a transition the goal is a constant of the compiled loop.
-    if not isinstance(settling, Tracer) and settling == 0:
+    if not checks.assumed(lambda time: time != 0, settling):
         return Setpoint(position)
     return Setpoint(position, Transition(settling, start))

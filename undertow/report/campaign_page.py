@@ -13,7 +13,7 @@ from undertow.campaign.columns import ENDINGS
 from undertow.campaign.labels import words
 from undertow.campaign.store_results import Results
 from undertow.core.status import Status
-from undertow.report.figures.campaign import distributions_figure, sensitivity_figure, shown_inputs
+from undertow.report.figures.campaign import SHOWN, distributions_figure, sensitivity_figure, shown_inputs
 from undertow.report.figures.writing import Plots, Saved, save_all
 from undertow.report.formats import chip, ending, number, prose, quantity, unit
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
@@ -24,10 +24,10 @@ _CAPTIONS = {
     "distributions": "Empirical cumulative distribution functions, with one step per trial. A curve that ends below 1 "
     "has failed trials. Smaller values are better. Metrics are computed over the steady window: the second half of a "
     "run, unless `steady` of the scenario says otherwise.",
-    "sensitivity": "Spearman's rank correlation over the completed trials, mean over the combinations: +1 where a "
-    "metric increases with an input, -1 where it decreases, 0 where they are unrelated. Above the line are the keys of "
-    "`vary`, below it scalars that the seed of a trial determines: offsets of sensors, factors of a parameter error "
-    "and the like, those with the largest correlation first.",
+    "sensitivity": "Spearman's rank correlation over the completed trials, the first 100 000 at most, mean over the "
+    "combinations: +1 where a metric increases with an input, -1 where it decreases, 0 where they are unrelated. Above "
+    "the line are the keys of `vary`, below it scalars that the seed of a trial determines: sensors' offsets, factors "
+    "of a parameter error and the like, those with the largest correlation first.",
 }
 _REPLAY = "The worst of the trials of the table above, in one scene."
 _INTERVALS = (
@@ -133,13 +133,13 @@ def _figures(saved: Saved) -> dict[str, Html]:
 
 
 def _values(results: Results, found: Mapping[str, Any]) -> dict[str, dict[str, np.ndarray]]:
-    """Finite values of each metric by combination; angles in degrees."""
+    """Finite values of each metric that is plotted, by combination; angles in degrees."""
     values: dict[str, dict[str, np.ndarray]] = {}
     numbers = np.unique(results.combinations)
     for combination, one in zip(numbers, found["combinations"], strict=True):
-        rows = results.rows.isel(trial=results.combinations == combination)
-        for metric in one["metrics"]:
-            whole = _people(results, metric)[0] * rows[metric].values
+        own = results.combinations == combination
+        for metric in (name for name in one["metrics"] if name in SHOWN):
+            whole = _people(results, metric)[0] * results.rows[metric].values[own]
             if np.isfinite(whole).any():
                 values.setdefault(metric, {})[named(one)] = whole[np.isfinite(whole)]
     return values

@@ -4,6 +4,7 @@ Thrust follows the voltage with a lag of 50 ms, under one sinusoid per axis: onc
 projected into a box that is too small for the drift.
 """
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from undertow.analysis.drift import gain_bound, gain_of
 from undertow.analysis.motor_loop import lag_matrix, stable_gains
 from undertow.reproduction.horizons import BOUND
 from undertow.reproduction.lag_map import lag_thruster
-from undertow.reproduction.running import BatchResult, run_batches, write_all
+from undertow.reproduction.running import BatchResult, begin_batches, write_all
 from undertow.reproduction.setup import law_of, scenario
+from undertow.reproduction.side_by_side import Tasks
 
 LAG = 0.05  # s
 _SECONDS = 20.0
@@ -45,15 +47,19 @@ def scenarios() -> dict[str, dict[str, Any]]:
     return found
 
 
-def shown(folder: Path) -> dict[str, Any]:
+def begin(folder: Path, tasks: Tasks) -> Callable[[], dict[str, BatchResult]]:
+    """Begin both runs, and return what waits for them; `scenarios/` is written in a folder."""
+    named = scenarios()
+    write_all(named, folder)
+    return begin_batches(named, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"), tasks)
+
+
+def shown(found: Mapping[str, BatchResult]) -> dict[str, Any]:
     """Gain c of every axis, largest weight and chattering against time, and the c that the linearised loop needs.
 
     Args:
-        folder: folder in which `scenarios/` is written.
+        found: both runs.
     """
-    named = scenarios()
-    write_all(named, folder)
-    found = run_batches(named, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"))
     law = law_of(found["drifting_free"])
     between = stable_gains(lambda gain: lag_matrix(law, LAG, drifted=gain), 6000.0)
     runs = {name.removeprefix("drifting_"): _curves(run) for name, run in found.items()}

@@ -1,8 +1,6 @@
-"""Running named scenarios: one by one, each saved for repetition, or in batches of one program."""
+"""Running named scenarios in batches of one program: with everything that is recorded, or for metrics alone."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,51 +11,52 @@ import numpy as np
 from undertow.analysis.metrics import Gathered, accumulators, results
 from undertow.campaign.batch_runner import leaves, planned, run_of
 from undertow.campaign.campaign_schema import Series
-from undertow.core.runtime import double_outside_runs
+from undertow.core.runtime import double_outside_runs, on_processor
 from undertow.core.status import Status
+from undertow.loop import continuous
 from undertow.loop.outcome import Outcome
-from undertow.loop.simd_batch import BatchRunner, Plan, Run, simd_width
+from undertow.loop.simd_batch import BatchRunner, Plan, Run, Unsupported, outcome_of, simd_width
 from undertow.reproduction.all_outputs import with_all_outputs
+from undertow.reproduction.side_by_side import Tasks, side_by_side
 from undertow.scenario.build import Built, build
-from undertow.scenario.execute import Executed, execute, save
+from undertow.scenario.execute import Executed, execute, finished, gathered_of, save
 from undertow.scenario.part_cache import PartCache, structure
 from undertow.scenario.reading import dump
 
 Scenarios = Mapping[str, dict[str, Any]]
 Window = tuple[float, float]  # s
-Progress = Callable[[str, float], None]
+_Runs = dict[str, tuple[Run, int]]  # by name, with their numbers of steps
 
 
-@contextmanager
-def two_at_once() -> Iterator[Executor]:
-    """Two threads, which use two cores: compiling and running release Python's lock most of the time.
+def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], dict[str, Executed]]:
+    """Begin to run named scenarios with everything that is recorded of them, those of equal programs in one batch.
 
-    An error cancels what has not begun.
-    """
-    with ThreadPoolExecutor(2) as pool:
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def run_all(scenarios: Scenarios, folder: Path, progress: Progress) -> dict[str, Executed]:
-    """Run named scenarios; writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
+    Writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
 
     Args:
         scenarios: name -> scenario.
         folder: folder of the results.
-        progress: called with a message and the share done.
+        tasks: where the runs are tasks.
+
+    Returns:
+        Function that waits for the results.
     """
     write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)
-    found = {}
-    for name, scenario in scenarios.items():
-        progress(f"running {name}", len(found) / len(scenarios))
-        found[name] = execute(scenario)
-        save(found[name].dataset, folder / "runs" / f"{name}.nc")
-    return found
+    # The adaptive integrator takes longest to compile, once for all of them: it begins before others are built.
+    alone = {name: one for name, one in scenarios.items() if one["loop"].get("method") == "adaptive"}
+    pieces = [tasks.begin(f"ran {_words(alone)}", _one_by_one, _built(alone), folder)] if alone else []
+    built = _built({name: one for name, one in scenarios.items() if name not in alone})
+    groups = _groups(built, _whole)
+    for plan, runs in groups:
+        own = {name: built[name] for name in runs}
+        pieces.append(tasks.begin(f"ran {_words(runs)}", _executed, plan, runs, own, folder))
+
+    def finished() -> dict[str, Executed]:
+        found = {name: one for piece in pieces for name, one in piece.result().items()}
+        return {name: found[name] for name in scenarios}
+
+    return finished
 
 
 def write_all(scenarios: Scenarios, folder: Path) -> None:
@@ -86,34 +85,31 @@ class BatchResult(NamedTuple):
 def run_batches(
     scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str]
 ) -> dict[str, BatchResult]:
-    """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `start`."""
-    with ThreadPoolExecutor(1) as pool:
-        return start(scenarios, windows, every, signals, pool)()
+    """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `begin_batches`."""
+    with side_by_side(1) as pool:
+        return begin_batches(scenarios, windows, every, signals, Tasks(pool, lambda words, share: None))()
 
 
-def start(
-    scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str], pool: Executor
+def begin_batches(
+    scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str], tasks: Tasks
 ) -> Callable[[], dict[str, BatchResult]]:
-    """Start to run sampled scenarios, one task for each program.
+    """Begin to run sampled scenarios, one task for each program.
 
     Args:
         scenarios: by name; all of them scenarios of the sampled loop.
         windows: windows of the metrics, s.
         every: time between records, s.
         signals: recorded signals.
-        pool: executor of the tasks.
+        tasks: where the batches are tasks.
 
     Returns:
         Function that waits for the results; it raises Unsupported where the batch compiler lacks an operation.
     """
-    part_cache = PartCache()
-    built = {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
-    groups: dict[Any, dict[str, tuple[Run, int]]] = {}
-    for name, one in built.items():
-        run = run_of(one)._replace(accumulators=_gathered(one, windows))
-        plan = planned(one, Series(signals=list(signals), every=every))
-        groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
-    pieces = [pool.submit(_together, plan, runs) for (_, plan), runs in groups.items()]
+    built = _built(scenarios)
+    asked = Series(signals=list(signals), every=every)
+    run = lambda one: run_of(one)._replace(accumulators=_gathered(one, windows))
+    groups = _groups(built, lambda one: (run(one), planned(one, asked)))
+    pieces = [tasks.begin(f"ran {_words(runs)}", _together, plan, runs) for plan, runs in groups]
 
     def finished() -> dict[str, BatchResult]:
         ended = {name: one for piece in pieces for name, one in piece.result().items()}
@@ -126,8 +122,63 @@ def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
     return tuple(one for window in windows for one in accumulators(built.closed_loop.plant, (), *window))
 
 
+def _words(runs: Mapping[str, Any]) -> str:
+    """Names of the runs of a batch, in short."""
+    return next(iter(runs)) + (f" and {len(runs) - 1} like it" if len(runs) > 1 else "")
+
+
+def _built(scenarios: Scenarios) -> dict[str, Built]:
+    part_cache = PartCache()
+    return {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
+
+
+def _groups(built: Mapping[str, Built], how: Callable[[Built], tuple[Run, Plan]]) -> list[tuple[Plan, _Runs]]:
+    """Runs of equal programs, with their plan; they may differ in the number of steps."""
+    groups: dict[Any, _Runs] = {}
+    for name, one in built.items():
+        run, plan = how(one)
+        groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
+    return [(plan, runs) for (_, plan), runs in groups.items()]
+
+
+def _whole(built: Built) -> tuple[Run, Plan]:
+    """A run as `execute` does it: everything is recorded."""
+    run, loop = run_of(built)._replace(accumulators=gathered_of(built)), built.scenario.loop
+    signals = tuple(built.closed_loop.signals())
+    if loop.kind == "continuous":
+        steps, every, dt = continuous.grid_of(loop.duration, loop.record, loop.dt)
+        return run, Plan(steps, dt, every, signals, continuous=True)
+    return run, planned(built, Series(signals=list(signals), every=loop.record))
+
+
+def _one_by_one(built: Mapping[str, Built], folder: Path) -> dict[str, Executed]:
+    """Runs, written to `runs/`."""
+    return {name: _saved(name, execute(one), folder) for name, one in built.items()}
+
+
+def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built], folder: Path) -> dict[str, Executed]:
+    """Runs of one program, written to `runs/`; one by one where the batch compiler lacks an operation."""
+    with on_processor():
+        try:
+            ended = _together(plan, runs)
+        except Unsupported:
+            return _one_by_one(built, folder)
+        found = {}
+        for name, (run, _) in runs.items():
+            outcome = ended[name]
+            if plan.continuous:
+                outcome = jax.device_get(continuous.explained(run.loop, run.key, outcome, plan.dt))
+            found[name] = _saved(name, finished(built[name], outcome, {}, run.accumulators), folder)
+        return found
+
+
+def _saved(name: str, one: Executed, folder: Path) -> Executed:
+    save(one.dataset, folder / "runs" / f"{name}.nc")
+    return one
+
+
 @double_outside_runs
-def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Outcome]:
+def _together(plan: Plan, runs: _Runs) -> dict[str, Outcome]:
     """Runs of one program, by name with their numbers of steps; those of one length in one batch."""
     first = next(iter(runs.values()))[0]
     numbers = {name: leaves(run) for name, (run, _) in runs.items()}
@@ -137,13 +188,13 @@ def _together(plan: Plan, runs: Mapping[str, tuple[Run, int]]) -> dict[str, Outc
     lengths = {steps: [name for name in runs if runs[name][1] == steps] for _, steps in runs.values()}
     # For one run a program of width one is faster than one of width eight.
     width = min(simd_width(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
-    batch = BatchRunner(first, plan, constant, width)
+    batch = BatchRunner(first, plan._replace(steps=max(lengths)), constant, width, runs=len(runs))
     tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}
     for steps, names in lengths.items():
         stacked = [np.stack(column) for column in zip(*(numbers[name] for name in names), strict=True)]
         outcome = batch.run(jax.tree.unflatten(tree, stacked), steps)
         for i, name in enumerate(names):
-            found[name] = jax.tree.map(lambda leaf, i=i: leaf[i] if isinstance(leaf, np.ndarray) else leaf, outcome)
+            found[name] = outcome_of(outcome, i)
     return found
 
 

@@ -111,7 +111,15 @@ def build(source: Text | Mapping[str, Any], part_cache: PartCache | None = None)
         BadInput: the scenario is invalid; the error names key path and location.
     """
     text = source if isinstance(source, Text) else from_data(source)
-    scenario = validate(text)
+    return build_scenario(validate(text), text, part_cache)
+
+
+def build_scenario(scenario: Scenario, text: Text, part_cache: PartCache | None = None) -> Built:
+    """`build` of a scenario that was validated; `text` is what it was read from. Some of its numbers may be traced.
+
+    Raises:
+        BadInput: the scenario is invalid; the error names key path and location.
+    """
     with runtime.on_processor(), within(location=text.location, written=text.as_written):
         with runtime.in_precision("float64"):
             built = _build(text, scenario, part_cache or PartCache())
@@ -127,7 +135,8 @@ def own_parts(scenario: Scenario, folder: Path) -> dict[str, str]:
 
 
 def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
-    resolved = scenario.model_dump(include={"description", "loop", "initial", "seed", "precision"})
+    included = {"description", "loop", "initial", "seed", "precision"}
+    resolved = scenario.model_dump(include=included, warnings=False)  # traced numbers are no floats
 
     start, stop = scenario.steady.of_run(scenario.loop.duration)
     resolved["steady"] = {"start": start, "stop": stop, "every_step": scenario.steady.every_step}

@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ import jax
 import numpy as np
 import xarray as xr
 
-from undertow.analysis.metrics import accumulators
+from undertow.analysis.metrics import Gathered, accumulators
 from undertow.analysis.success import Success
 from undertow.core import runtime
 from undertow.core.status import Status
@@ -54,13 +54,25 @@ def execute(source: Text | Mapping[str, Any] | Built) -> Executed:
 
 @in_its_precision
 def _execute(built: Built) -> Executed:
-    scenario, text, window = built.scenario, dump(built.resolved), built.window()
-    plant = built.closed_loop.plant
-    gathered = accumulators(plant, built.metrics, *window) if scenario.steady.every_step else ()
-    outcome, left_to_xla = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
+    scenario, gathered = built.scenario, gathered_of(built)
+    ended = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
+    return finished(built, *ended, gathered)
+
+
+def gathered_of(built: Built) -> Gathered:
+    """What gathers the steady metrics along a run; () where the record is what counts."""
+    if not built.scenario.steady.every_step:
+        return ()
+    return accumulators(built.closed_loop.plant, built.metrics, *built.window())
+
+
+@in_its_precision
+def finished(built: Built, outcome: Outcome, left_to_xla: Mapping[str, str], gathered: Gathered = ()) -> Executed:
+    """A run with its metrics and its dataset; for outcome and `left_to_xla` see `run_loop`."""
+    scenario, text = built.scenario, dump(built.resolved)
     why = step_failure(built.closed_loop, scenario.loop, outcome)
     attributes = (
-        left_to_xla
+        dict(left_to_xla)
         | ({"status_sentence": why} if why else {})
         | {
             "title": scenario.description or "a closed loop run by undertow",
@@ -70,9 +82,8 @@ def _execute(built: Built) -> Executed:
             "seed": scenario.seed,
         }
     )
-    how = Measuring(window, scenario.loop.dt, built.metrics, built.criterion(), gathered)
-    finished = label(built.closed_loop, outcome, how, attributes)
-    return Executed(built, outcome, *finished)
+    how = Measuring(built.window(), scenario.loop.dt, built.metrics, built.criterion(), gathered)
+    return Executed(built, outcome, *label(built.closed_loop, outcome, how, attributes))
 
 
 def run_loop(
@@ -89,25 +100,30 @@ def run_loop(
         not be used.
     """
     place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
-    common: dict[str, Any] = {"duration": settings.duration, "key": key_of_seed(seed), **place}
+    given: dict[str, Any] = {"duration": settings.duration, "dt": settings.dt, "key": key_of_seed(seed), **place}
+    compilers: tuple[Callable[..., Outcome], Callable[..., Outcome]]
     if settings.kind == "continuous":
-        adaptive = (settings.rtol, settings.atol) if settings.method == "adaptive" else None
-        outcome = continuous.simulate(loop, record_step=settings.record, dt=settings.dt, tolerances=adaptive, **common)
-        return jax.device_get(outcome), {}
-    common |= {
-        "dt": settings.dt,
-        "record_every": round(settings.record / settings.dt),
-        "method": settings.method,
-        "substeps": settings.substeps,
-        "accumulators": accumulators,
-    }
-    lacking = {}
+        given |= {"record_step": settings.record}
+        if settings.method == "adaptive":
+            tolerances = (settings.rtol, settings.atol)
+            return jax.device_get(continuous.simulate(loop, tolerances=tolerances, **given)), {}
+        compilers = simd_batch.integrate, continuous.simulate
+    else:
+        given |= {
+            "record_every": round(settings.record / settings.dt),
+            "method": settings.method,
+            "substeps": settings.substeps,
+            "accumulators": accumulators,
+        }
+        compilers = simd_batch.simulate, sampled.simulate
+    by_simd, by_xla = compilers
+    lacking: dict[str, str] = {}
     if settings.backend == "simd":
         try:
-            return simd_batch.simulate(loop, **common), {}
+            return jax.device_get(by_simd(loop, **given)), {}
         except simd_batch.Unsupported as error:
             lacking = {"left_to_xla": str(error)}
-    return jax.device_get(sampled.simulate(loop, **common)), lacking
+    return jax.device_get(by_xla(loop, **given)), lacking
 
 
 def write(executed: Executed, folder: Path) -> None:

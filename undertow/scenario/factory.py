@@ -11,6 +11,7 @@ import equinox as eqx
 import numpy as np
 
 from undertow.core import catalogue, checks, contracts
+from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput, joined, known_key, within
 from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import fault_of, place_of
@@ -157,7 +158,8 @@ def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -
             with within(key):
                 values[key] = adjust(values[key], change)
         else:
-            number = np.asarray(checked(key, change, None, 0.0), dtype=float)
+            number: Any = checked(key, change, None, 0.0)
+            number = as_array(number) if checks.traced(number) else np.asarray(number, dtype=float)
             if number.shape != np.shape(values[key]):
                 raise BadInput(
                     key, _sized(np.shape(values[key])), f"of shape {number.shape}" if number.shape else change

@@ -17,6 +17,12 @@ class PartCache:
         self._made: dict[Any, tuple[Any, tuple[Any, ...]]] = {}
         self._checked: set[Any] = set()
 
+    def copy(self) -> "PartCache":
+        """Another cache with the same parts, for parts that shall not be kept."""
+        other = PartCache()
+        other._made, other._checked = self._made.copy(), self._checked.copy()
+        return other
+
     def part(self, where: str, description: Mapping[str, Any], given: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """Result of `make`, cached by description and other parts.
 

@@ -68,8 +68,8 @@ class Loop(Strict):
     substeps: int = Field(1, ge=1, le=100, description="integration steps of the plant per dt (sampled only)")
     backend: Literal["simd", "xla"] = Field(
         "simd",
-        description="compiler of a sampled loop: simd gives the same bits for single runs and batches; xla supports "
-        "all parts and is used where simd does not",
+        description="compiler of a loop with fixed steps: simd gives the same bits for single runs and batches; xla "
+        "supports all parts and is used where simd does not, and for adaptive steps",
     )
     rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (adaptive only)")
     atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (adaptive only)")

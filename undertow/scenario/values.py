@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from undertow.core import checks
 from undertow.core.errors import BadInput
 
 _WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "text", type(None): "null"}
@@ -31,6 +32,9 @@ def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
     """
     if value is None and default is None:
         return None
+    if checks.traced(value):  # a campaign traces numbers that vary
+        _check_traced(name, value, hint)
+        return value
     kinds = typing.get_args(hint) or (hint,)
     plain = all(kind in _WORDS for kind in kinds)
     if not (any(_is(value, kind) for kind in kinds) if plain else _numbers(value)):
@@ -48,6 +52,14 @@ def checked(name: str, value: Any, hint: Any, default: Any) -> Any:
         if np.isnan(numbers).any() or (np.isinf(numbers).any() and not endless):
             raise BadInput(name, "be finite", value)
     return value
+
+
+def _check_traced(name: str, value: Any, hint: Any) -> None:
+    """Check that an option takes fractions and that a traced value is finite; its shape is that of any trial."""
+    kinds = typing.get_args(hint) or (hint,)
+    if float not in kinds and any(kind in _WORDS for kind in kinds):
+        raise BadInput(name, f"be {' or '.join(_WORDS[kind] for kind in kinds)}", value)
+    checks.finite(name, value)
 
 
 def remedy_of(value: Any, yes_or_no: bool = False) -> str:

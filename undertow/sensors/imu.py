@@ -1,7 +1,6 @@
 """Inertial measurement unit: roll and pitch, angular rates, specific force."""
 
 import jax.numpy as jnp
-import numpy as np
 
 from undertow.numerics.linear_algebra import matvec
 from undertow.sensors.estimate import Estimate, Motion, gravity
@@ -54,6 +53,6 @@ def imu(
         dropout: probability that a sample is lost.
         blend: share of each new inclination in the estimated one; the rest comes from the rates.
     """
-    noise = np.repeat([angle_noise, rate_noise, force_noise], [2, 3, 3])
-    bias = np.repeat([angle_bias, rate_bias, force_bias], [2, 3, 3])
+    noise = [angle_noise] * 2 + [rate_noise] * 3 + [force_noise] * 3
+    bias = [angle_bias] * 2 + [rate_bias] * 3 + [force_bias] * 3
     return IMU(Sampling(period, noise, bias, delay=delay, dropout=dropout), blend)

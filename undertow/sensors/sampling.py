@@ -6,7 +6,6 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jax.scipy.special import ndtri
 from jaxtyping import Array, Bool, Float, Int
 
@@ -60,7 +59,7 @@ class Sampling(eqx.Module):
         checks.positive("period", self.period, "s")
         for name in ("noise", "bias", "resolution", "delay", "dropout"):
             checks.not_negative(name, getattr(self, name))
-        if not isinstance(self.dropout, Tracer) and float(self.dropout) >= 1:
+        if not checks.assumed(lambda share: share < 1, self.dropout):
             raise BadInput("dropout", "be less than 1", f"{float(self.dropout):g}")
         if not self.slots:
             self.slots = math.ceil(float(np.asarray(self.delay) / np.asarray(self.period)) - _EARLY) + 1

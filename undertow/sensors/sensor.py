@@ -27,7 +27,7 @@ class AbstractSensor(eqx.Module):
 
     def __check_init__(self):
         checks.positive("blend", self.blend)
-        if (self.blend > 1).any():
+        if not checks.assumed(lambda share: (share <= 1).all(), self.blend):
             raise BadInput("blend", "be at most 1", f"{float(self.blend):g}")
 
     @abc.abstractmethod

@@ -129,8 +129,7 @@ def with_fidelity(
             `electromechanical`.
     """
     checks.choice("fidelity", fidelity, tuple(FIDELITIES))
-    if not supply > 0:
-        checks.positive("supply", supply, "V")
+    checks.positive("supply", supply, "V", finite=False)
     if fidelity == "electromechanical":
         checks.positive("inductance", motor.inductance, "H")
     return FIDELITIES[fidelity](motor=motor, supply=supply, dead_zone=dead_zone, dead_zone_kind=dead_zone_kind)

@@ -61,6 +61,7 @@ class Vehicle(eqx.Module):
         """Check M; the error names the added mass, or the inertia where that is at fault."""
         whole = self.mass_matrix()
         if isinstance(whole, Tracer):
+            checks.positive_definite("added_mass", whole)
             return
         rigid = np.asarray(whole) - np.asarray(self.added_mass)
         definite = np.abs(rigid - rigid.T).max() <= 1e-9 * np.abs(rigid).max() and np.linalg.eigvalsh(rigid).min() > 0
@@ -76,7 +77,7 @@ class Vehicle(eqx.Module):
                 "thruster_positions", "have one row (x, y, z) per thruster, like thruster_directions", shapes
             )
         checks.finite("thruster_positions", self.thruster_positions, "m")
-        if not isinstance(self.thruster_directions, Tracer):
+        if checks.known(self.thruster_directions):
             norms = np.linalg.norm(np.asarray(self.thruster_directions), axis=1)
             for j in np.flatnonzero(~(np.abs(norms - 1) < 1e-6)):
                 raise BadInput(f"thruster_directions[{j}]", "have length 1", f"{norms[j]:.6g} long")

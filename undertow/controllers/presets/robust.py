@@ -2,7 +2,6 @@
 
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 
 from undertow.controllers.bandwidths import Axis, Bandwidths, alike, axes_of, robust_bandwidths
 from undertow.controllers.reference_filter import ReferenceFilter
@@ -101,7 +100,7 @@ def robust(
         feedback = jnp.stack([tracking**2, 2 * tracking], -1)
     if reference_frequency is None:
         reference_frequency = jnp.minimum(tracking / 2, 2.0)
-    jumps = isinstance(reference_frequency, Tracer) or bool(np.any(np.asarray(reference_frequency) != 0))
+    jumps = checks.assumed(lambda frequency: (frequency != 0).any(), reference_frequency)
     return RobustRCAF(
         model=model,
         estimator=Estimator(fuzzy, bandwidth, damping, weights_bound, leakage),

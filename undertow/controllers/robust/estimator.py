@@ -1,14 +1,14 @@
 """The identification model and the composite adaptive law in discrete time: stable at any sampling time."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.arrays import as_array
 from undertow.core.param import Param, param
 from undertow.estimation.fuzzy_system import FuzzySystem
 
@@ -131,12 +131,15 @@ def widened(fuzzy: FuzzySystem, bandwidth, damping, bound) -> FuzzySystem:
         damping: zeta.
         bound: theta_max, m/s^2 and rad/s^2; without a finite one the sets are unchanged.
     """
-    factor = _widening(fuzzy, *map(as_array, (bandwidth, damping, bound)))
+    # Operation by operation, and not compiled, so that one value and many traced ones are rounded alike.
+    library: Any = jnp if checks.traced(bandwidth, damping, bound) else np
+    bandwidth, damping, bound = (library.asarray(value, dtype=float) for value in (bandwidth, damping, bound))
+    reach = bound * (float(_slope(fuzzy)) / (_ADDED * 2 * damping * bandwidth))
+    factor = library.maximum(_LEAST, library.where(library.isfinite(reach), reach, _LEAST)).max()
     return FuzzySystem(factor * fuzzy.centres, factor * fuzzy.widths, evenly_spaced=fuzzy.evenly_spaced)
 
 
 @eqx.filter_jit
-def _widening(fuzzy: FuzzySystem, bandwidth: Array, damping: Array, bound: Array) -> Float[Array, ""]:
-    slope = jnp.abs(jax.jacfwd(lambda x: fuzzy.basis(x[None, None])[0])(jnp.zeros(()))).sum()
-    reach = bound * slope / (_ADDED * 2 * damping * bandwidth)
-    return jnp.maximum(_LEAST, jnp.max(jnp.where(jnp.isfinite(reach), reach, _LEAST)))
+def _slope(fuzzy: FuzzySystem) -> Float[Array, ""]:
+    """Sum |xi'(0)|."""
+    return jnp.abs(jax.jacfwd(lambda x: fuzzy.basis(x[None, None])[0])(jnp.zeros(()))).sum()

@@ -11,7 +11,7 @@ from undertow.analysis.metrics import titled_name
 from undertow.report.figures import style
 
 # The metrics to plot, where they are defined.
-_SHOWN = (
+SHOWN = (
     "position_rms",
     "attitude_rms",
     "tracking_rms",
@@ -38,6 +38,7 @@ _WIDE = 100.0  # ratio of largest and smallest from which on an axis is logarith
 _DARK = 0.6  # correlations above this have a dark background
 _MOST_INPUTS = 24  # of the matrix of correlations
 _LETTER = 0.058  # in, mean width of a letter in its names
+_MOST_STEPS = 2000  # of a distribution function: more cannot be seen
 _HUNDREDTH = 0.005  # what rounds to less is zero
 
 
@@ -66,7 +67,7 @@ def distributions_figure(
         counts: name of the combination -> number of its trials, including failed ones.
         units: metric -> unit.
     """
-    shown = [name for name in _SHOWN if name in values]
+    shown = [name for name in SHOWN if name in values]
     rows = -(-len(shown) // _COLUMNS)
     names = list(dict.fromkeys(name for each in values.values() for name in each))
     looks = dict(zip(names, LOOKS, strict=False))
@@ -80,8 +81,15 @@ def distributions_figure(
         panel = style.place(figure, 0.6 + 3.1 * column, 0.65 + key + 2.25 * row, 2.35, 1.45)
         for name, look in looks.items():
             ordered = np.sort(values[metric].get(name, np.zeros(0)))
-            share = np.arange(1, len(ordered) + 1) / max(1, counts[name])
-            panel.step(ordered, share, where="post", color=look.colour, linestyle=look.dashes, linewidth=look.width)
+            rank = np.unique(np.linspace(1, len(ordered), min(len(ordered), _MOST_STEPS)).round().astype(int))
+            panel.step(
+                ordered[rank - 1],
+                rank / max(1, counts[name]),
+                where="post",
+                color=look.colour,
+                linestyle=look.dashes,
+                linewidth=look.width,
+            )
         everything = np.concatenate(list(values[metric].values()))
         if everything.min() > 0 and everything.max() > _WIDE * everything.min():
             panel.set_xscale("log")

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from undertow.campaign.batch_runner import BatchResult, ProgramCache, planned
+from undertow.campaign.batch_runner import BatchResult, ProgramCache, batch_of, planned
 from undertow.campaign.campaign_schema import Series
 from undertow.core import runtime
 from undertow.loop.dataset import to_dataset
@@ -44,7 +44,7 @@ def replays_of_trials(trials: Mapping[str, Built]) -> tuple[list[Replay], list[s
 
 def _together(trials: Mapping[str, Built], recorded: Series) -> dict[str, Replay]:
     several = list(trials.values())
-    result = ProgramCache(lambda: several).run(several, recorded)
+    result = ProgramCache(lambda: several).run([batch_of(built, recorded) for built in several], recorded)
     replays = {
         label: replay_of(_dataset(built, result, place, recorded), built.closed_loop, label)
         for place, (label, built) in enumerate(trials.items())

@@ -1,6 +1,7 @@
 """The report of `undertow reproduce`: two self-contained pages, and the figures as files."""
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,11 @@ _ELSEWHERE = ("fidelity", "sweep", *horizon_section.CAPTIONS, *CAPTIONS)
 
 
 def write_report(
-    results: Mapping[str, Any], figures: Mapping[str, Figure], folder: Path, pdf: str | None = None
+    results: Mapping[str, Any],
+    figures: Mapping[str, Figure],
+    folder: Path,
+    pdf: str | None = None,
+    pool: Executor | None = None,
 ) -> Path:
     """Write `report.html`, `ablations.html` if they were run, and every figure into `figures/`.
 
@@ -36,6 +41,7 @@ def write_report(
         figures: by name: fig02, fig06, ..., fig13, fidelity, sweep; others are shown after the paper's.
         folder: where to write, created if missing.
         pdf: width of PDF files; None for none.
+        pool: executor of `side_by_side` that writes the figures; None to write them here.
 
     Returns:
         The first page.
@@ -46,10 +52,11 @@ def write_report(
     folder.mkdir(parents=True, exist_ok=True)
     texts = captions(dict(results)) | horizon_section.CAPTIONS | CAPTIONS
     texts |= {"ablations": ablations_page.CAPTION}
-    shown = {}
-    for name, one in figures.items():
+    shown, arguments = {}, [(one, folder / "figures", name, pdf) for name, one in figures.items()]
+    waiting = None if pool is None else [pool.submit(save, *each) for each in arguments]
+    written = (save(*each) for each in arguments) if waiting is None else (each.result() for each in waiting)
+    for (name, one), (vector, _) in zip(figures.items(), written, strict=True):
         alternative = _alternative(one, name)
-        vector, _ = save(one, folder / "figures", name, pdf)
         shown[name] = figure(vector.read_text(encoding="utf-8"), name, alternative, texts.get(name, name))
     page, overview = folder / "report.html", shown.pop("ablations", Html(""))
     page.write_text(document(_TITLE, *_content(results, shown)), encoding="utf-8")
@@ -151,13 +158,13 @@ def _alternative(one: Figure, name: str) -> str:
     return one.texts[0].get_text() if one.texts else name
 
 
-def write(found: Reproduction, folder: Path, pdf: str | None = None) -> Path:
-    """Write the pages and `figures/`; returns the first page.
+def write(found: Reproduction, folder: Path, pdf: str | None = None, pool: Executor | None = None) -> Path:
+    """Write the pages and `figures/`; returns the first page. Arguments of `write_report`.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    return write_report(found.results, make_figures(found), folder, pdf)
+    return write_report(found.results, make_figures(found), folder, pdf, pool)
 
 
 def make_figures(found: Reproduction) -> dict[str, Figure]:

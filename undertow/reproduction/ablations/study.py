@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.campaign import task
+from undertow.campaign.build_trials import build_trial
 from undertow.campaign.campaign_schema import read_campaign, whole
 from undertow.campaign.campaign_summary import median_interval, quantiles
 from undertow.campaign.labels import words
@@ -62,6 +63,11 @@ def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str
     }
 
 
+def trials_of(ablation: Ablation) -> int:
+    """Number of trials of an ablation."""
+    return sum(read_campaign(_FOLDER / f"{name}.yaml")[0].number for name in ablation.campaigns)
+
+
 def variants(
     path: Path, metrics: tuple[str, ...], quick: bool, folder: Path | None = None
 ) -> Iterator[tuple[str, Variant]]:
@@ -76,7 +82,7 @@ def variants(
         (folder / "campaigns" / path.name).write_text(asked, encoding="utf-8")
     columns = task.run_trials(asked, str(several.scenario.folder), range(several.number))
     if (columns["status"] == task.INVALID).any():
-        task.build_trial(several, PartCache(), int(np.argmax(columns["status"] == task.INVALID)))  # raises the error
+        build_trial(several, PartCache(), int(np.argmax(columns["status"] == task.INVALID)))  # raises the error
     names = list(itertools.product(*campaign.axes.values()))
     for i, name in enumerate(names):
         own = {key: values[i :: len(names)] for key, values in columns.items()}

@@ -3,10 +3,11 @@
 import math
 from typing import cast
 
+import equinox as eqx
 import jax.numpy as jnp
 
 from undertow.core.status import Status
-from undertow.plants.magnetic_levitation import MagneticLevitation
+from undertow.plants.magnetic_levitation import LevitationRig, MagneticLevitation
 from undertow.reproduction.claims.finding import Finding, Runs, claim, tracking_error
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import scenario
@@ -90,7 +91,10 @@ def _lag(run: Executed) -> float:
     """Time constant of the upper coil where the ball starts, s."""
     rig = cast(MagneticLevitation, run.built.closed_loop.plant).rig
     start = run.built.scenario.initial.position
-    return float(rig.lag(jnp.asarray(start))[0])
+    return float(_lags(rig, jnp.asarray(start))[0])
+
+
+_lags = eqx.filter_jit(LevitationRig.lag)  # one program, not seven small ones
 
 
 def _shown(run: Executed, unit: str) -> str:

@@ -1,6 +1,6 @@
 """The chapter `The robust variant`: every fidelity level, the ablations, the conclusions."""
 
-from concurrent.futures import as_completed
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,38 +8,46 @@ from undertow.reproduction.ablations import study
 from undertow.reproduction.ablations.verdicts import ABLATIONS
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
-from undertow.reproduction.running import Progress, run_all, two_at_once
+from undertow.reproduction.running import begin_all
+from undertow.reproduction.side_by_side import Tasks
 from undertow.scenario.execute import Executed
 
+Chapter = tuple[dict[str, Any], dict[str, Executed]]
 
-def chapter(folder: Path, quick: bool, progress: Progress) -> tuple[dict[str, Any], dict[str, Executed]]:
-    """Run the chapter; scenarios and campaigns are saved as all others of `reproduce`.
+
+def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
+    """Begin to run the chapter; scenarios and campaigns are saved as all others of `reproduce`.
 
     Args:
         folder: folder of `scenarios/` and `runs/`.
         quick: fewer fidelity levels, ablations and seeds.
-        progress: called with a message and the share done.
+        tasks: where the runs and the ablations are tasks.
 
     Returns:
-        Entries of results.json, and the runs of the fidelity comparison.
+        Function that waits for the entries of results.json, and the runs of the fidelity comparison.
     """
     selected = [one for one in ABLATIONS if not (quick and one.long)]
-    silent = lambda message, share: None
-    with two_at_once() as pool:
-        runs_later = pool.submit(run_all, fidelity.scenarios(quick), folder, silent)
-        later = {pool.submit(study.run, one, quick, folder): one for one in selected}
-        for count, done in enumerate(as_completed([runs_later, *later])):
-            done.result()
-            what = "every fidelity level, sampled" if done is runs_later else f"ablation {later[done].id}"
-            progress(what, (count + 1) / (len(later) + 1))
-    runs, found = runs_later.result(), [one.result() for one in later]
-    rows = fidelity.table(runs, quick)
-    results = {
-        "quick": quick,
-        "seeds": found[0]["variants"][0]["seeds"],
-        "left_out": [one.id for one in ABLATIONS if one not in selected],
-        "fidelity": rows,
-        "ablations": found,
-        "conclusions": conclusions(rows, found),
-    }
-    return results, runs
+    compared = begin_all(fidelity.scenarios(quick), folder, tasks)
+    # The longest begin first, so that no process waits for the last one.
+    order = sorted(selected, key=study.trials_of, reverse=True)
+    later = {one.id: tasks.begin(f"ablation {one.id}", ablation, one.id, quick, folder) for one in order}
+
+    def finished() -> Chapter:
+        runs, found = compared(), [later[one.id].result() for one in selected]
+        rows = fidelity.table(runs, quick)
+        results = {
+            "quick": quick,
+            "seeds": found[0]["variants"][0]["seeds"],
+            "left_out": [one.id for one in ABLATIONS if one not in selected],
+            "fidelity": rows,
+            "ablations": found,
+            "conclusions": conclusions(rows, found),
+        }
+        return results, runs
+
+    return finished
+
+
+def ablation(name: str, quick: bool, folder: Path) -> dict[str, Any]:
+    """The ablation of an id, run."""
+    return study.run(next(one for one in ABLATIONS if one.id == name), quick, folder)
