@@ -20,7 +20,7 @@ from undertow.core.contracts import Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.stepped import Step
+from undertow.loop.stepped import Step, put
 from undertow.power.esc import ESC
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
@@ -136,14 +136,14 @@ class Autopilot:
         report = self._report(propellers, 0.0)
         for value in jax.tree.leaves(report):
             checks.finite("propellers", value)
-        _put(self._begin.inputs, (motion, report, self._target(target)))
+        put(self._begin.inputs, (motion, report, self._target(target)))
         self._begin()
         self._clock.begin()
         if target is None:  # the reference begins here
             self._place_reference(self._begin.outputs[0].y.position)
-            _put(self._begin.inputs.target, self._target(None))
+            put(self._begin.inputs.target, self._target(None))
             self._begin()
-        _put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
+        put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
         self._before[...], self._blended[...], self._started[...] = before, applied is not None, True
         return self._answered()
 
@@ -183,7 +183,7 @@ class Autopilot:
         passed = self._clock.passed(dt)
         if not passed:
             return self._convert.outputs.copy()
-        _put(self._go_on.inputs, (motion, report, wanted or self._target(None), given, passed))
+        put(self._go_on.inputs, (motion, report, wanted or self._target(None), given, passed))
         self._go_on()
         return self._answered()
 
@@ -278,7 +278,7 @@ class Autopilot:
     def _place_reference(self, position: np.ndarray) -> None:
         with runtime.on_processor(), runtime.in_precision(self._precision):
             placed = in_present_precision(starting_at(self._loop.reference, jnp.asarray(position)))
-        _put(self._at.numbers, eqx.filter(placed, eqx.is_array))
+        put(self._at.numbers, eqx.filter(placed, eqx.is_array))
 
     def _input(self, applied: Any) -> np.ndarray:
         found = _numbers("applied", applied, self._command.shape)
@@ -328,10 +328,3 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     if found.shape != shape:
         raise BadInput(name, f"have shape {shape}", f"of shape {found.shape}")
     return found
-
-
-def _put(places: Any, values: Any) -> None:
-    """Write the arrays of a tree into those of another."""
-    for place, value in zip(jax.tree.leaves(places), jax.tree.leaves(values), strict=True):
-        if place is not value:
-            place[...] = value

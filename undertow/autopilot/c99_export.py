@@ -5,7 +5,7 @@ bits of `Autopilot` and of a simulation. It needs no heap, no library but libm, 
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import starting_at
 from undertow.core.errors import BadInput
 from undertow.loop.simd_batch import Unsupported, unavailable
+from undertow.loop.stepped import Step, put
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built
 
@@ -45,12 +46,18 @@ class Exported(NamedTuple):
 
     files: Mapping[str, str]
 
-    def write(self, folder: Path) -> None:
-        """Write the files.
+    def write(self, folder: Path, overwrite: bool = False) -> None:
+        """Write the files; `overwrite` replaces those of an earlier export.
 
         Raises:
+            BadInput: a file is there already.
             OSError: the folder cannot be written.
         """
+        there = [name for name in self.files if (folder / name).exists()]
+        if there and not overwrite:
+            raise BadInput(
+                "--c99", "be a folder without the files of an export", f"one with {there[0]}", hint="Use --overwrite"
+            )
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in self.files.items():
             (folder / name).write_text(text, encoding="utf-8")
@@ -133,7 +140,37 @@ class _Export:
         signature = f"void {name}_reference({kind} t, {name}_target *target)"
         self._source.add(signature, reference.at, (of.time,), ["t"], _places("target", self._targets), ("t",))
         files = {f"{name}.h": self._header(kind), f"{name}.c": self._text()}
+        vectors = self._vectors(start, step, memory)
+        files |= {f"{name}_vectors.h": vectors, f"{name}_test.c": _TEST.replace("NAME", name)}
+        files |= {"example.c": _EXAMPLE.replace("NAME", name), "Makefile": _MAKEFILE.replace("NAME", name)}
         return Exported(files)
+
+    def _vectors(self, start: Callable, step: Callable, memory: Any) -> str:
+        """Random steps and what the batch compiler gives for them."""
+        of, chance = self._of, np.random.default_rng(0)
+        kept = jax.tree.map(lambda leaf: np.zeros(leaf.shape, leaf.dtype), memory)
+        first = Step(lambda _, __, given: ((), start(given)), (), (), of.given)
+        later = Step(lambda _, memory, given: step(memory, *given), (), kept, (of.given, of.applied, of.time))
+        given, results = [], []
+        for k in range(_VECTORS):
+            taken = first if k == 0 else later
+            drawn = jax.tree.map(lambda leaf: leaf + _SPREAD * chance.normal(size=leaf.shape), of.given)
+            applied = _SPREAD * chance.normal(size=of.applied.shape)
+            whole = (drawn, applied.astype(of.applied.dtype), of.time + self._period)
+            put(taken.inputs, drawn if k == 0 else whole)
+            taken()
+            if k == 0:
+                put(later.state, first.outputs[0])
+            given.append(_initialiser(jax.tree.leaves(whole)))
+            results.append(_initialiser(jax.tree.leaves(first.outputs[1] if k == 0 else later.outputs)))
+        name = self._name
+        return _VECTORS_FILE.format(
+            about=f"{_ABOUT} {self._said()}",
+            name=name,
+            count=_VECTORS,
+            inputs=",\n    ".join(given),
+            outputs=",\n    ".join(results),
+        )
 
     def _text(self) -> str:
         """The source file."""
@@ -172,6 +209,98 @@ class _Export:
         return f"Position north, east, down, m; attitude {turned}; velocity `{form.velocity}`, m/s and rad/s."
 
 
+_SPREAD = 0.2  # of the random numbers of a test, m, rad, V
+
+_VECTORS_FILE = """\
+/* Steps of a test. {about} */
+#include "{name}.h"
+
+#define STEPS {count}
+
+static const {name}_input INPUTS[STEPS] = {{
+    {inputs}
+}};
+
+static const {name}_output OUTPUTS[STEPS] = {{
+    {outputs}
+}};
+"""
+
+_TEST = """\
+/* Compares every output with that of undertow's own compiler, bit for bit. Exit code 0 where all are the same. */
+#include <stdio.h>
+#include <string.h>
+
+#include "NAME_vectors.h"
+
+int main(void) {
+    static NAME_state state;
+    NAME_output output;
+    int different = 0;
+    for (int k = 0; k < STEPS; ++k) {
+        if (k == 0) {
+            NAME_start(&state, &INPUTS[k], &output);
+        } else {
+            NAME_step(&state, &INPUTS[k], &output);
+        }
+        if (memcmp(&output, &OUTPUTS[k], sizeof output) != 0) {
+            different += 1;
+        }
+    }
+    printf("%d of %d steps differ; the state takes %u bytes\\n", different, STEPS, (unsigned)sizeof state);
+    return (different == 0) ? 0 : 1;
+}
+"""
+
+_EXAMPLE = """\
+/* The controller in a loop: fill in what the comments say. */
+#include "NAME.h"
+
+int main(void) {
+    static NAME_state state;
+    NAME_input input = {0};
+    NAME_output output;
+    NAME_target target;
+    input.dt = NAME_PERIOD;
+    for (int k = 0; k < 100; ++k) {
+        /* Measure: input.motion_position, input.motion_velocity and, of a vehicle, input.motion_attitude. */
+        NAME_reference(k * NAME_PERIOD, &target);
+        for (unsigned i = 0; i < sizeof target.position / sizeof target.position[0]; ++i) {
+            input.target_position[i] = target.position[i];
+            input.target_velocity[i] = target.velocity[i];
+            input.target_acceleration[i] = target.acceleration[i];
+        }
+        (k == 0) ? NAME_start(&state, &input, &output) : NAME_step(&state, &input, &output);
+        for (unsigned i = 0; i < sizeof output.command / sizeof output.command[0]; ++i) {
+            input.applied[i] = output.command[i]; /* Or what was applied: less, where the supply sagged. */
+        }
+        /* Write output.output to the thrusters, and wait for the next period. */
+    }
+    return 0;
+}
+"""
+
+_MAKEFILE = """\
+# make test compares the code with undertow's own; any C99 compiler does.
+CFLAGS ?= -O2
+CFLAGS += -std=c99 -Wall -Wextra -Werror -pedantic -ffp-contract=off
+
+test: NAME_test example
+	./NAME_test
+	./example
+
+NAME_test: NAME_test.c NAME.c NAME.h NAME_vectors.h
+	$(CC) $(CFLAGS) NAME_test.c NAME.c -o NAME_test -lm
+
+example: example.c NAME.c NAME.h
+	$(CC) $(CFLAGS) example.c NAME.c -o example -lm
+
+clean:
+	rm -f NAME_test example
+
+.PHONY: test clean
+"""
+
 _ABOUT = "Controller of an underwater vehicle. Do not edit."
 
 _HEADER = """\
@@ -198,6 +327,18 @@ void {name}_reference({kind} t, {name}_target *target);
 
 #endif
 """
+
+
+def _initialiser(leaves: list[np.ndarray]) -> str:
+    """The arrays of a struct, in C."""
+    from simdjit.c99 import literal
+
+    def written(value: np.ndarray) -> str:
+        if np.ndim(value) == 0:
+            return literal(value[()], str(value.dtype))
+        return "{" + ", ".join(map(written, value)) + "}"
+
+    return "{" + ", ".join(written(np.asarray(leaf)) for leaf in leaves if leaf.size) + "}"
 
 
 def _struct(name: str, fields: list[Field], said: str) -> str:

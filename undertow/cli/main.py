@@ -322,6 +322,37 @@ def compare(
     return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf, replay)
 
 
+@app.command()
+def export(
+    scenario: Annotated[
+        Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or the run.nc of an earlier run.")
+    ],
+    c99: Annotated[
+        Path | None, typer.Option("--c99", metavar="DIR", help="Write the controller as C99 into this folder.")
+    ] = None,
+    name: Annotated[str, typer.Option(metavar="NAME", help="Begins the names of files and functions.")] = "controller",
+    precision: Annotated[
+        str | None, typer.Option(metavar="WORD", help="float64 or float32. Default: that of the scenario.")
+    ] = None,
+    attitude: Annotated[str, typer.Option(metavar="WORD", help="Measured attitude: euler or quaternion.")] = "euler",
+    velocity: Annotated[str, typer.Option(metavar="WORD", help="Measured velocity: body, world or rates.")] = "body",
+    output: Annotated[
+        str,
+        typer.Option(metavar="WORD", help="What the vehicle takes: input (usually volts), newtons, pulses, wrench."),
+    ] = "input",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files of an earlier export.")] = False,
+    allow_code: AllowCode = False,
+) -> int:
+    """Export the controller of a scenario, to run it on a vehicle.
+
+    The C code needs no heap and no library but libm, and in double precision it has the bits of a simulation: `make
+    test` in the folder compares them.
+    """
+    from undertow.cli.export import export
+
+    return export(scenario, c99, name, precision, attitude, velocity, output, overwrite, allow_code)
+
+
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,
