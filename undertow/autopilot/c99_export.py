@@ -15,7 +15,7 @@ import numpy as np
 from undertow.autopilot.functions import Functions
 from undertow.autopilot.measured_motion import Format
 from undertow.autopilot.output import output_of
-from undertow.core import runtime
+from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import starting_at
 from undertow.core.errors import BadInput
@@ -91,6 +91,7 @@ def export_c99(
     if unavailable():
         raise BadInput("c99", "have the batch compiler installed", unavailable())
     chosen, form = precision or built.scenario.precision, Format(attitude, velocity)
+    checks.choice("precision", chosen, ("float64", "float32"))
     form.check()
     with runtime.on_processor(), runtime.in_precision(chosen):
         loop = in_present_precision(built.closed_loop)
