@@ -20,8 +20,8 @@ BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 # Rounded prices of 2026, $ per hour, and the power of a laptop, W.
 CORE_HOUR, GPU_HOUR, LAPTOP = 0.04, 2.50, 50
-# Bound of an H100 in single precision: 132 units x 128 lanes x 1.7 GHz, and 10 000 machine instructions per step of W1
-# (NVIDIA's assembler).
+# Bound of an H100 in single precision: 132 units of 128 numbers at 1.7 GHz, and 10 000 machine instructions per step
+# of W1 (NVIDIA's assembler).
 GPU_STEPS = 132 * 128 * 1.7e9 / 10_000
 
 
