@@ -20,8 +20,8 @@ BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 # Rounded prices of 2026, $ per hour, and the power of a laptop, W.
 CORE_HOUR, GPU_HOUR, LAPTOP = 0.04, 2.50, 50
-# Bound of an H100 in single precision: 132 units x 128 lanes x 1.7 GHz, and 10 000 machine instructions per step of W1
-# (NVIDIA's assembler).
+# Bound of an H100 in single precision: 132 units of 128 numbers at 1.7 GHz, and 10 000 machine instructions per step
+# of W1 (NVIDIA's assembler).
 GPU_STEPS = 132 * 128 * 1.7e9 / 10_000
 
 
@@ -82,12 +82,20 @@ def batch() -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("W1, plain NumPy", "", "", f"{thousands(numpy)} ns", "1")]
     named = {
         "W1, one run, by XLA": ("single_xla_ns", "single_xla_compile_s", ""),
-        "W1, one run": ("single_ns", "single_compile_s", "operations"),
-        "W1, many runs, one thread": ("batch_float64_one_thread_ns", "batch_float64_compile_s", ""),
+        "W1, one run": ("single_ns", "single_compile_s", ""),
+        "W1, many runs, one thread": (
+            "batch_float64_one_thread_ns",
+            "batch_float64_compile_s",
+            "batch_float64_operations",
+        ),
         "W1, many runs, all threads": ("batch_float64_ns", "", ""),
         "W1, many runs, all threads, single precision": ("batch_float32_ns", "batch_float32_compile_s", ""),
-        "W2, one run": ("w2_single_ns", "w2_single_compile_s", "w2_operations"),
-        "W2, many runs, all threads": ("w2_batch_float64_ns", "w2_batch_float64_compile_s", ""),
+        "W2, one run": ("w2_single_ns", "w2_single_compile_s", ""),
+        "W2, many runs, all threads": (
+            "w2_batch_float64_ns",
+            "w2_batch_float64_compile_s",
+            "w2_batch_float64_operations",
+        ),
     }
     for what, (ns, compiling, operations) in named.items():
         times = thousands(numpy / speed[ns]) if what.startswith("W1") else ""

@@ -1,8 +1,6 @@
 """What `simulate` adds when the results are written: figures, page, and the prediction beside the run."""
 
-import contextlib
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,36 +39,40 @@ class PredictedMetrics(NamedTuple):
 
 
 def present(
-    executed: Executed, plotting: PlottingProcess, draft: Draft, folder: Path, console: Console, prediction: bool
+    executed: Executed,
+    plotting: PlottingProcess,
+    predicting: Future[PredictedMetrics] | None,
+    draft: Draft,
+    folder: Path,
+    console: Console,
 ) -> Replay | None:
     """Write figures, page and prediction of a run.
 
     Args:
         executed: the run.
         plotting: plots its figures.
+        predicting: predicts its metrics; None for no prediction.
         draft: of the results.
         folder: of the results, as the user knows it.
         console: for what is printed.
-        prediction: whether the metrics are predicted too.
 
     Returns:
         The replay, for a video; None for a plant that is no vehicle.
     """
     page = draft.path / "run.html"
-    with _predicting(executed.built, prediction) as predicting:
-        with stage(console, "figures and page"):
-            looks = shown(executed.dataset, executed.built.closed_loop, lambda: _written(plotting, draft))
-            warn_of(looks.failures)
-            write_run_page(page, executed.dataset, looks)
-        draft.publish()  # nobody waits for the prediction, which is added to the page
-        console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
-        if predicting is not None:
-            with stage(console, "prediction"):
-                predicted = predicting.result()
-            write_metrics(executed, draft.path, in_results(predicted))
-            write_run_page(page, executed.dataset, looks, predicted.metrics)
-            draft.publish()
-            _print_prediction(predicted, executed, console)
+    with stage(console, "figures and page"):
+        looks = shown(executed.dataset, executed.built.closed_loop, lambda: _written(plotting, draft))
+        warn_of(looks.failures)
+        write_run_page(page, executed.dataset, looks)
+    draft.publish()  # nobody waits for the prediction, which is added to the page
+    console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
+    if predicting is not None:
+        with stage(console, "prediction"):
+            predicted = predicting.result()
+        write_metrics(executed, draft.path, in_results(predicted))
+        write_run_page(page, executed.dataset, looks, predicted.metrics)
+        draft.publish()
+        _print_prediction(predicted, executed, console)
     return looks.replay
 
 
@@ -79,16 +81,6 @@ def _written(plotting: PlottingProcess, draft: Draft) -> Plotted:
     plotted = plotting.plotted()
     plotted.write(draft.path / "figures")
     return plotted
-
-
-@contextlib.contextmanager
-def _predicting(built: Built, enabled: bool) -> Iterator[Future[PredictedMetrics] | None]:
-    """The prediction of a scenario, made in another thread meanwhile; None where it is left out."""
-    if not enabled:
-        yield None
-        return
-    with ThreadPoolExecutor(1) as other:
-        yield other.submit(_predict, built)
 
 
 def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
@@ -112,7 +104,8 @@ def in_results(predicted: PredictedMetrics) -> dict[str, Any]:
 
 
 @in_its_precision
-def _predict(built: Built) -> PredictedMetrics:
+def predict(built: Built) -> PredictedMetrics:
+    """Metrics of the steady window of a scenario, or the reason why there are none."""
     try:
         return PredictedMetrics(*predicted(operating_point(built)))
     except Exception as error:  # a user's part may run and yet not be differentiable

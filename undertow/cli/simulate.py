@@ -1,6 +1,8 @@
 """`undertow simulate`: run one scenario and write its results and figures."""
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
@@ -16,10 +18,13 @@ from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows
-from undertow.scenario.build import build, own_parts
+from undertow.scenario.build import Built, build, own_parts
 from undertow.scenario.execute import Executed, execute, write
 from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of
 from undertow.scenario.reading import read
+
+if TYPE_CHECKING:
+    from undertow.cli.run_presentation import PredictedMetrics
 
 _WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures", "run.html")
 
@@ -40,6 +45,7 @@ def simulate(
         output_folder(out, Path("runs") / scenario.stem) as folder,
         results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
         plotting_process() as plotting,
+        ThreadPoolExecutor(1) as thread,
     ):
         if video is not None:
             from undertow.report.replay.video import check_video
@@ -50,12 +56,13 @@ def simulate(
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
         plotting.plot(folder / "run.nc", pdf)
+        predicting = thread.submit(_predicted, executed.built) if prediction else None
         _print_results(executed, folder, console)
         code = max(_ending_code(executed), _repetition_code(repetition, console) if repetition else DONE)
         # What only the rest needs is imported now: users read the results meanwhile.
         from undertow.cli.run_presentation import present
 
-        replay = present(executed, plotting, draft, folder, console, prediction)
+        replay = present(executed, plotting, predicting, draft, folder, console)
     if video is not None and replay is not None:
         from undertow.report.replay.video import write_video
 
@@ -78,6 +85,13 @@ def _run(path: Path, console: Console, allow_code: bool, video: bool) -> Execute
         typer.echo(f"Advice: {one.sentence}", err=True)
     with stage(console, "compiling and running"):
         return interruptible(lambda: execute(built))
+
+
+def _predicted(built: Built) -> "PredictedMetrics":
+    """The prediction of a run, in another thread."""
+    from undertow.cli.run_presentation import predict
+
+    return predict(built)
 
 
 def _print_results(executed: Executed, folder: Path, console: Console) -> None:

@@ -132,9 +132,11 @@ def widened(fuzzy: FuzzySystem, bandwidth, damping, bound) -> FuzzySystem:
         bound: theta_max, m/s^2 and rad/s^2; without a finite one the sets are unchanged.
     """
     # Operation by operation, and not compiled, so that one value and many traced ones are rounded alike.
-    library: Any = jnp if checks.traced(bandwidth, damping, bound) else np
-    bandwidth, damping, bound = (library.asarray(value, dtype=float) for value in (bandwidth, damping, bound))
-    reach = bound * (float(_slope(fuzzy)) / (_ADDED * 2 * damping * bandwidth))
+    given = (bandwidth, damping, bound, _slope(fuzzy))
+    library: Any = jnp if checks.traced(*given) else np
+    bandwidth, damping, bound, slope = (library.asarray(value, dtype=float) for value in given)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of values that the estimator refuses
+        reach = bound * (slope / (_ADDED * 2 * damping * bandwidth))
     factor = library.maximum(_LEAST, library.where(library.isfinite(reach), reach, _LEAST)).max()
     return FuzzySystem(factor * fuzzy.centres, factor * fuzzy.widths, evenly_spaced=fuzzy.evenly_spaced)
 
