@@ -29,6 +29,7 @@ TYPES = {
 
 _OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "rem": "%", "and": "&", "or": "|", "xor": "^"}
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
+_TURNED = {"lt": "gt", "gt": "lt", "le": "ge", "ge": "le"}
 _LIBM = {"fma": "fma", "rem": "fmod", "copysign": "copysign", "abs": "fabs", "sqrt": "sqrt"}
 _LIBM |= {"floor": "floor", "ceil": "ceil", "round": "nearbyint"}
 
@@ -181,7 +182,7 @@ class _Body:
         if name == "convert":
             return self._converted(before, dtype, given[0])
         if name in _COMPARED:
-            return f"{given[0]} {_COMPARED[name]} {given[1]}"
+            return self._comparison(name, operands, given, before)
         if floating and name in _LIBM:
             return f"{_LIBM[name]}{'f' if before == 'float32' else ''}({', '.join(given)})"
         if name == "neg":
@@ -199,6 +200,23 @@ class _Body:
             return whole if floating else f"({kind})({whole})"
         word = _unsigned(before, cast=True)  # signed numbers must not overflow in C
         return f"({kind})(({word}){given[0]} {_OPERATORS[name]} ({word}){given[1]})"
+
+    def _comparison(self, name: str, operands: Sequence[Node], given: Sequence[str], dtype: str) -> str:
+        """A comparison, without those that compilers warn of because their result is known."""
+        if operands[0] == operands[1] and dtype.startswith("float") and name not in ("lt", "gt"):
+            return f"{'' if name == 'ne' else '!'}isnan({given[0]})"
+        if operands[0] == operands[1]:
+            return f"((void){given[0]}, {str(name in ('le', 'ge', 'eq')).lower()})"
+        values = [self._graph.value(node) for node in operands]
+        if dtype not in (BOOL, "float64", "float32") and any(value is not None for value in values):
+            turned = values[0] is not None
+            bound, seen = int(values[0] if turned else values[1]), _TURNED.get(name, name) if turned else name
+            limits = np.iinfo(dtype)
+            known = {("lt", limits.min): "false", ("ge", limits.min): "true", ("gt", limits.max): "false"}
+            known[("le", limits.max)] = "true"
+            if (seen, bound) in known:
+                return f"((void){given[turned]}, {known[seen, bound]})"
+        return f"{given[0]} {_COMPARED[name]} {given[1]}"
 
     def _converted(self, before: str, dtype: str, given: str) -> str:
         kind = TYPES[dtype]

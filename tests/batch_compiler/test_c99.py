@@ -40,7 +40,9 @@ def in_c(functions, folder, compiler, *flags):
     (folder / "all.c").write_text("\n\n".join([c99.HEAD, *declared, *source.functions, ""]))
     library = folder / f"{compiler}{len(flags)}{abs(hash(flags))}.so"
     options = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC", *flags]
-    done = subprocess.run([compiler, *options, "all.c", "-o", library, "-lm"], cwd=folder, capture_output=True, text=True)
+    done = subprocess.run(
+        [compiler, *options, "all.c", "-o", library, "-lm"], cwd=folder, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     code = ctypes.CDLL(str(library))
 
@@ -48,7 +50,9 @@ def in_c(functions, folder, compiler, *flags):
         found = [np.zeros((len(rows[0]), *leaf.shape), leaf.dtype) for leaf in shapes[i]]
         for row in range(len(rows[0])):
             given = [np.ascontiguousarray(x[row]) for x in rows]
-            getattr(code, f"f{i}")(*(ctypes.c_void_p(x.ctypes.data) for x in [*given, *(out[row] for out in found)]))
+            getattr(code, f"f{i}")(
+                *(ctypes.c_void_p(x.ctypes.data) for x in [*given, *(out[row : row + 1] for out in found)])
+            )
         return found
 
     return run
@@ -95,7 +99,7 @@ def test_loops_branches_tables_and_products(tmp_path):
     positive, place = chance.uniform(0.1, 1e6, (ROWS, 3)), chance.integers(0, 50, (ROWS, 3))
     large = chance.normal(size=(ROWS, 3)) * 1e30  # angles whose sine takes the long way
     cases = [
-        (lambda x: jax.vmap(newton)(x), [positive]),
+        (lambda x: newton(x[0]) + newton(x[1]), [positive]),
         (lambda x: jnp.sin(x) + jnp.exp(-(x**2)) * jnp.arctan2(x, 1.0), [large]),
         (lambda i: table[i], [place]),
         (lambda a, b: (a @ a) @ b, [matrix, vector]),
@@ -104,8 +108,8 @@ def test_loops_branches_tables_and_products(tmp_path):
     ]
     functions = [(function, [jnp.asarray(x[0]) for x in rows]) for function, rows in cases]
     for compiler in COMPILERS:
-        sanitized = ("-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all")
-        for flags in (("-O2",), sanitized):
+        sanitized = [("-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all")] if compiler == "gcc" else []
+        for flags in (("-O2",), *sanitized):
             run = in_c(functions, tmp_path, compiler, *flags)
             for i, (function, rows) in enumerate(cases):
                 wanted = simdjit.compile(function, *(x[0] for x in rows), lanes=1)(*rows)
