@@ -179,11 +179,11 @@ class Autopilot:
         motion = self._motion(position, velocity, attitude)
         given = self._command if applied is None else self._input(applied)
         report = self._report(propellers, np.nan)
-        wanted = None if target is None else self._target(target)
+        goal = None if target is None else self._target(target)  # before anything changes
         passed = self._clock.passed(dt)
         if not passed:
             return self._convert.outputs.copy()
-        put(self._go_on.inputs, (motion, report, wanted or self._target(None), given, passed))
+        put(self._go_on.inputs, (motion, report, goal or self._target(None), given, passed))
         self._go_on()
         return self._answered()
 

@@ -155,10 +155,10 @@ class _Export:
         given, results = [], []
         for k in range(_VECTORS):
             taken = first if k == 0 else later
-            drawn = jax.tree.map(lambda leaf: leaf + _SPREAD * chance.normal(size=leaf.shape), of.given)
-            applied = _SPREAD * chance.normal(size=of.applied.shape)
-            whole = (drawn, applied.astype(of.applied.dtype), of.time + self._period)
-            put(taken.inputs, drawn if k == 0 else whole)
+            random = lambda leaf: np.asarray(leaf + _SPREAD * chance.normal(size=leaf.shape), dtype=leaf.dtype)
+            motion, applied = jax.tree.map(random, of.given), random(of.applied)
+            whole = (motion, applied, np.asarray(self._period, dtype=of.time.dtype))
+            put(taken.inputs, motion if k == 0 else whole)
             taken()
             if k == 0:
                 put(later.state, first.outputs[0])
