@@ -12,7 +12,7 @@ elementary functions are made of them and of explicit fused products. What the c
 
 How it works: a traced function becomes a graph of scalar operations (`lowering`, `graph`, `simplify`), that becomes
 LLVM's assembly in which every scalar is a vector over lanes (`codegen`, `instructions`), and LLVM makes machine code of
-it, for this processor (`cpu`) or for a GPU where every lane is a thread (`nvidia`, `cuda`).
+it, for this processor (`cpu`) or for a GPU where every lane is a thread (`nvidia`, `cuda`). `c99` writes it as C.
 """
 
 from collections.abc import Callable
@@ -22,6 +22,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from simdjit import c99 as c99
 from simdjit.cache import default_folder as default_folder
 from simdjit.cpu import simd_width as simd_width
 from simdjit.cuda import Driver as Driver

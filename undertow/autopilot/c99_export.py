@@ -332,21 +332,23 @@ void {name}_reference({kind} t, {name}_target *target);
 
 def _initialiser(leaves: list[np.ndarray]) -> str:
     """The arrays of a struct, in C."""
-    from simdjit.c99 import literal
+    from simdjit import c99
 
     def written(value: np.ndarray) -> str:
         if np.ndim(value) == 0:
-            return literal(value[()], str(value.dtype))
+            return c99.literal(value[()], str(value.dtype))
         return "{" + ", ".join(map(written, value)) + "}"
 
     return "{" + ", ".join(written(np.asarray(leaf)) for leaf in leaves if leaf.size) + "}"
 
 
 def _struct(name: str, fields: list[Field], said: str) -> str:
-    from simdjit.c99 import TYPES
+    from simdjit import c99
 
     members = [
-        f"    {TYPES[one.dtype]} {one.name}{''.join(f'[{size}]' for size in one.shape)};" for one in fields if one.size
+        f"    {c99.TYPES[one.dtype]} {one.name}{''.join(f'[{size}]' for size in one.shape)};"
+        for one in fields
+        if one.size
     ]
     return "\n".join([f"/* {said} */", "typedef struct {", *members, f"}} {name};", ""])
 
