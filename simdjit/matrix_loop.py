@@ -8,8 +8,10 @@ from simdjit.instructions import Emitter, Table
 # Products of two numbers from which on a loop is quicker than what is written out (benchmarks/compiler_scale.py).
 FROM = 4000
 
-# Columns of the result that are summed side by side, where their number divides by it.
-_BESIDE = (8, 4, 3, 2, 1)
+# Rows and columns of the result that are summed side by side, where their number divides by it: 8 times 2 sums fit the
+# registers. The more rows, the less often the second matrix, which does not fit the first cache, is read.
+_BELOW = (8, 6, 5, 4, 3, 2, 1)
+_BESIDE = (2, 1)
 
 Matrix = list[list[Node]]
 
@@ -79,36 +81,43 @@ def emit(emitter: Emitter, one: Table, other: Table, shape: Product, dtype: str,
     """
     kind, lines = emitter.vector(dtype), emitter.lines
     times, add = ("fmul", "fadd") if dtype.startswith("float") else ("mul", "add")
+    below = next(count for count in _BELOW if shape.rows % count == 0)
     beside = next(count for count in _BESIDE if shape.columns % count == 0)
+    tile = [(a, b) for a in range(below) for b in range(beside)]
     result = emitter.room(f"%{name}", shape.rows * shape.columns, dtype)
     before = emitter.block
     emitter.enter(f"{name}row")
     lines.append(f"  %{name}i = phi i64 [ 0, %{before} ], [ %{name}in, %{name}rowend ]")
+    lines.extend(f"  %{name}i{a} = add i64 %{name}i, {a}" for a in range(below))
     emitter.enter(f"{name}column")
     lines.append(f"  %{name}j = phi i64 [ 0, %{name}row ], [ %{name}jn, %{name}columnend ]")
-    for b in range(beside):
-        lines.append(f"  %{name}j{b} = add i64 %{name}j, {b}")
+    lines.extend(f"  %{name}j{b} = add i64 %{name}j, {b}" for b in range(beside))
     emitter.enter(f"{name}sum")
     lines.append(f"  %{name}k = phi i64 [ 0, %{name}column ], [ %{name}kn, %{name}sum ]")
     nothing = emitter.everywhere(-0.0 if times == "fmul" else 0, dtype)  # what changes no sum, not even a zero's sign
-    for b in range(beside):
-        lines.append(f"  %{name}s{b} = phi {kind} [ {nothing}, %{name}column ], [ %{name}n{b}, %{name}sum ]")
-    entry = _place(emitter, f"{name}x", f"%{name}i", f"%{name}k", shape.rows, shape.length, shape.turned[0])
-    emitter.at(one, entry, dtype, f"%{name}x")
-    for b in range(beside):
-        y = f"{name}y{b}"
-        entry = _place(emitter, y, f"%{name}j{b}", f"%{name}k", shape.columns, shape.length, shape.turned[1])
-        emitter.at(other, entry, dtype, f"%{y}")
-        lines.append(f"  %{name}p{b} = {times} {kind} %{name}x, %{y}")
-        lines.append(f"  %{name}n{b} = {add} {kind} %{name}s{b}, %{name}p{b}")
+    for a, b in tile:
+        at = f"{a}x{b}"
+        lines.append(f"  %{name}s{at} = phi {kind} [ {nothing}, %{name}column ], [ %{name}n{at}, %{name}sum ]")
+    for letter, table, index, count, size, turned in (
+        ("x", one, "i", below, shape.rows, shape.turned[0]),
+        ("y", other, "j", beside, shape.columns, shape.turned[1]),
+    ):
+        for a in range(count):
+            place = f"{name}{letter}{a}"
+            entry = _place(emitter, place, f"%{name}{index}{a}", f"%{name}k", size, shape.length, turned)
+            emitter.at(table, entry, dtype, f"%{place}")
+    for a, b in tile:
+        at = f"{a}x{b}"
+        lines.append(f"  %{name}p{at} = {times} {kind} %{name}x{a}, %{name}y{b}")
+        lines.append(f"  %{name}n{at} = {add} {kind} %{name}s{at}, %{name}p{at}")
     _again(emitter, f"{name}k", 1, shape.length, f"{name}sum", f"{name}store")
-    for b in range(beside):
-        z = f"{name}z{b}"
-        entry = _place(emitter, z, f"%{name}i", f"%{name}j{b}", shape.rows, shape.columns, False)
-        emitter.put(f"%{name}n{b}", result, entry, dtype, f"%{z}")
+    for a, b in tile:
+        at = f"{a}x{b}"
+        entry = _place(emitter, f"{name}z{at}", f"%{name}i{a}", f"%{name}j{b}", shape.rows, shape.columns, False)
+        emitter.put(f"%{name}n{at}", result, entry, dtype, f"%{name}z{at}")
     emitter.enter(f"{name}columnend")
     _again(emitter, f"{name}j", beside, shape.columns, f"{name}column", f"{name}rowend")
-    _again(emitter, f"{name}i", 1, shape.rows, f"{name}row", f"{name}end")
+    _again(emitter, f"{name}i", below, shape.rows, f"{name}row", f"{name}end")
     return result
 
 
