@@ -75,10 +75,11 @@ class Packs(NamedTuple):
 
     def _units(self, graph: Graph, nodes: Sequence[Node]) -> dict[Node, Node | Group]:
         own, units = set(nodes), {}
-        for node in nodes:  # operands first, so that a region is known before its results
+        is_result = lambda node: graph.operations[node].name == "result"
+        for node in sorted(nodes, key=is_result):  # regions first: results are packed as theirs are
             group = self.groups.get(node, ())
             whole = bool(group) and own.issuperset(group)
-            if whole and graph.operations[node].name == "result":
+            if whole and is_result(node):
                 regions = tuple(graph.operations[member].operands[0] for member in group)
                 whole = units[regions[0]] == regions
             units[node] = group if whole else node

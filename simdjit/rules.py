@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Any, NamedTuple
 
+import jax
+
 from simdjit.graph import TYPES, U32, Graph, Node, Nodes, Unsupported
 
 
@@ -74,6 +76,11 @@ def parameters_read(name: str) -> frozenset[str] | None:
     return _RULES[name].read if name in _RULES else None
 
 
+def _asks_nothing(value: Any) -> bool:
+    """Whether a parameter is None, or a distribution over no devices, as `jax.vmap` writes it."""
+    return value is None or (isinstance(value, jax.sharding.NamedSharding) and value.mesh.empty)
+
+
 def results(name: str, equation: Equation, given: Sequence[Nodes]) -> list[Nodes]:
     """What a primitive makes of its operands.
 
@@ -85,7 +92,7 @@ def results(name: str, equation: Equation, given: Sequence[Nodes]) -> list[Nodes
     kinds = [_kind(out) for out in equation.outs]
     found = _RULES[name]
     for key, value in equation.params.items():
-        if key not in found.read and key not in found.idle and value is not None:  # None is: nothing is asked
+        if key not in found.read and key not in found.idle and not _asks_nothing(value):
             raise Unsupported(f"no rule for `{name}` with {key} {value}")
     try:
         made = found.make(equation, *given)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from undertow import thrusters as thrusters
     from undertow import vehicles as vehicles
     from undertow.autopilot.autopilot import Autopilot as Autopilot
+    from undertow.autopilot.navigation_filter import NavigationFilter as NavigationFilter
     from undertow.comparison.comparison import Comparison as Comparison
     from undertow.comparison.comparison import compare as compare
     from undertow.controllers.rcaf import rcaf as rcaf
@@ -39,6 +40,7 @@ _HOMES = {
     "BadInput": "undertow.core.errors",
     "Comparison": "undertow.comparison.comparison",
     "HybridVehicle": "undertow.plants.hybrid_vehicle",
+    "NavigationFilter": "undertow.autopilot.navigation_filter",
     "Run": "undertow.run",
     "compare": "undertow.comparison.comparison",
     "rcaf": "undertow.controllers.rcaf",

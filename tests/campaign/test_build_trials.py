@@ -68,7 +68,7 @@ HEAVY = {
     "controller.actuator_rate": {"uniform": [10.0, 20.0]},
     "disturbance[0].velocity[0]": {"normal": [0.3, 0.1]},
     "disturbance[1].height": {"uniform": [0.2, 0.8]},
-    "navigation.sensors[0].blend": {"uniform": [0.05, 0.2]},
+    "navigation.dvl_blend": {"uniform": [0.05, 0.2]},
     "navigation.sensors[0].rate_bias": {"choice": [0.0, 1e-3, 2e-3]},
 }
 

@@ -8,7 +8,7 @@ from textbook import rotation_from_euler
 from undertow.core.contracts import Load, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
 from undertow.power import ESC
-from undertow.sensors.estimate import estimate_of, motion_of
+from undertow.sensors.motion import motion_of
 from undertow.thrusters.thruster import PropellerReport
 
 NUMBERS = 64
@@ -74,14 +74,11 @@ def power(part, v):
 
 def sensors(sensor, v):
     truth = measurement_of_outputs(v[:6], v[6:12], PropellerReport(100 * v[25:33], 10 * v[33:41]))
-    estimate = estimate_of(measurement_of_outputs(v[13:19], v[19:25], truth.actuator))
     motion = motion_of(truth, v[41:44], 0.01)
     reading = sensor.reading(motion)
     state = sensor.sampling.init(reading, v[: reading.size])
     heard = sensor.sampling.deliver(state, 1 + jnp.abs(v[12]), reading, v[: reading.size + 1])
-    moved = sensor.predict(estimate, heard[0].reading) if hasattr(sensor, "predict") else estimate
-    later = moved.predicted(0.01)
-    return heard, sensor.correct(later, heard[0].reading)
+    return heard, jax.jacfwd(sensor.reading)(motion)
 
 
 def references(reference, v):

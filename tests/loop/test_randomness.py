@@ -96,7 +96,7 @@ def test_instruments_are_heard_and_noisy_at_any_time(precision):
     with runtime.in_precision(precision):
         times = [(0.0, 10.0), (1e7, 10.0)] + [(0.0, 1e-7), (1e5, 1e-7)] * (precision == "float64")
         for start, period in times:
-            sensor = observer([imu(period=period), compass(period=period, noise=DEVIATION, blend=1.0)])
+            sensor = observer([imu(period=period), compass(period=period, noise=DEVIATION)], compass_blend=1.0)
             truth = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
             path = sensor.realize(jax.random.PRNGKey(1))
 

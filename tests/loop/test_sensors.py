@@ -85,8 +85,6 @@ def test_noise_and_dropout_have_the_stated_statistics():
         ({"dropout": 1.0}, "dropout"),
         ({"noise": -1.0}, "noise"),
         ({"delay": float("nan")}, "delay"),
-        ({"blend": 0.0}, "blend"),
-        ({"blend": 1.5}, "blend"),
     ],
 )
 def test_impossible_instruments(wrong, name):
@@ -142,9 +140,9 @@ def largest(sensors, step):
     return np.asarray(largest_errors(observer(sensors), swinging, np.asarray(round(20.0 / step)), np.asarray(step)))
 
 
-def errors(sensors, motion, step, duration, key=0):
+def errors(sensors, motion, step, duration, key=0, **blends):
     """Errors of position and velocity at every step, [t, 12]."""
-    told, truth = observe(observer(sensors), motion, round(duration / step), step, jax.random.PRNGKey(key))
+    told, truth = observe(observer(sensors, **blends), motion, round(duration / step), step, jax.random.PRNGKey(key))
     apart = told.position - truth.position
     apart = apart.at[:, 3:].set(wrap_angle(apart[:, 3:]))
     return np.concatenate([apart, told.velocity - truth.velocity], axis=1)
@@ -178,8 +176,8 @@ def test_dead_reckoning_converges_at_first_order():
 def test_noise_of_the_dvl_is_smoothed_as_an_exponential_filter_does():
     """Variance alpha / (2 - alpha) of that of the reading."""
     alpha, sigma = 0.3, 0.02
-    parts = [imu(**QUIET_IMU), dvl(period=0.01, noise=sigma, resolution=0, delay=0, blend=alpha), compass(noise=0)]
-    velocity = errors(parts, still, 0.01, 400.0)[1000:, 6:9]
+    parts = [imu(**QUIET_IMU), dvl(period=0.01, noise=sigma, resolution=0, delay=0), compass(noise=0)]
+    velocity = errors(parts, still, 0.01, 400.0, dvl_blend=alpha)[1000:, 6:9]
     expected = sigma * np.sqrt(alpha / (2 - alpha))
     # Effective number of independent samples: a third of 39 000 per (2 - alpha) / alpha.
     assert abs(np.sqrt((velocity**2).mean()) / expected - 1) < 4 / np.sqrt(2 * 3 * 39_000 * alpha / (2 - alpha))
@@ -189,8 +187,8 @@ def test_noise_of_fixes_is_smoothed_as_an_alpha_beta_filter_does():
     """Steady variances of position and velocity of the alpha-beta filter. Bar-Shalom et al. (2001), section 6.5."""
     alpha, sigma, period = 0.2, 0.05, 0.1
     beta = alpha**2 / (2 - alpha)
-    parts = [imu(**QUIET_IMU), compass(noise=0), position_fix(period, sigma, delay=0.0, blend=alpha)]
-    found = errors(parts, still, period, 4000.0)[400:]
+    parts = [imu(**QUIET_IMU), compass(noise=0), position_fix(period, sigma, delay=0.0)]
+    found = errors(parts, still, period, 4000.0, fix_blend=alpha)[400:]
     denominator = alpha * (4 - 2 * alpha - beta)
     position = (2 * alpha**2 + beta * (2 - 3 * alpha)) / denominator
     velocity = 2 * beta**2 / denominator / period**2
@@ -216,15 +214,11 @@ def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
     """An offset of b in acceleration grows to b T / alpha between corrections of share alpha every T."""
     offset, period, alpha = 0.01, 0.2, 0.4
     key = 5
-    parts = [
-        imu(**QUIET_IMU, force_bias=offset),
-        dvl(period=period, noise=0, resolution=0, delay=0, blend=alpha),
-        compass(noise=0),
-    ]
-    sensor = observer(parts)
+    parts = [imu(**QUIET_IMU, force_bias=offset), dvl(period=period, noise=0, resolution=0, delay=0), compass(noise=0)]
+    sensor = observer(parts, dvl_blend=alpha)
     level = lambda t: measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
     realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).sensors[0].offset[5:]
-    velocity = errors(parts, level, 0.01, 40.0, key)[2000:, 6:9]
+    velocity = errors(parts, level, 0.01, 40.0, key, dvl_blend=alpha)[2000:, 6:9]
     before_correction = np.abs(velocity).max(0)
     expected = np.abs(np.asarray(realization)) * period / alpha * (1 - alpha)
     # The largest value that is reported is the one a step before the correction.

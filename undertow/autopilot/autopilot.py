@@ -1,6 +1,6 @@
 """One compiled controller, stepped by somebody else's clock."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from undertow.autopilot.clock import Clock
 from undertow.autopilot.functions import Functions
 from undertow.autopilot.measured_motion import Format, Motion
+from undertow.autopilot.numbers import numbers, step_of
 from undertow.autopilot.output import output_of
 from undertow.autopilot.saved_state import packed, unpacked
 from undertow.core import checks, runtime
@@ -20,7 +21,7 @@ from undertow.core.contracts import Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.stepped import Step, put
+from undertow.loop.stepped import put
 from undertow.power.esc import ESC
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
@@ -94,11 +95,13 @@ class Autopilot:
 
     def _compile(self, of: Functions) -> None:
         self._form, zero = of.form, jnp.zeros(len(self._loop.plant.outputs))
-        self._begin = _step(lambda law, _, given: ((), of.first(law, given)), of.controller, (), of.given)
+        self._begin = step_of(lambda law, _, given: ((), of.first(law, given)), of.controller, (), of.given)
         memory, going = self._begin.outputs[0], (of.given, of.applied, of.time + self.sampling_time)
-        self._go_on = _step(lambda law, memory, given: of.following(law, memory, *given), of.controller, memory, going)
-        self._convert = _step(lambda output, _, u: ((), output.of(u)), of.output, (), of.applied)
-        self._at = _step(lambda reference, _, t: ((), reference.at(t)), starting_at(of.reference, zero), (), of.time)
+        self._go_on = step_of(
+            lambda law, memory, given: of.following(law, memory, *given), of.controller, memory, going
+        )
+        self._convert = step_of(lambda output, _, u: ((), output.of(u)), of.output, (), of.applied)
+        self._at = step_of(lambda reference, _, t: ((), reference.at(t)), starting_at(of.reference, zero), (), of.time)
         self.backend = self._go_on.backend
 
     def start(
@@ -244,7 +247,7 @@ class Autopilot:
     def _motion(self, position: Any, velocity: Any, attitude: Any) -> Motion:
         shapes = map(np.shape, self._begin.inputs.motion)
         given = zip(Motion._fields, (position, attitude, velocity), shapes, strict=True)
-        return Motion(*(_numbers(name, value, shape) for name, value, shape in given))
+        return Motion(*(numbers(name, value, shape) for name, value, shape in given))
 
     def _report(self, propellers: Any, missing: float) -> Any:
         """What the propellers report, of the form that the plant has; `missing` stands for everything not given."""
@@ -257,7 +260,7 @@ class Autopilot:
         if len(parts) != len(places):
             must = "be the speeds alone" if len(places) == 1 else "be (speeds, accelerations)"
             raise BadInput("propellers", must, f"{len(parts)} parts")
-        found = [_numbers("propellers", part, place.shape) for part, place in zip(parts, places, strict=True)]
+        found = [numbers("propellers", part, place.shape) for part, place in zip(parts, places, strict=True)]
         return jax.tree.unflatten(form, found)
 
     def _target(self, target: Any) -> Target:
@@ -270,7 +273,7 @@ class Autopilot:
         parts = target if np.ndim(target) == 2 or isinstance(target, tuple) else (target,)
         if len(parts) > 3:
             raise BadInput("target", "be outputs, or (outputs, rates, accelerations)", f"{len(parts)} parts")
-        found: list[Any] = [_numbers("target", part, shape) for part in parts]
+        found: list[Any] = [numbers("target", part, shape) for part in parts]
         for part in found:
             checks.finite("target", part)
         return Target(*found, *[np.zeros(shape)] * (3 - len(found)))
@@ -281,7 +284,7 @@ class Autopilot:
         put(self._at.numbers, eqx.filter(placed, eqx.is_array))
 
     def _input(self, applied: Any) -> np.ndarray:
-        found = _numbers("applied", applied, self._command.shape)
+        found = numbers("applied", applied, self._command.shape)
         checks.finite("applied", found)
         return found
 
@@ -305,26 +308,3 @@ def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | No
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
     return built.closed_loop, built.scenario.precision, built.scenario.loop.dt
-
-
-def _step(function: Callable, part: Any, state: Any, inputs: Any) -> Step:
-    """A step whose numbers are those of a part: function(part, state, inputs) -> (state, outputs)."""
-    numbers, rest = eqx.partition(part, eqx.is_array)
-    return Step(
-        lambda numbers, state, inputs: function(eqx.combine(numbers, rest), state, inputs), numbers, state, inputs
-    )
-
-
-def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """A value as numbers of a shape.
-
-    Raises:
-        BadInput: it has another one, or holds something else.
-    """
-    try:
-        found = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise BadInput(name, "be numbers", repr(value)) from None
-    if found.shape != shape:
-        raise BadInput(name, f"have shape {shape}", f"of shape {found.shape}")
-    return found

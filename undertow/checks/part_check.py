@@ -24,7 +24,7 @@ from undertow.core.contracts import (
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.user_code import fault_of
-from undertow.sensors.estimate import estimate_of, motion_of
+from undertow.sensors.motion import motion_of
 from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 
@@ -116,29 +116,28 @@ def _navigation(navigation: AbstractNavigation, around: Surroundings) -> Iterato
 
 
 def _sensor(sensor: AbstractSensor, around: Surroundings) -> Iterator[Finding]:
-    """Check of a sensor on a body at rest, so that a delay has no effect."""
+    """Check of a sensor on a body that moves: what it reads, and how that changes with the motion."""
     report = PropellerReport(jnp.linspace(10.0, 80.0, 8), jnp.zeros(8))
-    truth = measurement_of_outputs(around.truth.position, jnp.zeros(6), report)
-    motion, right = motion_of(truth, jnp.zeros(3), jnp.asarray(0.01)), estimate_of(truth)
+    truth = measurement_of_outputs(around.truth.position, around.truth.velocity, report)
+    motion = motion_of(truth, truth.velocity[:3], jnp.asarray(0.01))
     reading = sensor.reading(motion)
     if jnp.ndim(reading) != 1:
         yield error("contract", "reading", "give an array of one axis", f"of shape {jnp.shape(reading)}")
         return
-    corrected = sensor.correct(right, reading)
-    wrong = list(alike("correct", corrected, right, "give an estimate in the form it was"))
-    if wrong:
+    if wrong := list(shaped("reading", reading, reading.shape)):
         yield from wrong
         return
-    off = jnp.array([0.1, -0.2, 0.3])
-    for name in ("position", "velocity"):
-        true = getattr(right, name)
-        yield from agree("correct", getattr(corrected, name), true, f"the {name}, where the reading tells nothing new")
-        after = sensor.correct(right._replace(**{name: true + off}), reading)
-        errors = [float(jnp.linalg.norm(vector)) for vector in (off, getattr(after, name) - true)]
-        late = name == "velocity" and (after.position != right.position).any()  # a position of some time ago
-        if not late and errors[1] > (1 + 1e-9) * errors[0]:
-            got = f"from {errors[0]:.3g} to {errors[1]:.3g} off"
-            yield error("contract", "correct", f"move the {name} towards the reading", got)
+    for i in sensor.angles:
+        if not 0 <= i < len(reading):
+            yield error("contract", "angles", f"be entries of a reading, from 0 to {len(reading) - 1}", str(i))
+    slopes = jnp.concatenate(
+        [leaf.reshape(len(reading), -1) for leaf in jax.tree.leaves(jax.jacfwd(sensor.reading)(motion))], axis=1
+    )
+    if not jnp.isfinite(slopes).all():
+        yield error("contract", "reading", "have finite derivatives, which a Kalman filter needs", "not differentiable")
+    elif not slopes.any(axis=1).all():
+        entry = int(jnp.argmin(slopes.any(axis=1))) + 1
+        yield error("contract", "reading", "depend on the motion", f"constant in entry {entry}: no filter can use it")
 
 
 def _reference(reference: AbstractReference, around: Surroundings) -> Iterator[Finding]:

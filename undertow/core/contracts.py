@@ -386,3 +386,11 @@ class AbstractInformedNavigation(AbstractNavigation):
     @abc.abstractmethod
     def ignored(self, state: PyTree) -> Int[Array, ""]:
         """Number of readings so far that were ignored because they were not finite."""
+
+    @abc.abstractmethod
+    def signals(self) -> dict[str, Signal]:
+        """Declarations of the signals of `diagnostics`, by name; {} for none."""
+
+    @abc.abstractmethod
+    def diagnostics(self, state: PyTree) -> dict[str, Array]:
+        """Values of the signals that this filter declares, by name."""

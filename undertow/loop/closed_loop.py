@@ -79,7 +79,8 @@ class ClosedLoop(eqx.Module):
             BadInput: two parts declare a signal of the same name.
         """
         found = dict(RECORDED)
-        for part in (self.plant, self.controller):
+        informed = [self.navigation] if isinstance(self.navigation, AbstractInformedNavigation) else []
+        for part in (self.plant, self.controller, *informed):
             for name, signal in part.signals().items():
                 if name in found:
                     raise BadInput(name, "be the name of one signal only", f"declared again by {type(part).__name__}")
@@ -175,7 +176,16 @@ class Realization(NamedTuple):
             "saturated": effort.saturated,
             "bad_readings": self._bad_readings(measuring),
         }
-        return recorded | of_plant | of_controller
+        return recorded | of_plant | of_controller | self._of_navigation(measuring)
+
+    def _of_navigation(self, measuring: Any) -> Signals:
+        """Signals that the navigation declares."""
+        navigation = self.loop.navigation
+        if not (isinstance(measuring, MeasurementState) and isinstance(navigation, AbstractInformedNavigation)):
+            return {}
+        found = navigation.diagnostics(measuring.navigation)
+        check_declared(navigation, found, "diagnostics")
+        return found
 
     def _bad_readings(self, measuring: Any) -> Int[Array, ""]:
         """Number of readings so far that were not finite: ignored by the navigation, or replaced for the law."""

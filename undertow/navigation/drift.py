@@ -2,16 +2,17 @@
 
 The errors are those of white noise and constant offsets that are integrated: a rate once, an acceleration twice.
 Inclination errors count as accelerations: gravity times the angle. With a sensor of velocity, an error of the
-acceleration acts for period / blend only. What else there is adds to it, so that the drift is at least this large.
+acceleration acts for period / dvl_blend only. What else there is adds to it, so that the drift is at least this large.
 """
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jax.typing import ArrayLike
 
-from undertow.sensors.estimate import gravity
 from undertow.sensors.imu import IMU
+from undertow.sensors.motion import gravity
 from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor
 
 _REMEDIES = {"north and east": "position_fix", "down": "depth", "yaw": "compass"}
@@ -24,9 +25,9 @@ class _Error(NamedTuple):
     offset: float
 
 
-def drift_advice(sensors: Sequence[AbstractSensor], duration: float) -> tuple[str, ...]:
+def drift_advice(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, duration: float) -> tuple[str, ...]:
     """A sentence where an output drifts in `duration` (s), with the sensors that prevent it."""
-    found = drifts(sensors, duration)
+    found = drifts(sensors, dvl_blend, duration)
     if not found:
         return ()
     sizes = {
@@ -42,7 +43,7 @@ def drift_advice(sensors: Sequence[AbstractSensor], duration: float) -> tuple[st
     )
 
 
-def drifts(sensors: Sequence[AbstractSensor], duration: float) -> dict[str, float]:
+def drifts(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, duration: float) -> dict[str, float]:
     """Standard deviation of the error (m, rad) after `duration` (s) of what no sensor measures.
 
     Empty where a sensor does not say what it measures, or without an IMU.
@@ -58,19 +59,21 @@ def drifts(sensors: Sequence[AbstractSensor], duration: float) -> dict[str, floa
     )
     found = {}
     if not {"north", "east"} <= fixed:
-        found["north and east"] = _of_position(sensors, error(5, g), 0, duration)
+        found["north and east"] = _of_position(sensors, dvl_blend, error(5, g), 0, duration)
     if "down" not in fixed:
-        found["down"] = _of_position(sensors, error(7, 0.0), 2, duration)
+        found["down"] = _of_position(sensors, dvl_blend, error(7, 0.0), 2, duration)
     if "yaw" not in fixed:
         found["yaw"] = _once(error(4, 0.0), duration)
     return {what: float(drift) for what, drift in found.items() if drift > 0}
 
 
-def _of_position(sensors: Sequence[AbstractSensor], acceleration: _Error, axis: int, duration: float) -> float:
+def _of_position(
+    sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, acceleration: _Error, axis: int, duration: float
+) -> float:
     """With the first sensor of velocity, or from the acceleration alone."""
     for one in sensors:
         if isinstance(one, AbstractVelocitySensor) and np.isfinite(noise := float(one.velocity_noise()[axis])):
-            held = float(one.sampling.period / one.blend)
+            held = float(np.asarray(one.sampling.period) / np.asarray(dvl_blend))
             offset = float(np.ravel(np.broadcast_to(np.asarray(one.sampling.bias, dtype=float), 3))[axis])
             density = float(one.sampling.period) * noise**2 + acceleration.density * held**2
             return _once(_Error(density, float(np.hypot(offset, acceleration.offset * held))), duration)

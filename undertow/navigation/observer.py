@@ -1,139 +1,187 @@
-"""Sensors and an observer with constant gains, which estimates x and x_dot at every control step."""
+"""Observer with constant gains, which estimates the motion of a vehicle from its sensors at every control step."""
 
-from typing import NamedTuple
-
-import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractInformedNavigation, Measurement
+from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.core.param import Param, param
 from undertow.navigation.drift import drift_advice
-from undertow.numerics.random_keys import numbered
-from undertow.sensors.estimate import Estimate, estimate_of, motion_of
+from undertow.navigation.estimate import Estimate, estimate_of
+from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation, check_sensors
+from undertow.numerics.linear_algebra import matvec
+from undertow.numerics.rotations import Vector3, quaternion_from_euler
+from undertow.sensors.compass import Compass
+from undertow.sensors.depth import Depth
+from undertow.sensors.dvl import DVL
 from undertow.sensors.imu import IMU
+from undertow.sensors.motion import gravity
+from undertow.sensors.position_fix import PositionFix
 from undertow.sensors.propeller_speed import PropellerSpeed
-from undertow.sensors.sampling import SensorState
-from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor
-
-# (m/s)^2 s; smaller densities count as no noise.
-_NOISELESS = 1e-20
+from undertow.sensors.sensor import AbstractSensor
 
 
-class NavigationState(NamedTuple):
-    """State of the observer and its sensors."""
-
-    time: Float[Array, ""]  # of the last step, s
-    velocity: Float[Array, "3"]  # true velocity then, m/s; accelerometers measure its change
-    sensors: tuple[SensorState, ...]  # state of each
-    estimate: Estimate
-    ignored: Int[Array, ""]  # readings so far that were not finite
-
-
-class Navigation(AbstractInformedNavigation):
+class Observer(AbstractFilter):
     """Strapdown inertial navigation, corrected by every other sensor with a constant gain.
 
     Between readings the estimate is integrated from rates and acceleration of the IMU. A delayed reading is compared
-    with the estimate of the time at which it was taken. There is no Kalman filter and no estimate of a bias: an offset
+    with the estimate of the time at which it was taken. There is no covariance and no estimate of a bias: an offset
     of the accelerometers, or of roll or pitch (times gravity), causes an error of the velocity: its growth between two
-    readings of the DVL, divided by their `blend`. A reading that is not finite counts as lost.
+    readings of the DVL, divided by `dvl_blend`. A reading that is not finite counts as lost.
 
     Raises:
-        BadInput: no sensor, or no IMU.
+        BadInput: no IMU, a sensor that the observer does not know, or a blend outside (0, 1].
     """
 
     sensors: tuple[AbstractSensor, ...]
-    smooth: bool = eqx.field(static=True, default=False)
+    imu_blend: Float[Param, ""] = param("", "share of each new inclination in the estimated one")
+    dvl_blend: Float[Param, ""] = param("", "share of each new velocity in the estimated one")
+    compass_blend: Float[Param, ""] = param("", "share of each new heading in the estimated one")
+    depth_blend: Float[Param, ""] = param("", "alpha of the alpha-beta filter of depth")
+    fix_blend: Float[Param, ""] = param("", "alpha of the alpha-beta filter of north and east")
+    propeller_blend: Float[Param, ""] = param("", "share of each new speed of the propellers in the estimated one")
 
     def __check_init__(self):
+        check_sensors(self.sensors)
         for i, sensor in enumerate(self.sensors):
-            if not isinstance(sensor, AbstractSensor):
-                raise BadInput(f"sensors[{i}]", "be a sensor", type(sensor).__name__)
-        if not any(isinstance(sensor, IMU) for sensor in self.sensors):
-            hint = "Add `imu`: no other sensor gives roll, pitch and angular rates"
-            raise BadInput("sensors", "have an IMU among them", f"{len(self.sensors)} without", hint=hint)
+            if not isinstance(sensor, tuple(_CORRECTIONS)):
+                kind, hint = type(sensor).__name__, "Take `kind: kalman`, which works with every sensor"
+                raise BadInput(f"sensors[{i}]", "be one that the observer has a gain for", kind, hint=hint)
+        for name in ("imu", "dvl", "compass", "depth", "fix", "propeller"):
+            blend = getattr(self, f"{name}_blend")
+            checks.positive(f"{name}_blend", blend)
+            if not checks.assumed(lambda share: (share <= 1).all(), blend):
+                raise BadInput(f"{name}_blend", "be at most 1", f"{float(blend):g}")
 
-    def realize(self, key):
-        return jax.random.split(key, len(self.sensors))
-
-    def velocity_noise(self, dt):
-        """Noise density of all sensors, spread over every control step; the memory of the filters is neglected."""
-        sensors = [one for one in self.sensors if isinstance(one, AbstractVelocitySensor)]
-        densities = [one.velocity_noise() ** 2 * one.sampling.period for one in sensors]
-        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in densities)
-        return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
-
-    def init(self, realization, truth: Measurement) -> NavigationState:
-        if truth.position.shape != (6,):
-            hint = "Take `perfect` or `white_noise`"
-            raise BadInput("", "be used on a vehicle", f"a plant of {truth.position.shape[0]} outputs", hint=hint)
-        motion = motion_of(truth, truth.velocity[:3], jnp.zeros(()))
-        readings = [sensor.reading(motion) for sensor in self.sensors]
-        chances = _chances(realization, jnp.full(len(readings), -1), readings)
-        states = tuple(
-            sensor.sampling.init(reading, chance[:-1])
-            for sensor, reading, chance in zip(self.sensors, readings, chances, strict=True)
-        )
-        estimate = estimate_of(truth)
+    def start(self, y) -> Estimate:
+        estimate = estimate_of(y)
         if not any(isinstance(sensor, PropellerSpeed) for sensor in self.sensors):
             estimate = estimate._replace(actuator=None)
-        return NavigationState(jnp.zeros(()), motion.velocity, states, estimate, jnp.zeros((), dtype=int))
+        return estimate
 
-    def measure(self, realization, state: NavigationState, t, truth: Measurement):
-        elapsed = t - state.time
-        motion = motion_of(truth, state.velocity, elapsed)
-        readings = [sensor.reading(motion) for sensor in self.sensors]
-        numbers = jnp.stack([sensor.sampling.number(t) for sensor in self.sensors])
-        deliveries = [
-            sensor.sampling.deliver(states, t, reading, chance)
-            for sensor, states, reading, chance in zip(
-                self.sensors, state.sensors, readings, _chances(realization, numbers, readings), strict=True
-            )
-        ]
-        arrivals = [arrival for arrival, _ in deliveries]
-        finite = [jnp.isfinite(reading).all() for reading, _ in arrivals]
-        ignored = state.ignored + sum(
-            jnp.where(fresh & ~good, 1, 0) for (_, fresh), good in zip(arrivals, finite, strict=True)
-        )
+    def update(self, state: Estimate, elapsed, received: tuple[Received, ...]) -> Estimate:
         news = [
-            (sensor, (reading, fresh & good))
-            for sensor, (reading, fresh), good in zip(self.sensors, arrivals, finite, strict=True)
+            (sensor, one.reading, one.fresh & jnp.isfinite(one.reading).all(), one.age)
+            for sensor, one in zip(self.sensors, received, strict=True)
         ]
-        estimate = state.estimate
-        for sensor, (reading, fresh) in news:
+        estimate = state
+        for sensor, reading, new, _ in news:
             if isinstance(sensor, IMU):
-                estimate = _either(fresh, sensor.predict(estimate, reading), estimate)
+                estimate = _either(new, _with_inertial(estimate, reading), estimate)
         estimate = estimate.predicted(elapsed)
-        for sensor, (reading, fresh) in news:
-            estimate = _either(fresh, sensor.correct(estimate, reading), estimate)
-        states = tuple(states for _, states in deliveries)
-        return estimate.measurement(), NavigationState(t, motion.velocity, states, estimate, ignored)
+        for sensor, reading, new, age in news:
+            correct = next(_CORRECTIONS[kind] for kind in _CORRECTIONS if isinstance(sensor, kind))
+            estimate = _either(new, correct(self, sensor, estimate, reading, age), estimate)
+        return estimate
 
-    def advice(self, duration: float = 60.0) -> tuple[str, ...]:
-        """What is not measured, and how far its estimate drifts in `duration` (s)."""
-        return drift_advice(self.sensors, duration)
+    def measurement(self, state: Estimate):
+        return state.measurement()
 
-    def ignored(self, state: NavigationState):
-        return state.ignored
+    def signals(self):
+        return {}
+
+    def diagnostics(self, state):
+        return {}
+
+    def advice(self, duration):
+        return drift_advice(self.sensors, self.dvl_blend, duration)
 
 
-def _chances(keys, numbers, readings) -> list:
-    """Standard normal numbers, one per entry of each reading and one more, in one call, which compiles faster."""
-    most = max(reading.size for reading in readings) + 1
-    normal = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
-    together = jax.vmap(normal)(keys, numbers)
-    return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]
+def _with_inertial(estimate: Estimate, reading) -> Estimate:
+    """Rates and acceleration as the IMU reads them."""
+    acceleration = matvec(estimate.rotation(), reading[5:]) + gravity()
+    return estimate._replace(rates=reading[2:5], acceleration=acceleration)
+
+
+def _inclination(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    return _turned(estimate, jnp.concatenate([reading[:2], estimate.angles()[2:]]), own.imu_blend)
+
+
+def _heading(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    now = reading + age * estimate.rates[2]
+    return _turned(estimate, jnp.concatenate([estimate.angles()[:2], now]), own.compass_blend)
+
+
+def _velocity(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    """Compare the reading with the velocity at its time, from the acceleration since."""
+    then = estimate.velocity - age * estimate.acceleration
+    error = matvec(estimate.rotation(), reading) - then
+    return estimate._replace(velocity=estimate.velocity + own.dvl_blend * error)
+
+
+def _down(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    return _fixed(estimate, slice(2, 3), reading, age, sensor.sampling.period, own.depth_blend)
+
+
+def _level(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    return _fixed(estimate, slice(0, 2), reading, age, sensor.sampling.period, own.fix_blend)
+
+
+def _propellers(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    """Speeds; their rate of change is the difference of successive readings."""
+    before = estimate.actuator.speed
+    speed = before + own.propeller_blend * (reading - before)
+    report = estimate.actuator._replace(speed=speed)
+    if report.acceleration is not None:
+        report = report._replace(acceleration=(speed - before) / sensor.sampling.period)
+    return estimate._replace(actuator=report)
+
+
+# How a reading of each sensor corrects the estimate; called after the prediction.
+_CORRECTIONS = {
+    IMU: _inclination,
+    DVL: _velocity,
+    Compass: _heading,
+    Depth: _down,
+    PositionFix: _level,
+    PropellerSpeed: _propellers,
+}
+
+
+def _turned(estimate: Estimate, angles: Vector3, share) -> Estimate:
+    """The estimate with its attitude turned by a share of the way towards Euler angles (rad)."""
+    there = quaternion_from_euler(angles)
+    aligned = jnp.where((there * estimate.attitude).sum() < 0, -there, there)
+    between = (1 - share) * estimate.attitude + share * aligned
+    return estimate._replace(attitude=between / jnp.sqrt((between * between).sum()))
+
+
+def _fixed(estimate: Estimate, axes: slice, reading: Float[Array, " k"], age, period, share) -> Estimate:
+    """Position and velocity corrected on some axes by a position that was read `age` ago: an alpha-beta filter.
+
+    beta = alpha^2 / (2 - alpha) is that of Benedict and Bordner (1962), optimal for a given noise.
+    """
+    then = estimate.position[axes] - age * estimate.velocity[axes]
+    error, beta = jnp.zeros(3).at[axes].set(reading - then), share**2 / (2 - share)
+    return estimate._replace(
+        position=estimate.position + share * error, velocity=estimate.velocity + beta / period * error
+    )
 
 
 def _either(fresh, new: Estimate, old: Estimate) -> Estimate:
     return jax.tree.map(lambda a, b: jnp.where(fresh, a, b), new, old)
 
 
-def observer(sensors) -> Navigation:
-    """Navigation of a vehicle from its sensors only. For the sampled loop.
+def observer(
+    sensors,
+    imu_blend: float = 0.05,
+    dvl_blend: float = 0.3,
+    compass_blend: float = 0.05,
+    depth_blend: float = 0.2,
+    fix_blend: float = 0.2,
+    propeller_blend: float = 1.0,
+) -> SensorNavigation:
+    """Navigation of a vehicle from its sensors, by an observer with constant gains. For the sampled loop.
 
     Args:
         sensors: any of imu, dvl, depth, position_fix, compass, propeller_speed; an IMU must be among them.
+        imu_blend: share of each new inclination in the estimated one; the rest comes from the rates.
+        dvl_blend: share of each new velocity in the estimated one; the rest comes from the accelerometers.
+        compass_blend: share of each new heading in the estimated one; the rest comes from the rates.
+        depth_blend: alpha of the alpha-beta filter of depth and its rate.
+        fix_blend: alpha of the alpha-beta filter of north and east and their rates.
+        propeller_blend: share of each new reading of propeller speeds in the estimate; 1 for no filter.
     """
-    return Navigation(sensors=tuple(sensors))
+    blends = imu_blend, dvl_blend, compass_blend, depth_blend, fix_blend, propeller_blend
+    return SensorNavigation(Observer(tuple(sensors), *blends))

@@ -37,6 +37,12 @@ class WhiteNoise(AbstractInformedNavigation):
     def ignored(self, state):
         return jnp.zeros((), dtype=int)
 
+    def signals(self):
+        return {}
+
+    def diagnostics(self, state):
+        return {}
+
     def init(self, realization, truth) -> Int[Array, ""]:
         """Samples so far."""
         for name in ("position", "velocity"):

@@ -90,6 +90,24 @@ def quaternion_rate(q: Quaternion, omega: Vector3) -> Quaternion:
     return 0.5 * turn + 0.5 * (1.0 - (q * q).sum()) * q
 
 
+def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Product a b: the rotation b, then a."""
+    w0, v0, w1, v1 = a[0], a[1:], b[0], b[1:]
+    return jnp.concatenate([(w0 * w1 - (v0 * v1).sum())[None], w0 * v1 + w1 * v0 + cross(v0, v1)])
+
+
+def conjugate(q: Quaternion) -> Quaternion:
+    """The inverse of a unit quaternion."""
+    return jnp.concatenate([q[:1], -q[1:]])
+
+
+def quaternion_of_turn(turn: Vector3) -> Quaternion:
+    """Unit quaternion of a rotation vector (rad), to the third order: for turns of less than about 0.3 rad."""
+    square = (turn * turn).sum()
+    q = jnp.concatenate([(1 - square / 8)[None], (0.5 - square / 48) * turn])
+    return q / jnp.sqrt((q * q).sum())
+
+
 def attitude_error(target: Quaternion, actual: Quaternion) -> Vector3:
     """Attitude error sign(q0) 2 q_v of the rotation actual -> target, at most half a turn, in body axes.
 

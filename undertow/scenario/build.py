@@ -20,7 +20,7 @@ from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.observer import Navigation
+from undertow.navigation.from_sensors import SensorNavigation
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import check_fit, check_noise, check_start, check_times, check_window, rounded_times
@@ -81,7 +81,7 @@ class Built(NamedTuple):
         if start >= end:
             window = f"the steady window starts at {start:g} s, and the run ends at {end:g} s"
             yield advice("steady.start", f"there are no steady metrics: {window}")
-        if isinstance(navigation, Navigation):
+        if isinstance(navigation, SensorNavigation):
             yield from (advice("navigation", sentence) for sentence in navigation.advice(end))
         yield from plausibility(self.closed_loop, end, self.scenario.initial.position)
 

@@ -1,8 +1,6 @@
 """Compass: heading."""
 
-import jax.numpy as jnp
-
-from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractSensor
 
@@ -11,13 +9,10 @@ class Compass(AbstractSensor):
     """Yaw, rad."""
 
     fixes = ("yaw",)
+    angles = (0,)
 
     def reading(self, motion: Motion):
         return motion.angles[2:]
-
-    def correct(self, estimate: Estimate, reading) -> Estimate:
-        now = reading + self.sampling.delay * estimate.rates[2]
-        return estimate.turned(jnp.concatenate([estimate.angles()[:2], now]), self.blend)
 
 
 def compass(
@@ -27,7 +22,6 @@ def compass(
     resolution: float = 0.0,
     delay: float = 0.0,
     dropout: float = 0.0,
-    blend: float = 0.05,
 ) -> Compass:
     """Heading, from a magnetic or fibre-optic compass.
 
@@ -38,6 +32,5 @@ def compass(
         resolution: step of the reading, rad; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.
-        blend: share of each new heading in the estimated one; the rest comes from the rates.
     """
-    return Compass(Sampling(period, noise, bias, resolution, delay, dropout), blend)
+    return Compass(Sampling(period, noise, bias, resolution, delay, dropout))

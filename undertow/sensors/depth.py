@@ -1,10 +1,8 @@
 """Depth from pressure."""
 
-from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractSensor
-
-_DOWN = slice(2, 3)
 
 
 class Depth(AbstractSensor):
@@ -13,10 +11,7 @@ class Depth(AbstractSensor):
     fixes = ("down",)
 
     def reading(self, motion: Motion):
-        return motion.position[_DOWN]
-
-    def correct(self, estimate: Estimate, reading) -> Estimate:
-        return estimate.fixed(_DOWN, reading, self.sampling, self.blend)
+        return motion.position[2:]
 
 
 def depth(
@@ -26,7 +21,6 @@ def depth(
     resolution: float = 1e-3,
     delay: float = 0.0,
     dropout: float = 0.0,
-    blend: float = 0.2,
 ) -> Depth:
     """Depth below the surface, by a pressure sensor at the body origin.
 
@@ -37,6 +31,5 @@ def depth(
         resolution: step of the reading, m; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.
-        blend: alpha of the alpha-beta filter of the estimate.
     """
-    return Depth(Sampling(period, noise, bias, resolution, delay, dropout), blend)
+    return Depth(Sampling(period, noise, bias, resolution, delay, dropout))

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from undertow.numerics.linear_algebra import matvec
-from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractVelocitySensor
 
@@ -19,12 +19,6 @@ class DVL(AbstractVelocitySensor):
     def velocity_noise(self):
         return jnp.full(6, jnp.inf).at[:3].set(self.sampling.noise)
 
-    def correct(self, estimate: Estimate, reading) -> Estimate:
-        """Compare the reading with the velocity at its time, from the acceleration since."""
-        then = estimate.velocity - self.sampling.delay * estimate.acceleration
-        error = matvec(estimate.rotation(), reading) - then
-        return estimate._replace(velocity=estimate.velocity + self.blend * error)
-
 
 def dvl(
     period: float = 0.125,
@@ -33,7 +27,6 @@ def dvl(
     resolution: float = 1e-3,
     delay: float = 0.05,
     dropout: float = 0.0,
-    blend: float = 0.3,
 ) -> DVL:
     """Velocity over the ground from four acoustic beams. Defaults are those of a small device near the bottom.
 
@@ -44,6 +37,5 @@ def dvl(
         resolution: step of the reading, m/s; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a ping finds no bottom.
-        blend: share of each new velocity in the estimated one; the rest comes from the accelerometers.
     """
-    return DVL(Sampling(period, noise, bias, resolution, delay, dropout), blend)
+    return DVL(Sampling(period, noise, bias, resolution, delay, dropout))

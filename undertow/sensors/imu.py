@@ -2,8 +2,7 @@
 
 import jax.numpy as jnp
 
-from undertow.numerics.linear_algebra import matvec
-from undertow.sensors.estimate import Estimate, Motion, gravity
+from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractVelocitySensor
 
@@ -12,19 +11,13 @@ class IMU(AbstractVelocitySensor):
     """Roll, pitch (rad), p, q, r (rad/s), specific force (m/s^2, body axes, the mean since the last step)."""
 
     fixes = ("roll", "pitch")
+    angles = (0, 1)
 
     def reading(self, motion: Motion):
         return jnp.concatenate([motion.angles[:2], motion.rates, motion.specific_force])
 
     def velocity_noise(self):
         return jnp.full(6, jnp.inf).at[3:].set(self.sampling.noise[2:5])
-
-    def predict(self, estimate: Estimate, reading) -> Estimate:
-        acceleration = matvec(estimate.rotation(), reading[5:]) + gravity()
-        return estimate._replace(rates=reading[2:5], acceleration=acceleration)
-
-    def correct(self, estimate: Estimate, reading) -> Estimate:
-        return estimate.turned(jnp.concatenate([reading[:2], estimate.angles()[2:]]), self.blend)
 
 
 def imu(
@@ -37,7 +30,6 @@ def imu(
     force_bias: float = 0.0,
     delay: float = 0.0,
     dropout: float = 0.0,
-    blend: float = 0.05,
 ) -> IMU:
     """Gyroscopes, accelerometers and the inclination fused from them. Defaults are those of cheap MEMS devices.
 
@@ -51,8 +43,7 @@ def imu(
         force_bias: likewise of the specific force, m/s^2; an error of roll of 0.01 rad acts like 0.1 m/s^2.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.
-        blend: share of each new inclination in the estimated one; the rest comes from the rates.
     """
     noise = [angle_noise] * 2 + [rate_noise] * 3 + [force_noise] * 3
     bias = [angle_bias] * 2 + [rate_bias] * 3 + [force_bias] * 3
-    return IMU(Sampling(period, noise, bias, delay=delay, dropout=dropout), blend)
+    return IMU(Sampling(period, noise, bias, delay=delay, dropout=dropout))

@@ -1,10 +1,8 @@
 """Position fixes: acoustic positioning (USBL, LBL), or a satellite receiver at the surface."""
 
-from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractSensor
-
-_LEVEL = slice(0, 2)
 
 
 class PositionFix(AbstractSensor):
@@ -13,10 +11,7 @@ class PositionFix(AbstractSensor):
     fixes = ("north", "east")
 
     def reading(self, motion: Motion):
-        return motion.position[_LEVEL]
-
-    def correct(self, estimate: Estimate, reading) -> Estimate:
-        return estimate.fixed(_LEVEL, reading, self.sampling, self.blend)
+        return motion.position[:2]
 
 
 def position_fix(
@@ -26,7 +21,6 @@ def position_fix(
     resolution: float = 0.0,
     delay: float = 0.2,
     dropout: float = 0.0,
-    blend: float = 0.2,
 ) -> PositionFix:
     """North and east at a low rate.
 
@@ -37,6 +31,5 @@ def position_fix(
         resolution: step of the reading, m; 0 for none.
         delay: until a fix is delivered, s.
         dropout: probability that a fix is lost.
-        blend: alpha of the alpha-beta filter of the estimate.
     """
-    return PositionFix(Sampling(period, noise, bias, resolution, delay, dropout), blend)
+    return PositionFix(Sampling(period, noise, bias, resolution, delay, dropout))

@@ -1,13 +1,13 @@
 """Propeller speeds, reported by sensorless drives or encoders."""
 
 from undertow.core.errors import BadInput
-from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractSensor
 
 
 class PropellerSpeed(AbstractSensor):
-    """Speed of every propeller, rad/s; its rate of change is the difference of successive readings.
+    """Speed of every propeller, rad/s.
 
     Raises:
         BadInput: the thrusters have no speed that could be measured.
@@ -21,14 +21,6 @@ class PropellerSpeed(AbstractSensor):
             raise BadInput("propeller_speed", "have propellers that turn", "thrusters without a speed", hint=hint)
         return motion.actuator.speed
 
-    def correct(self, estimate: Estimate, reading) -> Estimate:
-        before = estimate.actuator.speed
-        speed = before + self.blend * (reading - before)
-        report = estimate.actuator._replace(speed=speed)
-        if report.acceleration is not None:
-            report = report._replace(acceleration=(speed - before) / self.sampling.period)
-        return estimate._replace(actuator=report)
-
 
 def propeller_speed(
     period: float = 0.01,
@@ -37,7 +29,6 @@ def propeller_speed(
     resolution: float = 0.0,
     delay: float = 0.0,
     dropout: float = 0.0,
-    blend: float = 1.0,
 ) -> PropellerSpeed:
     """Speeds of all propellers.
 
@@ -48,6 +39,5 @@ def propeller_speed(
         resolution: step of the reading, rad/s; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.
-        blend: share of each new reading in the estimate; 1 for no filter.
     """
-    return PropellerSpeed(Sampling(period, noise, bias, resolution, delay, dropout), blend)
+    return PropellerSpeed(Sampling(period, noise, bias, resolution, delay, dropout))

@@ -6,37 +6,24 @@ from typing import ClassVar
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from undertow.core import checks
-from undertow.core.errors import BadInput
-from undertow.core.param import Param, param
-from undertow.sensors.estimate import Estimate, Motion
+from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Reading, Sampling
 
 
 class AbstractSensor(eqx.Module):
-    """A sensor: its reading of the motion, and how a reading corrects the estimate.
+    """A sensor: when it is read, and its reading of a motion. What is made of readings is up to the navigation filter.
 
-    Raises:
-        BadInput: a blend outside (0, 1].
+    The filter may call `reading` with an estimated motion, to compare, and differentiate it.
     """
 
     sampling: Sampling
-    blend: Float[Param, ""] = param("", "share of each new reading in the estimate")
     # Outputs (north, east, down, roll, pitch, yaw) that it keeps from drifting; None where it does not say.
     fixes: ClassVar[tuple[str, ...] | None] = None
-
-    def __check_init__(self):
-        checks.positive("blend", self.blend)
-        if not checks.assumed(lambda share: (share <= 1).all(), self.blend):
-            raise BadInput("blend", "be at most 1", f"{float(self.blend):g}")
+    angles: ClassVar[tuple[int, ...]] = ()  # entries of a reading that are angles, which may turn by 2 pi
 
     @abc.abstractmethod
     def reading(self, motion: Motion) -> Reading:
-        """Reading without error."""
-
-    @abc.abstractmethod
-    def correct(self, estimate: Estimate, reading: Reading) -> Estimate:
-        """Estimate corrected by a reading that was taken `sampling.delay` ago; called after the prediction."""
+        """Reading without error, of one axis."""
 
 
 class AbstractVelocitySensor(AbstractSensor):

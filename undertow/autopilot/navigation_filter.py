@@ -1,0 +1,230 @@
+"""One compiled navigation filter, stepped by somebody else's clock and fed with the readings of real sensors."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.autopilot.clock import Clock
+from undertow.autopilot.numbers import numbers, step_of
+from undertow.autopilot.saved_state import packed, unpacked
+from undertow.core import checks, runtime
+from undertow.core.arrays import in_present_precision
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.measurement import measurement_of_pose
+from undertow.loop.stepped import put
+from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation
+from undertow.numerics.rotations import quaternion_from_euler
+from undertow.scenario.build import build
+from undertow.scenario.reading import from_data, read
+from undertow.sensors.motion import motion_of
+
+
+class EstimatedMotion(NamedTuple):
+    """Estimated motion; `autopilot.step(*motion)` takes it, if it was made with `attitude="quaternion"`.
+
+    Attributes:
+        position: north, east, down, m.
+        velocity: u, v, w, p, q, r in body axes, m/s and rad/s.
+        attitude: quaternion w, x, y, z, body -> world.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    attitude: np.ndarray
+
+
+class NavigationFilter:
+    """The filter of a scenario's `navigation`, called at every sampling time by whoever owns the clock.
+
+        navigation = ut.NavigationFilter("bluerov2_heavy.yaml")
+        navigation.start(position, velocity, attitude)
+        while True:
+            motion = navigation.step({"imu": imu, "dvl": velocity}, ages={"dvl": 0.08})
+            volts = autopilot.step(*motion)
+
+    Each step takes the readings that have arrived since the last one, the newest of each sensor; sensors without one
+    are left out. Entries that are not finite were not measured. The same readings give the same bits as in a
+    simulation.
+
+    Args:
+        scenario: a .yaml file or an earlier run.nc, or the same as a mapping.
+        sampling_time: s; None for that of the scenario.
+        allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
+
+    Attributes:
+        sampling_time: s.
+        sensors: numbers of a reading, by name of the sensor: `imu`, `dvl`, ...; a second DVL is `dvl_2`.
+        backend: `simd` or `xla`.
+
+    Raises:
+        BadInput: something given cannot be used, or the scenario's navigation is not a filter of readings.
+    """
+
+    def __init__(
+        self, scenario: str | Path | Mapping[str, Any], *, sampling_time: float | None = None, allow_code: bool = False
+    ):
+        text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
+        built = build(text)
+        navigation = built.closed_loop.navigation
+        if not isinstance(navigation, SensorNavigation):
+            raise BadInput("navigation", "be one of sensors: `kalman` or `observer`", built.scenario.navigation.kind)
+        period = built.scenario.loop.dt if sampling_time is None else sampling_time
+        checks.positive("sampling_time", period, "s")
+        self.sampling_time = float(period)
+        self._clock, self._started = Clock(self.sampling_time), np.zeros((), dtype=bool)
+        with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
+            plant = built.closed_loop.plant
+            report = plant.output(jnp.zeros(()), plant.initial_state()).actuator
+            self._compile(in_present_precision(navigation.filter), report)
+
+    def _compile(self, of: AbstractFilter, report: Any) -> None:
+        still = measurement_of_pose(jnp.zeros(3), jnp.array([1.0, 0, 0, 0]), jnp.zeros(6), report)
+        readings = [sensor.reading(motion_of(still, jnp.zeros(3), jnp.zeros(()))) for sensor in of.sensors]
+        self._delays = [float(sensor.sampling.delay) for sensor in of.sensors]
+        self.sensors = {name: one.size for name, one in zip(_names(of.sensors), readings, strict=True)}
+        nothing = tuple(Received(0 * one, jnp.asarray(False), jnp.zeros(())) for one in readings)
+        pose = EstimatedMotion(jnp.zeros(3), jnp.zeros(6), jnp.array([1.0, 0, 0, 0]))
+
+        def begin(part: AbstractFilter, _, pose: EstimatedMotion):
+            return (), part.start(measurement_of_pose(pose.position, pose.attitude, pose.velocity, report))
+
+        def go_on(part: AbstractFilter, state, given):
+            state = part.update(state, *given)
+            y = part.measurement(state)
+            assert y.body is not None
+            motion = EstimatedMotion(y.position[:3], y.body.nu, y.body.attitude)
+            return state, (motion, y.actuator, part.diagnostics(state))
+
+        self._begin = step_of(begin, of, (), pose)
+        state = jax.tree.map(jnp.asarray, self._begin.outputs)
+        self._go_on = step_of(go_on, of, state, (jnp.zeros(()), nothing))
+        self._signals = of.signals()
+        self.backend = self._go_on.backend
+
+    def start(
+        self, position: Any, velocity: Any, attitude: Any, readings: Mapping[str, Any] | None = None
+    ) -> EstimatedMotion:
+        """Begin with a motion that is known to the standard deviations of the filter.
+
+        Args:
+            position: north, east, down, m.
+            velocity: u, v, w, p, q, r in body axes, m/s and rad/s.
+            attitude: quaternion w, x, y, z (body -> world), or roll, pitch, yaw, rad.
+            readings: as for `step`, of now.
+
+        Raises:
+            BadInput: a shape is wrong, a number is not finite, or a sensor is unknown.
+        """
+        turned = np.shape(attitude) == (3,)
+        given = EstimatedMotion(
+            numbers("position", position, (3,)),
+            numbers("velocity", velocity, (6,)),
+            numbers("attitude", attitude, (3,) if turned else (4,)),
+        )
+        for name, value in zip(EstimatedMotion._fields, given, strict=True):
+            checks.finite(name, value)
+        length = 1.0 if turned else np.linalg.norm(given.attitude)
+        if not length > 0:
+            raise BadInput("attitude", "be a quaternion of some length", "zero")
+        angles = np.asarray(quaternion_from_euler(jnp.asarray(given.attitude))) if turned else given.attitude / length
+        received = self._received(readings or {}, {})
+        put(self._begin.inputs, given._replace(attitude=angles))
+        self._begin()
+        put(self._go_on.state, self._begin.outputs)
+        self._clock.begin()
+        self._started[...] = True
+        return self._stepped(0.0, received)
+
+    def step(
+        self, readings: Mapping[str, Any], ages: Mapping[str, float] | None = None, dt: float | None = None
+    ) -> EstimatedMotion:
+        """One step.
+
+        Args:
+            readings: numbers of each sensor that has a new reading, by its name, in the units of the sensor.
+            ages: s since they were taken, by name; without an entry the delay that the scenario states.
+            dt: time since the last step, s; None for the sampling time. Late steps follow the rule of `Autopilot`.
+
+        Raises:
+            BadInput: a sensor is unknown, a shape is wrong, an age is negative, or `start` was not called.
+        """
+        if not self._started:
+            raise BadInput("start", "be called before `step`", "not")
+        received = self._received(readings, ages or {})
+        return self._stepped(self._clock.passed(dt), received)
+
+    def signals(self) -> dict[str, np.ndarray]:
+        """Values of the signals of the last step, such as the standard deviation of each output."""
+        return {name: value.copy() for name, value in self._go_on.outputs[2].items()}
+
+    def declared_signals(self) -> dict[str, Any]:
+        """Unit and meaning of the signals, by name."""
+        return dict(self._signals)
+
+    @property
+    def propellers(self) -> tuple[np.ndarray, ...]:
+        """Estimated speeds of the propellers, rad/s, and accelerations where the scenario has them; () without."""
+        return tuple(leaf.copy() for leaf in jax.tree.leaves(self._go_on.outputs[1]))
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Steps after the first one, and those of them that were late, missed or repeated."""
+        return self._clock.counts
+
+    def save(self) -> bytes:
+        """The state; a filter that is made alike goes on from it with the same bits."""
+        if not self._started:
+            raise BadInput("start", "be called before `save`", "not")
+        return packed(self._identity(), self._kept())
+
+    def restore(self, state: bytes) -> None:
+        """Go on from a state that `save` gave.
+
+        Raises:
+            BadInput: it is damaged, or of another filter; everything stays as it was.
+        """
+        for place, value in zip(self._kept(), unpacked(state, self._identity(), self._kept()), strict=True):
+            place[...] = value
+
+    def _kept(self) -> list[np.ndarray]:
+        steps = jax.tree.leaves((self._go_on.state, self._go_on.outputs))
+        return [*steps, self._started, self._clock.numbers]
+
+    def _identity(self) -> bytes:
+        form = jax.tree.structure((self._go_on.state, self._go_on.outputs)), self.sensors, self.sampling_time
+        return repr(form).encode() + b"".join(number.tobytes() for number in jax.tree.leaves(self._go_on.numbers))
+
+    def _received(self, readings: Mapping[str, Any], ages: Mapping[str, float]) -> list[tuple[Any, bool, float]]:
+        for name in (*readings, *ages):
+            if name not in self.sensors:
+                hint = did_you_mean(name, self.sensors)
+                raise BadInput("readings", f"be of {', '.join(self.sensors)}", repr(name), hint=hint)
+        found = []
+        for (name, size), delay in zip(self.sensors.items(), self._delays, strict=True):
+            new = name in readings and readings[name] is not None
+            value = numbers(f"readings[{name!r}]", readings[name], (size,)) if new else np.zeros(size)
+            age = ages.get(name, delay)
+            checks.not_negative(f"ages[{name!r}]", age)
+            found.append((value, new, age))
+        return found
+
+    def _stepped(self, elapsed: float, received: list[tuple[Any, bool, float]]) -> EstimatedMotion:
+        put(self._go_on.inputs, (elapsed, tuple(Received(*one) for one in received)))
+        self._go_on()
+        return EstimatedMotion(*(part.copy() for part in self._go_on.outputs[0]))
+
+
+def _names(sensors: tuple[eqx.Module, ...]) -> list[str]:
+    """A name for each sensor: that of its class in lower case, with a number from the second on."""
+    found: list[str] = []
+    for sensor in sensors:
+        plain = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(sensor).__name__).lower()
+        same = sum(name == plain or name.startswith(f"{plain}_") for name in found)
+        found.append(f"{plain}_{same + 1}" if same else plain)
+    return found

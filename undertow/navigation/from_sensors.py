@@ -1,0 +1,165 @@
+"""Navigation of a vehicle from its sensors, whose readings are simulated; a filter estimates the motion from them."""
+
+import abc
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, PyTree
+
+from undertow.core.contracts import AbstractInformedNavigation, Measurement
+from undertow.core.errors import BadInput
+from undertow.core.signals import Signal
+from undertow.numerics.number import Number
+from undertow.numerics.random_keys import numbered
+from undertow.sensors.imu import IMU
+from undertow.sensors.motion import motion_of
+from undertow.sensors.sampling import Reading, SensorState
+from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor
+
+# (m/s)^2 s; smaller densities count as no noise.
+_NOISELESS = 1e-20
+
+
+class Received(NamedTuple):
+    """What one sensor has delivered."""
+
+    reading: Reading
+    fresh: Bool[Array, ""]  # whether it is new
+    age: Number  # s, since it was taken
+
+
+class AbstractFilter(eqx.Module):
+    """A filter that estimates the motion of a vehicle from readings, as they come.
+
+    In a simulation and on a vehicle it is the same; only the readings come from elsewhere.
+    """
+
+    sensors: eqx.AbstractVar[tuple[AbstractSensor, ...]]
+
+    @abc.abstractmethod
+    def start(self, y: Measurement) -> PyTree:
+        """State for a motion that is known."""
+
+    @abc.abstractmethod
+    def update(self, state: PyTree, elapsed: Number, received: tuple[Received, ...]) -> PyTree:
+        """State `elapsed` (s) later, with what the sensors delivered since; entries that are not finite are lost."""
+
+    @abc.abstractmethod
+    def measurement(self, state: PyTree) -> Measurement:
+        """The estimate, for a controller."""
+
+    @abc.abstractmethod
+    def signals(self) -> dict[str, Signal]:
+        """Declarations of the signals of `diagnostics`, by name; {} for none."""
+
+    @abc.abstractmethod
+    def diagnostics(self, state: PyTree) -> dict[str, Array]:
+        """Values of the signals that this filter declares, by name."""
+
+    @abc.abstractmethod
+    def advice(self, duration: float) -> tuple[str, ...]:
+        """What the sensors do not measure, and how far its estimate drifts in `duration` (s)."""
+
+
+class SensorNavigationState(NamedTuple):
+    """State of the sensors and of the filter."""
+
+    time: Float[Array, ""]  # of the last step, s
+    velocity: Float[Array, "3"]  # true velocity then, m/s; accelerometers measure its change
+    sensors: tuple[SensorState, ...]  # state of each
+    filter: Any
+    ignored: Int[Array, ""]  # readings so far that were not finite
+
+
+class SensorNavigation(AbstractInformedNavigation):
+    """Readings of the sensors of a filter, simulated with errors and delays, and what the filter makes of them."""
+
+    filter: AbstractFilter
+    smooth: bool = eqx.field(static=True, default=False)
+
+    def realize(self, key):
+        return jax.random.split(key, len(self.filter.sensors))
+
+    def velocity_noise(self, dt):
+        """Noise density of all sensors, spread over every control step; the memory of the filters is neglected."""
+        sensors = [one for one in self.filter.sensors if isinstance(one, AbstractVelocitySensor)]
+        densities = [one.velocity_noise() ** 2 * one.sampling.period for one in sensors]
+        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in densities)
+        return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
+
+    def init(self, realization, truth: Measurement) -> SensorNavigationState:
+        if truth.position.shape != (6,):
+            hint = "Take `perfect` or `white_noise`"
+            raise BadInput("", "be used on a vehicle", f"a plant of {truth.position.shape[0]} outputs", hint=hint)
+        motion = motion_of(truth, truth.velocity[:3], jnp.zeros(()))
+        readings = [sensor.reading(motion) for sensor in self.filter.sensors]
+        chances = _chances(realization, jnp.full(len(readings), -1), readings)
+        states = tuple(
+            sensor.sampling.init(reading, chance[:-1])
+            for sensor, reading, chance in zip(self.filter.sensors, readings, chances, strict=True)
+        )
+        start = self.filter.start(truth)
+        return SensorNavigationState(jnp.zeros(()), motion.velocity, states, start, jnp.zeros((), dtype=int))
+
+    def measure(self, realization, state: SensorNavigationState, t, truth: Measurement):
+        received, states, velocity = self.sample(realization, state, t, truth)
+        lost = [one.fresh & ~jnp.isfinite(one.reading).all() for one in received]
+        estimated = self.filter.update(state.filter, t - state.time, received)
+        ignored = state.ignored + sum(jnp.where(one, 1, 0) for one in lost)
+        after = SensorNavigationState(t, velocity, states, estimated, ignored)
+        return self.filter.measurement(estimated), after
+
+    def sample(self, realization, state: SensorNavigationState, t, truth: Measurement):
+        """What the sensors deliver at time t, their states afterwards, and the true velocity (m/s)."""
+        motion = motion_of(truth, state.velocity, t - state.time)
+        readings = [sensor.reading(motion) for sensor in self.filter.sensors]
+        numbers = jnp.stack([sensor.sampling.number(t) for sensor in self.filter.sensors])
+        deliveries = [
+            sensor.sampling.deliver(states, t, reading, chance)
+            for sensor, states, reading, chance in zip(
+                self.filter.sensors, state.sensors, readings, _chances(realization, numbers, readings), strict=True
+            )
+        ]
+        received = tuple(
+            Received(*delivery, age=sensor.sampling.delay)
+            for sensor, (delivery, _) in zip(self.filter.sensors, deliveries, strict=True)
+        )
+        return received, tuple(states for _, states in deliveries), motion.velocity
+
+    def signals(self):
+        return self.filter.signals()
+
+    def diagnostics(self, state: SensorNavigationState):
+        return self.filter.diagnostics(state.filter)
+
+    def advice(self, duration: float = 60.0) -> tuple[str, ...]:
+        """What the sensors do not measure, and how far its estimate drifts in `duration` (s)."""
+        return self.filter.advice(duration)
+
+    def ignored(self, state: SensorNavigationState):
+        return state.ignored
+
+
+def check_sensors(sensors: Sequence[AbstractSensor]) -> None:
+    """Check what a filter is given.
+
+    Raises:
+        BadInput: something else than a sensor, or no IMU.
+    """
+    for i, sensor in enumerate(sensors):
+        if not isinstance(sensor, AbstractSensor):
+            raise BadInput(f"sensors[{i}]", "be a sensor", type(sensor).__name__)
+    if not any(isinstance(sensor, IMU) for sensor in sensors):
+        hint = "Add `imu`: no other sensor gives roll, pitch and angular rates"
+        raise BadInput("sensors", "have an IMU among them", f"{len(sensors)} without", hint=hint)
+
+
+def _chances(keys, numbers, readings) -> list:
+    """Standard normal numbers, one per entry of each reading and one more, in one call, which compiles faster."""
+    most = max(reading.size for reading in readings) + 1
+    normal = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
+    together = jax.vmap(normal)(keys, numbers)
+    return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]

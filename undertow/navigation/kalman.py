@@ -1,0 +1,388 @@
+"""Error-state Kalman filter, which estimates the motion of a vehicle and the biases of its IMU from all its sensors.
+
+J. Sola, Quaternion kinematics for the error-state Kalman filter, arXiv 1711.02508 (2017), with attitude errors in world
+axes; Y. Bar-Shalom, Update with out-of-sequence measurements, IEEE Trans. Aerosp. Electron. Syst. 38 (2002), for late
+readings (its algorithm without process noise over the delay).
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from undertow.core import checks
+from undertow.core.contracts import Measurement
+from undertow.core.measurement import body_of, measurement_of_outputs, measurement_of_pose
+from undertow.core.param import Param, param
+from undertow.core.signals import Signal
+from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation, check_sensors
+from undertow.navigation.motion_history import MotionHistory, resting, spacing_for
+from undertow.navigation.observability import Sensed, drift_sentences
+from undertow.numerics.linear_algebra import matvec
+from undertow.numerics.number import Number
+from undertow.numerics.rotations import (
+    Kinematics,
+    Matrix3,
+    Quaternion,
+    Vector3,
+    conjugate,
+    euler_from_rotation,
+    quaternion_of_turn,
+    quaternion_product,
+    rotation_from_quaternion,
+    skew,
+)
+from undertow.sensors.imu import IMU
+from undertow.sensors.motion import Motion, gravity
+from undertow.sensors.propeller_speed import PropellerSpeed
+from undertow.sensors.sensor import AbstractSensor
+
+# Errors of the state, in world axes but for the biases; slices of the covariance.
+ATTITUDE, GYRO_BIAS, VELOCITY, FORCE_BIAS, POSITION = (slice(3 * i, 3 * i + 3) for i in range(5))
+_SIZE = 15
+_UPPER = np.triu_indices(_SIZE)
+_WHERE = np.zeros((_SIZE, _SIZE), dtype=int)  # of each entry of the covariance among those of its upper triangle
+_WHERE[_UPPER] = _WHERE.T[_UPPER] = np.arange(len(_UPPER[0]))
+
+_LEAST_VARIANCE = 1e-12  # of a reading; one without noise would leave a covariance that is singular
+
+Covariance = Float[Array, "15 15"]
+
+
+class KalmanState(NamedTuple):
+    """State of the filter."""
+
+    position: Vector3  # m, world
+    attitude: Quaternion  # body -> world
+    velocity: Vector3  # m/s, world
+    gyro_bias: Vector3  # rad/s
+    force_bias: Vector3  # m/s^2
+    covariance: Float[
+        Array, "120"
+    ]  # upper triangle, of the errors of attitude, gyro bias, velocity, force bias, position
+    rates: Vector3  # last reading of the gyroscopes, rad/s
+    force: Vector3  # last reading of the accelerometers, m/s^2
+    actuator: Any
+    history: MotionHistory
+    tolerance: Float[Array, " sensors"]  # factor of the gate's square: doubled by every rejection in a row
+    rejected: Int[Array, ""]  # readings so far
+
+
+class Kalman(AbstractFilter):
+    """Strapdown inertial navigation whose errors are estimated by an extended Kalman filter.
+
+    It takes every sensor that an undertow scenario can have, those of a user too: what a sensor would read at the
+    estimate is its own `reading`, which is differentiated. Its variances are those of the sensors, times a scale.
+
+    A late reading is compared with the estimate of its time. A reading whose errors exceed `gate` standard deviations
+    is rejected; every rejection in a row doubles the square that is tolerated, so that the filter finds back. Entries
+    that are not finite are left out.
+
+    Raises:
+        BadInput: no IMU, or a deviation that is not positive.
+    """
+
+    sensors: tuple[AbstractSensor, ...]
+    position_deviation: Float[Param, ""] = param("m", "initial standard deviation of the position")
+    velocity_deviation: Float[Param, ""] = param("m/s", "initial standard deviation of the velocity")
+    tilt_deviation: Float[Param, ""] = param("rad", "initial standard deviation of roll and pitch")
+    heading_deviation: Float[Param, ""] = param("rad", "initial standard deviation of the heading")
+    gyro_bias_deviation: Float[Param, ""] = param("rad/s", "initial standard deviation of the biases of the gyroscopes")
+    force_bias_deviation: Float[Param, ""] = param(
+        "m/s^2", "initial standard deviation of the biases of the accelerometers"
+    )
+    gyro_drift: Float[Param, ""] = param("rad/s/s^0.5", "random walk of the biases of the gyroscopes")
+    force_drift: Float[Param, ""] = param("m/s^2/s^0.5", "random walk of the biases of the accelerometers")
+    gate: Float[Param, ""] = param("", "standard deviations beyond which a reading is rejected")
+    noise_scale: Float[Param, ""] = param("", "assumed over stated standard deviations of the sensors")
+    longest_delay: Float[Param, ""] = param("s", "of readings; older ones are taken to be of that age")
+
+    def __check_init__(self):
+        check_sensors(self.sensors)
+        for name in _DEVIATIONS:
+            checks.positive(name, getattr(self, name))
+        for name in ("gyro_drift", "force_drift", "longest_delay"):
+            checks.not_negative(name, getattr(self, name))
+
+    def start(self, y: Measurement) -> KalmanState:
+        body, still = body_of(y), jnp.zeros(3)
+        reports = any(isinstance(sensor, PropellerSpeed) for sensor in self.sensors)
+        return KalmanState(
+            y.position[:3],
+            body.attitude,
+            y.velocity[:3],
+            still,
+            still,
+            jnp.diag(self.initial_deviations() ** 2)[_UPPER],
+            body.nu[3:],
+            matvec(body.rotation.T, -gravity()),
+            y.actuator if reports else None,
+            resting(body.attitude),
+            jnp.ones(len(self.sensors)),
+            jnp.zeros((), dtype=int),
+        )
+
+    def update(self, state: KalmanState, elapsed: Number, received: tuple[Received, ...]) -> KalmanState:
+        imu, inertial = next(
+            (sensor, one) for sensor, one in zip(self.sensors, received, strict=True) if isinstance(sensor, IMU)
+        )
+        new = lambda read, old: jnp.where(inertial.fresh & jnp.isfinite(read), read, old)
+        rates, force = new(inertial.reading[2:5], state.rates), new(inertial.reading[5:], state.force)
+        covariance = state.covariance[_WHERE]
+        turning = (rates + state.rates) / 2 - state.gyro_bias
+        half = rotation_from_quaternion(_turned(state.attitude, elapsed / 2 * turning))
+        acceleration = matvec(half, force - state.force_bias) + gravity()
+        history = state.history.after(
+            elapsed, acceleration, _turned(state.history.attitude, elapsed * turning), spacing_for(self.longest_delay)
+        )
+        state = state._replace(
+            position=state.position + elapsed * (state.velocity + elapsed / 2 * acceleration),
+            velocity=state.velocity + elapsed * acceleration,
+            attitude=_turned(state.attitude, elapsed * turning),
+            rates=rates,
+            force=force,
+            history=history,
+        )
+        covariance = self._spread(covariance, elapsed, half, acceleration - gravity(), imu)
+        for i, (sensor, one) in enumerate(zip(self.sensors, received, strict=True)):
+            if isinstance(sensor, PropellerSpeed):
+                state = state._replace(actuator=_propellers(state.actuator, sensor, one))
+            else:
+                state, covariance = self._corrected(state, covariance, i, one)
+        return state._replace(covariance=covariance[_UPPER])
+
+    def measurement(self, state: KalmanState) -> Measurement:
+        rotation = rotation_from_quaternion(state.attitude)
+        nu = jnp.concatenate([matvec(rotation.T, state.velocity), state.rates - state.gyro_bias])
+        return measurement_of_pose(state.position, state.attitude, nu, state.actuator)
+
+    def covariance(self, state: KalmanState) -> Covariance:
+        """Covariance of the errors of attitude (rad, world axes), gyro bias, velocity (world), force bias, position."""
+        return state.covariance[_WHERE]
+
+    def signals(self):
+        return {
+            "navigation_deviation": Signal(("axis",), "[axis]", "standard deviation of the estimate by the filter"),
+            "rejected_readings": Signal((), "1", "readings so far that were too far from the estimate"),
+        }
+
+    def diagnostics(self, state: KalmanState):
+        covariance = self.covariance(state)
+        turn = Kinematics(rotation_from_quaternion(state.attitude))
+        # Errors of Euler angles from one of the attitude, which is in world axes.
+        angles = jax.vmap(lambda e: turn.to_world(jnp.concatenate([jnp.zeros(3), matvec(turn.rotation.T, e)]))[3:])
+        slopes = angles(jnp.eye(3)).T
+        of_angles = (slopes[:, :, None] * slopes[:, None, :] * covariance[ATTITUDE, ATTITUDE][None]).sum((1, 2))
+        variances = jnp.concatenate([jnp.diag(covariance)[POSITION], of_angles])
+        return {"navigation_deviation": jnp.sqrt(variances), "rejected_readings": state.rejected}
+
+    def advice(self, duration):
+        level = self.start(measurement_of_outputs(jnp.zeros(6), jnp.zeros(6)))
+        sensed = []
+        for sensor in self.sensors:
+            if not isinstance(sensor, PropellerSpeed):
+                slopes = np.asarray(_expected(level, sensor, 0.0)[1])
+                variance = np.asarray(self.variance(sensor, len(slopes)))
+                sensed.append(Sensed(slopes, variance, float(sensor.sampling.period)))
+        of_rates, of_force = self.inertial_noise(next(one for one in self.sensors if isinstance(one, IMU)))
+        one = np.ones(3)
+        noise = np.concatenate([of_rates, self.gyro_drift**2 * one, of_force, self.force_drift**2 * one, 0 * one])
+        return drift_sentences(sensed, np.asarray(self.initial_deviations()), noise, duration)
+
+    def initial_deviations(self) -> Float[Array, "15"]:
+        """Standard deviations of the errors at the start."""
+        tilt, heading, biased = self.tilt_deviation, self.heading_deviation, self.gyro_bias_deviation
+        whole = [tilt, tilt, heading, *[biased] * 3, *[self.velocity_deviation] * 3]
+        whole += [*[self.force_bias_deviation] * 3, *[self.position_deviation] * 3]
+        return jnp.stack([jnp.asarray(one, dtype=float) for one in whole])
+
+    def inertial_noise(self, imu: IMU) -> tuple[Vector3, Vector3]:
+        """Densities of the noise of gyroscopes, (rad/s)^2 s, and accelerometers, (m/s^2)^2 s."""
+        noise = jnp.broadcast_to(jnp.asarray(imu.sampling.noise, dtype=float), (8,)) * self.noise_scale
+        return noise[2:5] ** 2 * imu.sampling.period, noise[5:] ** 2 * imu.sampling.period
+
+    def variance(self, sensor: AbstractSensor, width: int) -> Float[Array, " width"]:
+        """Variance of each entry of a reading: of noise, resolution and offset."""
+        sampling = sensor.sampling
+        square = jnp.asarray(sampling.noise) ** 2 + jnp.asarray(sampling.resolution) ** 2 / 12
+        whole = (square + jnp.asarray(sampling.bias) ** 2) * self.noise_scale**2
+        if isinstance(sensor, IMU):
+            whole = jnp.broadcast_to(whole, (8,))[:width]
+        return jnp.maximum(jnp.broadcast_to(whole, (width,)), _LEAST_VARIANCE)
+
+    def _spread(self, covariance: Covariance, h: Number, rotation: Matrix3, force: Vector3, imu: IMU) -> Covariance:
+        """The covariance h (s) later. Half steps before and after make products of matrices of second order in h."""
+        of_rates, of_force = self.inertial_noise(imu)
+        there = lambda p: _sheared(p, POSITION, VELOCITY, h / 2 * jnp.eye(3))
+        turned = lambda p: _sheared(p, ATTITUDE, GYRO_BIAS, -h / 2 * rotation)
+        covariance = turned(there(covariance))
+        covariance = _sheared(covariance, VELOCITY, ATTITUDE, -h * skew(force))
+        covariance = _sheared(covariance, VELOCITY, FORCE_BIAS, -h * rotation)
+        covariance = turned(there(covariance))
+        in_world = lambda density: (rotation[:, None, :] * rotation[None, :, :] * density).sum(-1)
+        gained = jnp.zeros((_SIZE, _SIZE))
+        gained = gained.at[ATTITUDE, ATTITUDE].set(in_world(of_rates)).at[VELOCITY, VELOCITY].set(in_world(of_force))
+        gained = gained.at[GYRO_BIAS, GYRO_BIAS].set(self.gyro_drift**2 * jnp.eye(3))
+        return covariance + h * gained.at[FORCE_BIAS, FORCE_BIAS].set(self.force_drift**2 * jnp.eye(3))
+
+    def _corrected(
+        self, state: KalmanState, covariance: Covariance, i: int, one: Received
+    ) -> tuple[KalmanState, Covariance]:
+        """State and covariance with a reading, entry by entry; as they are where it is rejected or there is none."""
+        sensor = self.sensors[i]
+        reading = one.reading[:2] if isinstance(sensor, IMU) else one.reading
+        expected, slopes = _expected(state, sensor, one.age)
+        error = reading - expected
+        for entry in sensor.angles:
+            error = error.at[entry].add(-2 * jnp.pi * jnp.round(error[entry] / (2 * jnp.pi)))
+        there = jnp.isfinite(reading)
+        error, posterior = jnp.where(there, error, 0.0), covariance
+        correction, square = jnp.zeros(_SIZE), jnp.zeros(())
+        for k, variance in enumerate(self.variance(sensor, len(reading))):
+            shared = _product(posterior, slopes[k])
+            total = (slopes[k] * shared).sum() + variance
+            left = error[k] - (slopes[k] * correction).sum()
+            gain, share = shared / jnp.sqrt(total), jnp.where(there[k], 1.0, 0.0)
+            square = square + share * left**2 / total
+            correction = correction + share * left / total * shared
+            posterior = posterior - share * gain[:, None] * gain[None, :]
+            least = share * (gain**2 / total) * variance  # no variance is below what the reading's noise leaves
+            posterior = jnp.where(_DIAGONAL, jnp.maximum(posterior, least[:, None]), posterior)
+        count, tolerance = there.sum(), state.tolerance[i]
+        known = one.fresh & (count > 0)
+        taken = known & (square <= self.gate**2 * count * tolerance)
+        following = jnp.where(taken, 1.0, jnp.where(known, 2 * tolerance, tolerance))
+        correction = jnp.where(taken, correction, 0.0)
+        turn = quaternion_product(quaternion_of_turn(correction[ATTITUDE]), state.attitude)
+        after = state._replace(
+            position=state.position + correction[POSITION],
+            velocity=state.velocity + correction[VELOCITY],
+            attitude=turn / jnp.sqrt((turn * turn).sum()),
+            gyro_bias=state.gyro_bias + correction[GYRO_BIAS],
+            force_bias=state.force_bias + correction[FORCE_BIAS],
+            tolerance=state.tolerance.at[i].set(following),
+            rejected=state.rejected + jnp.where(known & ~taken, 1, 0),
+        )
+        return after, jnp.where(taken, posterior, covariance)
+
+
+_DIAGONAL = np.eye(_SIZE, dtype=bool)
+_DEVIATIONS = (
+    "position_deviation",
+    "velocity_deviation",
+    "tilt_deviation",
+    "heading_deviation",
+    "gyro_bias_deviation",
+    "force_bias_deviation",
+    "gate",
+    "noise_scale",
+)
+
+
+def _expected(state: KalmanState, sensor: AbstractSensor, age: Number):
+    """What a sensor would have read `age` (s) ago, and its slopes in the errors of now, [entries, 15].
+
+    Of what the errors of attitude and force bias changed in the meantime nothing is kept in the slopes: age^2 / 2 times
+    a force bias, some millimetres in a second.
+    """
+    past = state.history.at(age)
+    then = quaternion_product(state.attitude, quaternion_product(conjugate(state.history.attitude), past.attitude))
+    rotation = rotation_from_quaternion(then)
+
+    def read(errors):
+        turn, faster, moved = errors[:3], errors[3:6], errors[6:]
+        velocity = state.velocity + faster
+        turned = rotation + (skew(turn)[:, :, None] * rotation[None]).sum(1)
+        motion = Motion(
+            position=state.position + moved + past.displacement - age * velocity,
+            angles=euler_from_rotation(turned),
+            rotation=turned,
+            velocity=velocity + past.velocity,
+            rates=state.rates - state.gyro_bias,
+            specific_force=state.force - state.force_bias,
+            actuator=state.actuator,
+        )
+        reading = sensor.reading(motion)
+        return reading[:2] if isinstance(sensor, IMU) else reading
+
+    none = jnp.zeros(9)
+    slopes, zero = jax.jacfwd(read)(none), jnp.zeros
+    of = lambda errors: slopes[:, errors]
+    rows = slopes.shape[0]
+    whole = [of(slice(0, 3)), zero((rows, 3)), of(slice(3, 6)), zero((rows, 3)), of(slice(6, 9))]
+    return read(none), jnp.concatenate(whole, axis=1)
+
+
+def _turned(attitude: Quaternion, turn: Vector3) -> Quaternion:
+    """The attitude after a turn about body axes, rad."""
+    after = quaternion_product(attitude, quaternion_of_turn(turn))
+    return after / jnp.sqrt((after * after).sum())
+
+
+def _sheared(covariance: Covariance, to: slice, source: slice, matrix: Matrix3) -> Covariance:
+    """Covariance where errors `to` have gained `matrix` times the errors `source`."""
+    rows = covariance[to] + _product(matrix, covariance[source])
+    corner = rows[:, to] + _product(rows[:, source], matrix.T)
+    rows = rows.at[:, to].set((corner + corner.T) / 2)
+    return covariance.at[to].set(rows).at[:, to].set(rows.T)
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Product of a small matrix with a vector or a matrix, without a call of a library."""
+    if b.ndim == 1:
+        return matvec(a, b)
+    return (a[:, :, None] * b[None, :, :]).sum(1)
+
+
+def _propellers(report: Any, sensor: PropellerSpeed, one: Received) -> Any:
+    """Speeds as read; their rate of change is the difference of successive readings."""
+    new = one.fresh & jnp.isfinite(one.reading)
+    after = report._replace(speed=jnp.where(new, one.reading, report.speed))
+    if report.acceleration is None:
+        return after
+    rate = (one.reading - report.speed) / sensor.sampling.period
+    return after._replace(acceleration=jnp.where(new, rate, report.acceleration))
+
+
+def kalman(
+    sensors,
+    position_deviation: float = 0.1,
+    velocity_deviation: float = 0.05,
+    tilt_deviation: float = 0.02,
+    heading_deviation: float = 0.05,
+    gyro_bias_deviation: float = 5e-3,
+    force_bias_deviation: float = 0.05,
+    gyro_drift: float = 1e-5,
+    force_drift: float = 1e-4,
+    gate: float = 5.0,
+    noise_scale: float = 1.0,
+    longest_delay: float | None = None,
+) -> SensorNavigation:
+    """Navigation of a vehicle from its sensors, by an error-state Kalman filter. For the sampled loop.
+
+    It estimates position, velocity, attitude and the biases of gyroscopes and accelerometers, with their covariance.
+    Defaults are those of cheap MEMS devices.
+
+    Args:
+        sensors: any; an IMU must be among them.
+        position_deviation: initial standard deviation of the position, m.
+        velocity_deviation: of the velocity, m/s.
+        tilt_deviation: of roll and pitch, rad.
+        heading_deviation: of the heading, rad.
+        gyro_bias_deviation: of the biases of the gyroscopes, rad/s.
+        force_bias_deviation: of the biases of the accelerometers, m/s^2.
+        gyro_drift: random walk of the biases of the gyroscopes, rad/s per square root of a second.
+        force_drift: likewise of the accelerometers, m/s^2 per square root of a second.
+        gate: standard deviations beyond which a reading is rejected.
+        noise_scale: standard deviations that the filter assumes, over those of the sensors.
+        longest_delay: age of readings back to which the motion is kept, s; None for the longest delay of the sensors.
+    """
+    sensors = tuple(sensors)
+    check_sensors(sensors)
+    if longest_delay is None:
+        longest_delay = max(np.asarray(sensor.sampling.delay) for sensor in sensors)
+    of_motion = position_deviation, velocity_deviation, tilt_deviation, heading_deviation
+    of_biases = gyro_bias_deviation, force_bias_deviation, gyro_drift, force_drift
+    return SensorNavigation(Kalman(sensors, *of_motion, *of_biases, gate, noise_scale, longest_delay))
