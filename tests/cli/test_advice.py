@@ -69,21 +69,21 @@ def test_top_speed_is_unknown_without_limits():
 def test_drift_of_a_heading_is_that_of_the_integrated_rate():
     sensors = [imu(rate_noise=2e-3, rate_bias=1e-4, period=0.01), dvl(), depth(), position_fix()]
     expected = np.hypot(2e-3 * np.sqrt(0.01 * 100.0), 1e-4 * 100.0)
-    assert drifts(sensors, 100.0) == {"yaw": pytest.approx(expected)}
-    assert not drifts([*sensors, compass()], 100.0) and not drift_advice([*sensors, compass()], 100.0)
+    assert drifts(sensors, 0.3, 100.0) == {"yaw": pytest.approx(expected)}
+    assert not drifts([*sensors, compass()], 0.3, 100.0) and not drift_advice([*sensors, compass()], 0.3, 100.0)
 
 
 def test_drift_of_a_position_without_any_velocity_is_that_of_the_twice_integrated_acceleration():
     sensors = [imu(angle_noise=0.0, force_noise=0.02, force_bias=1e-3), depth(), compass()]
     expected = np.hypot(0.02 * np.sqrt(0.01 * 60.0**3 / 3), 1e-3 * 60.0**2 / 2)
-    assert drifts(sensors, 60.0) == {"north and east": pytest.approx(expected)}
+    assert drifts(sensors, 0.3, 60.0) == {"north and east": pytest.approx(expected)}
 
 
 def test_nothing_is_said_of_sensors_that_do_not_say_what_they_measure():
     class Unsaid(type(compass())):
         fixes = None
 
-    assert not drifts([imu(), Unsaid(compass().sampling, 0.05)], 60.0)
+    assert not drifts([imu(), Unsaid(compass().sampling)], 0.3, 60.0)
 
 
 @pytest.mark.slow
@@ -110,6 +110,6 @@ def test_drift_is_that_of_the_observer(sensors):
 
     errors = np.asarray(jax.jit(jax.vmap(error))(jax.random.split(jax.random.PRNGKey(0), 64)))
     rms = dict(zip(BODY_OUTPUTS, np.sqrt((errors**2).mean(axis=0)), strict=True))
-    for what, drift in drifts(sensors, 60.0).items():
+    for what, drift in drifts(sensors, 0.3, 60.0).items():
         for output in what.split(" and "):
             assert rms[output] == pytest.approx(drift, rel=0.27)

@@ -123,7 +123,7 @@ ERRORS = {
     "slice of a measurement": (OWN, "law.py", "self.model.coordinates.tracking_error(y, r)\n", "r[:6] - y[:6], 0, 0\n", ["law.py, line 38", "`y.position` and `y.velocity`"]),
     "module that is missing": (("check", "./mine.py:my_law"), "mine.py", "import undertow", "import pandsa", ["mine.py, line 1", "Install `pandsa`"]),
     "sensor without the observer": (SIMULATE, "s.yaml", "loop:", "navigation: dvl\nloop:", ["`navigation`", "s.yaml, line 8", "`navigation.sensors`"]),
-    "sensors at the top": (SIMULATE, "s.yaml", "loop:", "sensors: [imu, dvl]\nloop:", ["`sensors`", "s.yaml, line 8", "`navigation: {kind: observer, sensors: ...}`"]),
+    "sensors at the top": (SIMULATE, "s.yaml", "loop:", "sensors: [imu, dvl]\nloop:", ["`sensors`", "s.yaml, line 8", "`navigation: {kind: kalman, sensors: ...}`"]),
     "observer without an IMU": (SIMULATE, "s.yaml", "loop:", "navigation: {kind: observer, sensors: [dvl]}\nloop:", ["`navigation.sensors`", "s.yaml, line 8", "Add `imu`"]),
     "file for --out": (("simulate", "s.yaml", "--out", "notes.txt"), "", "", "", ["`--out`", "notes.txt, a file", "another name"]),
     "results that exist": (("simulate", "s.yaml", "--out", "old"), "", "", "", ["`--out`", "old, which has run.nc", "--overwrite"]),

@@ -22,6 +22,7 @@ def test_every_kind_has_a_use():
 
 # Their gradients take long to compile, and the quicker parts of their kind meet the same operations: slow tests.
 HEAVY = {
+    ("navigation", "kalman"),
     ("navigation", "observer"),
     ("navigation", "white_noise"),
     ("navigation", "degraded"),
@@ -36,6 +37,7 @@ HEAVY = {
 
 # Operation by operation these take longest: without compilation they are met by the slow tests only.
 LONG = {
+    ("navigation", "kalman"),
     ("navigation", "observer"),
     ("disturbances", "gauss_markov_current"),
     ("disturbances", "waves"),

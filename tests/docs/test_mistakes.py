@@ -218,17 +218,16 @@ MISTAKES = [
     (
         "sensor",
         "altimeter",
-        "set(self.bottom - reading[0] - then)",
-        "set(reading[0] - then)",
-        "Error: `correct` must agree with the position, where the reading tells nothing new, but is 2.208 instead of "
-        "0.26 in entry 3",
+        "self.bottom - motion.position[2:]",
+        "(motion.position[2:] - motion.position[2:]) ** 0.5",
+        "Error: `reading` must have finite derivatives, which a Kalman filter needs, but is not differentiable",
     ),
     (
         "sensor",
         "altimeter",
-        "set(self.bottom - reading[0] - then)",
-        "set(then + reading[0] - self.bottom)",
-        "Error: `correct` must move the position towards the reading, but is from 0.374 to 0.399 off",
+        "self.bottom - motion.position[2:]",
+        "self.bottom + 0 * motion.position[2:]",
+        "Error: `reading` must depend on the motion, but is constant in entry 1: no filter can use it",
     ),
 ]
 

@@ -244,7 +244,7 @@ class Flooded(Depth):
 def test_navigation_leaves_out_readings_that_are_none():
     """As if they were lost: the estimate goes on, each is counted, and the depth is known again afterwards."""
     quiet = [imu(angle_noise=0, rate_noise=0, force_noise=0), dvl(noise=0, resolution=0, delay=0), compass(noise=0)]
-    sensor = observer([*quiet, position_fix(noise=0, delay=0), Flooded(Sampling(0.05), 0.2)])
+    sensor = observer([*quiet, position_fix(noise=0, delay=0), Flooded(Sampling(0.05))])
     motion = lambda t: measurement_of_outputs(jnp.zeros(6).at[2].set(jnp.sin(t)), jnp.zeros(6).at[2].set(jnp.cos(t)))
     path = sensor.realize(jax.random.PRNGKey(0))
 

@@ -118,7 +118,7 @@ def test_slopes_are_taken_without_steps():
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0] * 6), sinusoid(), sensor)
     smooth = without(loop, ("resolution", "dead_zone"))
     assert float(smooth.plant.thruster.dead_zone) == 0.0 and float(loop.plant.thruster.dead_zone) == 1.2
-    pairs = zip(loop.navigation.sensors, smooth.navigation.sensors, strict=True)
+    pairs = zip(loop.navigation.filter.sensors, smooth.navigation.filter.sensors, strict=True)
     assert [(float(a.sampling.resolution), float(b.sampling.resolution)) for a, b in pairs] == [(0.0, 0.0)] + [
         (1e-3, 0.0)
     ] * 2

@@ -28,6 +28,7 @@ from undertow.numerics.rotations import (
     Quaternion,
     Vector3,
     conjugate,
+    cross,
     euler_from_rotation,
     quaternion_of_turn,
     quaternion_product,
@@ -39,7 +40,10 @@ from undertow.sensors.motion import Motion, gravity
 from undertow.sensors.propeller_speed import PropellerSpeed
 from undertow.sensors.sensor import AbstractSensor
 
-# Errors of the state, in world axes but for the biases; slices of the covariance.
+# Errors of the state, in world axes but for the biases; slices of the covariance. That of the velocity is the error of
+# the velocity in body axes, turned: the truth is exp(attitude error) (velocity + error). So what a DVL reads does not
+# depend on the heading, and noise in the estimated velocity tells the filter nothing about the heading. (With the error
+# of the velocity in world axes it does, and a filter without a compass believes in a heading that nothing measured.)
 ATTITUDE, GYRO_BIAS, VELOCITY, FORCE_BIAS, POSITION = (slice(3 * i, 3 * i + 3) for i in range(5))
 _SIZE = 15
 _UPPER = np.triu_indices(_SIZE)
@@ -145,7 +149,7 @@ class Kalman(AbstractFilter):
             force=force,
             history=history,
         )
-        covariance = self._spread(covariance, elapsed, half, acceleration - gravity(), imu)
+        covariance = self._spread(covariance, elapsed, half, state.velocity, imu)
         for i, (sensor, one) in enumerate(zip(self.sensors, received, strict=True)):
             if isinstance(sensor, PropellerSpeed):
                 state = state._replace(actuator=_propellers(state.actuator, sensor, one))
@@ -212,19 +216,28 @@ class Kalman(AbstractFilter):
             whole = jnp.broadcast_to(whole, (8,))[:width]
         return jnp.maximum(jnp.broadcast_to(whole, (width,)), _LEAST_VARIANCE)
 
-    def _spread(self, covariance: Covariance, h: Number, rotation: Matrix3, force: Vector3, imu: IMU) -> Covariance:
+    def _spread(self, covariance: Covariance, h: Number, rotation: Matrix3, velocity: Vector3, imu: IMU) -> Covariance:
         """The covariance h (s) later. Half steps before and after make products of matrices of second order in h."""
         of_rates, of_force = self.inertial_noise(imu)
-        there = lambda p: _sheared(p, POSITION, VELOCITY, h / 2 * jnp.eye(3))
-        turned = lambda p: _sheared(p, ATTITUDE, GYRO_BIAS, -h / 2 * rotation)
-        covariance = turned(there(covariance))
-        covariance = _sheared(covariance, VELOCITY, ATTITUDE, -h * skew(force))
-        covariance = _sheared(covariance, VELOCITY, FORCE_BIAS, -h * rotation)
-        covariance = turned(there(covariance))
-        in_world = lambda density: (rotation[:, None, :] * rotation[None, :, :] * density).sum(-1)
+        across = skew(velocity)
+
+        def half(p: Covariance) -> Covariance:
+            p = _sheared(p, POSITION, VELOCITY, h / 2 * jnp.eye(3))
+            p = _sheared(p, POSITION, ATTITUDE, -h / 2 * across)
+            p = _sheared(p, ATTITUDE, GYRO_BIAS, -h / 2 * rotation)
+            return _sheared(p, VELOCITY, GYRO_BIAS, -h / 2 * _product(across, rotation))
+
+        covariance = _sheared(half(covariance), VELOCITY, ATTITUDE, h * skew(gravity()))
+        covariance = half(_sheared(covariance, VELOCITY, FORCE_BIAS, -h * rotation))
+        in_world = lambda density: (rotation[:, None, :] * rotation[None, :, :] * density[None, None, :]).sum(-1)
+        turning = in_world(of_rates)
+        sideways = _product(across, turning)  # noise of the gyroscopes turns the velocity in body axes
         gained = jnp.zeros((_SIZE, _SIZE))
-        gained = gained.at[ATTITUDE, ATTITUDE].set(in_world(of_rates)).at[VELOCITY, VELOCITY].set(in_world(of_force))
-        gained = gained.at[GYRO_BIAS, GYRO_BIAS].set(self.gyro_drift**2 * jnp.eye(3))
+        gained = (
+            gained.at[ATTITUDE, ATTITUDE].set(turning).at[GYRO_BIAS, GYRO_BIAS].set(self.gyro_drift**2 * jnp.eye(3))
+        )
+        gained = gained.at[VELOCITY, ATTITUDE].set(sideways).at[ATTITUDE, VELOCITY].set(sideways.T)
+        gained = gained.at[VELOCITY, VELOCITY].set(in_world(of_force) - _product(sideways, across))
         return covariance + h * gained.at[FORCE_BIAS, FORCE_BIAS].set(self.force_drift**2 * jnp.eye(3))
 
     def _corrected(
@@ -250,16 +263,17 @@ class Kalman(AbstractFilter):
             posterior = posterior - share * gain[:, None] * gain[None, :]
             least = share * (gain**2 / total) * variance  # no variance is below what the reading's noise leaves
             posterior = jnp.where(_DIAGONAL, jnp.maximum(posterior, least[:, None]), posterior)
-        count, tolerance = there.sum(), state.tolerance[i]
+        count, tolerance = jnp.where(there, 1.0, 0.0).sum(), state.tolerance[i]
         known = one.fresh & (count > 0)
         taken = known & (square <= self.gate**2 * count * tolerance)
         following = jnp.where(taken, 1.0, jnp.where(known, 2 * tolerance, tolerance))
         correction = jnp.where(taken, correction, 0.0)
-        turn = quaternion_product(quaternion_of_turn(correction[ATTITUDE]), state.attitude)
+        turn = quaternion_of_turn(correction[ATTITUDE])
+        turned = quaternion_product(turn, state.attitude)
         after = state._replace(
             position=state.position + correction[POSITION],
-            velocity=state.velocity + correction[VELOCITY],
-            attitude=turn / jnp.sqrt((turn * turn).sum()),
+            velocity=matvec(rotation_from_quaternion(turn), state.velocity + correction[VELOCITY]),
+            attitude=turned / jnp.sqrt((turned * turned).sum()),
             gyro_bias=state.gyro_bias + correction[GYRO_BIAS],
             force_bias=state.force_bias + correction[FORCE_BIAS],
             tolerance=state.tolerance.at[i].set(following),
@@ -284,22 +298,24 @@ _DEVIATIONS = (
 def _expected(state: KalmanState, sensor: AbstractSensor, age: Number):
     """What a sensor would have read `age` (s) ago, and its slopes in the errors of now, [entries, 15].
 
-    Of what the errors of attitude and force bias changed in the meantime nothing is kept in the slopes: age^2 / 2 times
-    a force bias, some millimetres in a second.
+    What the biases changed in the meantime is not kept in the slopes: age^2 / 2 times a force bias, some millimetres in
+    a second.
     """
     past = state.history.at(age)
     then = quaternion_product(state.attitude, quaternion_product(conjugate(state.history.attitude), past.attitude))
-    rotation = rotation_from_quaternion(then)
+    rotation, fallen = rotation_from_quaternion(then), age * gravity()
 
     def read(errors):
         turn, faster, moved = errors[:3], errors[3:6], errors[6:]
-        velocity = state.velocity + faster
-        turned = rotation + (skew(turn)[:, :, None] * rotation[None]).sum(1)
+        velocity = state.velocity + faster + cross(turn, state.velocity)
+        turned = rotation + _product(skew(turn), rotation)
+        # What accelerated the body since then is turned with it, gravity is not.
+        displaced = past.displacement + cross(turn, past.displacement - age / 2 * fallen)
         motion = Motion(
-            position=state.position + moved + past.displacement - age * velocity,
+            position=state.position + moved + displaced - age * velocity,
             angles=euler_from_rotation(turned),
             rotation=turned,
-            velocity=velocity + past.velocity,
+            velocity=velocity + past.velocity + cross(turn, past.velocity + fallen),
             rates=state.rates - state.gyro_bias,
             specific_force=state.force - state.force_bias,
             actuator=state.actuator,

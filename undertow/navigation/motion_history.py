@@ -41,7 +41,7 @@ class MotionHistory(NamedTuple):
             attitude: afterwards, without corrections.
             spacing: between two slots, s.
         """
-        gained = elapsed * acceleration
+        gained = elapsed * acceleration[None]
         age = self.age + elapsed
         # Relative to the new velocity, which is larger by what was gained, an old place lies ahead.
         displacement = self.displacement + (self.age + elapsed / 2)[:, None] * gained

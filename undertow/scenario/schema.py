@@ -294,7 +294,7 @@ def _section_of(path: tuple, model: type[BaseModel]) -> str:
     sections = [key.path.split(".") for key in keys()]
     inside = [steps[0] for steps in sections if len(steps) == 2 and steps[1] == path[0] != "kind"]
     section = next(iter(inside), _INSIDE.get(path[0]))
-    kind = "kind: observer, " if section == "navigation" else ""
+    kind = "kind: kalman, " if section == "navigation" else ""
     return f"It belongs to `{section}`: write `{section}: {{{kind}{path[0]}: ...}}`" if section else ""
 
 

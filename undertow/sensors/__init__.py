@@ -1,4 +1,4 @@
-"""Sensors of a vehicle, one file each. `navigation/observer.py` estimates the state from their readings."""
+"""Sensors of a vehicle, one file each. The filters of `navigation` estimate the motion from readings."""
 
 from undertow.core.catalogue import publish
 

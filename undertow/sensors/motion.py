@@ -8,7 +8,7 @@ from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement
 from undertow.core.measurement import body_of
 from undertow.numerics.linear_algebra import matvec
-from undertow.numerics.rotations import Matrix3, Vector3
+from undertow.numerics.rotations import Matrix3, Vector3, cross
 
 
 def gravity() -> Vector3:
@@ -24,7 +24,7 @@ class Motion(NamedTuple):
     rotation: Matrix3  # body -> world
     velocity: Vector3  # m/s, world
     rates: Vector3  # rad/s, body
-    specific_force: Vector3  # m/s^2, body: as of an accelerometer, the mean since the previous instant
+    specific_force: Vector3  # m/s^2, body: as of an accelerometer, the mean since the previous instant, in its axes
     actuator: Any  # report of the thrusters, or None
 
 
@@ -39,4 +39,5 @@ def motion_of(truth: Measurement, velocity_before: Vector3, elapsed) -> Motion:
     body, velocity = body_of(truth), truth.velocity[:3]
     acceleration = jnp.where(elapsed > 0, (velocity - velocity_before) / jnp.where(elapsed > 0, elapsed, 1.0), 0.0)
     force = matvec(body.rotation.T, acceleration - gravity())
+    force = force + elapsed / 2 * cross(body.nu[3:], force)  # in the axes of half the time ago, of which it is the mean
     return Motion(truth.position[:3], truth.position[3:], body.rotation, velocity, body.nu[3:], force, truth.actuator)

@@ -1,0 +1,287 @@
+"""The error-state Kalman filter: against textbook matrices, consistent with its covariance, late and wrong readings."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jaxtyping import Float
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+from textbook import rotation_from_euler
+
+from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
+from undertow.core.param import Param, param
+from undertow.navigation.from_sensors import Received
+from undertow.navigation.kalman import ATTITUDE, FORCE_BIAS, GYRO_BIAS, POSITION, VELOCITY, kalman
+from undertow.navigation.observability import Sensed, deviations, unobservable
+from undertow.sensors import compass, depth, dvl, imu, position_fix
+from undertow.sensors.sampling import Sampling
+from undertow.sensors.sensor import AbstractSensor
+
+AMPLITUDE = jnp.array([1.0, 0.7, 0.4, 0.3, 0.2, 0.5])
+FREQUENCY = jnp.array([0.3, 0.5, 0.4, 0.7, 0.6, 0.2])
+BIASES = {"rate_bias": 5e-3, "force_bias": 0.05}
+ALL = [imu(**BIASES), dvl(), depth(), compass(), position_fix()]
+
+
+def swinging(t):
+    return measurement_of_outputs(AMPLITUDE * jnp.sin(FREQUENCY * t), AMPLITUDE * FREQUENCY * jnp.cos(FREQUENCY * t))
+
+
+def level(t):
+    return measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
+
+
+@eqx.filter_jit
+def followed(navigation, motion, steps, step, keys):
+    """Errors of every state, [keys, steps, 15], and their covariances, of runs with these keys."""
+
+    def run(key):
+        realization = navigation.realize(key)
+
+        def advance(state, k):
+            truth = motion(k * step)
+            _, state = navigation.measure(realization, state, k * step, truth)
+            return state, (errors_of(state, truth), navigation.filter.covariance(state.filter))
+
+        return jax.lax.scan(advance, navigation.init(realization, motion(0.0)), jnp.arange(steps, dtype=float))[1]
+
+    return jax.vmap(run)(keys)
+
+
+def errors_of(state, truth):
+    """Truth minus estimate: attitude in world axes, gyro bias, velocity turned back, force bias, position."""
+    own, offset = state.filter, state.sensors[0].offset
+    w, x, y, z = own.attitude
+    estimated = jnp.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    turned = rotation_from_euler(truth.position[3:]) @ estimated.T
+    turn = jnp.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
+    velocity = turned.T @ truth.velocity[:3] - own.velocity
+    parts = [turn, offset[2:5] - own.gyro_bias, velocity, offset[5:] - own.force_bias]
+    return jnp.concatenate([*parts, truth.position[:3] - own.position])
+
+
+def nothing(sensors):
+    """Deliveries of sensors that are silent."""
+    widths = {"IMU": 8, "DVL": 3, "PositionFix": 2}
+    return tuple(
+        Received(jnp.zeros(widths.get(type(one).__name__, 1)), jnp.asarray(False), jnp.zeros(())) for one in sensors
+    )
+
+
+def with_reading(received, index, reading, age=0.0):
+    """The same with one reading."""
+    one = Received(jnp.atleast_1d(jnp.asarray(reading, dtype=float)), jnp.asarray(True), jnp.asarray(age))
+    return (*received[:index], one, *received[index + 1 :])
+
+
+def test_the_covariance_spreads_as_the_matrix_exponential_says():
+    """At rest and level the errors follow constant matrices; Van Loan (1978) gives the covariance exactly."""
+    own, h, steps = kalman(ALL, gyro_drift=1e-3, force_drift=1e-2).filter, 0.01, 300
+    state = own.start(level(0.0))
+    update = eqx.filter_jit(own.update)
+    for _ in range(steps):
+        state = update(state, jnp.asarray(h), nothing(ALL))
+    a = np.zeros((15, 15))
+    g = 9.81
+    a[ATTITUDE, GYRO_BIAS], a[VELOCITY, FORCE_BIAS], a[POSITION, VELOCITY] = -np.eye(3), -np.eye(3), np.eye(3)
+    a[VELOCITY, ATTITUDE] = -np.array([[0, g, 0], [-g, 0, 0], [0, 0, 0]])  # -[f x], f = (0, 0, -g)
+    of_rates, of_force = 0.01 * 2e-3**2, 0.01 * 0.02**2
+    noise = np.diag(np.repeat([of_rates, 1e-6, of_force, 1e-4, 0.0], 3))
+    t = steps * h
+    both = expm(np.block([[-a, noise], [np.zeros((15, 15)), a.T]]) * t)
+    over = both[15:, 15:].T
+    expected = over @ np.diag(np.asarray(own.initial_deviations()) ** 2) @ over.T + over @ both[:15, 15:]
+    found = np.asarray(own.covariance(state))
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    # Noise enters at the end of each step instead of throughout: off by about half a step in the time.
+    assert np.abs((found - expected) / scale).max() < h / t
+    np.testing.assert_array_equal(found, found.T)
+
+
+def test_a_correction_is_that_of_the_textbook():
+    """Entry by entry it gives what K = P H' (H P H' + R)^-1 gives for the whole reading."""
+    own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)
+    state = own.start(swinging(0.7))
+    for _ in range(50):
+        state = update(state, jnp.asarray(0.01), nothing(ALL))
+    before, p = state, np.asarray(own.covariance(state))
+    w = rotation_from_euler(np.asarray(state_angles(state)))
+    velocity = np.asarray(state.velocity)
+    slopes = np.zeros((3, 15))
+    slopes[:, VELOCITY] = w.T
+    reading = w.T @ velocity + np.array([0.02, -0.01, 0.015])
+    noise = 5e-3**2 + 1e-3**2 / 12
+    gain = p @ slopes.T @ np.linalg.inv(slopes @ p @ slopes.T + noise * np.eye(3))
+    correction, after = gain @ (reading - w.T @ velocity), (np.eye(15) - gain @ slopes) @ p
+    state = update(state, jnp.zeros(()), with_reading(nothing(ALL), 1, reading))
+    np.testing.assert_allclose(own.covariance(state), after, atol=1e-9 * np.abs(p).max())
+    turned = Rotation.from_rotvec(np.array(correction[ATTITUDE])).as_matrix()
+    np.testing.assert_allclose(state.velocity, turned @ (velocity + correction[VELOCITY]), atol=1e-10)
+    for name, part in (("position", POSITION), ("gyro_bias", GYRO_BIAS), ("force_bias", FORCE_BIAS)):
+        moved = np.asarray(getattr(state, name) - getattr(before, name))
+        np.testing.assert_allclose(moved, correction[part], atol=1e-10)
+
+
+def state_angles(state):
+    """Euler angles of the estimated attitude."""
+    return kalman(ALL).filter.measurement(state).position[3:]
+
+
+EXACT = dict.fromkeys(("position_deviation", "velocity_deviation", "tilt_deviation", "heading_deviation"), 1e-6)
+
+
+@pytest.mark.parametrize(
+    "sensors, motion",
+    [(ALL, swinging), (ALL[:3], level)],
+    ids=["all sensors, swinging", "no compass or fixes, at rest"],
+)
+def test_errors_are_as_large_as_the_filter_says(sensors, motion):
+    """Normalised squared errors of 15 states over 40 runs: their mean is 15, within four standard deviations.
+
+    At rest without a compass a filter with velocity errors in world axes believes in a heading that nothing measured.
+    """
+    keys = jax.random.split(jax.random.PRNGKey(4), 40)
+    biases = {"gyro_bias_deviation": 5e-3, "force_bias_deviation": 0.05, "gyro_drift": 0, "force_drift": 0}
+    found, covariances = followed(kalman(sensors, **EXACT, **biases), motion, 3000, 0.01, keys)
+    for k in (500, 1500, 2999):
+        squares = np.einsum("ki,kij,kj->k", found[:, k], np.linalg.inv(covariances[:, k]), found[:, k])
+        assert abs(squares.mean() - 15) < 4 * np.sqrt(2 * 15 / len(keys)), (k, squares.mean())
+    last = np.sqrt((np.asarray(found[:, -1]) ** 2).mean(0))
+    observed = slice(GYRO_BIAS.start, GYRO_BIAS.stop if len(sensors) == len(ALL) else GYRO_BIAS.stop - 1)  # yaw is not
+    assert (last[observed] < 0.2 * 5e-3).all() and (last[FORCE_BIAS] < 0.4 * 0.05).all()
+
+
+def test_late_readings_count_as_much_as_their_age_says():
+    """Fixes and velocities that come a second late, while the body swings: as consistent as fresh ones."""
+    keys = jax.random.split(jax.random.PRNGKey(5), 40)
+    late = [imu(), dvl(delay=1.0), depth(delay=0.5), compass(delay=0.7), position_fix(delay=1.0)]
+    found, covariances = followed(kalman(late), swinging, 2000, 0.01, keys)
+    position, of_position = np.asarray(found[:, -1, POSITION]), np.asarray(covariances[:, -1, POSITION, POSITION])
+    squares = np.einsum("ki,kij,kj->k", position, np.linalg.inv(of_position), position)
+    assert abs(squares.mean() - 3) < 4 * np.sqrt(2 * 3 / len(keys))
+    assert np.abs(position).max() < 0.1  # the body moves 0.35 m in that second
+
+
+def test_an_outlier_is_rejected_and_a_lasting_jump_is_believed_in_the_end():
+    own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)
+    state = own.start(level(0.0))
+    fixed = update(state, jnp.asarray(0.0), with_reading(nothing(ALL), 4, [100.0, 0.0]))
+    assert int(fixed.rejected) == 1
+    np.testing.assert_array_equal(fixed.position, state.position)
+    np.testing.assert_array_equal(fixed.covariance, state.covariance)
+    for count in range(1, 60):
+        fixed = update(fixed, jnp.asarray(0.0), with_reading(nothing(ALL), 4, [100.0, 0.0]))
+        if int(fixed.rejected) == count:
+            break
+    assert count < 20 and float(fixed.position[0]) > 50.0
+
+
+def test_entries_that_are_none_are_left_out():
+    """East is taken although north is NaN; a reading of nothing but NaN changes nothing."""
+    own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)
+    state = own.start(level(0.0))
+    half = update(state, jnp.asarray(0.0), with_reading(nothing(ALL), 4, [np.nan, 0.1]))
+    assert float(half.position[0]) == 0.0 and float(half.position[1]) > 0.05
+    none = update(state, jnp.asarray(0.0), with_reading(nothing(ALL), 4, [np.nan, np.inf]))
+    for before, after in zip(jax.tree.leaves(state), jax.tree.leaves(none), strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
+def test_an_angle_may_have_turned_once():
+    own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)
+    turned = lambda yaw: measurement_of_outputs(jnp.zeros(6).at[5].set(yaw), jnp.zeros(6))
+    state = update(own.start(turned(3.13)), jnp.asarray(0.0), with_reading(nothing(ALL), 3, -3.13))
+    assert int(state.rejected) == 0
+    assert abs(abs(float(state_angles(state)[2])) - np.pi) < 0.0117  # between both: half a turn
+
+
+class Altimeter(AbstractSensor):
+    """Height above a flat bottom, along the axis of the vehicle that looks down."""
+
+    bottom: Float[Param, ""] = param("m", "depth of the bottom")
+
+    def reading(self, motion):
+        return ((self.bottom - motion.position[2:]) / motion.rotation[2, 2])[:1]
+
+
+def test_a_sensor_of_a_user_needs_no_more_than_its_reading():
+    sensors = [imu(), dvl(), compass(), position_fix(), Altimeter(Sampling(0.2, noise=0.02), bottom=20.0)]
+    found, _ = followed(kalman(sensors), swinging, 2000, 0.01, jax.random.split(jax.random.PRNGKey(0), 4))
+    assert np.sqrt((np.asarray(found[:, 500:, 14]) ** 2).mean()) < 0.02
+
+
+def sensed(sensors):
+    """What `advice` finds out of sensors."""
+    own = kalman(sensors).filter
+    names = {"IMU": (ATTITUDE, 2), "DVL": (VELOCITY, 3), "Depth": (POSITION, 1), "Compass": (ATTITUDE, 1)}
+    found = []
+    for one in sensors:
+        part, count = names.get(type(one).__name__, (POSITION, 2))
+        rows = {"Depth": [2], "Compass": [2]}.get(type(one).__name__, list(range(count)))
+        slopes = np.zeros((count, 15))
+        for i, row in enumerate(rows):
+            slopes[i, part.start + row] = 1.0
+        found.append(Sensed(slopes, np.asarray(own.variance(one, count)), float(one.sampling.period)))
+    return found
+
+
+@pytest.mark.parametrize(
+    "sensors, unseen",
+    [
+        (ALL, []),
+        ([imu(), dvl(), depth(), position_fix()], ["yaw"]),
+        ([imu(), dvl(), depth(), compass()], ["north", "east"]),
+        ([imu(), dvl(), compass(), position_fix()], ["down"]),
+        ([imu()], ["north", "east", "down", "yaw"]),
+    ],
+)
+def test_what_sensors_cannot_observe_is_said_in_words(sensors, unseen):
+    assert unobservable(sensed(sensors)) == unseen
+    said = kalman(sensors).advice(60.0)
+    assert len(said) == bool(unseen)
+    if unseen:
+        assert f"the sensors cannot observe {', '.join(unseen)} of a vehicle at rest" in said[0]
+
+
+def test_the_drift_that_is_foretold_is_that_of_the_filter():
+    """Without fixes and compass: the deviations after a minute are those of a filter that ran for a minute."""
+    sensors = [imu(), dvl(resolution=0.0, delay=0.0), depth(resolution=0.0)]
+    navigation = kalman(sensors)
+    own = navigation.filter
+    of_rates, of_force = (np.asarray(one) for one in own.inertial_noise(sensors[0]))
+    drifts = np.repeat([1e-5**2, 1e-4**2], 3)
+    noise = np.concatenate([of_rates, drifts[:3], of_force, drifts[3:], np.zeros(3)])
+    foretold = deviations(sensed(sensors), np.asarray(own.initial_deviations()), noise, 60.0)
+    _, covariances = followed(navigation, level, 6000, 0.01, jax.random.split(jax.random.PRNGKey(0), 1))
+    of_filter = np.sqrt(np.diag(np.asarray(covariances[0, -1])))
+    for name, i in {"north": 12, "east": 13, "down": 14, "yaw": 2, "roll": 0}.items():
+        np.testing.assert_allclose(foretold[name], of_filter[i], rtol=0.05, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"gate": 0.0},
+        {"noise_scale": -1.0},
+        {"position_deviation": 0.0},
+        {"longest_delay": -1.0},
+        {"gyro_drift": np.nan},
+    ],
+)
+def test_impossible_numbers(wrong):
+    with pytest.raises(BadInput, match=next(iter(wrong))):
+        kalman(ALL, **wrong)
+
+
+def test_an_imu_is_needed():
+    with pytest.raises(BadInput, match="IMU among them"):
+        kalman([dvl(), depth()])
