@@ -1,9 +1,10 @@
 """Workload W1 in hand-written C++ beside undertow: python benchmarks/yardstick.py [--rounds 5] [--json]
 
-Compiles benchmarks/yardstick/w1.cpp, compares its trajectory and metrics with undertow's, and measures nanoseconds per
-step: of the C++ on one core, of one run of undertow, and of a batch on all cores. The shortest time of all rounds
-counts, because other processes only ever lengthen it. The C++ program counts its processor time, undertow the time on
-the wall.
+Compiles benchmarks/yardstick/w1.cpp with the FLAGS below, compares its trajectory and metrics with undertow's, and
+prints nanoseconds per step and run, beside those of one run of undertow and of batches. The shortest of all rounds
+counts, because other processes only lengthen it. Times are processor time on one core. The batch on all cores is also
+measured on the wall, as `undertow bench` does; its processor time divided by the cores is what that comes to where
+nothing else runs.
 
 The compiler is `c++`, or that in the environment variable CXX.
 """
@@ -16,9 +17,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from undertow import process_setup
 
@@ -27,7 +29,7 @@ process_setup.prepare()
 import numpy as np
 
 from undertow.analysis.metrics import results_of_batch
-from undertow.bench import measure, workload
+from undertow.bench import workload
 from undertow.bench.workload import W1
 from undertow.core import runtime
 from undertow.core.errors import BadInput
@@ -38,10 +40,10 @@ SOURCE = Path(__file__).parent / "yardstick" / "w1.cpp"
 # No -ffast-math: sums keep their order. The compiler may use the vector units as it likes, and contract to fused
 # operations, which undertow does not.
 FLAGS = ("-std=c++17", "-O3", "-march=native")
-RUNS = 20  # of 20 000 steps, in a round
-COMPARED_S = 0.2  # of the trajectory
-# Roundings differ, and weights that meet their bound carry a difference on: the metrics of 20 s differ by more.
-SAME_TRAJECTORY, SAME_METRICS = 1e-9, 1e-6
+COMPARED_S = 0.2  # s of the trajectory
+SAME = 1e-9  # largest difference of trajectory and metrics; roundings make one of some 1e-12
+REPETITIONS = 7  # in a round
+TOGETHER = 64  # runs of a batch and thread, as in undertow/bench/measure.py
 
 
 def constants() -> dict[str, Any]:
@@ -57,7 +59,8 @@ def constants() -> dict[str, Any]:
             "PI": math.pi,
             "DT": built.scenario.loop.dt,
             "INWARD": 1e-9,  # undertow/numerics/integrators.py
-            "ENVELOPE": 1e3,  # undertow/plants/hybrid_vehicle.py
+            "ENVELOPE": 1e3,  # m, m/s, rad/s; this and the next: undertow/plants/hybrid_vehicle.py
+            "LEAST_COSINE": 1e-3,  # of the pitch
             "SETTLED": 0.02,  # undertow/analysis/metrics.py
             "TARGET": built.closed_loop.reference.position,
             "MASS": body.mass_matrix,
@@ -125,22 +128,38 @@ def _braced(values: np.ndarray) -> str:
     return f"{{{inner}}}" if values.ndim == 1 else f"{{{{{inner}}}}}"
 
 
+def compiler_name() -> str:
+    """The C++ compiler.
+
+    Raises:
+        BadInput: there is none.
+    """
+    name = os.environ.get("CXX", "c++")
+    if shutil.which(name) is None:
+        hint = "Install g++ or clang++, or name another one in the environment variable CXX"
+        raise BadInput("", "", f"there is no C++ compiler `{name}`", hint=hint)
+    return name
+
+
+def version() -> str:
+    """The first line that the compiler says of itself."""
+    return subprocess.run([compiler_name(), "--version"], capture_output=True, text=True).stdout.partition("\n")[0]
+
+
 def compiled(folder: Path, numbers: Mapping[str, Any]) -> Path:
     """The C++ program, compiled into a folder.
 
     Raises:
         BadInput: there is no compiler, or it fails.
     """
-    compiler = os.environ.get("CXX", "c++")
-    if shutil.which(compiler) is None:
-        hint = "Install g++ or clang++, or name another one in the environment variable CXX"
-        raise BadInput("", "", f"there is no C++ compiler `{compiler}`", hint=hint)
+    compiler = compiler_name()
     (folder / "w1_constants.h").write_text(header(numbers), encoding="utf-8")
     program = folder / "w1"
     command = [compiler, *FLAGS, "-Wall", "-Wextra", "-I", str(folder), "-o", str(program), str(SOURCE)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0 or done.stderr:
-        raise BadInput("", "", f"`{compiler}` does not compile {SOURCE.name} without a warning: {done.stderr}")
+        said = next((line for line in done.stderr.splitlines() if "error" in line or "warning" in line), done.stderr)
+        raise BadInput("", "", f"`{compiler}` does not compile {SOURCE.name} without a warning: {said}")
     return program
 
 
@@ -162,31 +181,122 @@ def named(program: Path, *arguments: object) -> dict[str, float]:
 
 
 def trajectory_difference(program: Path) -> float:
-    """Largest difference of outputs (m, rad) and voltages (relative to the largest) from undertow's, step by step."""
-    dt = 1e-3
-    loop = {"kind": "sampled", "duration": COMPARED_S, "dt": dt, "record": dt}
+    """Largest difference from undertow's run, step by step: of outputs in m, rad, of voltages as shares of the peak."""
+    loop = {"kind": "sampled", "duration": COMPARED_S, "record": 1e-3}
     record = execute(W1 | {"loop": loop}).dataset
-    ours = [record[name].values[:-1] for name in ("position", "input")]
-    rows = np.array(printed(program, "trajectory", len(ours[0])), dtype=float)
-    outputs, voltages = rows[:, 1:7], rows[:, 7:]
-    return float(max(np.abs(outputs - ours[0]).max(), np.abs(voltages / ours[1] - 1).max()))
+    outputs, voltages = (record[name].values[:-1] for name in ("position", "input"))
+    rows = np.array(printed(program, "trajectory", len(outputs)), dtype=float)
+    apart = np.abs(rows[:, 7:] - voltages).max() / np.abs(voltages).max()
+    return float(max(np.abs(rows[:, 1:7] - outputs).max(), apart))
 
 
-def metrics_differences(program: Path) -> dict[str, float]:
-    """Relative difference of each metric of W1 from undertow's."""
-    with runtime.on_processor(), runtime.in_precision("float64"):
-        one = workload.workload(W1)
-        accumulated = workload.batch(one, width=1).run(workload.alone(one.run)).accumulated
-        ours = {name: float(value[0]) for name, value in results_of_batch(one.run.accumulators, accumulated).items()}
-        ours["tracking_rms"] = float(workload.tracking(accumulated)[0])
-    theirs = named(program, "metrics", one.steps)
-    return {name: abs(value / ours[name] - 1) for name, value in theirs.items()}
+def metrics_of_undertow(one: workload.Workload) -> dict[str, float]:
+    """Metrics of one run of W1, and `tracking_rms`, as `undertow bench` prints it."""
+    accumulated = workload.batch(one, width=1).run(workload.alone(one.run)).accumulated
+    found = {name: float(value[0]) for name, value in results_of_batch(one.run.accumulators, accumulated).items()}
+    return found | {"tracking_rms": float(workload.tracking(accumulated)[0])}
+
+
+def compare(program: Path, one: workload.Workload) -> dict[str, float]:
+    """Figures of the comparison with undertow.
+
+    Raises:
+        BadInput: trajectory or metrics differ.
+    """
+    apart = trajectory_difference(program)
+    theirs, ours = named(program, "metrics", one.steps), metrics_of_undertow(one)
+    differences = {name: abs(value / ours[name] - 1) for name, value in theirs.items()}
+    worst = max(differences, key=differences.__getitem__)
+    if not apart <= SAME:
+        raise BadInput("w1.cpp", f"have undertow's trajectory to {SAME:g}", f"off by {apart:.3g} within {COMPARED_S} s")
+    if not all(difference <= SAME for difference in differences.values()):
+        raise BadInput("w1.cpp", f"have undertow's metrics to {SAME:g}", f"off by {differences[worst]:.3g} in {worst}")
+    figures = {"tracking_rms": theirs["tracking_rms"], "undertow_tracking_rms": ours["tracking_rms"]}
+    return figures | {"trajectory_difference": apart, "metrics_difference": differences[worst]}
+
+
+class Timed(NamedTuple):
+    """Nanoseconds per step and run: on the wall, and of all processor cores together."""
+
+    wall: float
+    processor: float
+
+
+def timed(work: Callable[[], Any], steps: int) -> Timed:
+    """Shortest times of some repetitions after a first one."""
+    work()
+    found = []
+    for _ in range(REPETITIONS):
+        begun = time.perf_counter(), time.process_time()
+        work()
+        found.append((time.perf_counter() - begun[0], time.process_time() - begun[1]))
+    return Timed(*(1e9 * min(each) / steps for each in zip(*found, strict=True)))
+
+
+def times(program: Path, one: workload.Workload, rounds: int) -> dict[str, float]:
+    """Nanoseconds per step and run, the shortest of all rounds; each round measures everything."""
+    threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    single, batch = workload.batch(one, width=1), workload.batch(one)
+    alone, several = workload.alone(one.run), workload.several(one.run, TOGETHER)
+    found: dict[str, float] = {}
+
+    def keep(name: str, value: float) -> None:
+        found[name] = min(value, found.get(name, math.inf))
+
+    with runtime.workers(threads) as pool:
+        together = lambda: list(pool.map(lambda _: batch.run(several), range(threads)))
+        for _ in range(rounds):
+            keep("yardstick_ns", named(program, "time", one.steps, REPETITIONS)["ns_per_step"])
+            keep("single_ns", timed(lambda: single.run(alone), one.steps).processor)
+            keep("batch_one_thread_ns", timed(lambda: batch.run(several), TOGETHER * one.steps).processor)
+            every = timed(together, threads * TOGETHER * one.steps)
+            keep("batch_ns", every.wall)
+            keep("batch_undisturbed_ns", every.processor / threads)
+    ratio = lambda name: found["yardstick_ns"] / found[name]
+    ratios = {f"{name}_times_yardstick": ratio(f"{name}_ns") for name in ("single", "batch", "batch_undisturbed")}
+    return {"threads": threads} | found | ratios
+
+
+_ROWS = {
+    "yardstick_ns": "hand-written C++, one core",
+    "single_ns": "undertow, one run, one core",
+    "batch_one_thread_ns": "undertow, batch on one core",
+    "batch_ns": "undertow, batch on all cores, on the wall",
+    "batch_undisturbed_ns": "undertow, batch on all cores, processor time over cores",
+}
+
+
+def report(found: Mapping[str, Any]) -> str:
+    """The figures as text."""
+    lines = [
+        f"w1.cpp compiled by {found['compiler']} with {found['flags']}",
+        f"rms of all six errors {found['tracking_rms']:.8f}, of undertow {found['undertow_tracking_rms']:.8f}; largest "
+        f"differences: trajectory {found['trajectory_difference']:.1g}, metrics {found['metrics_difference']:.1g}",
+        f"{'nanoseconds per step of W1':<58}{'ns':>8}{'C++ over it':>13}",
+    ]
+    for name, words in _ROWS.items():
+        lines.append(f"{words:<58}{found[name]:>8.4g}{found['yardstick_ns'] / found[name]:>13.3g}")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    try:
+        if options.rounds < 1:
+            raise BadInput("--rounds", "be 1 or more", options.rounds)
+        with tempfile.TemporaryDirectory() as folder, runtime.on_processor(), runtime.in_precision("float64"):
+            program, one = compiled(Path(folder), constants()), workload.workload(W1)
+            found = {"compiler": version(), "flags": " ".join(FLAGS)} | compare(program, one)
+            found |= times(program, one, options.rounds)
+    except BadInput as wrong:
+        print(f"Error: {wrong}", file=sys.stderr)
+        return 2
+    print(json.dumps(found, indent=1) if options.json else report(found))
+    return 0
 
 
 if __name__ == "__main__":
-    import time
-    with tempfile.TemporaryDirectory() as name:
-        p = compiled(Path(name), constants())
-        print(trajectory_difference(p))
-        print(metrics_differences(p))
-        print(named(p, "time", 20000, 20))
+    sys.exit(main())

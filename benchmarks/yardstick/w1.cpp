@@ -10,7 +10,8 @@
 //     w1 time STEPS RUNS     shortest processor time of a step, ns, of so many runs
 //
 // The attitude is a unit quaternion, so that the plant needs no trigonometry. Stages of the integrator that fall on the
-// same time share the load, and the metrics take the acceleration from the first stage.
+// same time share the load, the metrics take the acceleration from the first stage, and only steps inside their window
+// compute them.
 
 #include <algorithm>
 #include <array>
@@ -51,7 +52,7 @@ inline Vector3 cross(double ax, double ay, double az, double bx, double by, doub
 
 inline double square(double x) { return x * x; }
 
-// Suite U1, m/s^2 and rad/s^2: docs, undertow/disturbances/u1.py.
+// Suite U1, m/s^2 and rad/s^2; its formulas are those of undertow/disturbances/u1.py.
 inline Vector6 suite_u1(double t) {
     const double turns = t / 10.0;
     return {
@@ -228,12 +229,12 @@ inline Vector<SETS> fuzzy_basis(double eps) {
     return xi;
 }
 
-// RCAFC. `command` gives the voltages and keeps what `advance` needs: the law moves on after the input was applied.
+// RCAFC. `command` gives the voltages and keeps what the others need: the law advances once an input has been applied.
 struct Law {
     Vector6 predicted_velocity{};  // x_hat_dot, m/s, rad/s
     Weights theta{};
 
-    Vector6 error, eps, estimate, robust, drift, known, filtered;
+    Vector6 error, eps, estimate, robust, drift, filtered;
     Weights xi;
 
     PerThruster command(const Measurement& y) {
@@ -254,11 +255,15 @@ struct Law {
         return product(VOLTAGE_PER_ACCELERATION, y.at.to_body(desired));  // Eq. (23): G+ = (B alpha)+ M J^-1
     }
 
-    // Eqs. (32) and (44) over one sampling time by Euler's method, weights projected into their box.
-    void advance(const Measurement& y, const PerThruster& applied) {
-        const Vector6 pushed = y.at.to_world(product(ACCELERATION_PER_VOLT, applied));
+    Vector6 known(const Measurement& y, const PerThruster& applied) const {  // F + G V
+        Vector6 found = y.at.to_world(product(ACCELERATION_PER_VOLT, applied));
+        for (int i = 0; i < 6; ++i) found[i] += drift[i];
+        return found;
+    }
+
+    // Eqs. (32) and (44) over one sampling time by Euler's method; weights are projected into their box.
+    void advance(const Vector6& known) {
         for (int i = 0; i < 6; ++i) {
-            known[i] = drift[i] + pushed[i];
             const double compensation = COMPENSATION_GAIN * std::tanh(eps[i] * (1 / COMPENSATION_LAYER));
             predicted_velocity[i] += DT * (-POLE * eps[i] + known[i] + estimate[i] - compensation);
             const double rate = -ADAPTATION * (filtered[i] + COMPOSITE * eps[i]);
@@ -276,12 +281,12 @@ struct Metrics {
     double input_squares = 0, input_peak = 0, variation = 0, energy = 0, power_before = 0;
     PerThruster input_before{};
 
-    void settle(double t, const Vector6& error_now) {
+    void settle(double t, const Law& law) {  // the vehicle starts at zero
         for (int i = 0; i < 6; ++i)
-            if (std::abs(error_now[i]) > SETTLED * std::abs(TARGET[i])) settled[i] = t;
+            if (std::abs(law.error[i]) > SETTLED * std::abs(TARGET[i])) settled[i] = t;
     }
 
-    void update(const State& x, const Law& law, const Weights& theta, const PerThruster& input, const Vector6& d) {
+    void update(const State& x, const Law& law, const PerThruster& input, const Vector6& d) {
         for (int i = 0; i < 6; ++i) {
             error[i] += square(law.error[i]);
             estimation[i] += square(law.estimate[i] - d[i]);
@@ -289,7 +294,7 @@ struct Metrics {
             robust[i] += square(law.robust[i]);
             model[i] += square(law.eps[i]);
             largest_error[i] = std::max(largest_error[i], std::abs(law.error[i]));
-            for (double weight : theta[i]) weights_peak[i] = std::max(weights_peak[i], std::abs(weight));
+            for (double weight : law.theta[i]) weights_peak[i] = std::max(weights_peak[i], std::abs(weight));
         }
         double squares = 0, change = 0, power = 0;
         for (std::size_t j = 0; j < THRUSTERS; ++j) {
@@ -333,17 +338,17 @@ struct Metrics {
     }
 };
 
-// Whether a state can be gone on from: finite, within the plausible range, Euler angles defined.
+// Whether a run can go on: the state is finite and within the plausible range, and Euler angles are defined.
 inline bool valid(const State& x) {
     bool inside = true;
     for (double one : x.position) inside &= std::abs(one) < ENVELOPE;
     for (double one : x.nu) inside &= std::abs(one) < ENVELOPE;
-    return inside && Kinematics(x.attitude).cos_pitch > 1e-3;
+    return inside && Kinematics(x.attitude).cos_pitch > LEAST_COSINE;
 }
 
-// A run of so many steps; `seen` is called with time, measurement and voltages of each.
-template <class Seen>
-Metrics run(int steps, Seen seen) {
+// A run of so many steps; `record` is called with time, measurement and voltages of each.
+template <class Record>
+Metrics run(int steps, Record record) {
     State x{};
     x.attitude = {1.0, 0.0, 0.0, 0.0};
     Law law;
@@ -352,17 +357,17 @@ Metrics run(int steps, Seen seen) {
         const double t = k * DT;
         const Measurement y(x);
         const PerThruster voltage = law.command(y);
-        seen(t, y, voltage);
+        record(t, y, voltage);
+        const Vector6 known = law.known(y, voltage);
         const State first = rates(x, voltage, suite_u1(t + INWARD * DT));
-        const Weights theta = law.theta;
-        law.advance(y, voltage);
-        metrics.settle(t, law.error);
+        metrics.settle(t, law);
         if (k >= steps / 2) {
             Vector6 d = y.at.to_world(first.nu);  // x_ddot - F - G V
             const Vector6 turning = y.at.rate_term(x.nu);
-            for (int i = 0; i < 6; ++i) d[i] += turning[i] - law.known[i];
-            metrics.update(x, law, theta, voltage, d);
+            for (int i = 0; i < 6; ++i) d[i] += turning[i] - known[i];
+            metrics.update(x, law, voltage, d);
         }
+        law.advance(known);
         x = runge_kutta(t, x, first, voltage);
         if (!valid(x)) {
             std::fprintf(stderr, "The run failed at %g s.\n", t + DT);
@@ -385,17 +390,17 @@ int main(int count, char** words) {
         });
         return 0;
     }
-    const auto unseen = [](double, const Measurement&, const PerThruster&) {};
+    const auto nothing = [](double, const Measurement&, const PerThruster&) {};
     if (asked("metrics") && steps > 0) {
-        run(steps, unseen).print();
+        run(steps, nothing).print();
         return 0;
     }
     if (asked("time") && steps > 0 && number(3) > 0) {
         double shortest = std::numeric_limits<double>::infinity(), total = 0.0;
         for (int i = 0; i < number(3); ++i) {
             const std::clock_t begun = std::clock();
-            total += run(steps, unseen).error[0];  // which the compiler cannot leave out, because it is printed
-            shortest = std::min(shortest, double(std::clock() - begun) / CLOCKS_PER_SEC);
+            total += run(steps, nothing).error[0];  // which the compiler cannot leave out, because it is printed
+            shortest = std::min(shortest, static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC);
         }
         std::printf("ns_per_step %.17g\nchecksum %.17g\n", 1e9 * shortest / steps, total);
         return 0;
