@@ -1,13 +1,13 @@
 // Workload W1 in scalar C++, as it would be written by hand: the yardstick for the speed of undertow's batches.
 //
-// ODIN with eight electromechanical motors under the paper's sensorless law (RCAFC), suite U1, control at 1 kHz with the
-// input held, one Runge-Kutta step of the plant per control step. benchmarks/yardstick.py writes w1_constants.h from
-// undertow's own vehicle, motor and gains, so that no number of them is typed twice, compiles this file, compares its
-// results with undertow's, and measures its time. Equation numbers are those of the paper.
+// ODIN with eight electromechanical motors under the paper's sensorless law (RCAFC), suite U1, control at 1 kHz with
+// the input held, one Runge-Kutta step of the plant per control step. benchmarks/yardstick.py writes w1_constants.h
+// from undertow's own vehicle, motor and gains, so that no number of them is typed twice, compiles this file, compares
+// its results with undertow's, and measures its time. Equation numbers are those of the paper.
 //
 //     w1 trajectory STEPS    time, outputs and voltages of each control step, one line each
-//     w1 metrics STEPS       metrics over the second half of a run, one `name value` per line
-//     w1 time STEPS RUNS     shortest processor time of a step, ns, of so many runs
+//     w1 metrics STEPS RUNS  metrics over the second half of a run, one `name value` per line, and the shortest
+//                            processor time of a step, ns, of so many equal runs
 //
 // The attitude is a unit quaternion, so that the plant needs no trigonometry. Stages of the integrator that fall on the
 // same time share the load, the metrics take the acceleration from the first stage, and only steps inside their window
@@ -19,9 +19,10 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <ctime>
 #include <limits>
+#include <numeric>
+#include <string>
 
 template <std::size_t N>
 using Vector = std::array<double, N>;
@@ -46,8 +47,8 @@ inline Vector<Rows> product(const Matrix<Rows, Columns>& a, const Vector<Columns
     return y;
 }
 
-inline Vector3 cross(double ax, double ay, double az, double bx, double by, double bz) {
-    return {ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx};
+inline Vector3 cross(const double* a, const double* b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
 inline double square(double x) { return x * x; }
@@ -91,25 +92,21 @@ struct Kinematics {
         return {r[0][0] * nu[0] + r[0][1] * nu[1] + r[0][2] * nu[2],
                 r[1][0] * nu[0] + r[1][1] * nu[1] + r[1][2] * nu[2],
                 r[2][0] * nu[0] + r[2][1] * nu[1] + r[2][2] * nu[2],
-                nu[3] + tan_pitch * across,
-                cos_roll * nu[4] - sin_roll * nu[5],
-                secant * across};
+                nu[3] + tan_pitch * across, cos_roll * nu[4] - sin_roll * nu[5], secant * across};
     }
 
     Vector6 to_body(const Vector6& a) const {  // J^-1 a
         return {r[0][0] * a[0] + r[1][0] * a[1] + r[2][0] * a[2],
                 r[0][1] * a[0] + r[1][1] * a[1] + r[2][1] * a[2],
                 r[0][2] * a[0] + r[1][2] * a[1] + r[2][2] * a[2],
-                a[3] + r[2][0] * a[5],
-                cos_roll * a[4] + r[2][1] * a[5],
-                -sin_roll * a[4] + r[2][2] * a[5]};
+                a[3] + r[2][0] * a[5], cos_roll * a[4] + r[2][1] * a[5], -sin_roll * a[4] + r[2][2] * a[5]};
     }
 
     Vector6 rate_term(const Vector6& nu) const {  // J_dot nu
         const double across = sin_roll * nu[4] + cos_roll * nu[5];
         const double pitch_rate = cos_roll * nu[4] - sin_roll * nu[5];
         const double roll_rate = nu[3] + tan_pitch * across;
-        const Vector3 turning = cross(nu[3], nu[4], nu[5], nu[0], nu[1], nu[2]);
+        const Vector3 turning = cross(&nu[3], &nu[0]);
         Vector6 found = to_world({turning[0], turning[1], turning[2], 0.0, 0.0, 0.0});
         found[3] = pitch_rate * across * square(secant) + tan_pitch * roll_rate * pitch_rate;
         found[4] = -roll_rate * across;
@@ -121,12 +118,11 @@ struct Kinematics {
 // -C(nu) nu - D(nu) nu - g of Eq. (2), N and N m. ODIN's damping matrices are diagonal.
 inline Vector6 hull_forces(const Kinematics& at, const Vector6& nu) {
     const Vector6 p = product(MASS, nu);
-    const Vector3 force = cross(nu[3], nu[4], nu[5], p[0], p[1], p[2]);
-    const Vector3 moment = cross(nu[0], nu[1], nu[2], p[0], p[1], p[2]);
-    const Vector3 turning = cross(nu[3], nu[4], nu[5], p[3], p[4], p[5]);
+    const Vector3 force = cross(&nu[3], &p[0]);
+    const Vector3 moment = cross(&nu[0], &p[0]);
+    const Vector3 turning = cross(&nu[3], &p[3]);
     const auto& down = at.r[2];
-    const Vector3 righting =
-        cross(RIGHTING_LEVER[0], RIGHTING_LEVER[1], RIGHTING_LEVER[2], down[0], down[1], down[2]);
+    const Vector3 righting = cross(RIGHTING_LEVER.data(), down.data());
     Vector6 found;
     for (int i = 0; i < 3; ++i) {
         found[i] = NET_WEIGHT * down[i] - force[i];
@@ -150,9 +146,9 @@ inline State rates(const State& x, const PerThruster& voltage, const Vector6& lo
     State d;
     PerThruster thrust;
     for (std::size_t j = 0; j < THRUSTERS; ++j) {
-        const double swirl = x.speed[j] * std::abs(x.speed[j]);
-        thrust[j] = C_T * swirl;
-        d.speed[j] = (K_T * x.current[j] - K_F * x.speed[j] - C_Q * swirl) * (1.0 / J_ROTOR);
+        const double signed_square = x.speed[j] * std::abs(x.speed[j]);
+        thrust[j] = C_T * signed_square;
+        d.speed[j] = (K_T * x.current[j] - K_F * x.speed[j] - C_Q * signed_square) * (1.0 / J_ROTOR);
         d.current[j] = (voltage[j] - R * x.current[j] - K_E * x.speed[j]) * (1.0 / L);
     }
     Vector6 wrench = product(THRUSTER_MATRIX, thrust);
@@ -185,17 +181,14 @@ inline State moved(State x, double h, const State& d) {
     return x;
 }
 
-// The rest of a classical Runge-Kutta step after its first stage. Times are moved into the step by a share INWARD of it,
-// so that a load that jumps at a control step has jumped, as in undertow/numerics/integrators.py.
+// The rest of a classical Runge-Kutta step after its first stage. Times are moved into the step by a share INWARD of
+// it, so that a load that jumps at a control step has jumped, as in undertow/numerics/integrators.py.
 inline State runge_kutta(double t, const State& x, const State& k1, const PerThruster& voltage) {
     const Vector6 middle = suite_u1(t + DT / 2);
     const State k2 = rates(moved(x, DT / 2, k1), voltage, middle);
     const State k3 = rates(moved(x, DT / 2, k2), voltage, middle);
     const State k4 = rates(moved(x, DT, k3), voltage, suite_u1(t + DT - INWARD * DT));
-    State y = moved(x, DT / 6, k1);
-    y = moved(y, DT / 3, k2);
-    y = moved(y, DT / 3, k3);
-    return moved(y, DT / 6, k4);
+    return moved(moved(moved(moved(x, DT / 6, k1), DT / 3, k2), DT / 3, k3), DT / 6, k4);
 }
 
 // What the law measures: outputs x = (north, east, down, roll, pitch, yaw) and their rates, body velocity and attitude.
@@ -273,6 +266,8 @@ struct Law {
     }
 };
 
+void say(const std::string& name, double value) { std::printf("%s %.17g\n", name.c_str(), value); }
+
 // The metrics of undertow/analysis/metrics.py: those of the window, and the settling time.
 struct Metrics {
     int samples = 0;
@@ -314,27 +309,26 @@ struct Metrics {
     }
 
     void print() const {
-        const char* groups[] = {"position", "attitude"};
-        const double count = samples;
         for (int g = 0; g < 2; ++g) {
+            const std::string group = g == 0 ? "position" : "attitude";
             const auto rms = [&](const Vector6& sums) {
-                return std::sqrt((sums[3 * g] + sums[3 * g + 1] + sums[3 * g + 2]) / 3 / count);
+                return std::sqrt((sums[3 * g] + sums[3 * g + 1] + sums[3 * g + 2]) / (3.0 * samples));
             };
-            const auto largest = [&](const Vector6& of) {
-                return std::max({of[3 * g], of[3 * g + 1], of[3 * g + 2]});
-            };
-            std::printf("%s_rms %.17g\n%s_estimation_rms %.17g\n", groups[g], rms(error), groups[g], rms(estimation));
-            std::printf("%s_uncertainty_rms %.17g\n", groups[g], rms(uncertainty));
-            std::printf("%s_robust_rms %.17g\n%s_model_rms %.17g\n", groups[g], rms(robust), groups[g], rms(model));
-            std::printf("%s_max %.17g\n", groups[g], largest(largest_error));
-            std::printf("%s_weights_peak %.17g\n", groups[g], largest(weights_peak));
+            const auto largest = [&](const Vector6& one) { return *std::max_element(&one[3 * g], &one[3 * g] + 3); };
+            say(group + "_rms", rms(error));
+            say(group + "_estimation_rms", rms(estimation));
+            say(group + "_uncertainty_rms", rms(uncertainty));
+            say(group + "_robust_rms", rms(robust));
+            say(group + "_model_rms", rms(model));
+            say(group + "_max", largest(largest_error));
+            say(group + "_weights_peak", largest(weights_peak));
         }
-        double all = 0;
-        for (double sum : error) all += sum;
-        std::printf("tracking_rms %.17g\n", std::sqrt(all / 6 / count));
-        std::printf("input_rms %.17g\ninput_peak %.17g\n", std::sqrt(input_squares / count), input_peak);
-        std::printf("input_variation %.17g\nenergy %.17g\n", variation / (DT * (count - 1)), energy);
-        std::printf("settling_time %.17g\n", *std::max_element(settled.begin(), settled.end()));
+        say("tracking_rms", std::sqrt(std::accumulate(error.begin(), error.end(), 0.0) / (6.0 * samples)));
+        say("input_rms", std::sqrt(input_squares / samples));
+        say("input_peak", input_peak);
+        say("input_variation", variation / (DT * (samples - 1)));
+        say("energy", energy);
+        say("settling_time", *std::max_element(settled.begin(), settled.end()));
     }
 };
 
@@ -379,9 +373,9 @@ Metrics run(int steps, Record record) {
 
 int main(int count, char** words) {
     const auto number = [&](int i) { return i < count ? std::atoi(words[i]) : 0; };
-    const auto asked = [&](const char* word) { return count > 1 && std::strcmp(words[1], word) == 0; };
+    const std::string asked = count > 1 ? words[1] : "";
     const int steps = number(2);
-    if (asked("trajectory") && steps > 0) {
+    if (asked == "trajectory" && steps > 0) {
         run(steps, [](double t, const Measurement& y, const PerThruster& voltage) {
             std::printf("%.17g", t);
             for (double one : y.outputs) std::printf(" %.17g", one);
@@ -390,21 +384,18 @@ int main(int count, char** words) {
         });
         return 0;
     }
-    const auto nothing = [](double, const Measurement&, const PerThruster&) {};
-    if (asked("metrics") && steps > 0) {
-        run(steps, nothing).print();
-        return 0;
-    }
-    if (asked("time") && steps > 0 && number(3) > 0) {
-        double shortest = std::numeric_limits<double>::infinity(), total = 0.0;
+    if (asked == "metrics" && steps > 0 && number(3) > 0) {
+        double shortest = std::numeric_limits<double>::infinity();
+        Metrics found;  // printed, so that the compiler cannot leave out any of them
         for (int i = 0; i < number(3); ++i) {
             const std::clock_t begun = std::clock();
-            total += run(steps, nothing).error[0];  // which the compiler cannot leave out, because it is printed
+            found = run(steps, [](double, const Measurement&, const PerThruster&) {});
             shortest = std::min(shortest, static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC);
         }
-        std::printf("ns_per_step %.17g\nchecksum %.17g\n", 1e9 * shortest / steps, total);
+        found.print();
+        say("ns_per_step", 1e9 * shortest / steps);
         return 0;
     }
-    std::fprintf(stderr, "Usage: w1 trajectory STEPS | w1 metrics STEPS | w1 time STEPS RUNS\n");
+    std::fprintf(stderr, "Usage: w1 trajectory STEPS | w1 metrics STEPS RUNS\n");
     return 2;
 }

@@ -51,7 +51,7 @@ def test_it_computes_what_undertow_computes(tmp_path, numbers):
     assert found["trajectory_difference"] < 1e-9 and found["metrics_difference"] < 1e-9
     assert found["tracking_rms"] == pytest.approx(0.00457549, abs=5e-9)
     left_out = {"saturated_fraction", "bad_readings"}  # both are zero: no limit, and perfect navigation
-    theirs, ours = yardstick.named(made, "metrics", one.steps), yardstick.metrics_of_undertow(one)
+    theirs, ours = yardstick.timed_metrics(made, one.steps, 1)[0], yardstick.metrics_of_undertow(one)
     assert theirs.keys() == ours.keys() - left_out and not any(ours[name] for name in left_out)
 
 
@@ -74,7 +74,9 @@ def test_numbers_are_written_with_every_bit(numbers):
         np.testing.assert_array_equal([float.fromhex(one) for one in written], np.ravel(value), err_msg=name)
 
 
-@pytest.mark.parametrize("arguments", [(), ("metrics",), ("metrics", "0"), ("time", "10", "-1"), ("simulate", "10")])
+@pytest.mark.parametrize(
+    "arguments", [(), ("metrics",), ("metrics", "0", "1"), ("metrics", "10"), ("trajectory", "-1")]
+)
 def test_wrong_arguments(tmp_path, numbers, arguments):
     if (made := program(tmp_path, numbers)) is None:
         return
@@ -94,7 +96,7 @@ def test_a_run_that_fails(tmp_path, numbers):
     if (made := program(tmp_path, numbers | {"ROBUST_GAIN": -1e4})) is None:
         return
     with pytest.raises(BadInput, match=r"exit code 1: The run failed at \d"):
-        yardstick.printed(made, "metrics", 20_000)
+        yardstick.printed(made, "metrics", 20_000, 1)
 
 
 @pytest.mark.parametrize(
