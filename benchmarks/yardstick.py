@@ -50,7 +50,9 @@ def constants() -> dict[str, Any]:
     """Numbers of W1, by their names in the C++ program; from undertow's parts, so that none is typed twice."""
     with runtime.in_precision("float64"):
         built = build(W1)
-        plant, law = built.closed_loop.plant, built.closed_loop.controller
+        plant: Any = built.closed_loop.plant
+        law: Any = built.closed_loop.controller
+        target: Any = built.closed_loop.reference
         body, motor, dynamics = plant.body, plant.thruster.motor, law.model.dynamics
         lyapunov, (centres,), (widths,) = law.lyapunov(), law.fuzzy.centres, law.fuzzy.widths
         centres, width = np.asarray(centres), float(widths[0])
@@ -62,7 +64,7 @@ def constants() -> dict[str, Any]:
             "ENVELOPE": 1e3,  # m, m/s, rad/s; this and the next: undertow/plants/hybrid_vehicle.py
             "LEAST_COSINE": 1e-3,  # of the pitch
             "SETTLED": 0.02,  # undertow/analysis/metrics.py
-            "TARGET": built.closed_loop.reference.position,
+            "TARGET": target.position,
             "MASS": body.mass_matrix,
             "INVERSE_MASS": body.inverse_mass_matrix,
             "LINEAR_DAMPING": diagonal(body.linear_damping),

@@ -9,9 +9,8 @@
 //     w1 metrics STEPS RUNS  metrics over the second half of a run, one `name value` per line, and the shortest
 //                            processor time of a step, ns, of so many equal runs
 //
-// The attitude is a unit quaternion, so that the plant needs no trigonometry. Stages of the integrator that fall on the
-// same time share the load, the metrics take the acceleration from the first stage, and only steps inside their window
-// compute them.
+// The attitude is a unit quaternion, so that the plant needs no trigonometry. Stages of the integrator at the same time
+// share the load, and metrics are computed inside their window only, with the acceleration of the first stage.
 
 #include <algorithm>
 #include <array>

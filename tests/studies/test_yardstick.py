@@ -28,6 +28,11 @@ def loaded():
 yardstick = loaded()
 
 
+@pytest.fixture(autouse=True)
+def usual_compiler(monkeypatch):
+    monkeypatch.delenv("CXX", raising=False)
+
+
 @pytest.fixture(scope="module")
 def numbers():
     return yardstick.constants()
