@@ -33,6 +33,7 @@ from undertow.bench import workload
 from undertow.bench.workload import W1
 from undertow.core import runtime
 from undertow.core.errors import BadInput
+from undertow.loop.simd_batch import Unsupported
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
 
@@ -294,7 +295,7 @@ def main() -> int:
             program, one = compiled(Path(folder), constants()), workload.workload(W1)
             found = {"compiler": version(), "flags": " ".join(FLAGS)} | compare(program, one)
             found |= times(program, one, options.rounds)
-    except BadInput as wrong:
+    except (BadInput, Unsupported) as wrong:
         print(f"Error: {wrong}", file=sys.stderr)
         return 2
     print(json.dumps(found, indent=1) if options.json else report(found))
