@@ -157,7 +157,10 @@ class NavigationFilter:
         if not self._started:
             raise BadInput("start", "be called before `step`", "not")
         received = self._received(readings, ages or {})
-        return self._stepped(self._clock.passed(dt), received)
+        before = self._clock.time
+        passed = self._clock.passed(dt)
+        on_time = passed == self.sampling_time  # then rounded as the times of a simulation are
+        return self._stepped(self._clock.time - before if on_time else passed, received)
 
     def signals(self) -> dict[str, np.ndarray]:
         """Values of the signals of the last step, such as the standard deviation of each output."""
