@@ -34,9 +34,9 @@ class EstimatedMotion(NamedTuple):
         attitude: quaternion w, x, y, z, body -> world.
     """
 
-    position: np.ndarray
-    velocity: np.ndarray
-    attitude: np.ndarray
+    position: Any  # an array of 3, 6 and 4 numbers
+    velocity: Any
+    attitude: Any
 
 
 class NavigationFilter:
@@ -218,7 +218,7 @@ class NavigationFilter:
         return found
 
     def _stepped(self, elapsed: float, received: list[tuple[Any, bool, float]]) -> EstimatedMotion:
-        put(self._go_on.inputs, (elapsed, tuple(Received(*one) for one in received)))
+        put(self._go_on.inputs, (elapsed, received))
         self._go_on()
         return EstimatedMotion(*(part.copy() for part in self._go_on.outputs[0]))
 

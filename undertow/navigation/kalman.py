@@ -397,8 +397,9 @@ def kalman(
     """
     sensors = tuple(sensors)
     check_sensors(sensors)
-    if longest_delay is None:
-        longest_delay = max(np.asarray(sensor.sampling.delay) for sensor in sensors)
+    delays = [np.asarray(sensor.sampling.delay) for sensor in sensors]
+    longest: Any = max(delays) if longest_delay is None else longest_delay
     of_motion = position_deviation, velocity_deviation, tilt_deviation, heading_deviation
     of_biases = gyro_bias_deviation, force_bias_deviation, gyro_drift, force_drift
-    return SensorNavigation(Kalman(sensors, *of_motion, *of_biases, gate, noise_scale, longest_delay))
+    filter = Kalman(sensors, *of_motion, *of_biases, gate, noise_scale, longest)
+    return SensorNavigation(filter=filter)

@@ -48,11 +48,11 @@ class MotionHistory(NamedTuple):
         old = age, displacement, self.velocity - gained, self.attitudes
         now = jnp.zeros(()), jnp.zeros(3), jnp.zeros(3), attitude
         due = age[0] >= spacing
-        shifted = (
+        shifted = [
             jnp.where(due, jnp.concatenate([jnp.asarray(new)[None], kept[:-1]]), kept)
             for new, kept in zip(now, old, strict=True)
-        )
-        return MotionHistory(*shifted, attitude)
+        ]
+        return MotionHistory(*shifted, attitude=attitude)
 
     def at(self, age: Number) -> Past:
         """The motion `age` (s) ago, by cubic interpolation; the oldest kept one before that."""

@@ -184,4 +184,4 @@ def observer(
         propeller_blend: share of each new reading of propeller speeds in the estimate; 1 for no filter.
     """
     blends = imu_blend, dvl_blend, compass_blend, depth_blend, fix_blend, propeller_blend
-    return SensorNavigation(Observer(tuple(sensors), *blends))
+    return SensorNavigation(filter=Observer(tuple(sensors), *blends))
