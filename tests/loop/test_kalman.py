@@ -10,6 +10,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from textbook import rotation_from_euler
 
+import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.param import Param, param
@@ -285,3 +286,32 @@ def test_impossible_numbers(wrong):
 def test_an_imu_is_needed():
     with pytest.raises(BadInput, match="IMU among them"):
         kalman([dvl(), depth()])
+
+
+@pytest.mark.parametrize(
+    "precision, duration",
+    [
+        ("float32", 30),
+        pytest.param("float64", 2000, marks=pytest.mark.slow),
+        pytest.param("float32", 2000, marks=pytest.mark.slow),
+    ],
+)
+def test_errors_stay_as_large_as_the_filter_says(precision, duration):
+    """BlueROV2 Heavy in a current, with biases: nothing drifts, in single precision either, and nothing is rejected."""
+    sensors = [{"kind": "imu", "rate_bias": 2e-3, "force_bias": 0.05}, "dvl", "depth", "compass", "position_fix"]
+    run = ut.simulate_scenario(
+        {
+            "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
+            "controller": {"kind": "rcaf", "preset": "robust"},
+            "reference": {"kind": "circle", "radius": 1.0, "period": 40},
+            "disturbance": {"kind": "current", "velocity": [0.2, 0.1, 0]},
+            "navigation": {"kind": "kalman", "sensors": sensors},
+            "loop": {"dt": 0.01, "duration": duration, "record": 1.0},
+            "precision": precision,
+        }
+    )
+    late = slice(duration // 2, None)
+    error = (run.dataset["measured_position"] - run.dataset["position"]).values[late]
+    deviation = run.dataset["navigation_deviation"].values[late]
+    assert (np.abs(error) < 4.5 * deviation).all() and (deviation[:, :2] < 0.02).all()
+    assert int(run.dataset["rejected_readings"][-1]) == 0

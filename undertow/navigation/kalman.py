@@ -46,8 +46,8 @@ from undertow.sensors.sensor import AbstractSensor
 # of the velocity in world axes it does, and a filter without a compass believes in a heading that nothing measured.)
 ATTITUDE, GYRO_BIAS, VELOCITY, FORCE_BIAS, POSITION = (slice(3 * i, 3 * i + 3) for i in range(5))
 _SIZE = 15
-_UPPER = np.triu_indices(_SIZE)
-_WHERE = np.zeros((_SIZE, _SIZE), dtype=int)  # of each entry of the covariance among those of its upper triangle
+_UPPER = tuple(index.astype(np.int32) for index in np.triu_indices(_SIZE))  # a width that both precisions have
+_WHERE = np.zeros((_SIZE, _SIZE), dtype=np.int32)  # of each entry of the covariance among those of its upper triangle
 _WHERE[_UPPER] = _WHERE.T[_UPPER] = np.arange(len(_UPPER[0]))
 
 _LEAST_VARIANCE = 1e-12  # of a reading; one without noise would leave a covariance that is singular
