@@ -186,6 +186,25 @@ def test_an_outlier_is_rejected_and_a_lasting_jump_is_believed_in_the_end():
     assert count < 20 and float(fixed.position[0]) > 50.0
 
 
+def test_nothing_that_a_sensor_says_makes_the_estimate_undefined():
+    """A sensor that has gone mad, for minutes: numbers of any size, of any age."""
+    own, rng = kalman(ALL).filter, np.random.default_rng(0)
+
+    @jax.jit
+    def fly(state, readings, ages):
+        def step(state, given):
+            reading, age = given
+            received = tuple(Received(reading[: len(one.reading)], jnp.asarray(True), age) for one in nothing(ALL))
+            return own.update(state, jnp.asarray(0.01), received), None
+
+        return jax.lax.scan(step, state, (readings, ages))[0]
+
+    mad = rng.normal(size=(3000, 8)) * 10.0 ** rng.uniform(-3, 300, size=(3000, 8))
+    state = fly(own.start(level(0.0)), jnp.asarray(mad), jnp.asarray(10.0 ** rng.uniform(-3, 9, size=3000)))
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(state))
+    assert int(state.rejected) > 0
+
+
 def test_entries_that_are_none_are_left_out():
     """East is taken although north is NaN; a reading of nothing but NaN changes nothing."""
     own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)

@@ -50,6 +50,9 @@ _UPPER = tuple(index.astype(np.int32) for index in np.triu_indices(_SIZE))  # a 
 _WHERE = np.zeros((_SIZE, _SIZE), dtype=np.int32)  # of each entry of the covariance among those of its upper triangle
 _WHERE[_UPPER] = _WHERE.T[_UPPER] = np.arange(len(_UPPER[0]))
 
+_MOST_TOLERATED = 2.0**20  # a lasting jump of 1000 gates is believed, nothing beyond
+_FASTEST, _STRONGEST = 35.0, 160.0  # rad/s, m/s^2: full scale of MEMS devices; what is larger was not measured
+_USUAL_DELAY = 0.5  # s
 _LEAST_VARIANCE = 1e-12  # of a reading; one without noise would leave a covariance that is singular
 
 Covariance = Float[Array, "15 15"]
@@ -81,8 +84,8 @@ class Kalman(AbstractFilter):
     estimate is its own `reading`, which is differentiated. Its variances are those of the sensors, times a scale.
 
     A late reading is compared with the estimate of its time. A reading whose errors exceed `gate` standard deviations
-    is rejected; every rejection in a row doubles the square that is tolerated, so that the filter finds back. Entries
-    that are not finite are left out.
+    is rejected; every rejection in a row doubles the square that is tolerated, up to a thousand times the gate, so that
+    the filter finds back. Entries that are not finite are left out.
 
     Raises:
         BadInput: no IMU, or a deviation that is not positive.
@@ -132,8 +135,9 @@ class Kalman(AbstractFilter):
         imu, inertial = next(
             (sensor, one) for sensor, one in zip(self.sensors, received, strict=True) if isinstance(sensor, IMU)
         )
-        new = lambda read, old: jnp.where(inertial.fresh & jnp.isfinite(read), read, old)
-        rates, force = new(inertial.reading[2:5], state.rates), new(inertial.reading[5:], state.force)
+        new = lambda read, old, most: jnp.where(inertial.fresh & (jnp.abs(read) <= most), read, old)
+        rates = new(inertial.reading[2:5], state.rates, _FASTEST)
+        force = new(inertial.reading[5:], state.force, _STRONGEST)
         covariance = state.covariance[_WHERE]
         turning = (rates + state.rates) / 2 - state.gyro_bias
         half = rotation_from_quaternion(_turned(state.attitude, elapsed / 2 * turning))
@@ -246,7 +250,7 @@ class Kalman(AbstractFilter):
         """State and covariance with a reading, entry by entry; as they are where it is rejected or there is none."""
         sensor = self.sensors[i]
         reading = one.reading[:2] if isinstance(sensor, IMU) else one.reading
-        expected, slopes = _expected(state, sensor, one.age)
+        expected, slopes = _expected(state, sensor, jnp.minimum(one.age, self.longest_delay))
         error = reading - expected
         for entry in sensor.angles:
             error = error.at[entry].add(-2 * jnp.pi * jnp.round(error[entry] / (2 * jnp.pi)))
@@ -266,7 +270,7 @@ class Kalman(AbstractFilter):
         count, tolerance = jnp.where(there, 1.0, 0.0).sum(), state.tolerance[i]
         known = one.fresh & (count > 0)
         taken = known & (square <= self.gate**2 * count * tolerance)
-        following = jnp.where(taken, 1.0, jnp.where(known, 2 * tolerance, tolerance))
+        following = jnp.where(taken, 1.0, jnp.where(known, jnp.minimum(2 * tolerance, _MOST_TOLERATED), tolerance))
         correction = jnp.where(taken, correction, 0.0)
         turn = quaternion_of_turn(correction[ATTITUDE])
         turned = quaternion_product(turn, state.attitude)
@@ -393,12 +397,13 @@ def kalman(
         force_drift: likewise of the accelerometers, m/s^2 per square root of a second.
         gate: standard deviations beyond which a reading is rejected.
         noise_scale: standard deviations that the filter assumes, over those of the sensors.
-        longest_delay: age of readings back to which the motion is kept, s; None for the longest delay of the sensors.
+        longest_delay: age of readings back to which the motion is kept, s; older ones are taken to be of that age. None
+            for twice the longest delay of the sensors, at least half a second.
     """
     sensors = tuple(sensors)
     check_sensors(sensors)
     delays = [np.asarray(sensor.sampling.delay) for sensor in sensors]
-    longest: Any = max(delays) if longest_delay is None else longest_delay
+    longest: Any = max(_USUAL_DELAY, 2 * max(delays)) if longest_delay is None else longest_delay
     of_motion = position_deviation, velocity_deviation, tilt_deviation, heading_deviation
     of_biases = gyro_bias_deviation, force_bias_deviation, gyro_drift, force_drift
     filter = Kalman(sensors, *of_motion, *of_biases, gate, noise_scale, longest)
