@@ -353,6 +353,47 @@ def export(
     return export(scenario, c99, name, precision, attitude, velocity, output, overwrite, allow_code)
 
 
+@app.command()
+def ardupilot(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    address: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Address of this machine to listen on; 0.0.0.0 for all.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(metavar="PORT", help="UDP port; SITL's option -I1 sends to 9012.")] = 9002,
+    frame: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Frame of ArduSub: vectored_6dof or vectored. Default: the one with as many motors as the vehicle.",
+        ),
+    ] = None,
+    channels: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="Servo channel of each thruster, negative where it turns the other way: --channels=1,2,-3. Default: "
+            "found from the frame and the geometry of the thrusters.",
+        ),
+    ] = None,
+    depth: Annotated[
+        float, typer.Option(metavar="M", help="Depth of the scenario's origin below the surface, m.")
+    ] = 0.0,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="End after this time of the physics, s. Default: at Ctrl-C.")
+    ] = None,
+    allow_code: AllowCode = False,
+) -> int:
+    """Be the physics behind ArduSub's software in the loop.
+
+    The command speaks ArduPilot's JSON simulator interface: servo pulses come in, readings of the scenario's vehicle
+    go out, in lock step. Disturbances are those of the scenario; its controller is not used. Start ArduSub with
+    `--model JSON:127.0.0.1`.
+    """
+    from undertow.cli.ardupilot import ardupilot
+
+    return ardupilot(scenario, address, port, frame, channels, depth, duration, allow_code)
+
+
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,

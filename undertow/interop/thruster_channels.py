@@ -14,12 +14,20 @@ MOST_CHANNELS = 32  # of ArduPilot
 # Factors of libraries/AP_Motors/AP_Motors6DOF.cpp; motor n is on servo output n.
 _HORIZONTAL = ((0, 0, 1, 0, -1, 1), (0, 0, -1, 0, -1, -1), (0, 0, -1, 0, 1, 1), (0, 0, 1, 0, 1, -1))
 FRAMES = {
-    "vectored_6dof": (*_HORIZONTAL, (1, -1, 0, -1, 0, 0), (-1, -1, 0, -1, 0, 0), (1, 1, 0, -1, 0, 0), (-1, 1, 0, -1, 0, 0)),
+    "vectored_6dof": (
+        *_HORIZONTAL,
+        (1, -1, 0, -1, 0, 0),
+        (-1, -1, 0, -1, 0, 0),
+        (1, 1, 0, -1, 0, 0),
+        (-1, 1, 0, -1, 0, 0),
+    ),
     "vectored": (*_HORIZONTAL, (1, 0, 0, -1, 0, 0), (-1, 0, 0, -1, 0, 0)),
 }
 
 # Rows of a thruster matrix (surge, sway, heave, roll, pitch, yaw) in the order of those factors; heave is down.
 _ROWS, _SIGNS = [3, 4, 5, 2, 0, 1], np.array([1, 1, 1, -1, 1, 1])
+
+_FORCES = slice(3, 6)
 
 _SMALL = 1e-6  # share of the largest entry of a column below which an entry of a thruster matrix is zero
 
@@ -48,7 +56,7 @@ class Channels(NamedTuple):
         return neutral + self.signs * (given[self.numbers - 1] - neutral)
 
     def of_outputs(self, pulses: ArrayLike, neutral: float) -> dict[int, float]:
-        """Pulse, us, by number of the channel, from those of the thrusters."""
+        """Pulse (or another signal about its neutral value) by number of the channel, from those of the thrusters."""
         turned = neutral + self.signs * (np.asarray(pulses, dtype=float) - neutral)
         return dict(zip(self.numbers.tolist(), turned.tolist(), strict=True))
 
@@ -95,7 +103,9 @@ def channels_of_frame(frame: str, thruster_matrix: ArrayLike) -> Channels:
     if len(found) != len(FRAMES[frame]) or sorted(numbers) != list(range(1, len(found) + 1)):
         names = ", ".join(str(number or "none") for number in numbers)
         hint = "Give the channel of each thruster, such as --channels 1,2,-3"
-        raise BadInput("frame", "have the thrusters of the vehicle", f"{frame}: thrusters are motors {names}", hint=hint)
+        raise BadInput(
+            "frame", "have the thrusters of the vehicle", f"{frame}: thrusters are motors {names}", hint=hint
+        )
     return Channels(np.array(numbers), np.array([sign for _, sign in found]))
 
 
@@ -118,15 +128,13 @@ def channels_of_vehicle(thruster_matrix: ArrayLike, frame: str | None = None, ch
 
 
 def _motor(push: NDArray, motors: NDArray) -> tuple[int, int]:
-    """Number, from 1, of the motor that pushes in the same directions, and the sign; (0, 1) where there is none."""
+    """Number, from 1, of the motor that pushes in the same directions, and the sign; (0, 1) where there is none.
+
+    Forces are in the same axes; moments may be more, such as the pitch of a thruster that is mounted low.
+    """
     for number, motor in enumerate(motors, start=1):
         acts = motor != 0
         for sign in (1, -1):
-            if (push[acts] == sign * np.sign(motor[acts])).all() and _mainly(push, acts):
+            if (push[acts] == sign * motor[acts]).all() and not push[_FORCES][~acts[_FORCES]].any():
                 return number, sign
     return 0, 1
-
-
-def _mainly(push: NDArray, acts: NDArray) -> bool:
-    """Whether the forces of a thruster are those of a motor; moments may be more, as of one mounted off the centre."""
-    return bool(((push[3:] != 0) == acts[3:]).all())
