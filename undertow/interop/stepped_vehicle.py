@@ -11,8 +11,8 @@ from undertow.autopilot.numbers import step_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Inputs
-from undertow.core.errors import BadInput
 from undertow.core.status import Status
+from undertow.interop.pulse_driven import pulse_driven
 from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.readings import all_finite
 from undertow.loop.stepped import put
@@ -74,8 +74,8 @@ class SteppedVehicle:
 
     def __init__(self, scenario: str | Path, allow_code: bool = False):
         built = build(read(Path(scenario), allow_code=allow_code))
-        settings, plant = built.scenario.loop, built.closed_loop.plant
-        self.plant, self.esc = _checked(plant), _speed_controllers(plant)
+        settings, plant = built.scenario.loop, pulse_driven(built.closed_loop.plant, battery_suffices=True)
+        self.plant, self.esc = plant, plant.power.esc or esc()
         self.thrusters, self.sampling_time = plant.inputs(), float(settings.dt)
         self._longest = self.sampling_time / settings.substeps
         integrate = COMPACT_METHODS.get(settings.method, COMPACT_METHODS["rk4"])
@@ -207,22 +207,6 @@ def _state_of(of: Realization, t, x: VehicleState, u: Inputs) -> State:
         electrical = jnp.stack([battery.bus_voltage(charge, taken), battery.current(charge, taken)])
     propellers = () if report is None else report.speed
     return State(x.position, x.attitude, pose.velocity, x.nu, force, propellers, electrical)
-
-
-def _checked(plant: Any) -> HybridVehicle:
-    if not isinstance(plant, HybridVehicle):
-        raise BadInput("plant", "be a vehicle with thrusters", type(plant).__name__)
-    if plant.thruster.input_unit != "V":
-        hint = "Take thrusters commanded in volts, such as t200"
-        raise BadInput("plant.thruster", "take volts, as speed controllers give", plant.thruster.input_unit, hint=hint)
-    if plant.power.battery is None and not np.isfinite(np.asarray(plant.thruster.supply)).all():
-        hint = "Give the thruster a supply, or the vehicle a battery"
-        raise BadInput("plant.thruster.supply", "be finite for speed controllers", "infinite", hint=hint)
-    return plant
-
-
-def _speed_controllers(plant: HybridVehicle) -> ESC:
-    return plant.power.esc or esc()
 
 
 def _numbers(pair: tuple[str, Any]) -> Any:

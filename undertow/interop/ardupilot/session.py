@@ -1,6 +1,6 @@
 """The rules by which the vehicle and ArduPilot go in lock step: what each datagram does, whatever it is."""
 
-from collections.abc import Hashable
+from typing import Any
 
 import numpy as np
 
@@ -51,10 +51,11 @@ class Session:
         self.vehicle, self._channels, self._depth = vehicle, channels, depth
         self._neutral = float(vehicle.esc.neutral)
         self.counts = dict.fromkeys(_COUNTS, 0)
-        self.complaint, self.ended, self.sender, self.frame_rate, self.undriven = "", False, None, 0, 0
+        self.complaint, self.ended, self.frame_rate, self.undriven = "", False, 0, 0
+        self.sender: Any = None
         self._last, self._received, self._answer = -1, -np.inf, b""
 
-    def answer(self, datagram: bytes, sender: Hashable, now: float) -> bytes | None:
+    def answer(self, datagram: bytes, sender: Any, now: float) -> bytes | None:
         """The reply to a datagram; None where it gets none.
 
         Args:
