@@ -22,7 +22,7 @@ from undertow.core.errors import BadInput
 _RC_CHANNELS = 18
 _IGNORED = 65535  # the autopilot keeps what it has of an RC channel
 _PER_COMMAND, _PER_GROUP = 6, 8  # outputs of MAV_CMD_DO_SET_ACTUATOR and SET_ACTUATOR_CONTROL_TARGET
-_ACTUATORS, _CONTROLS = 16, 16  # two groups
+_ACTUATORS, _CONTROLS = 2 * _PER_COMMAND, 2 * _PER_GROUP
 
 
 class Target(NamedTuple):

@@ -120,8 +120,6 @@ class Companion:
             message: of pymavlink.
             now: time of a clock that never jumps, s.
         """
-        if message.get_type() == "BAD_DATA":
-            return []
         if message.get_srcSystem() != self._target.system:
             self.counts["foreign"] += 1
             return []

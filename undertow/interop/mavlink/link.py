@@ -79,10 +79,14 @@ class UdpLink:
 
 
 def parsed(data: bytes) -> list[Any]:
-    """Messages in the bytes of a datagram; what is none is left out."""
+    """Messages in the bytes of a datagram; what is none is left out, and so are those of an unknown kind.
+
+    Without knowing the kind, pymavlink cannot check the sum of a message: random bytes pass as one.
+    """
     parser: Any = mavlink.MAVLink(None)
     parser.robust_parsing = True
-    return [message for message in parser.parse_buffer(data) or [] if message.get_type() != "BAD_DATA"]
+    found = parser.parse_buffer(data) or []
+    return [one for one in found if not isinstance(one, mavlink.MAVLink_bad_data | mavlink.MAVLink_unknown)]
 
 
 def accompany(
