@@ -30,7 +30,14 @@ class MavlinkVehicle:
 
     def odometry(self, time_usec, state, frames=(mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_BODY_FRD), resets=0):
         self.link.mav.odometry_send(
-            time_usec, *frames, *state.position, list(state.attitude), *state.body_velocity, COVARIANCE, COVARIANCE, resets
+            time_usec,
+            *frames,
+            *state.position,
+            list(state.attitude),
+            *state.body_velocity,
+            COVARIANCE,
+            COVARIANCE,
+            resets,
         )
 
     def position_and_attitude(self, time_ms, state):

@@ -97,7 +97,11 @@ def test_nothing_is_sent_before_the_vehicle_is_armed(talk):
 
 def test_our_heartbeat(talk):
     (first,) = talk.idle()
-    assert (first.type, first.autopilot, first.base_mode) == (mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0)
+    assert (first.type, first.autopilot, first.base_mode) == (
+        mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+        mavlink.MAV_AUTOPILOT_INVALID,
+        0,
+    )
     assert talk.idle(0.5 * HEARTBEAT_PERIOD) == []
     assert [one.get_type() for one in talk.idle(0.5 * HEARTBEAT_PERIOD)] == ["HEARTBEAT"]
 
@@ -217,7 +221,9 @@ def test_anything_may_arrive(talk):
     chance = np.random.default_rng(20261124)
     messages = [
         mavlink.MAVLink_heartbeat_message(12, 3, 128, 0, 4, 3),
-        mavlink.MAVLink_odometry_message(1, 1, 12, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0, 0, 0, 0, 21 * [0.0], 21 * [0.0], 0, 3, 0),
+        mavlink.MAVLink_odometry_message(
+            1, 1, 12, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0, 0, 0, 0, 21 * [0.0], 21 * [0.0], 0, 3, 0
+        ),
         mavlink.MAVLink_local_position_ned_message(1, 0, 0, 0, 0, 0, 0),
         mavlink.MAVLink_attitude_quaternion_message(1, 1, 0, 0, 0, 0, 0, 0),
         mavlink.MAVLink_command_ack_message(183, 0),

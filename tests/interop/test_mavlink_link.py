@@ -123,7 +123,8 @@ def test_status_lines(companion, vehicle):
 
 
 @pytest.mark.parametrize(
-    "place", ["serial:/dev/ttyACM0", "udpin:127.0.0.1", "udpin:127.0.0.1:70000", "udpin::14550", "14550", "/dev/ttyACM0,115200"]
+    "place",
+    ["serial:/dev/ttyACM0", "udpin:127.0.0.1", "udpin:127.0.0.1:70000", "udpin::14550", "14550", "/dev/ttyACM0,115200"],
 )
 def test_places_that_are_none(place):
     with pytest.raises(BadInput, match="`connect` must be udpin:HOST:PORT or udpout:HOST:PORT, but is"):

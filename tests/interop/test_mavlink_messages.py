@@ -22,7 +22,9 @@ TURNED = np.asarray(quaternion_from_euler(np.array([0.3, -0.4, 1.2])))
 def odometry(frames=(NED, BODY), q=TURNED, place=(1.0, -2.0, 3.0), velocity=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), quality=0):
     none = 21 * [0.0]
     made = mavlink.MAVLink_odometry_message
-    return made(1_500_000, *frames, *place, list(q), *velocity, none, none, 3, mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT, quality)
+    return made(
+        1_500_000, *frames, *place, list(q), *velocity, none, none, 3, mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT, quality
+    )
 
 
 def through_the_wire(message):
@@ -44,7 +46,10 @@ def test_odometry(world):
 @pytest.mark.parametrize(
     "message, said",
     [
-        (odometry((ENU, BODY)), "`ODOMETRY.frame_id` must be MAV_FRAME_LOCAL_NED or MAV_FRAME_LOCAL_FRD, but is MAV_FRAME_LOCAL_ENU"),
+        (
+            odometry((ENU, BODY)),
+            "`ODOMETRY.frame_id` must be MAV_FRAME_LOCAL_NED or MAV_FRAME_LOCAL_FRD, but is MAV_FRAME_LOCAL_ENU",
+        ),
         (odometry((200, BODY)), "`ODOMETRY.frame_id` must be .*, but is 200, which is no frame"),
         (odometry((NED, NED)), "`ODOMETRY.child_frame_id` must be MAV_FRAME_BODY_FRD, but is MAV_FRAME_LOCAL_NED"),
         (odometry(quality=-1), "`ODOMETRY.quality` must not be -1"),
@@ -84,7 +89,9 @@ def test_a_position_waits_for_its_attitude():
     reader = OdometryReader("local_position")
     assert reader.read(place) is None
     assert reader.read(mavlink.MAVLink_attitude_quaternion_message(1800, 1, 0, 0, 0, 0, 0, 0)) is None
-    with pytest.raises(BadInput, match="`ATTITUDE_QUATERNION` must be within 0.1 s of LOCAL_POSITION_NED, but is 0.2 s"):
+    with pytest.raises(
+        BadInput, match="`ATTITUDE_QUATERNION` must be within 0.1 s of LOCAL_POSITION_NED, but is 0.2 s"
+    ):
         reader.read(place)
     reader.read(mavlink.MAVLink_attitude_quaternion_message(2050, 1, 0, 0, 0, 0, 0, 0))
     assert reader.read(place) is not None and reader.read(odometry()) is None

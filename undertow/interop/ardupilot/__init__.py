@@ -5,5 +5,6 @@ readings of the vehicle goes out. `packets` is the format, `session` the rules o
 """
 
 from undertow.interop.ardupilot.packets import ServoPacket as ServoPacket
+from undertow.interop.ardupilot.server import listen as listen
 from undertow.interop.ardupilot.server import serve as serve
 from undertow.interop.ardupilot.session import Session as Session
