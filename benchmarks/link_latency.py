@@ -2,9 +2,9 @@
 
     python benchmarks/link_latency.py [--steps 2000] [--rate 100] [--json]
 
-The commands run in processes of their own, as users run them, with examples/bluerov2_heavy.yaml (the vehicle at sea; the
-law of the preset `robust`). This process is the autopilot: it sends over the loopback interface, waits for the answer,
-and takes the time of both ways. `--rate` is that of the packets, Hz; 0 sends the next one at once.
+The commands run in processes of their own, as users run them, with examples/bluerov2_heavy.yaml (the vehicle at sea;
+the law of the preset `robust`). This process is the autopilot: it sends over the loopback interface, waits for the
+answer, and takes the time of both ways. `--rate` is that of the packets, Hz; 0 sends the next one at once.
 """
 
 import argparse

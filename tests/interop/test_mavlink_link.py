@@ -110,6 +110,14 @@ def test_another_sender_with_the_same_system_id_is_ignored(companion, vehicle):
             assert other.wait("RC_CHANNELS_OVERRIDE", timeout=0.2) is None
 
 
+def test_a_network_that_takes_nothing(companion):
+    """Commands are lost and counted; the loop goes on."""
+    with UdpLink("udpin:127.0.0.1:0") as link:
+        link.peer = "127.0.0.1", 0  # no port to send to
+        link.send(companion.neutral())
+        assert link.unsent == len(companion.neutral()) > 0
+
+
 def test_status_lines(companion, vehicle):
     lines = []
     with UdpLink("udpin:127.0.0.1:0") as link, MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as peer:
@@ -124,7 +132,15 @@ def test_status_lines(companion, vehicle):
 
 @pytest.mark.parametrize(
     "place",
-    ["serial:/dev/ttyACM0", "udpin:127.0.0.1", "udpin:127.0.0.1:70000", "udpin::14550", "14550", "/dev/ttyACM0,115200"],
+    [
+        "serial:/dev/ttyACM0",
+        "udpin:127.0.0.1",
+        "udpin:127.0.0.1:70000",
+        "udpin::14550",
+        "14550",
+        "/dev/ttyACM0,115200",
+        "udpout:127.0.0.1:0",
+    ],
 )
 def test_places_that_are_none(place):
     with pytest.raises(BadInput, match="`connect` must be udpin:HOST:PORT or udpout:HOST:PORT, but is"):
@@ -169,6 +185,18 @@ sys.exit(run(["mavlink", {str(driven)!r}, "--connect", "udpin:127.0.0.1:0"]))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.startswith("Error: Pymavlink is not installed. In the folder of undertow, run: pip install")
+
+
+def test_another_vehicles_file(written, capsys):
+    pendulum = {
+        "plant": "inverted_pendulum",
+        "reference": {"kind": "setpoint", "position": [0]},
+        "loop": {"duration": 1.0, "dt": 0.01},
+    }
+    path = written(pendulum)
+    for command in (["ardupilot", str(path)], ["mavlink", str(path), "--connect", "udpin:127.0.0.1:0"]):
+        assert run(command) == 2
+        assert "`plant` must be a vehicle with thrusters, but is InvertedPendulum" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])

@@ -104,6 +104,26 @@ def test_the_battery_obeys_kirchhoff(written):
     np.testing.assert_allclose(vehicle.input, (pulses - 1500) / 400 * held.battery[0], rtol=0, atol=1e-2)
 
 
+def test_single_precision(written):
+    """In the precision of the scenario, as the simulation."""
+    scenario = DRIVEN | {"precision": "float32"}
+    run = ut.simulate_scenario(scenario).dataset
+    vehicle = SteppedVehicle(written(scenario))
+    np.testing.assert_array_equal(motions(vehicle, pulses_of(run)[:-1], 0.01), recorded(run))
+    assert vehicle.state().position.dtype == np.float32
+
+
+def test_a_continuous_scenario_is_stepped_too(vehicle, written):
+    """Its steps are those of the fourth-order method; the same motion as of the sampled one with the same step."""
+    scenario = DRIVEN | {"loop": {"kind": "continuous", "duration": 2.0, "dt": 0.01}}
+    scenario["controller"] = {"kind": "rcaf", "preset": "robust"}  # a law in continuous time
+    scenario["plant"] = {key: value for key, value in DRIVEN["plant"].items() if key != "esc"}
+    other = SteppedVehicle(written(scenario))
+    for pulses in ([1600.0] * 8, [1450.0] * 8):
+        assert other.step(pulses, 0.01) and vehicle.step(pulses, 0.01)
+    np.testing.assert_array_equal(other.state().position, vehicle.state().position)
+
+
 def test_a_state_that_is_not_finite_is_noticed_and_not_kept(vehicle):
     before = vehicle.state()
     assert not vehicle.hold(np.full(8, np.nan), 0.01)

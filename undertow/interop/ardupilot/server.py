@@ -1,5 +1,6 @@
 """The UDP socket of the JSON simulator: it waits for ArduPilot's packets and answers them."""
 
+import contextlib
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -68,7 +69,8 @@ def serve(
             if answered is not None and session.vehicle.time >= duration - _LITTLE:
                 break
         if answered is not None:
-            link.sendto(answered, session.sender)
+            with contextlib.suppress(OSError):  # the network is down: ArduPilot sends its packet again
+                link.sendto(answered, session.sender)
             measured.add(time.perf_counter() - begun)
         if time.monotonic() >= due:
             report(status_line(session, measured))

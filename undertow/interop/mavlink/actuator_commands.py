@@ -19,7 +19,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from undertow.core import checks
 from undertow.core.errors import BadInput
 
-_RC_CHANNELS = 18
+_RC_CHANNELS, _RC_OUTPUTS = 18, 16  # of the message, and functions RCIN1 to RCIN16 of ArduPilot
 _IGNORED = 65535  # the autopilot keeps what it has of an RC channel
 _PER_COMMAND, _PER_GROUP = 6, 8  # outputs of MAV_CMD_DO_SET_ACTUATOR and SET_ACTUATOR_CONTROL_TARGET
 _ACTUATORS, _CONTROLS = 2 * _PER_COMMAND, 2 * _PER_GROUP
@@ -79,7 +79,7 @@ def control_target(target: Target, pulses: Pulses, time_usec: int) -> list[Any]:
 
 # Word of the option -> commands, and the highest channel that they reach.
 OUTPUTS: dict[str, tuple[Commands, int]] = {
-    "rc_override": (rc_override, _RC_CHANNELS),
+    "rc_override": (rc_override, _RC_OUTPUTS),
     "servo": (servo, 32),
     "actuator": (actuator, _ACTUATORS),
     "control_target": (control_target, _CONTROLS),

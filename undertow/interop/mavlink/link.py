@@ -28,6 +28,7 @@ class UdpLink:
     Attributes:
         port: on which it listens.
         peer: address of the vehicle; None before it is known.
+        unsent: messages that the network did not take, such as while a cable is unplugged. They are lost.
 
     Raises:
         BadInput: the place is none, or the port is taken.
@@ -41,6 +42,7 @@ class UdpLink:
         self._packer: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.peer: Any = None
+        self.unsent = 0
         try:
             if kind == "udpout":
                 self.peer = socket.gethostbyname(address[0]), address[1]
@@ -75,7 +77,10 @@ class UdpLink:
         for message in messages:
             data = message.pack(self._packer)
             self._packer.seq = (self._packer.seq + 1) % 256
-            self._socket.sendto(data, self.peer)
+            try:
+                self._socket.sendto(data, self.peer)
+            except OSError:  # the vehicle notices that commands are missing, and the next one may get through
+                self.unsent += 1
 
 
 def parsed(data: bytes) -> list[Any]:
@@ -127,18 +132,19 @@ def accompany(
                     measured.add(time.perf_counter() - begun)
             link.send(companion.idle(time.monotonic()))
             if time.monotonic() >= due:
-                report(status_line(companion, measured, (companion.counts["steps"] - steps) / every))
+                report(status_line(companion, link, measured, (companion.counts["steps"] - steps) / every))
                 steps, due = companion.counts["steps"], due + every
     finally:
         for _ in range(_LAST):
             link.send(companion.neutral())
 
 
-def status_line(companion: Companion, latency: Latency, rate: float) -> str:
+def status_line(companion: Companion, link: UdpLink, latency: Latency, rate: float) -> str:
     """What is going on, in one line; `rate` is that of the steps, Hz."""
+    timing = companion.steps_counted
+    counts = companion.counts | {"late": timing["late"], "missed": timing["missed"], "unsent": link.unsent}
     parts = [companion.state(time.monotonic()), f"{rate:.0f} Hz", f"step {latency}"]
-    parts += [f"{name} {number}" for name, number in companion.counts.items() if number and name != "steps"]
-    parts += [f"{name} {companion.steps_counted[name]}" for name in ("late", "missed") if companion.steps_counted[name]]
+    parts += [f"{name} {number}" for name, number in counts.items() if number and name != "steps"]
     return "; ".join([*parts, companion.complaint] if companion.complaint else parts)
 
 
@@ -146,7 +152,8 @@ def _parsed(place: str) -> tuple[str, tuple[str, int]]:
     """Kind and address of `udpin:HOST:PORT`."""
     kind, _, rest = place.partition(":")
     host, _, port = rest.rpartition(":")
-    if kind not in _KINDS or not host or not port.isdecimal() or int(port) > 65535:
+    lowest = 1 if kind == "udpout" else 0  # of which a listener gets any that is free
+    if kind not in _KINDS or not host or not port.isdecimal() or not lowest <= int(port) <= 65535:
         hint = "For a serial line, start a router such as mavlink-router or MAVProxy"
         raise BadInput("connect", "be udpin:HOST:PORT or udpout:HOST:PORT", place, hint=hint)
     return kind, (host, int(port))
