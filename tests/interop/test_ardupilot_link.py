@@ -9,6 +9,7 @@ import threading
 
 import numpy as np
 import pytest
+from driven_scenario import DRIVEN
 from fake_autopilot import FakeAutopilot, vector
 
 from undertow.cli.main import run
@@ -75,6 +76,32 @@ def test_status_lines(session):
     assert re.match(
         r"0\.0 s; 100 Hz; north 0\.1\d m, east -0\.\d\d m, down 0\.3\d m; reply no step yet; invalid 1", said
     )
+
+
+def test_a_vehicle_that_leaves_the_plausible_range_ends_the_command(written, capsys):
+    """Beyond a kilometre: exit code 1, as of a simulation, and a line that says so."""
+    path = written(DRIVEN | {"initial": {"position": [999.99, 0, 0, 0, 0, 0], "velocity": [2, 0, 0, 0, 0, 0]}})
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+
+    ended = threading.Event()
+
+    def send():
+        packet = b"\x1a\x48\x64\x00" + bytes(36)  # 100 Hz, frame 0
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as autopilot:
+            while not ended.wait(0.1):
+                autopilot.sendto(packet, ("127.0.0.1", port))
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    try:
+        assert run(["ardupilot", str(path), "--port", str(port)]) == 1
+    finally:
+        ended.set()
+        thread.join(10)
+    said = capsys.readouterr().err
+    assert said.startswith("Error: the vehicle ended as `diverged` at 0.01 s. ") and said.count("\n") == 1
 
 
 def test_a_port_that_is_taken(driven, capsys):

@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from conftest import DRIVEN
+from driven_scenario import DRIVEN
 
 import undertow as ut
 from undertow.interop.ardupilot.session import SILENCE, Session

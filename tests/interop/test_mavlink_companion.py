@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import DRIVEN
+from driven_scenario import DRIVEN
 from pymavlink.dialects.v20 import common as mavlink
 
 import undertow as ut

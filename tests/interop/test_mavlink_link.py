@@ -10,7 +10,7 @@ import threading
 
 import numpy as np
 import pytest
-from conftest import DRIVEN
+from driven_scenario import DRIVEN
 from mavlink_vehicle import MavlinkVehicle
 
 import undertow as ut

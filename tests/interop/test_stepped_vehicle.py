@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import DRIVEN
+from driven_scenario import DRIVEN
 
 import undertow as ut
 from undertow.core.errors import BadInput
@@ -104,6 +104,12 @@ def test_the_battery_obeys_kirchhoff(written):
     np.testing.assert_allclose(vehicle.input, (pulses - 1500) / 400 * held.battery[0], rtol=0, atol=1e-2)
 
 
+def test_pulses_that_are_not_one_for_each_thruster(vehicle):
+    with pytest.raises(BadInput, match=r"`pulses` must have shape \(8,\), but is of shape \(6,\)"):
+        vehicle.step([1500] * 6, 0.01)
+    assert vehicle.time == 0
+
+
 def test_single_precision(written):
     """In the precision of the scenario, as the simulation."""
     scenario = DRIVEN | {"precision": "float32"}
@@ -116,7 +122,7 @@ def test_single_precision(written):
 def test_a_continuous_scenario_is_stepped_too(vehicle, written):
     """Its steps are those of the fourth-order method; the same motion as of the sampled one with the same step."""
     scenario = DRIVEN | {"loop": {"kind": "continuous", "duration": 2.0, "dt": 0.01}}
-    scenario["controller"] = {"kind": "rcaf", "preset": "robust"}  # a law in continuous time
+    scenario["controller"] = "rcaf"  # a law in continuous time
     scenario["plant"] = {key: value for key, value in DRIVEN["plant"].items() if key != "esc"}
     other = SteppedVehicle(written(scenario))
     for pulses in ([1600.0] * 8, [1450.0] * 8):

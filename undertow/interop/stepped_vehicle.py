@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.autopilot.numbers import step_of
+from undertow.autopilot.numbers import numbers, step_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Inputs
@@ -127,14 +127,17 @@ class SteppedVehicle:
         Returns:
             Whether the vehicle goes on. If not, its state is not finite or beyond any vehicle; the last valid one is
             kept.
+
+        Raises:
+            BadInput: not one pulse for each thruster.
         """
-        put(self._apply.inputs, (self._advance.state, pulses))
+        put(self._apply.inputs, (self._advance.state, numbers("pulses", pulses, (self.thrusters,))))
         self._apply()
         return self.hold(self._apply.outputs, dt)
 
     def hold(self, applied: Any, dt: float) -> bool:
         """As `step`, with the input of the plant in place of pulses: volts."""
-        self._input = np.array(applied, dtype=float)
+        self._input = numbers("applied", applied, (self.thrusters,)).copy()
         parts = max(1, round(np.ceil(dt / self._longest - 1e-6)))
         going_on, given, start = True, self._advance.inputs, self.time
         given.applied[...], given.h[...] = self._input, dt / parts

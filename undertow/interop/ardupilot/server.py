@@ -74,18 +74,14 @@ def serve(
             measured.add(time.perf_counter() - begun)
         if time.monotonic() >= due:
             report(status_line(session, measured))
-            due += every
+            due = time.monotonic() + every
 
 
 def status_line(session: Session, latency: Latency) -> str:
     """What is going on, in one line."""
     if session.sender is None:
-        waiting = "waiting for ArduPilot"
-        return (
-            f"{waiting}; {session.counts['invalid']} other packets: {session.complaint}"
-            if session.complaint
-            else waiting
-        )
+        others = f"; {session.counts['invalid']} other packets: {session.complaint}" if session.complaint else ""
+        return f"waiting for ArduPilot{others}"
     north, east, down = session.vehicle.state().position
     parts = [
         f"{session.vehicle.time:.1f} s",

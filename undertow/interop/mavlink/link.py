@@ -133,7 +133,7 @@ def accompany(
             link.send(companion.idle(time.monotonic()))
             if time.monotonic() >= due:
                 report(status_line(companion, link, measured, (companion.counts["steps"] - steps) / every))
-                steps, due = companion.counts["steps"], due + every
+                steps, due = companion.counts["steps"], time.monotonic() + every
     finally:
         for _ in range(_LAST):
             link.send(companion.neutral())
