@@ -46,13 +46,17 @@ def test_an_autopilot_holds_depth_and_heading(session):
 
 def test_copies_that_wait_get_one_reply(session):
     """ArduPilot takes any reply for the one to its last packet: a second one would put it a frame behind for good."""
+    frame = lambda count: b"\x1a\x48\x64\x00" + count.to_bytes(4, "little") + bytes(32)  # 100 Hz
     with listen(port=0) as link, FakeAutopilot(link.getsockname(), 100, 1.0, 0.0) as autopilot:
-        packet = b"\x1a\x48\x64\x00" + bytes(36)
         for _ in range(5):
-            autopilot.link.sendto(packet, link.getsockname())
-        thread = served(session, link, duration=0.01)
+            autopilot.link.sendto(frame(0), link.getsockname())
+        thread = served(session, link, duration=0.02)
+        autopilot.link.settimeout(10)
+        assert b'"timestamp":0.01,' in autopilot.link.recv(65000)
+        autopilot.link.sendto(frame(1), link.getsockname())
+        assert b'"timestamp":0.02,' in autopilot.link.recv(65000)
         thread.join(10)
-        assert len(autopilot.link.recv(65000)) > 100
+        assert session.counts["repeated"] == 4
         autopilot.link.settimeout(0.2)
         with pytest.raises(TimeoutError):
             autopilot.link.recv(65000)

@@ -11,7 +11,7 @@ from undertow.core.errors import BadInput
 MOST_CHANNELS = 32  # of ArduPilot
 
 # How each motor of an ArduSub frame pushes the vehicle at a pulse above neutral: roll, pitch, yaw, up, forward, right.
-# Factors of libraries/AP_Motors/AP_Motors6DOF.cpp; motor n is on servo output n.
+# Factors of ArduPilot libraries/AP_Motors/AP_Motors6DOF.cpp@0fd5fbf; motor n is on servo output n.
 _HORIZONTAL = ((0, 0, 1, 0, -1, 1), (0, 0, -1, 0, -1, -1), (0, 0, -1, 0, 1, 1), (0, 0, 1, 0, 1, -1))
 FRAMES = {
     "vectored_6dof": (

@@ -1,7 +1,8 @@
 """Packets of ArduPilot's JSON simulator: servo pulses in, readings out.
 
-Source: libraries/SITL/examples/JSON/readme.md and SIM_JSON.h of ArduPilot. The packet is a C structure, little-endian,
-without padding: magic number (which also tells how many channels follow), frame rate in Hz, frame count, pulses in us.
+Source: ArduPilot libraries/SITL/examples/JSON/readme.md@045bdf5 and SIM_JSON.h. The packet is a C structure,
+little-endian, without padding: magic number (which also tells how many channels follow), frame rate in Hz, frame count,
+pulses in us.
 """
 
 import json
