@@ -58,6 +58,8 @@ class Autopilot:
     Attributes:
         sampling_time: s.
         unit: of the output.
+        plant: of the scenario.
+        precision: `float64` or `float32`.
         backend: `simd` or `xla`.
 
     Raises:
@@ -84,9 +86,9 @@ class Autopilot:
         checks.positive("blend", blend, "s")
         form = Format(attitude, velocity)
         form.check()
-        self._loop, self._precision, self.sampling_time, self._blend = loop, precision, float(period), float(blend)
+        self._loop, self.precision, self.sampling_time, self._blend = loop, precision, float(period), float(blend)
         conversion = output_of(output, loop.plant, loop.controller, esc)
-        self.unit = conversion.unit
+        self.unit, self.plant = conversion.unit, loop.plant
         with runtime.on_processor(), runtime.in_precision(precision):
             self._compile(Functions(loop, form, conversion))
         self._clock = Clock(self.sampling_time)
@@ -279,7 +281,7 @@ class Autopilot:
         return Target(*found, *[np.zeros(shape)] * (3 - len(found)))
 
     def _place_reference(self, position: np.ndarray) -> None:
-        with runtime.on_processor(), runtime.in_precision(self._precision):
+        with runtime.on_processor(), runtime.in_precision(self.precision):
             placed = in_present_precision(starting_at(self._loop.reference, jnp.asarray(position)))
         put(self._at.numbers, eqx.filter(placed, eqx.is_array))
 

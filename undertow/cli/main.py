@@ -353,6 +353,92 @@ def export(
     return export(scenario, c99, name, precision, attitude, velocity, output, overwrite, allow_code)
 
 
+@app.command()
+def ardupilot(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    address: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Address of this machine to listen on; 0.0.0.0 for all.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(metavar="PORT", help="UDP port; SITL's option -I1 sends to 9012.")] = 9002,
+    frame: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Frame of ArduSub: vectored_6dof or vectored. Default: the one with as many motors as the vehicle.",
+        ),
+    ] = None,
+    channels: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="Servo channel of each thruster, negative where it turns the other way: --channels=1,2,-3. Default: "
+            "found from the frame and the geometry of the thrusters.",
+        ),
+    ] = None,
+    depth: Annotated[
+        float, typer.Option(metavar="M", help="Depth of the scenario's origin below the surface, m.")
+    ] = 0.0,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="End after this time of the physics, s. Default: at Ctrl-C.")
+    ] = None,
+    allow_code: AllowCode = False,
+) -> int:
+    """Be the physics behind ArduSub's software in the loop.
+
+    The command speaks ArduPilot's JSON simulator interface: servo pulses come in, readings of the scenario's vehicle
+    go out, in lock step. Disturbances are those of the scenario; its controller is not used. Start ArduSub with
+    `--model JSON:127.0.0.1`.
+    """
+    from undertow.cli.ardupilot import ardupilot
+
+    return ardupilot(scenario, address, port, frame, channels, depth, duration, allow_code)
+
+
+@app.command()
+def mavlink(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    connect: Annotated[
+        str,
+        typer.Option(metavar="PLACE", help="udpin:HOST:PORT (or udp:...) to listen, udpout:HOST:PORT to send first."),
+    ],
+    output: Annotated[
+        str,
+        typer.Option(metavar="WORD", help="Commands for the thrusters: rc_override, servo, actuator, control_target."),
+    ] = "rc_override",
+    source: Annotated[
+        str, typer.Option("--input", metavar="WORD", help="Measured motion: odometry, or local_position with attitude.")
+    ] = "odometry",
+    system: Annotated[
+        int, typer.Option(metavar="ID", help="Our system id. ArduPilot takes RC overrides from MAV_GCS_SYSID only.")
+    ] = 255,
+    target_system: Annotated[int, typer.Option(metavar="ID", help="System id of the vehicle.")] = 1,
+    frame: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Frame of ArduSub: vectored_6dof or vectored; see `ardupilot`.")
+    ] = None,
+    channels: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Channel of each thruster: --channels=1,2,-3; see `ardupilot`.")
+    ] = None,
+    timeout: Annotated[
+        float, typer.Option(metavar="S", help="Time without valid odometry after which the thrusters stop, s.")
+    ] = 0.5,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="End after this time, s. Default: at Ctrl-C.")
+    ] = None,
+    allow_code: AllowCode = False,
+) -> int:
+    """Control a vehicle over MAVLink, as a companion of its autopilot.
+
+    Odometry comes in, the controller of the scenario runs, commands for the thrusters go out. It runs only while the
+    vehicle is armed, which this command never does, and sends neutral commands when it stops. Before you use it on a
+    vehicle, read docs/how-to/mavlink.md.
+    """
+    from undertow.cli.mavlink import mavlink
+
+    return mavlink(
+        scenario, connect, output, source, system, target_system, frame, channels, timeout, duration, allow_code
+    )
+
+
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,

@@ -1,0 +1,265 @@
+"""When the law of a companion runs, and what the thrusters get when it does not; messages only, without a socket."""
+
+import numpy as np
+import pytest
+from driven_scenario import DRIVEN
+from pymavlink.dialects.v20 import common as mavlink
+
+import undertow as ut
+from undertow.core.errors import BadInput
+from undertow.interop.mavlink import Companion
+from undertow.interop.mavlink.companion import HEARTBEAT_PERIOD, HEARTBEAT_TIMEOUT, NEUTRAL_PERIOD
+from undertow.interop.mavlink.link import parsed
+
+TIMEOUT = 0.5
+STILL = [1500] * 8
+
+
+class Talk:
+    """A companion, and what its vehicle says through the wire."""
+
+    def __init__(self, companion):
+        self.companion, self.wire = companion, mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        self.now, self.time_usec = 100.0, 0
+
+    def say(self, message, wire=None):
+        (received,) = parsed(message.pack(wire or self.wire))
+        return self.companion.receive(received, self.now)
+
+    def heartbeat(self, armed=True, autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, wire=None):
+        mode = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
+        return self.say(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_SUBMARINE, autopilot, mode, 0, 4, 3), wire)
+
+    def odometry(self, place=(0, 0, 0), q=(1, 0, 0, 0), velocity=(0,) * 6, after=10_000, resets=0, wire=None, frame=1):
+        self.time_usec += after
+        self.now += 0.01
+        none = 21 * [0.0]
+        motion = [*place, list(q), *velocity]
+        made = mavlink.MAVLink_odometry_message
+        return self.say(made(self.time_usec, frame, 12, *motion, none, none, resets, 3, 0), wire)
+
+    def idle(self, passed=0.0):
+        self.now += passed
+        return self.companion.idle(self.now)
+
+
+def pulses(messages):
+    """Pulses of channels 1 to 8 of the one command."""
+    (found,) = messages
+    assert found.get_type() == "RC_CHANNELS_OVERRIDE"
+    return [getattr(found, f"chan{n}_raw") for n in range(1, 9)]
+
+
+def neutrals(messages):
+    return [one for one in messages if one.get_type() == "RC_CHANNELS_OVERRIDE"]
+
+
+@pytest.fixture(scope="module")
+def made(driven):
+    """Compiled once; `talk` begins with the state that a new one has."""
+    companion = Companion(driven, blend=0.0, timeout=TIMEOUT)
+    fresh = {name: value.copy() if isinstance(value, dict) else value for name, value in vars(companion).items()}
+    return companion, fresh
+
+
+@pytest.fixture
+def talk(made):
+    companion, fresh = made
+    vars(companion).update({name: value.copy() if isinstance(value, dict) else value for name, value in fresh.items()})
+    return Talk(companion)
+
+
+def test_commands_are_those_of_the_autopilot_by_itself(talk):
+    """The pulses of `ut.Autopilot` with the same measurements, mirrored on the reversed channels."""
+    by_itself = ut.Autopilot(DRIVEN, attitude="quaternion", output="input")
+    talk.heartbeat()
+    places = np.linspace([0, 0, 0], [0.125, -0.25, 0.5], 5)  # exact in single precision
+    first = by_itself.start(places[0], np.zeros(6), [1, 0, 0, 0])
+    applied = np.round(400 * first / 16) * 16 / 400
+    applied[np.abs(applied) <= 1.0] = 0.0  # the dead band of 25 us
+    assert pulses(talk.odometry(places[0])) == (1500 - np.round(400 * np.clip(first, -16, 16) / 16)).tolist()
+    for place in places[1:]:
+        volts = by_itself.step(place, np.zeros(6), [1, 0, 0, 0], applied=applied, dt=0.01)
+        steps = np.round(400 * np.clip(volts, -16, 16) / 16)
+        assert pulses(talk.odometry(place)) == (1500 - steps).tolist()
+        applied = np.where(np.abs(steps) > 25, steps, 0) / 400 * 16
+
+
+def test_nothing_is_sent_before_the_vehicle_is_armed(talk):
+    """And nothing that would arm it, ever."""
+    sent = talk.odometry() + talk.heartbeat(armed=False) + talk.odometry() + talk.idle()
+    assert [one.get_type() for one in sent] == ["HEARTBEAT"]
+    assert talk.companion.state(talk.now) == "disarmed"
+    talk.heartbeat(armed=True)
+    assert talk.companion.state(talk.now) == "no valid odometry"
+    assert len(pulses(talk.odometry())) == 8 and talk.companion.state(talk.now) == "running"
+
+
+def test_our_heartbeat(talk):
+    (first,) = talk.idle()
+    assert (first.type, first.autopilot, first.base_mode) == (
+        mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+        mavlink.MAV_AUTOPILOT_INVALID,
+        0,
+    )
+    assert talk.idle(0.5 * HEARTBEAT_PERIOD) == []
+    assert [one.get_type() for one in talk.idle(0.5 * HEARTBEAT_PERIOD)] == ["HEARTBEAT"]
+
+
+def test_disarming_stops_the_law(talk):
+    talk.heartbeat()
+    talk.odometry()
+    talk.heartbeat(armed=False)
+    assert [pulses([one]) for one in neutrals(talk.idle())] == [STILL]
+    assert neutrals(talk.idle(0.5 * NEUTRAL_PERIOD)) == [] and len(neutrals(talk.idle(NEUTRAL_PERIOD))) == 1
+    assert talk.odometry() == []
+    talk.heartbeat()
+    assert pulses(talk.odometry()) and talk.companion.counts["starts"] == 2
+
+
+def test_lost_odometry_stops_the_law(talk):
+    talk.heartbeat()
+    talk.odometry()
+    assert neutrals(talk.idle(0.9 * TIMEOUT)) == []
+    assert len(neutrals(talk.idle(0.2 * TIMEOUT))) == 1
+    assert talk.companion.state(talk.now) == "no valid odometry"
+    assert pulses(talk.odometry()) and talk.companion.counts["starts"] == 2
+
+
+def test_a_lost_heartbeat_stops_the_law(talk):
+    """Although odometry goes on."""
+    talk.heartbeat()
+    began = talk.now
+    while talk.now + 0.02 < began + HEARTBEAT_TIMEOUT:
+        assert pulses(talk.odometry())
+    talk.now += 0.03
+    assert talk.odometry() == [] and len(neutrals(talk.idle())) == 1
+    assert talk.companion.state(talk.now) == "no heartbeat of system 1"
+
+
+def test_others_are_ignored(talk):
+    """Another system, whatever it says; a camera of the same system that says it is disarmed."""
+    other = mavlink.MAVLink(None, srcSystem=2, srcComponent=1)
+    talk.heartbeat(wire=other)
+    assert talk.odometry() == [] and not talk.companion.armed
+    talk.heartbeat()
+    assert talk.odometry(wire=other) == []
+    assert talk.companion.counts["foreign"] == 2
+    talk.heartbeat(armed=False, autopilot=mavlink.MAV_AUTOPILOT_INVALID)
+    assert talk.companion.armed and pulses(talk.odometry())
+
+
+def test_odometry_in_other_axes_is_ignored(talk):
+    talk.heartbeat()
+    talk.odometry()
+    assert talk.odometry(frame=mavlink.MAV_FRAME_LOCAL_ENU) == []
+    assert talk.companion.counts["invalid"] == 1 and "MAV_FRAME_LOCAL_ENU" in talk.companion.complaint
+    assert len(neutrals(talk.idle(1.1 * TIMEOUT))) == 1
+
+
+def test_nan_is_what_was_not_measured(talk):
+    """The law begins with a whole odometry, goes on without a velocity, and stops without a pose."""
+    talk.heartbeat()
+    assert talk.odometry(velocity=[np.nan] * 6) == [] and talk.companion.counts["starts"] == 0
+    talk.odometry()
+    for hole in ({"velocity": [np.nan] * 6}, {"place": [np.nan, 0, 0]}, {"q": [0, 0, 0, 0]}):
+        assert all(1100 <= one <= 1900 for one in pulses(talk.odometry(**hole)))
+    for _ in range(round(TIMEOUT / 0.01) + 2):
+        talk.odometry(place=[np.nan] * 3)
+    assert not talk.companion.running
+
+
+def test_the_same_odometry_again(talk):
+    talk.heartbeat()
+    talk.odometry()
+    assert talk.odometry(after=0) == [] and talk.companion.counts["repeated"] == 1
+
+
+def test_a_clock_that_is_set(talk):
+    """Back by an hour, on by a day: the law advances by one sampling time."""
+    talk.time_usec = 10**15
+    talk.heartbeat()
+    talk.odometry()
+    for jump in (-3600 * 10**6, 86400 * 10**6):
+        assert pulses(talk.odometry(after=jump))
+    assert pulses(talk.odometry())
+    assert talk.companion.counts["clock jumps"] == 2 and talk.companion.counts["starts"] == 1
+    assert talk.companion.steps_counted == {"steps": 3, "late": 0, "missed": 0, "repeated": 0}
+    assert pulses(talk.odometry(after=20_000))
+    assert talk.companion.steps_counted["late"] == 1
+
+
+def test_an_estimator_that_jumps(talk):
+    """The reference begins at the new place: no command for the distance of the jump."""
+    talk.heartbeat()
+    at_start = pulses(talk.odometry())
+    assert pulses(talk.odometry(place=[50, 50, 0], resets=1)) == at_start
+    assert talk.companion.counts["estimator resets"] == 1 and talk.companion.counts["starts"] == 2
+
+
+def test_a_command_that_is_rejected(talk):
+    talk.say(mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_SERVO, mavlink.MAV_RESULT_DENIED))
+    talk.say(mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_SERVO, mavlink.MAV_RESULT_ACCEPTED))
+    talk.say(mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_HOME, mavlink.MAV_RESULT_DENIED))
+    assert talk.companion.counts["rejected commands"] == 1
+    assert talk.companion.complaint == "command 183 was answered MAV_RESULT_DENIED"
+
+
+def test_a_start_without_a_jump(driven):
+    """By default the output turns from neutral into the law's within seconds."""
+    companion = Companion(driven, output="servo")
+    talk = Talk(companion)
+    talk.heartbeat()
+    first = talk.odometry(place=[0.5, 0.5, 0.5])
+    assert [(one.param1, one.param2) for one in first] == [(n, 1500) for n in range(1, 9)]
+    last = [one.param2 for one in talk.odometry(place=[0.5, 0.5, 0.5])]
+    assert max(abs(np.array(last) - 1500)) < 40
+
+
+def test_anything_may_arrive(talk):
+    """Mutated messages of a vehicle, and random bytes: nothing raises, and commands stay pulses of servos."""
+    chance = np.random.default_rng(20261124)
+    messages = [
+        mavlink.MAVLink_heartbeat_message(12, 3, 128, 0, 4, 3),
+        mavlink.MAVLink_odometry_message(
+            1, 1, 12, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0, 0, 0, 0, 21 * [0.0], 21 * [0.0], 0, 3, 0
+        ),
+        mavlink.MAVLink_local_position_ned_message(1, 0, 0, 0, 0, 0, 0),
+        mavlink.MAVLink_attitude_quaternion_message(1, 1, 0, 0, 0, 0, 0, 0),
+        mavlink.MAVLink_command_ack_message(183, 0),
+        mavlink.MAVLink_param_value_message(b"NAME", 1.0, 9, 1, 0),
+    ]
+    sent = accepted = 0
+    for k in range(3000):
+        talk.now += 0.001
+        message = messages[k % len(messages)]
+        if message.get_type() == "ODOMETRY":
+            message.time_usec += int(chance.integers(-5_000, 50_000)) if message.time_usec > 5_000 else 5_000
+            message.x, message.vx = (float(one) for one in chance.choice([0.0, 1.0, np.nan, np.inf, 1e30, -1e38], 2))
+        data = bytearray(message.pack(talk.wire))
+        if chance.integers(2):
+            for _ in range(chance.integers(1, 4)):
+                data[chance.integers(len(data))] ^= int(chance.integers(1, 256))
+        if not chance.integers(5):
+            data = data[: chance.integers(len(data))] + chance.bytes(int(chance.integers(30)))
+        for one in parsed(bytes(data)):
+            accepted += 1
+            for answer in talk.companion.receive(one, talk.now):
+                sent += 1
+                assert all(1100 <= pulse <= 1900 for pulse in pulses([answer]))
+    assert sent > 100 and accepted > 1000
+    assert parsed(chance.bytes(5000)) == []
+
+
+@pytest.mark.parametrize(
+    "options, said",
+    [
+        ({"target_system": 0}, "`target_system` must be from 1 to 255"),
+        ({"timeout": 0.0}, "`timeout` must be positive"),
+        ({"blend": -1.0}, "`blend` must be zero or positive"),
+        ({"source": "gps"}, "`input` must be one of odometry, local_position"),
+    ],
+)
+def test_wrong_options(driven, options, said):
+    with pytest.raises(BadInput, match=said):
+        Companion(driven, **options)

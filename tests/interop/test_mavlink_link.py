@@ -1,0 +1,220 @@
+"""`undertow mavlink` with pymavlink as the vehicle at the other end of the socket: a closed loop, and what goes wrong."""
+
+import contextlib
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+from driven_scenario import DRIVEN
+from mavlink_vehicle import MavlinkVehicle
+
+import undertow as ut
+from undertow.cli.main import run
+from undertow.core.errors import BadInput
+from undertow.interop.mavlink import Companion, UdpLink, accompany
+
+FRAMES = round(DRIVEN["loop"]["duration"] / DRIVEN["loop"]["dt"])
+# m and m/s. Odometry holds single precision, and commands whole microseconds: as long as no command lies on the edge
+# between two, nothing differs at all. One that does is 0.04 V in one step: less than this.
+CLOSE = 2e-5
+
+
+@pytest.fixture(scope="module")
+def companion(driven):
+    """Starts at once, as a simulation does."""
+    return Companion(driven, blend=0.0, timeout=5.0)
+
+
+@contextlib.contextmanager
+def accompanied(companion, link, **options):
+    """The companion talks in a thread, until the block ends."""
+    ended = threading.Event()
+    options |= {"until": ended.is_set}
+    thread = threading.Thread(target=accompany, args=(companion, link), kwargs=options)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join(10)
+
+
+def closed_loop(vehicle, peer, send):
+    """Positions of the vehicle as its own odometry and the companion's commands move it."""
+    found = []
+    for frame in range(FRAMES):
+        if frame % 20 == 0:
+            peer.heartbeat()
+        state = vehicle.state()
+        found.append(np.concatenate([state.position, state.velocity]))
+        send(frame, state)
+        vehicle.step(peer.pulses(), 0.01)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("source", ["odometry", "local_position"])
+@pytest.mark.parametrize("listens", ["companion", "vehicle"])
+def test_a_closed_loop_is_that_of_a_simulation(driven, vehicle, source, listens):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        place = f"127.0.0.1:{free.getsockname()[1]}"
+    companion = Companion(driven, source=source, blend=0.0, timeout=5.0)
+    kinds = ("udpin", "udpout") if listens == "companion" else ("udpout", "udpin")
+    first, second = (lambda: UdpLink(f"{kinds[0]}:{place}")), (lambda: MavlinkVehicle(f"{kinds[1]}:{place}"))
+    with first() as link, second() as peer, accompanied(companion, link):
+        if listens == "vehicle":
+            assert peer.wait("HEARTBEAT").get_srcSystem() == 255
+        if source == "odometry":
+            send = lambda frame, state: peer.odometry(5_000_000 + 10_000 * frame, state)
+        else:
+            send = lambda frame, state: peer.position_and_attitude(5_000 + 10 * frame, state)
+        found = closed_loop(vehicle, peer, send)
+        assert companion.counts == dict.fromkeys(companion.counts, 0) | {"steps": FRAMES, "starts": 1}
+        assert companion.steps_counted == {"steps": FRAMES - 1, "late": 0, "missed": 0, "repeated": 0}
+    run = ut.simulate_scenario(DRIVEN).dataset
+    expected = np.concatenate([run["position"].values[:-1, :3], run["velocity"].values[:-1, :3]], axis=1)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE)
+    assert np.abs(expected[-1] - expected[0]).max() > 0.2  # it has moved a thousand times as far
+
+
+def test_what_is_sent_last_is_neutral(companion, vehicle):
+    """However the loop ends; three times, because datagrams may be lost."""
+    with UdpLink("udpin:127.0.0.1:0") as link, MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as peer:
+        with accompanied(companion, link):
+            peer.heartbeat()
+            peer.odometry(1_000_000, vehicle.state())
+            assert (peer.pulses() != 1500).any()
+        for _ in range(3):
+            assert (peer.pulses() == 1500).all()
+        assert peer.wait("RC_CHANNELS_OVERRIDE", timeout=0.2) is None
+
+
+def test_another_sender_with_the_same_system_id_is_ignored(companion, vehicle):
+    """While the vehicle talks: the commands go to it, and not to the other one."""
+    with UdpLink("udpin:127.0.0.1:0") as link, MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as peer:
+        with MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as other, accompanied(companion, link):
+            peer.heartbeat()
+            peer.odometry(20_000_000, vehicle.state())
+            peer.pulses()
+            steps = companion.counts["steps"]
+            other.heartbeat(armed=False)
+            other.odometry(20_010_000, vehicle.state())
+            peer.odometry(20_020_000, vehicle.state())
+            peer.pulses()
+            assert companion.counts["steps"] == steps + 1 and companion.armed
+            assert other.wait("RC_CHANNELS_OVERRIDE", timeout=0.2) is None
+
+
+def test_a_network_that_takes_nothing(companion):
+    """Commands are lost and counted; the loop goes on."""
+    with UdpLink("udpin:127.0.0.1:0") as link:
+        link.peer = "127.0.0.1", 0  # no port to send to
+        link.send(companion.neutral())
+        assert link.unsent == len(companion.neutral()) > 0
+
+
+def test_status_lines(companion, vehicle):
+    lines = []
+    with UdpLink("udpin:127.0.0.1:0") as link, MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as peer:
+        with accompanied(companion, link, report=lines.append, every=0.2):
+            peer.heartbeat()
+            peer.odometry(40_000_000, vehicle.state(), frames=(4, 12))
+            while not (lines and "MAV_FRAME_LOCAL_ENU" in lines[-1]):
+                assert len(lines) < 50
+                threading.Event().wait(0.05)
+    assert re.match(r"(no valid odometry|running); \d+ Hz; step (p50 \d|no step)", lines[-1])
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "serial:/dev/ttyACM0",
+        "udpin:127.0.0.1",
+        "udpin:127.0.0.1:70000",
+        "udpin::14550",
+        "14550",
+        "/dev/ttyACM0,115200",
+        "udpout:127.0.0.1:0",
+    ],
+)
+def test_places_that_are_none(place):
+    with pytest.raises(BadInput, match="`connect` must be udpin:HOST:PORT or udpout:HOST:PORT, but is"):
+        UdpLink(place)
+
+
+def test_a_place_that_is_taken(driven, capsys):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        place = f"udp:127.0.0.1:{other.getsockname()[1]}"
+        assert run(["mavlink", str(driven), "--connect", place]) == 2
+    assert f"`connect` must be free to use, but is {place}: Address already in use" in capsys.readouterr().err
+
+
+def test_a_vehicle_that_is_not_there(driven):
+    """Nobody listens at the other end: heartbeats go nowhere, and nothing happens."""
+    assert run(["mavlink", str(driven), "--connect", "udpout:127.0.0.1:9", "--duration", "0.3"]) == 0
+
+
+@pytest.mark.parametrize(
+    "options, said",
+    [
+        (["--output", "pwm"], "`output` must be one of rc_override, servo, actuator, control_target"),
+        (["--input", "gps"], "`input` must be one of odometry, local_position"),
+        (["--system", "0"], "`system` must be from 1 to 255"),
+        (["--channels", "1,2"], "`channels` must have 8 entries"),
+        (["--duration", "-1"], "`duration` must be positive"),
+    ],
+)
+def test_wrong_options(driven, capsys, options, said):
+    assert run(["mavlink", str(driven), "--connect", "udpin:127.0.0.1:0", *options]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_without_pymavlink(driven):
+    code = f"""
+import sys
+sys.modules["pymavlink"] = None
+from undertow.cli.main import run
+sys.exit(run(["mavlink", {str(driven)!r}, "--connect", "udpin:127.0.0.1:0"]))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith("Error: Pymavlink is not installed. In the folder of undertow, run: pip install")
+
+
+def test_another_vehicles_file(written, capsys):
+    pendulum = {
+        "plant": "inverted_pendulum",
+        "reference": {"kind": "setpoint", "position": [0]},
+        "loop": {"duration": 1.0, "dt": 0.01},
+    }
+    path = written(pendulum)
+    for command in (["ardupilot", str(path)], ["mavlink", str(path), "--connect", "udpin:127.0.0.1:0"]):
+        assert run(command) == 2
+        assert "`plant` must be a vehicle with thrusters, but is InvertedPendulum" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_it_with_neutral_commands(driven, vehicle, how):
+    command = [sys.executable, "-m", "undertow.cli.main", "mavlink", str(driven), "--connect", "udpin:127.0.0.1:0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stderr is not None
+        for line in process.stdout:
+            if found := re.search(r"MAVLink on UDP port (\d+)", line):
+                break
+        with MavlinkVehicle(f"udpout:127.0.0.1:{found[1]}") as peer:
+            peer.heartbeat()
+            peer.odometry(1_000_000, vehicle.state())
+            peer.pulses()
+            process.send_signal(how)
+            assert process.wait(20) == 128 + how
+            last = None
+            while (message := peer.wait("RC_CHANNELS_OVERRIDE", timeout=0.3)) is not None:
+                last = message
+        assert last is not None and [getattr(last, f"chan{n}_raw") for n in range(1, 9)] == [1500] * 8
+        assert process.stderr.read().strip() == "Interrupted: stopping."

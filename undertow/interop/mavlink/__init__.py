@@ -1,0 +1,15 @@
+"""The controller of a scenario as a MAVLink companion of an autopilot: odometry in, commands to the thrusters out.
+
+`odometry` reads positions and attitudes, `actuator_commands` writes what the thrusters get, `companion` has the rules
+of when the law runs, and `link` the UDP socket. docs/how-to/mavlink.md explains them.
+"""
+
+import importlib.util
+
+if importlib.util.find_spec("pymavlink") is None:
+    remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[mavlink]'"
+    raise ModuleNotFoundError(f"pymavlink is not installed. {remedy}", name="pymavlink")
+
+from undertow.interop.mavlink.companion import Companion as Companion
+from undertow.interop.mavlink.link import UdpLink as UdpLink
+from undertow.interop.mavlink.link import accompany as accompany

@@ -1,0 +1,140 @@
+"""Which servo channel of an autopilot drives which thruster, and in which direction."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+
+MOST_CHANNELS = 32  # of ArduPilot
+
+# How each motor of an ArduSub frame pushes the vehicle at a pulse above neutral: roll, pitch, yaw, up, forward, right.
+# Factors of ArduPilot libraries/AP_Motors/AP_Motors6DOF.cpp@0fd5fbf; motor n is on servo output n.
+_HORIZONTAL = ((0, 0, 1, 0, -1, 1), (0, 0, -1, 0, -1, -1), (0, 0, -1, 0, 1, 1), (0, 0, 1, 0, 1, -1))
+FRAMES = {
+    "vectored_6dof": (
+        *_HORIZONTAL,
+        (1, -1, 0, -1, 0, 0),
+        (-1, -1, 0, -1, 0, 0),
+        (1, 1, 0, -1, 0, 0),
+        (-1, 1, 0, -1, 0, 0),
+    ),
+    "vectored": (*_HORIZONTAL, (1, 0, 0, -1, 0, 0), (-1, 0, 0, -1, 0, 0)),
+}
+
+# Rows of a thruster matrix (surge, sway, heave, roll, pitch, yaw) in the order of those factors; heave is down.
+_ROWS, _SIGNS = [3, 4, 5, 2, 0, 1], np.array([1, 1, 1, -1, 1, 1])
+
+_FORCES = slice(3, 6)
+
+_SMALL = 1e-6  # share of the largest entry of a column below which an entry of a thruster matrix is zero
+
+
+class Channels(NamedTuple):
+    """Servo channels of the thrusters of a vehicle.
+
+    Attributes:
+        numbers: channel of each thruster, from 1.
+        signs: -1 where a pulse above neutral has to push against the direction of the thruster, else 1.
+    """
+
+    numbers: NDArray
+    signs: NDArray
+
+    def of_thrusters(self, pwm: ArrayLike, neutral: float) -> NDArray:
+        """Pulses of the thrusters, us, from those of all channels.
+
+        Raises:
+            BadInput: there are fewer channels than the thrusters need.
+        """
+        given = np.asarray(pwm, dtype=float)
+        if self.numbers.max() > len(given):
+            hint = "With SERVO_32_ENABLE = 1 ArduPilot sends 32"
+            raise BadInput("channels", f"be of the {len(given)} that arrive", str(self.numbers.max()), hint=hint)
+        return neutral + self.signs * (given[self.numbers - 1] - neutral)
+
+    def of_outputs(self, pulses: ArrayLike, neutral: float) -> dict[int, float]:
+        """Pulse (or another signal about its neutral value) by number of the channel, from those of the thrusters."""
+        turned = neutral + self.signs * (np.asarray(pulses, dtype=float) - neutral)
+        return dict(zip(self.numbers.tolist(), turned.tolist(), strict=True))
+
+    def __str__(self) -> str:
+        return ",".join(str(number) for number in (self.signs * self.numbers).tolist())
+
+
+def channels_from_text(text: str, thrusters: int) -> Channels:
+    """Channels as a user writes them: `1,2,-3` for three thrusters, the third of which turns the other way.
+
+    Raises:
+        BadInput: not one channel for each thruster, or a channel twice or out of range.
+    """
+    try:
+        signed = np.array([int(word) for word in text.split(",")])
+    except ValueError:
+        raise BadInput("channels", "be whole numbers with commas, such as 1,2,-3", repr(text)) from None
+    checks.length("channels", signed, thrusters, "one per thruster, negative where it turns the other way")
+    numbers = np.abs(signed)
+    if not ((numbers >= 1) & (numbers <= MOST_CHANNELS)).all():
+        raise BadInput("channels", f"be from 1 to {MOST_CHANNELS}", text)
+    if len(set(numbers.tolist())) < len(numbers):
+        raise BadInput("channels", "be different", text)
+    return Channels(numbers, np.sign(signed))
+
+
+def channels_of_frame(frame: str, thruster_matrix: ArrayLike) -> Channels:
+    """Channels of a vehicle whose thrusters are the motors of a frame of ArduSub, in any order and direction.
+
+    A thruster is the motor that pushes as it does in every axis that the motor acts on.
+
+    Args:
+        frame: one of FRAMES.
+        thruster_matrix: force and moment per newton of each thruster, (6, N), body axes forward, starboard, down.
+
+    Raises:
+        BadInput: there is no such frame, or its motors are not the thrusters of the vehicle.
+    """
+    checks.choice("frame", frame, tuple(FRAMES))
+    pushes = np.asarray(thruster_matrix, dtype=float)[_ROWS].T * _SIGNS
+    pushes = np.sign(np.where(np.abs(pushes) > _SMALL * np.abs(pushes).max(axis=1, keepdims=True), pushes, 0.0))
+    found = [_motor(push, np.array(FRAMES[frame])) for push in pushes]
+    numbers = [number for number, _ in found]
+    if len(found) != len(FRAMES[frame]) or sorted(numbers) != list(range(1, len(found) + 1)):
+        names = ", ".join(str(number or "none") for number in numbers)
+        hint = "Give the channel of each thruster, such as --channels 1,2,-3"
+        raise BadInput(
+            "frame", "have the thrusters of the vehicle", f"{frame}: thrusters are motors {names}", hint=hint
+        )
+    return Channels(np.array(numbers), np.array([sign for _, sign in found]))
+
+
+def channels_of_vehicle(thruster_matrix: ArrayLike, frame: str | None = None, channels: str | None = None) -> Channels:
+    """Channels as given, or of a frame; of the frame with as many motors where neither is given.
+
+    Raises:
+        BadInput: as above, or both are given, or no frame has as many motors.
+    """
+    thrusters = np.shape(thruster_matrix)[1]
+    if channels is not None:
+        if frame is not None:
+            raise BadInput("frame", "be left out with `channels`", frame)
+        return channels_from_text(channels, thrusters)
+    fitting = [name for name, motors in FRAMES.items() if len(motors) == thrusters]
+    if frame is None and not fitting:
+        hint = "Give the channel of each thruster, such as --channels 1,2,-3"
+        raise BadInput("channels", f"be given for {thrusters} thrusters, which no known frame has", hint=hint)
+    return channels_of_frame(frame or fitting[0], thruster_matrix)
+
+
+def _motor(push: NDArray, motors: NDArray) -> tuple[int, int]:
+    """Number, from 1, of the motor that pushes in the same directions, and the sign; (0, 1) where there is none.
+
+    Forces are in the same axes; moments may be more, such as the pitch of a thruster that is mounted low.
+    """
+    for number, motor in enumerate(motors, start=1):
+        acts = motor != 0
+        for sign in (1, -1):
+            if (push[acts] == sign * motor[acts]).all() and not push[_FORCES][~acts[_FORCES]].any():
+                return number, sign
+    return 0, 1
