@@ -28,7 +28,7 @@ from undertow.scenario.reading import from_data, read
 
 
 class Autopilot:
-    """A controller that is called once per sampling time, by whoever owns the clock. NumPy goes in and comes out.
+    """A controller that is called once per sampling time, by whoever owns the clock. NumPy goes in and comes out::
 
         autopilot = ut.Autopilot("bluerov2_heavy.yaml", attitude="quaternion")
         autopilot.start(position, velocity, quaternion)

@@ -40,7 +40,7 @@ class EstimatedMotion(NamedTuple):
 
 
 class NavigationFilter:
-    """The filter of a scenario's `navigation`, called at every sampling time by whoever owns the clock.
+    """The filter of a scenario's `navigation`, called at every sampling time by whoever owns the clock::
 
         navigation = ut.NavigationFilter("bluerov2_heavy.yaml")
         navigation.start(position, velocity, attitude)
