@@ -1,0 +1,257 @@
+"""The controller of a scenario as a ROS 2 node: odometry and target in, thruster commands or a wrench out.
+
+It steps when odometry arrives, by the time between the stamps. What goes wrong, and what it then does:
+
+    another frame, a quaternion not of unit length    the message is ignored
+    a number that is not finite                       it was not measured: the law takes what its model expects
+    a stamp older than `max_age`                      the message is ignored
+    a stamp before the last one                       ignored; by more than `RESTART` the controller starts again
+    no odometry that can be used for `max_age`        zero thrust is commanded until there is some again
+
+Ages are in the time that is used: where that of /clock stands still, nothing grows old.
+"""
+
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from undertow.autopilot.autopilot import Autopilot
+from undertow.autopilot.numbers import step_of
+from undertow.autopilot.output import Output, output_of
+from undertow.core import checks, runtime
+from undertow.core.errors import BadInput
+from undertow.interop.ros2 import messages as ros
+from undertow.interop.ros2.from_messages import (
+    SECOND,
+    Frames,
+    PoseAndVelocity,
+    motion_of,
+    nanoseconds_of,
+    target_of,
+    thruster_label,
+)
+from undertow.interop.ros2.link import Link, why_nothing
+from undertow.interop.ros2.node import WAIT, Reporter, Topics
+from undertow.interop.ros2.simulated_vehicle import check_vehicle
+from undertow.interop.ros2.to_messages import stamp_of, thrusters_of, wrench_of
+from undertow.loop.stepped import put
+from undertow.scenario.build import Built, build
+from undertow.scenario.reading import read
+
+RESTART = 0.1  # s, by which a clock must go back to be one that was set back
+
+_DUE = 0.75  # sampling times after which a measurement is used; odometry may come faster than the controller steps
+_EXACT = 2  # ns, within which stamps are one sampling time apart
+_ABSENT = 3.0  # s, after which missing odometry is explained
+
+
+class ControllerSettings(NamedTuple):
+    """How the controller is run as a node.
+
+    Attributes:
+        output: `input`, `newtons` or `pulses` (an array, one number per thruster), or `wrench`.
+        rate: control steps per second; None for the scenario's.
+        max_age: s, of the newest odometry, until zero thrust is commanded; also of a stamp, until it is ignored.
+        use_sim_time: whether the time is that of /clock.
+        topics, frames: names.
+    """
+
+    output: str = "input"
+    rate: float | None = None
+    max_age: float = 0.5
+    use_sim_time: bool = False
+    topics: Topics = Topics()
+    frames: Frames = Frames()
+
+
+class ControllerNode:
+    """The controller of a scenario, connected to a link.
+
+    Args:
+        scenario: a .yaml file or an earlier run.nc.
+        link: participant.
+        settings: see there.
+        reporter: told of what happens.
+        allow_code: whether the Python code that an earlier run.nc names may run.
+
+    Raises:
+        BadInput: something given cannot be used.
+    """
+
+    def __init__(
+        self, scenario: Path, link: Link, settings: ControllerSettings, reporter: Reporter, allow_code: bool = False
+    ):
+        if settings.rate is not None:
+            checks.positive("rate", settings.rate, "Hz")
+        checks.positive("max_age", settings.max_age, "s", finite=False)
+        built = build(read(scenario, allow_code=allow_code))
+        check_vehicle(built)
+        period = built.scenario.loop.dt if settings.rate is None else 1 / settings.rate
+        self._autopilot = Autopilot(
+            scenario, sampling_time=period, attitude="quaternion", velocity="body", allow_code=allow_code
+        )
+        self._period = round(period * SECOND)
+        self._settings, self._link, self._reporter = settings, link, reporter
+        self._conversion = _Conversion(built, settings.output)
+        topics = settings.topics
+        self._odometry = link.subscriber(topics.odom, ros.Odometry)
+        self._targets = link.subscriber(topics.target_pose, ros.PoseStamped)
+        self._clock = link.subscriber(topics.clock, ros.Clock) if settings.use_sim_time else None
+        topic, kind = (topics.wrench, ros.WrenchStamped) if settings.output == "wrench" else (topics.thrusters, None)
+        self._commands: Any = link.publisher(topic, kind or ros.Float64MultiArray)
+        link.now = self._now
+        self._simulated: int | None = None  # time of /clock, ns
+        self._last: int | None = None  # stamp of the last step, ns; None before the start
+        self._applied, self._target = np.zeros(built.closed_loop.plant.inputs()), None
+        self._stopped = False  # whether zero thrust was commanded since the last step
+        self._heartbeat = 0  # time of the last command, ns
+        self._explained = time.monotonic()
+
+    def run(self, duration: float = np.inf) -> None:
+        """Control for so many seconds, or until KeyboardInterrupt; zero thrust is the last command in either case."""
+        until = time.monotonic() + duration
+        try:
+            while time.monotonic() < until:
+                self.spin(min(WAIT, self._settings.max_age))
+        finally:
+            self.stop()
+
+    def spin(self, seconds: float) -> None:
+        """Wait for messages, at most so long, and answer them."""
+        self._link.wait(seconds)
+        self._take_clock()
+        self._take_targets()
+        arrived = self._odometry.take()
+        self._reporter.counts["odometry superseded"] += max(0, len(arrived) - 1)
+        if arrived:  # the newest counts
+            try:
+                self._answer(arrived[-1])
+            except BadInput as error:
+                self._reporter.trouble(f"ignored ({error.name})", f"{error}. The message is ignored")
+        self._watch()
+        self._reporter.status(self.status)
+
+    def stop(self) -> None:
+        """Command zero thrust, and wait a little until it has arrived."""
+        self._publish(np.zeros_like(self._applied))
+        self._link.flush(0.5)
+
+    def status(self) -> str:
+        """Counts in one line."""
+        of_clock = {name: number for name, number in self._autopilot.counts.items() if name != "steps" and number}
+        late = "".join(f", {number} steps {name}" for name, number in of_clock.items())
+        malformed = f", {self._odometry.malformed} malformed" if self._odometry.malformed else ""
+        received = f"{self._odometry.received} odometry, {self._targets.received} targets"
+        return f"{received}, {self._commands.sent} commands{late}{malformed}{self._reporter.events()}"
+
+    def _now(self) -> int:
+        """Time, ns: of /clock where that is used and there is one."""
+        return time.time_ns() if self._simulated is None else self._simulated
+
+    def _take_clock(self) -> None:
+        for message in self._clock.take() if self._clock else ():
+            now = nanoseconds_of(message.clock)
+            if self._simulated is not None and now < self._simulated - RESTART * SECOND:
+                back = (self._simulated - now) / SECOND
+                self._reporter.trouble("restarts", f"/clock went back by {back:g} s: the controller starts again")
+                self._last = None
+            self._simulated = now
+
+    def _take_targets(self) -> None:
+        for message in self._targets.take():
+            try:
+                self._target = target_of(message, self._settings.frames, self._targets.topic)
+            except BadInput as error:
+                self._reporter.trouble(f"ignored ({error.name})", f"{error}. The target is ignored")
+
+    def _answer(self, message: ros.Odometry) -> None:
+        """Step and send the command, if a step is due."""
+        stamp, topic = nanoseconds_of(message.header.stamp), self._odometry.topic
+        motion = motion_of(message, self._settings.frames, topic)
+        self._check_age(stamp, topic)
+        passed = None if self._last is None else stamp - self._last
+        if passed is not None and passed < -RESTART * SECOND:
+            back = f"{topic} went back in time by {-passed / SECOND:g} s: the controller starts again"
+            self._reporter.trouble("restarts", back)
+            passed = None
+        if passed is not None and passed <= 0:
+            self._reporter.trouble("out of order", f"{topic} has stamps that do not increase. Those are ignored")
+            return
+        if passed is not None and passed < _DUE * self._period:
+            self._reporter.counts["odometry between steps"] += 1
+            return
+        command = self._start(motion) if passed is None else self._step(motion, passed)
+        self._publish(command)
+        self._last, self._stopped, self._heartbeat = stamp, False, self._now()
+        self._reporter.over("stopped")
+
+    def _start(self, motion: PoseAndVelocity) -> NDArray:
+        position, quaternion, velocity = motion
+        applied = self._applied if self._stopped else None  # the output turns from zero thrust into the law's
+        return self._autopilot.start(position, velocity, quaternion, target=self._target, applied=applied)
+
+    def _step(self, motion: PoseAndVelocity, passed: int) -> NDArray:
+        position, quaternion, velocity = motion
+        dt = None if abs(passed - self._period) <= _EXACT else passed / SECOND
+        return self._autopilot.step(position, velocity, quaternion, target=self._target, applied=self._applied, dt=dt)
+
+    def _check_age(self, stamp: int, topic: str) -> None:
+        if self._settings.use_sim_time and self._simulated is None:
+            return
+        age = (self._now() - stamp) / SECOND
+        if age > self._settings.max_age:
+            hint = "Set the clocks, or give a larger --max-age" if self._settings.use_sim_time or age < 1e6 else ""
+            hint = hint or "Is this simulated time? Use --use-sim-time"
+            must = f"be at most {self._settings.max_age:g} s old"
+            raise BadInput(f"{topic} header.stamp", must, f"{age:.4g} s old", hint=hint)
+
+    def _publish(self, u: NDArray) -> None:
+        """Send an input, as far as the thrusters can give it, in the form of the output."""
+        self._applied, values = self._conversion(u)
+        if self._settings.output == "wrench":
+            self._commands.publish(wrench_of(values, stamp_of(self._now()), self._settings.frames))
+        else:
+            self._commands.publish(thrusters_of(values, self._conversion.label))
+
+    def _watch(self) -> None:
+        """Command zero thrust while there is no odometry; explain why there has been none yet."""
+        if self._last is None:
+            if time.monotonic() > self._explained + _ABSENT:
+                self._reporter.trouble("waiting", why_nothing(self._link, self._odometry, ros.Odometry))
+                self._explained = time.monotonic()
+            return
+        silent = self._now() - self._heartbeat
+        if silent > self._settings.max_age * SECOND:
+            why = f"no odometry that can be used for {self._settings.max_age:g} s: zero thrust until there is some"
+            self._reporter.trouble("stopped", why)
+            self._publish(np.zeros_like(self._applied))
+            self._stopped, self._heartbeat = True, self._now()
+
+
+class _Conversion:
+    """Compiled: an input -> the input as far as the thrusters can give it, and the same as output.
+
+    The law then adapts to what is applied. A battery counts as full.
+    """
+
+    def __init__(self, built: Built, kind: str):
+        plant, controller = built.closed_loop.plant, built.closed_loop.controller
+        with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
+            output = output_of(kind, plant, controller, None)
+            self.label = thruster_label(output.unit)
+            self._step = step_of(_limited, output, (), jnp.zeros(plant.inputs()))
+
+    def __call__(self, u: NDArray) -> tuple[NDArray, NDArray]:
+        put(self._step.inputs, u)
+        self._step()
+        applied, values = self._step.outputs
+        return applied.copy(), values.copy()
+
+
+def _limited(output: Output, _: Any, u: Any):
+    applied = output.plant.admissible(output.plant.initial_state(), u)
+    return (), (applied, output.of(applied))
