@@ -39,7 +39,7 @@ from undertow.interop.ros2.node import WAIT, Reporter, Topics
 from undertow.interop.ros2.simulated_vehicle import check_vehicle
 from undertow.interop.ros2.to_messages import stamp_of, thrusters_of, wrench_of
 from undertow.loop.stepped import put
-from undertow.scenario.build import Built, build
+from undertow.scenario.build import build
 from undertow.scenario.reading import read
 
 RESTART = 0.1  # s, by which a clock must go back to be one that was set back
@@ -53,60 +53,105 @@ class ControllerSettings(NamedTuple):
     """How the controller is run as a node.
 
     Attributes:
-        output: `input`, `newtons` or `pulses` (an array, one number per thruster), or `wrench`.
-        rate: control steps per second; None for the scenario's.
         max_age: s, of the newest odometry, until zero thrust is commanded; also of a stamp, until it is ignored.
         use_sim_time: whether the time is that of /clock.
         topics, frames: names.
     """
 
-    output: str = "input"
-    rate: float | None = None
     max_age: float = 0.5
     use_sim_time: bool = False
     topics: Topics = Topics()
     frames: Frames = Frames()
 
 
-class ControllerNode:
-    """The controller of a scenario, connected to a link.
+class CompiledController:
+    """The controller of a scenario, compiled, with its output.
+
+    Commands are limited to what the thrusters can give, so that the law adapts to what is applied; a battery counts as
+    full.
 
     Args:
-        scenario: a .yaml file or an earlier run.nc.
-        link: participant.
-        settings: see there.
-        reporter: told of what happens.
+        scenario: a .yaml file or an earlier run.nc, of a vehicle.
+        output: `input`, `newtons` or `pulses` (one number per thruster), or `wrench`.
+        rate: control steps per second; None for the scenario's.
         allow_code: whether the Python code that an earlier run.nc names may run.
+
+    Attributes:
+        autopilot: it gives inputs.
+        output: as given.
+        thrusters: how many.
+        label: of an array of outputs.
 
     Raises:
         BadInput: something given cannot be used.
     """
 
-    def __init__(
-        self, scenario: Path, link: Link, settings: ControllerSettings, reporter: Reporter, allow_code: bool = False
-    ):
-        if settings.rate is not None:
-            checks.positive("rate", settings.rate, "Hz")
-        checks.positive("max_age", settings.max_age, "s", finite=False)
+    def __init__(self, scenario: Path, output: str = "input", rate: float | None = None, allow_code: bool = False):
+        if rate is not None:
+            checks.positive("rate", rate, "Hz")
         built = build(read(scenario, allow_code=allow_code))
         check_vehicle(built)
-        period = built.scenario.loop.dt if settings.rate is None else 1 / settings.rate
-        self._autopilot = Autopilot(
-            scenario, sampling_time=period, attitude="quaternion", velocity="body", allow_code=allow_code
+        plant, law = built.closed_loop.plant, built.closed_loop.controller
+        self.autopilot = Autopilot(
+            scenario,
+            sampling_time=None if rate is None else 1 / rate,
+            attitude="quaternion",
+            velocity="body",
+            allow_code=allow_code,
         )
-        self._period = round(period * SECOND)
+        self.output, self.thrusters = output, plant.inputs()
+        with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
+            conversion = output_of(output, plant, law, None)
+            self.label = thruster_label(conversion.unit)
+            self._conversion = step_of(_limited, conversion, (), jnp.zeros(self.thrusters))
+
+    def limited(self, u: NDArray) -> tuple[NDArray, NDArray]:
+        """An input as far as the thrusters can give it, and the same as output."""
+        put(self._conversion.inputs, u)
+        self._conversion()
+        applied, values = self._conversion.outputs
+        return applied.copy(), values.copy()
+
+
+def _limited(output: Output, _: Any, u: Any):
+    applied = output.plant.admissible(output.plant.initial_state(), u)
+    return (), (applied, output.of(applied))
+
+
+class ControllerNode:
+    """A controller, connected to a link.
+
+    Args:
+        controller: compiled.
+        link: participant.
+        settings: see there.
+        reporter: gets what happens.
+
+    Attributes:
+        topic: of the commands.
+
+    Raises:
+        BadInput: something given cannot be used.
+    """
+
+    def __init__(self, controller: CompiledController, link: Link, settings: ControllerSettings, reporter: Reporter):
+        checks.positive("max_age", settings.max_age, "s", finite=False)
+        self._controller, self._autopilot = controller, controller.autopilot
+        self._period = round(self._autopilot.sampling_time * SECOND)
         self._settings, self._link, self._reporter = settings, link, reporter
-        self._conversion = _Conversion(built, settings.output)
         topics = settings.topics
         self._odometry = link.subscriber(topics.odom, ros.Odometry)
         self._targets = link.subscriber(topics.target_pose, ros.PoseStamped)
         self._clock = link.subscriber(topics.clock, ros.Clock) if settings.use_sim_time else None
-        topic, kind = (topics.wrench, ros.WrenchStamped) if settings.output == "wrench" else (topics.thrusters, None)
-        self._commands: Any = link.publisher(topic, kind or ros.Float64MultiArray)
+        if controller.output == "wrench":
+            self._commands: Any = link.publisher(topics.wrench, ros.WrenchStamped)
+        else:
+            self._commands = link.publisher(topics.thrusters, ros.Float64MultiArray)
+        self.topic = self._commands.topic
         link.now = self._now
         self._simulated: int | None = None  # time of /clock, ns
         self._last: int | None = None  # stamp of the last step, ns; None before the start
-        self._applied, self._target = np.zeros(built.closed_loop.plant.inputs()), None
+        self._applied, self._target = np.zeros(controller.thrusters), None
         self._stopped = False  # whether zero thrust was commanded since the last step
         self._heartbeat = 0  # time of the last command, ns
         self._explained = time.monotonic()
@@ -211,11 +256,11 @@ class ControllerNode:
 
     def _publish(self, u: NDArray) -> None:
         """Send an input, as far as the thrusters can give it, in the form of the output."""
-        self._applied, values = self._conversion(u)
-        if self._settings.output == "wrench":
+        self._applied, values = self._controller.limited(u)
+        if self._controller.output == "wrench":
             self._commands.publish(wrench_of(values, stamp_of(self._now()), self._settings.frames))
         else:
-            self._commands.publish(thrusters_of(values, self._conversion.label))
+            self._commands.publish(thrusters_of(values, self._controller.label))
 
     def _watch(self) -> None:
         """Command zero thrust while there is no odometry; explain why there has been none yet."""
@@ -230,28 +275,3 @@ class ControllerNode:
             self._reporter.trouble("stopped", why)
             self._publish(np.zeros_like(self._applied))
             self._stopped, self._heartbeat = True, self._now()
-
-
-class _Conversion:
-    """Compiled: an input -> the input as far as the thrusters can give it, and the same as output.
-
-    The law then adapts to what is applied. A battery counts as full.
-    """
-
-    def __init__(self, built: Built, kind: str):
-        plant, controller = built.closed_loop.plant, built.closed_loop.controller
-        with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
-            output = output_of(kind, plant, controller, None)
-            self.label = thruster_label(output.unit)
-            self._step = step_of(_limited, output, (), jnp.zeros(plant.inputs()))
-
-    def __call__(self, u: NDArray) -> tuple[NDArray, NDArray]:
-        put(self._step.inputs, u)
-        self._step()
-        applied, values = self._step.outputs
-        return applied.copy(), values.copy()
-
-
-def _limited(output: Output, _: Any, u: Any):
-    applied = output.plant.admissible(output.plant.initial_state(), u)
-    return (), (applied, output.of(applied))

@@ -63,7 +63,9 @@ class SimulatedVehicle:
 
     Attributes:
         sampling_time: s.
+        duration: of the scenario, s.
         thrusters: how many.
+        input_unit: of their inputs.
         backend: `simd` or `xla`.
 
     Raises:
@@ -75,7 +77,8 @@ class SimulatedVehicle:
         check_vehicle(built)
         period = settings.dt if sampling_time is None else sampling_time
         checks.positive("sampling_time", period, "s")
-        self.sampling_time, self.thrusters = float(period), loop.plant.inputs()
+        self.sampling_time, self.duration = float(period), settings.duration
+        self.thrusters, self.input_unit = loop.plant.inputs(), loop.plant.input_unit
         self._method, self._substeps = METHODS[settings.method], settings.substeps
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             self._compile(loop, built)

@@ -20,7 +20,6 @@ from undertow.interop.ros2.link import Link, why_nothing
 from undertow.interop.ros2.node import WAIT, Reporter, Topics
 from undertow.interop.ros2.simulated_vehicle import Observed, SimulatedVehicle
 from undertow.interop.ros2.to_messages import imu_of, odometry_of, stamp_of
-from undertow.scenario.build import Built
 
 PACES = ("real-time", "lock-step", "fast")
 
@@ -32,7 +31,6 @@ class VehicleSettings(NamedTuple):
 
     Attributes:
         pace: `real-time`, `lock-step` or `fast`.
-        rate: control steps per second; None for the scenario's.
         duration: s, simulated; None for the scenario's.
         max_age: s, without a command, until no input is applied.
         patience: s, for which `lock-step` waits for a controller, or for a command.
@@ -40,7 +38,6 @@ class VehicleSettings(NamedTuple):
     """
 
     pace: str = "real-time"
-    rate: float | None = None
     duration: float | None = None
     max_age: float = 0.5
     patience: float = 30.0
@@ -49,30 +46,26 @@ class VehicleSettings(NamedTuple):
 
 
 class VehicleNode:
-    """The simulated vehicle of a scenario, connected to a link.
+    """A simulated vehicle, connected to a link.
 
     Args:
-        built: the scenario.
+        vehicle: compiled.
         link: participant.
         settings: see there.
-        reporter: told of what happens.
+        reporter: gets what happens.
 
     Raises:
         BadInput: something given cannot be used.
     """
 
-    def __init__(self, built: Built, link: Link, settings: VehicleSettings, reporter: Reporter):
+    def __init__(self, vehicle: SimulatedVehicle, link: Link, settings: VehicleSettings, reporter: Reporter):
         checks.choice("pace", settings.pace, PACES)
-        for name in ("rate", "duration"):
-            if getattr(settings, name) is not None:
-                checks.positive(name, getattr(settings, name), finite=name == "rate")
         for name in ("max_age", "patience"):
             checks.positive(name, getattr(settings, name), "s", finite=False)
-        self._vehicle = SimulatedVehicle(built, None if settings.rate is None else 1 / settings.rate)
-        duration = built.scenario.loop.duration if settings.duration is None else settings.duration
-        self._steps = duration / self._vehicle.sampling_time if duration == np.inf else self._rounded(duration)
+        self._vehicle = vehicle
+        self._steps = self._steps_of(vehicle.duration if settings.duration is None else settings.duration)
         self._settings, self._link, self._reporter = settings, link, reporter
-        self._label = thruster_label(built.closed_loop.plant.input_unit)
+        self._label = thruster_label(vehicle.input_unit)
         topics = settings.topics
         self._commands = link.subscriber(topics.thrusters, ros.Float64MultiArray)
         self._clock = link.publisher(topics.clock, ros.Clock)
@@ -106,12 +99,14 @@ class VehicleNode:
         counts = f"{self._odometry.sent} odometry, {self._commands.received} commands"
         return f"{self._time / SECOND:.1f} s simulated, {counts}{malformed}{self._reporter.events()}"
 
-    def _rounded(self, duration: float) -> int:
-        steps = round(duration / self._vehicle.sampling_time)
-        if steps < 1:
+    def _steps_of(self, duration: float) -> float:
+        """Number of control steps; infinite for a run without end."""
+        checks.positive("duration", duration, "s", finite=False)
+        steps = duration / self._vehicle.sampling_time
+        if steps < 0.5:
             must = f"be at least one control step ({self._vehicle.sampling_time:g} s)"
             raise BadInput("duration", must, f"{duration:g} s")
-        return steps
+        return steps if steps == np.inf else round(steps)
 
     def _publish(self, observed: Observed, k: int) -> None:
         """Send the time, then what is observed at it."""
