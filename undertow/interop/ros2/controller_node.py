@@ -44,7 +44,6 @@ from undertow.scenario.reading import read
 
 RESTART = 0.1  # s, by which a clock must go back to be one that was set back
 
-_DUE = 0.75  # sampling times after which a measurement is used; odometry may come faster than the controller steps
 _EXACT = 2  # ns, within which stamps are one sampling time apart
 _ABSENT = 3.0  # s, after which missing odometry is explained
 
@@ -151,6 +150,7 @@ class ControllerNode:
         link.now = self._now
         self._simulated: int | None = None  # time of /clock, ns
         self._last: int | None = None  # stamp of the last step, ns; None before the start
+        self._arrived = 0  # stamp of the last odometry, ns
         self._applied, self._target = np.zeros(controller.thrusters), None
         self._stopped = False  # whether zero thrust was commanded since the last step
         self._heartbeat = 0  # time of the last command, ns
@@ -218,15 +218,17 @@ class ControllerNode:
         stamp, topic = nanoseconds_of(message.header.stamp), self._odometry.topic
         motion = motion_of(message, self._settings.frames, topic)
         self._check_age(stamp, topic)
+        before, self._arrived = self._arrived, stamp
         passed = None if self._last is None else stamp - self._last
         if passed is not None and passed < -RESTART * SECOND:
             back = f"{topic} went back in time by {-passed / SECOND:g} s: the controller starts again"
             self._reporter.trouble("restarts", back)
             passed = None
-        if passed is not None and passed <= 0:
+        if passed is not None and stamp <= before:
+            self._arrived = before
             self._reporter.trouble("out of order", f"{topic} has stamps that do not increase. Those are ignored")
             return
-        if passed is not None and passed < _DUE * self._period:
+        if passed is not None and passed + (stamp - before) / 2 < self._period:  # the next one is nearer to a step
             self._reporter.counts["odometry between steps"] += 1
             return
         command = self._start(motion) if passed is None else self._step(motion, passed)

@@ -6,7 +6,6 @@ waits on a WaitSet; polling would cost milliseconds.
 
 import contextlib
 import functools
-import gc
 import re
 import time
 from collections.abc import Callable, Iterator
@@ -145,11 +144,10 @@ class Link:
         self.close()
 
     def close(self) -> None:
-        """Leave the domain."""
-        self._kept.clear()
-        self._writers.clear()
-        self._waiting = self._announced = self._participant = None
-        gc.collect()  # entities of CycloneDDS end with their Python objects, which refer to each other
+        """Leave the domain: the participant ends, with all that was made of it."""
+        participant, self._participant = self._participant, None
+        if participant is not None:
+            participant.__del__()  # CycloneDDS has no other way; references among its objects keep them alive
 
     def publisher(self, topic: str, kind: type[Message]) -> Outlet[Message]:
         """A publisher of a topic.
@@ -210,15 +208,14 @@ class Link:
 
 def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
     """Why nothing arrives at a subscriber, in a sentence."""
-    there = link.topics()
+    there, expected = link.topics(), ros_type(kind)
+    if inlet.topic in there and there[inlet.topic] != expected:
+        return f"{inlet.topic} is published as {there[inlet.topic]}, but {expected} is expected"
     if inlet.incompatible():
         return (
             f"{inlet.topic} is published with another quality of service than is asked for. "
             "Use --reliability best-effort"
         )
-    expected = ros_type(kind)
-    if inlet.topic in there and there[inlet.topic] != expected:
-        return f"{inlet.topic} is published as {there[inlet.topic]}, but {expected} is expected"
     if inlet.publishers():
         return f"{inlet.topic} has a publisher that sends nothing"
     alike = sorted(name for name, one in there.items() if one == expected)
