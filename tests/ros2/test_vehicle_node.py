@@ -151,7 +151,7 @@ def test_what_a_vehicle_node_cannot_be_made_of(vehicle, domain):
         for settings, said in cases:
             with pytest.raises(BadInput, match=said):
                 VehicleNode(vehicle, link, VehicleSettings(**settings), Reporter(Said()))
-    with pytest.raises(BadInput, match="`loop.kind` must be sampled"):
+    with pytest.raises(BadInput, match=r"`loop\.kind` must be sampled"):
         SimulatedVehicle(build(SCENARIO | {"loop": {"kind": "continuous", "dt": 0.01, "record": 0.01}}))
     with pytest.raises(BadInput, match=r"`command` must have shape \(8,\)"):
         vehicle.step(np.zeros(3))
