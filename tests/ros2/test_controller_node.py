@@ -216,6 +216,17 @@ def test_faster_odometry_is_taken_once_per_step(setup):
     assert found == 6  # at 1, 1.05, ... 1.25
 
 
+def test_missing_odometry_is_explained(setup, monkeypatch):
+    """Once, and again where the reason changes."""
+    monkeypatch.setattr("undertow.interop.ros2.controller_node._ABSENT", 0.05)
+    node, peer, said = setup()
+    nothing(node, peer)
+    assert said.warnings == ["Warning: /odom has a publisher that sends nothing"]
+    peer.link.close()
+    nothing_more = "Warning: nobody publishes /odom (nav_msgs/msg/Odometry). Is the domain right?"
+    until(lambda: node.spin(0.02) or said.warnings[1:] == [nothing_more])
+
+
 def test_a_text_that_is_none_costs_one_message(setup):
     """CycloneDDS checks lengths before it gives a message to anybody, but not that a text is UTF-8."""
     node, peer, _ = setup(use_sim_time=True)
@@ -238,6 +249,30 @@ def test_a_wrench_in_ros_axes(scenario, setup):
     expected = autopilot.start(AWAY.position, AWAY.velocity, AWAY.quaternion) * [1, -1, -1, 1, -1, -1]
     np.testing.assert_allclose(given, expected, rtol=1e-9, atol=1e-9)
     assert found[0].header.frame_id == "base_link"
+
+
+@pytest.mark.parametrize("output, label", [("newtons", "thrusters [N]"), ("pulses", "thrusters [us]")])
+def test_other_outputs_are_those_of_an_autopilot(scenario, autopilot, output, label):
+    """Of the limited input: 24 V give the thrust that 100 V give."""
+    controller = CompiledController(scenario, output)
+    assert controller.label == label
+    other = ut.Autopilot(scenario, attitude="quaternion", output=output)
+    at = AWAY.position, AWAY.velocity, AWAY.quaternion
+    _, values = controller.limited(autopilot.start(*at))
+    np.testing.assert_allclose(values, other.start(*at), rtol=1e-12)
+    np.testing.assert_array_equal(controller.limited(np.full(8, 100.0))[0], np.full(8, 24.0))
+    np.testing.assert_array_equal(controller.limited(np.full(8, 100.0))[1], controller.limited(np.full(8, 24.0))[1])
+    stop = controller.limited(np.zeros(8))[1]
+    np.testing.assert_array_equal(stop, np.full(8, 1500.0 if output == "pulses" else 0.0))
+
+
+def test_a_clock_of_any_quality_of_service_is_taken(setup, domain):
+    node, _, _ = setup(use_sim_time=True)
+    with Link(domain, True, "best-effort") as other:
+        clock = other.publisher("/clock", ros.Clock)
+        until(clock.subscribers)
+        clock.publish(ros.Clock(ros.Time(7, 0)))
+        until(lambda: node.spin(0.01) or node._now() == 7_000_000_000)
 
 
 def test_why_nothing_arrives(domain):

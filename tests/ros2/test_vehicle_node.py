@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from peer import Running, Said, until
 
+import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.interop.ros2 import messages as ros
@@ -82,6 +83,20 @@ def test_lock_step_waits_for_each_command(setup, vehicle):
     assert imu.header.frame_id == "base_link" and nanoseconds_of(imu.header.stamp) == stamps[-1]
 
 
+def test_a_command_before_the_odometry_is_no_answer_to_it(setup, vehicle):
+    node, other, said = setup(pace="lock-step", duration=0.05)
+    other.thrusters.publish(thrusters_of(np.full(8, 1.0), ""))
+    until(lambda: node._link.wait(0.0))
+    running, seen = Running(node.run), []
+    for _ in range(2):
+        seen += until(other.odometry.take)
+        other.thrusters.publish(thrusters_of(VOLTS, ""))
+    running.join(10)
+    vehicle.start()
+    np.testing.assert_array_equal(positions(seen)[1], vehicle.step(VOLTS).position)
+    assert said.warnings == ["Warning: a command came before its odometry: it is ignored"]
+
+
 def test_without_a_controller_it_drifts_with_the_current(setup, vehicle):
     node, other, said = setup(pace="fast", duration=0.4)
     assert node.run() is Status.OK
@@ -89,6 +104,17 @@ def test_without_a_controller_it_drifts_with_the_current(setup, vehicle):
     expected = [vehicle.start().position, *(vehicle.step(np.zeros(8)).position for _ in range(8))]
     np.testing.assert_array_equal(found, expected)
     assert found[-1, 0] > 0 and not said.warnings
+
+
+def test_a_vehicle_that_leaves_the_envelope_ends_the_run(domain):
+    """A kilometre from the origin numbers are taken for an error, as in a simulation."""
+    away = {"initial": {"position": [999.9, 0, 0, 0, 0, 0], "velocity": [5, 0, 0, 0, 0, 0]}}
+    vehicle = SimulatedVehicle(build(SCENARIO | away))
+    with Link(domain, True) as link:
+        node = VehicleNode(vehicle, link, VehicleSettings("fast"), Reporter(Said()))
+        status = node.run()
+    assert status is Status(int(ut.simulate_scenario(SCENARIO | away).status)) and status is not Status.OK
+    assert node.status().startswith("0.1 s simulated")
 
 
 def test_real_time_is_that_of_this_machine(setup):

@@ -141,7 +141,9 @@ class ControllerNode:
         topics = settings.topics
         self._odometry = link.subscriber(topics.odom, ros.Odometry)
         self._targets = link.subscriber(topics.target_pose, ros.PoseStamped)
-        self._clock = link.subscriber(topics.clock, ros.Clock) if settings.use_sim_time else None
+        # Of any publisher: ROS 2's own quality of service of a clock is not reliable.
+        clock = lambda: link.subscriber(topics.clock, ros.Clock, "best-effort")
+        self._clock = clock() if settings.use_sim_time else None
         if controller.output == "wrench":
             self._commands: Any = link.publisher(topics.wrench, ros.WrenchStamped)
         else:
@@ -268,7 +270,8 @@ class ControllerNode:
         """Command zero thrust while there is no odometry; explain why there has been none yet."""
         if self._last is None:
             if time.monotonic() > self._explained + _ABSENT:
-                self._reporter.trouble("waiting", why_nothing(self._link, self._odometry, ros.Odometry))
+                why = why_nothing(self._link, self._odometry, ros.Odometry)
+                self._reporter.warn(why, why)
                 self._explained = time.monotonic()
             return
         silent = self._now() - self._heartbeat

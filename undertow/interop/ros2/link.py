@@ -160,13 +160,19 @@ class Link:
         self._writers.append(writer)
         return Outlet(self, topic, writer)
 
-    def subscriber(self, topic: str, kind: type[Message]) -> Inlet[Message]:
+    def subscriber(self, topic: str, kind: type[Message], reliability: str | None = None) -> Inlet[Message]:
         """A subscriber of a topic, for whose messages `wait` waits.
+
+        Args:
+            topic: its name in ROS 2.
+            kind: type of its messages.
+            reliability: None for that of the link; `best-effort` takes messages of any publisher.
 
         Raises:
             BadInput: no name of a topic.
         """
-        reader = DataReader(self._participant, self._topic(topic, kind), self._qos)
+        qos = self._qos if reliability is None else _quality(reliability)
+        reader = DataReader(self._participant, self._topic(topic, kind), qos)
         condition = ReadCondition(reader, ViewState.Any | SampleState.NotRead | InstanceState.Any)
         self._waiting.attach(condition)
         self._kept += [reader, condition]
@@ -187,9 +193,9 @@ class Link:
         """Topics that are published in the domain, and their types in ROS 2."""
         found = {}
         for one in self._announced.read(1000):
-            name, kind = getattr(one, "topic_name", ""), getattr(one, "type_name", "")
-            if name.startswith("rt/"):
-                found[name[2:]] = kind.replace("::msg::dds_::", "/msg/").removesuffix("_")
+            name = getattr(one, "topic_name", None)  # None of a publisher that has left
+            if name is not None and name.startswith("rt/"):
+                found[name[2:]] = one.type_name.replace("::msg::dds_::", "/msg/").removesuffix("_")
         return found
 
     def record(self, topic: str, message: Any) -> None:

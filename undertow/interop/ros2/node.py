@@ -58,12 +58,16 @@ class Reporter:
         """Print a line."""
         self._say(sentence)
 
-    def trouble(self, event: str, sentence: str) -> None:
-        """Count an event; the first one of its kind is explained."""
-        self.counts[event] += 1
+    def warn(self, event: str, sentence: str) -> None:
+        """Explain an event, if it is the first one of its kind."""
         if event not in self._said:
             self._said.add(event)
             self._say(f"Warning: {' '.join(sentence.split())}")
+
+    def trouble(self, event: str, sentence: str) -> None:
+        """Count an event; the first one of its kind is explained."""
+        self.counts[event] += 1
+        self.warn(event, sentence)
 
     def over(self, event: str) -> None:
         """An event has ended: the next one of its kind is explained again."""

@@ -82,6 +82,8 @@ class VehicleNode:
             self._await_controller()
         observed, k, begun = self._vehicle.start(), 0, time.monotonic()
         while True:
+            if lock_step and self._commands.take():
+                self._reporter.trouble("unasked commands", "a command came before its odometry: it is ignored")
             self._publish(observed, k)
             self._reporter.status(self.status)
             if lock_step:
