@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from cyclonedds._clayer import ddspy_write
 from peer import STILL, Peer, Said, until
+from random_messages import random_message
 
 import undertow as ut
 from undertow.core.errors import BadInput
@@ -178,6 +179,46 @@ def test_time_that_goes_back_starts_the_controller_again(setup, by_clock):
     np.testing.assert_array_equal(answers(node, peer)[0], first)
     name = "/clock" if by_clock else "/odom"
     assert len(said.warnings) == 1 and name in said.warnings[0] and "the controller starts again" in said.warnings[0]
+
+
+def test_zero_thrust_after_the_clock_went_back_and_odometry_stopped(setup):
+    """In simulated time; and a clock before zero is ignored."""
+    node, peer, said = setup(use_sim_time=True)
+    peer.tell_time(10.0)
+    peer.send(10.0, AWAY)
+    assert answers(node, peer)[0].any()
+    peer.clock.publish(ros.Clock(ros.Time(-5, 0)))
+    peer.tell_time(2.0)
+    nothing(node, peer)
+    peer.tell_time(2.6)
+    assert not answers(node, peer)[0].any()
+    assert [("/clock is at -5 s" in one, "back by 8 s" in one, "zero thrust" in one) for one in said.warnings] == [
+        (True, False, False),
+        (False, True, False),
+        (False, False, True),
+    ]
+
+
+def test_numbers_of_any_size_harm_nobody(setup):
+    """Random fields in the right frames; commands stay finite."""
+    node, peer, _ = setup(use_sim_time=True)
+    chance, sent = np.random.default_rng(9), 0
+    peer.send(0.0)
+    commands = answers(node, peer)
+    for _ in range(300):
+        message = random_message(ros.Odometry, chance)
+        message.header.frame_id, message.child_frame_id = "odom", "base_link"
+        if chance.random() < 0.8:
+            message.header.stamp = ros.Time(sent := sent + 1, 0)
+            quaternion = chance.normal(size=4)
+            message.pose.pose.orientation = ros.Quaternion(*(quaternion / np.linalg.norm(quaternion)).tolist())
+        peer.odometry.publish(message)
+        target = random_message(ros.PoseStamped, chance)
+        target.header.frame_id = "map"
+        peer.target.publish(target)
+        node.spin(0.01)
+        commands += [np.array(one.data) for one in peer.commands.take()]
+    assert len(commands) > 100 and np.isfinite(commands).all()
 
 
 def test_zero_thrust_while_there_is_no_odometry(setup):

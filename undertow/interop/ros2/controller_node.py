@@ -155,7 +155,7 @@ class ControllerNode:
         self._arrived = 0  # stamp of the last odometry, ns
         self._applied, self._target = np.zeros(controller.thrusters), None
         self._stopped = False  # whether zero thrust was commanded since the last step
-        self._heartbeat = 0  # time of the last command, ns
+        self._heartbeat: int | None = None  # when odometry was last used; ns, by `_elapsed`
         self._explained = time.monotonic()
 
     def run(self, duration: float = np.inf) -> None:
@@ -199,14 +199,25 @@ class ControllerNode:
         """Time, ns: of /clock where that is used and there is one."""
         return time.time_ns() if self._simulated is None else self._simulated
 
+    def _elapsed(self) -> int:
+        """Time by which silence is measured, ns: setting the clock of this machine does not change it."""
+        return time.monotonic_ns() if self._simulated is None else self._simulated
+
     def _take_clock(self) -> None:
         for message in self._clock.take() if self._clock else ():
-            now = nanoseconds_of(message.clock)
-            if self._simulated is not None and now < self._simulated - RESTART * SECOND:
-                back = (self._simulated - now) / SECOND
-                self._reporter.trouble("restarts", f"/clock went back by {back:g} s: the controller starts again")
-                self._last = None
+            now, before = nanoseconds_of(message.clock), self._simulated
+            if now < 0:
+                self._reporter.trouble(
+                    "ignored (/clock)", f"/clock is at {now / SECOND:g} s, before zero: it is ignored"
+                )
+                continue
             self._simulated = now
+            if before is None or now < before - RESTART * SECOND:
+                self._heartbeat = None if self._heartbeat is None else now
+            if before is not None and now < before - RESTART * SECOND:
+                back = f"/clock went back by {(before - now) / SECOND:g} s: the controller starts again"
+                self._reporter.trouble("restarts", back)
+                self._last = None
 
     def _take_targets(self) -> None:
         for message in self._targets.take():
@@ -235,7 +246,7 @@ class ControllerNode:
             return
         command = self._start(motion) if passed is None else self._step(motion, passed)
         self._publish(command)
-        self._last, self._stopped, self._heartbeat = stamp, False, self._now()
+        self._last, self._stopped, self._heartbeat = stamp, False, self._elapsed()
         self._reporter.over("stopped")
 
     def _start(self, motion: PoseAndVelocity) -> NDArray:
@@ -268,15 +279,13 @@ class ControllerNode:
 
     def _watch(self) -> None:
         """Command zero thrust while there is no odometry; explain why there has been none yet."""
-        if self._last is None:
+        if self._heartbeat is None:
             if time.monotonic() > self._explained + _ABSENT:
                 why = why_nothing(self._link, self._odometry, ros.Odometry)
                 self._reporter.warn(why, why)
                 self._explained = time.monotonic()
-            return
-        silent = self._now() - self._heartbeat
-        if silent > self._settings.max_age * SECOND:
+        elif self._elapsed() - self._heartbeat > self._settings.max_age * SECOND:
             why = f"no odometry that can be used for {self._settings.max_age:g} s: zero thrust until there is some"
             self._reporter.trouble("stopped", why)
             self._publish(np.zeros_like(self._applied))
-            self._stopped, self._heartbeat = True, self._now()
+            self._stopped, self._heartbeat = True, self._elapsed()

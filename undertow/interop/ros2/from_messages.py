@@ -137,7 +137,7 @@ def _attitude(given: Any, topic: str) -> NDArray:
     numbers = np.array([given.w, given.x, given.y, given.z])
     if not np.isfinite(numbers).all():
         return np.full(4, np.nan)
-    square = float(numbers @ numbers)
+    square = sum(one * one for one in numbers.tolist())
     if not abs(square - 1) < _UNIT:
         must = "be of unit length"
         raise BadInput(f"{topic} orientation", must, f"{numbers.tolist()} (w, x, y, z), of length {square**0.5:.4g}")

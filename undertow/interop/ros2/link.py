@@ -191,12 +191,14 @@ class Link:
 
     def topics(self) -> dict[str, str]:
         """Topics that are published in the domain, and their types in ROS 2."""
-        found = {}
+        there: dict[Any, Any] = {}
         for one in self._announced.read(1000):
-            name = getattr(one, "topic_name", None)  # None of a publisher that has left
-            if name is not None and name.startswith("rt/"):
-                found[name[2:]] = one.type_name.replace("::msg::dds_::", "/msg/").removesuffix("_")
-        return found
+            there[one.key] = one  # without names where the publisher has left
+        return {
+            one.topic_name[2:]: one.type_name.replace("::msg::dds_::", "/msg/").removesuffix("_")
+            for one in there.values()
+            if (one.topic_name or "").startswith("rt/")
+        }
 
     def record(self, topic: str, message: Any) -> None:
         """Write a message into the bag, where there is one."""
