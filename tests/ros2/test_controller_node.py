@@ -1,10 +1,12 @@
 """The controller as a node: what it answers, and what it does when a message, the clock or the link is wrong."""
 
+import socket
 import time
 
 import numpy as np
 import pytest
 from cyclonedds._clayer import ddspy_write
+from cyclonedds.core import Policy
 from peer import STILL, Peer, Said, until
 from random_messages import random_message
 
@@ -219,6 +221,27 @@ def test_numbers_of_any_size_harm_nobody(setup):
         node.spin(0.01)
         commands += [np.array(one.data) for one in peer.commands.take()]
     assert len(commands) > 100 and np.isfinite(commands).all()
+
+
+def test_datagrams_that_are_no_rtps_harm_nobody(setup, domain):
+    """Random bytes, with and without the header of the protocol, to the ports of the first participants (RTPS 9.6.1)."""
+    node, peer, _ = setup(use_sim_time=True)
+    chance = np.random.default_rng(10)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        for _ in range(1000):
+            head = b"RTPS\x02\x03" * bool(chance.random() < 0.7)
+            port = 7400 + 250 * domain + 10 + int(chance.integers(0, 8))
+            out.sendto(head + chance.bytes(chance.integers(0, 400)), ("127.0.0.1", port))
+    peer.send(1.0)
+    assert np.isfinite(answers(node, peer)[0]).all()
+
+
+def test_a_publisher_announces_the_hash_of_its_type(setup):
+    """As `ros2 topic info --verbose` shows it."""
+    _, peer, _ = setup(use_sim_time=True)
+    announced = {one.topic_name: one.qos[Policy.Userdata].data for one in peer.link._announced.read(100) if one.qos}
+    assert announced["rt/thrusters"] == f"typehash={ros.type_hash(ros.Float64MultiArray)};".encode()
+    assert announced["rt/odom"] == f"typehash={ros.type_hash(ros.Odometry)};".encode()
 
 
 def test_zero_thrust_while_there_is_no_odometry(setup):
