@@ -85,6 +85,18 @@ def test_a_domain_that_is_no_number(scenario, capsys, monkeypatch):
     assert "`ROS_DOMAIN_ID` must be a whole number, but is 'home'" in capsys.readouterr().err
 
 
+def test_a_network_that_is_not_there(scenario):
+    """In a process of its own: CycloneDDS reads its configuration once."""
+    interfaces = "<Interfaces><NetworkInterface name='nowhere0'/></Interfaces>"
+    uri = f"<CycloneDDS><Domain><General>{interfaces}</General></Domain></CycloneDDS>"
+    environment = os.environ | {"CYCLONEDDS_URI": uri}
+    command = [sys.executable, "-m", "undertow.cli.main", "ros2", "odin.yaml", "--domain", "3", "--duration", "1"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("Error: No DDS participant could be made in domain 3: ") and "CYCLONEDDS_URI" in last
+
+
 def test_without_cyclonedds(scenario, capsys, monkeypatch):
     """As where the extra is not installed."""
     for name in [name for name in sys.modules if name.startswith("undertow.interop.ros2")]:

@@ -72,16 +72,25 @@ def test_a_topic_in_another_frame_is_left_out(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         for name, frame in (("/good", "map"), ("/wrong", "world_ned")):
             bag.write(name, ros.PoseStamped(ros.Header(ros.Time(), frame)), 1_000_000_000)
-    with pytest.warns(UserWarning, match=r"Left out: `/wrong header.frame_id` must be .*, but is 'world_ned'"):
+    said = r"Left out: 1 messages of /wrong. The first: `/wrong header.frame_id` must be .*, but is 'world_ned'"
+    with pytest.warns(UserWarning, match=said):
         found = read_rosbag2(tmp_path / "bag")
     assert found.keys() == {"/good/pose"} and found["/good/pose"][0].tolist() == [1.0]
     assert read_rosbag2(tmp_path / "bag", frames=Frames(("map", "world_ned"))).keys() == {"/good/pose", "/wrong/pose"}
 
 
+def test_a_message_that_cannot_be_used_costs_no_other(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        for x in (1.0, np.nan, 3.0):
+            bag.write("/t", ros.PoseStamped(ros.Header(ros.Time(), "map"), ros.Pose(ros.Point(x))), 10**9)
+    with pytest.warns(UserWarning, match="Left out: 1 messages of /t"):
+        assert read_rosbag2(tmp_path / "bag")["/t/pose"][1][:, 1].tolist() == [1.0, 3.0]
+
+
 def test_topics_are_chosen(run, tmp_path):
     write_rosbag2(run, tmp_path / "bag")
     assert read_rosbag2(tmp_path / "bag", ["/thrusters"]).keys() == {"/thrusters"}
-    with pytest.raises(BadInput, match="must have messages of /nothing"):
+    with pytest.raises(BadInput, match="must have messages that can be used of /nothing"):
         read_rosbag2(tmp_path / "bag", ["/nothing"])
 
 

@@ -30,8 +30,8 @@ def read_rosbag2(
     Args:
         path: folder of the bag, of either storage.
         topics: those that are read; None for all of the types below.
-        frames: names of the frames whose axes are those of REP 103. A topic in another frame is left out, with a
-            warning.
+        frames: names of the frames whose axes are those of REP 103. Messages in another frame, and others that cannot
+            be used, are left out, with a warning. Readings of an IMU are in the axes of its own frame.
 
     Returns:
         Name -> (times, s, at which the bag has it; values, a row each). Odometry /t gives `/t/position` (north, east,
@@ -42,24 +42,23 @@ def read_rosbag2(
     Raises:
         BadInput: no bag is there, it is damaged, or has none of the topics.
     """
-    only, rows = None if topics is None else set(topics), {}
-    left_out: set[str] = set()
+    only = None if topics is None else set(topics)
+    rows: dict[str, list[tuple[float, NDArray]]] = {}
+    refused: dict[str, list[BadInput]] = {}
     for topic, kind, nanoseconds, data in _messages(Path(path), only):
-        if topic in left_out:
-            continue
         try:
             found = _READERS[kind](_decoded(kind, data, topic), frames, topic)
         except BadInput as error:
-            left_out.add(topic)
-            warnings.warn(f"Left out: {error}", stacklevel=2)
+            refused.setdefault(topic, []).append(error)
             continue
         for name, value in found.items():
             rows.setdefault(topic + name, []).append((nanoseconds / SECOND, value))
-    kept = {name: each for name, each in rows.items() if not any(_of(name, topic) for topic in left_out)}
-    if not kept:
+    for topic, errors in refused.items():
+        warnings.warn(f"Left out: {len(errors)} messages of {topic}. The first: {errors[0]}", stacklevel=2)
+    if not rows:
         which = "of " + ", ".join(sorted(only)) if only else f"of the types {', '.join(_READERS)}"
-        raise BadInput(str(path), f"have messages {which}", "without")
-    return {name: _series(name, each) for name, each in kept.items()}
+        raise BadInput(str(path), f"have messages that can be used {which}", "without")
+    return {name: _series(name, each) for name, each in rows.items()}
 
 
 def _messages(path: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
@@ -85,10 +84,6 @@ def _open(path: Path) -> Reader:
     reader = Reader(path)
     reader.open()
     return reader
-
-
-def _of(name: str, topic: str) -> bool:
-    return name == topic or name.startswith(topic + "/")
 
 
 def _series(name: str, rows: list[tuple[float, NDArray]]) -> Series:
