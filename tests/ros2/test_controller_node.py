@@ -339,7 +339,8 @@ def test_a_clock_of_any_quality_of_service_is_taken(setup, domain):
         until(lambda: node.spin(0.01) or node._now() == 7_000_000_000)
 
 
-def test_why_nothing_arrives(domain):
+def test_why_nothing_arrives(empty_domain):
+    domain = empty_domain
     with Link(domain, True) as one, Link(domain, True, "best-effort") as other:
         inlet = one.subscriber("/odom", ros.Odometry)
         why = lambda: why_nothing(one, inlet, ros.Odometry)

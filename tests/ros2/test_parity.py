@@ -52,10 +52,10 @@ def simulated(scenario):
 
 def lock_step(controller, vehicle, domain, folder):
     """Run both nodes, and return what the vehicle's side saw; in its own thread the controller answers."""
-    told, done = Reporter(lambda line: None), threading.Event()
+    quiet, done = Reporter(lambda line: None), threading.Event()
     with BagWriter(folder) as bag, Link(domain, True) as one, Link(domain, True, bag=bag) as other:
-        node = ControllerNode(controller, one, ControllerSettings(use_sim_time=True), told)
-        running = VehicleNode(vehicle, other, VehicleSettings("lock-step"), told)
+        node = ControllerNode(controller, one, ControllerSettings(use_sim_time=True), quiet)
+        running = VehicleNode(vehicle, other, VehicleSettings("lock-step"), quiet)
 
         def answer():
             while not done.is_set():
@@ -68,7 +68,7 @@ def lock_step(controller, vehicle, domain, folder):
         finally:
             done.set()
             thread.join()
-    assert not any(told.counts.values())
+    assert not any(quiet.counts.values())
     return {name: values for name, (_, values) in read_rosbag2(folder).items()}
 
 
