@@ -363,7 +363,7 @@ def test_what_a_node_cannot_be_made_of(scenario, tmp_path, domain):
     speeds.write_text(SCENARIO + "model: {speed_sensor: true}\n")
     cases = [
         (lambda: CompiledController(pendulum), "`plant` must be a vehicle with thrusters"),
-        (lambda: CompiledController(speeds), "`model.speed_sensor` must be false"),
+        (lambda: CompiledController(speeds), r"`model.speed_sensor` must be false: .* \(speeds.yaml, line 6\)"),
         (lambda: CompiledController(scenario, rate=0.0), "`rate` must be positive"),
         (lambda: CompiledController(scenario, "pwm"), "`output` must be one of input, newtons, pulses, wrench"),
         (lambda: Link(233, True), "`domain` must be 0 to 232"),

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, Int
 from undertow.autopilot.numbers import numbers, step_of
 from undertow.core import checks, runtime
 from undertow.core.contracts import Inputs, Outputs, Time
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, within
 from undertow.core.measurement import body_of
 from undertow.loop.closed_loop import ClosedLoop, MeasurementState, Realization
 from undertow.loop.outcome import status_of
@@ -154,9 +154,10 @@ def check_vehicle(built: Built) -> None:
     Raises:
         BadInput: it has not.
     """
-    if not isinstance(built.closed_loop.plant, HybridVehicle):
-        raise BadInput("plant", "be a vehicle with thrusters", built.scenario.plant.kind)
-    if built.scenario.loop.kind != "sampled":
-        raise BadInput("loop.kind", "be sampled", built.scenario.loop.kind)
-    if built.scenario.model.get("speed_sensor"):
-        raise BadInput("model.speed_sensor", "be false: there is no message for the speeds of propellers", "true")
+    with within(location=built.text.location):
+        if not isinstance(built.closed_loop.plant, HybridVehicle):
+            raise BadInput("plant", "be a vehicle with thrusters", built.scenario.plant.kind)
+        if built.scenario.loop.kind != "sampled":
+            raise BadInput("loop.kind", "be sampled", built.scenario.loop.kind)
+        if built.scenario.model.get("speed_sensor"):
+            raise BadInput("model.speed_sensor", "be false: there is no message for the speeds of propellers", "true")
