@@ -1,0 +1,161 @@
+"""rosbag2 of either storage: a run comes back in our axes, rosbags itself reads it, damage is one line."""
+
+import warnings
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+
+import undertow as ut
+from undertow.core.errors import BadInput
+from undertow.interop.ros2 import messages as ros
+from undertow.interop.ros2 import read_rosbag2, to_messages
+from undertow.interop.ros2.from_messages import Frames
+from undertow.interop.ros2.write_bag import STORAGES, BagWriter, write_rosbag2
+from undertow.numerics.rotations import quaternion_from_euler
+
+STILL = {
+    "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "shaft", "supply": 24}},
+    "controller": {"kind": "pid", "frequency": 1.0},
+    "reference": {"kind": "setpoint", "position": [1, 0.5, 0.3, 0, 0, 0.4], "settling": 2},
+    "navigation": {"kind": "white_noise", "position": 0.001, "velocity": 0.01},
+    "loop": {"duration": 1.0, "dt": 0.01, "record": 0.01},
+}
+
+
+@pytest.fixture(scope="module")
+def run():
+    return ut.simulate_scenario(STILL)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_run_comes_back(run, tmp_path, storage):
+    record = run.dataset
+    write_rosbag2(run, tmp_path / "bag", storage)
+    found = read_rosbag2(tmp_path / "bag")
+    for topic, name in (("/odom", "measured_position"), ("/ground_truth", "position")):
+        times, position = found[f"{topic}/position"]
+        np.testing.assert_allclose(times, record["time"].values, atol=1e-9)
+        np.testing.assert_array_equal(position, record[name].values[:, :3])
+        angles = record[name].values[:, 3:]
+        expected = np.array([quaternion_from_euler(one) for one in angles])
+        np.testing.assert_allclose(found[f"{topic}/quaternion"][1], expected, atol=1e-15)
+    np.testing.assert_array_equal(found["/thrusters"][1], record["input"].values)
+    np.testing.assert_allclose(found["/target_pose/pose"][1], record["reference"].values, atol=1e-14)
+    final = run.outcome.final[0]
+    np.testing.assert_allclose(found["/ground_truth/velocity"][1][-1], final.nu, atol=1e-14)
+
+
+def test_a_run_file_is_written_too(run, tmp_path):
+    run.save(tmp_path / "run.nc")
+    write_rosbag2(tmp_path / "run.nc", tmp_path / "bag")
+    np.testing.assert_array_equal(read_rosbag2(tmp_path / "bag")["/thrusters"][1], run.dataset["input"].values)
+
+
+def test_rosbags_reads_what_was_written(run, tmp_path):
+    """By the standard names and definitions that are in the bag, not by this package."""
+    write_rosbag2(run, tmp_path / "bag")
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with Reader(tmp_path / "bag") as reader:
+        kinds = {one.topic: one.msgtype for one in reader.connections}
+        first = next(
+            store.deserialize_cdr(data, one.msgtype) for one, _, data in reader.messages() if one.topic == "/odom"
+        )
+    assert kinds["/odom"] == "nav_msgs/msg/Odometry" and kinds["/clock"] == "rosgraph_msgs/msg/Clock"
+    position = run.dataset["measured_position"].values[0]
+    assert (first.pose.pose.position.x, first.pose.pose.position.z) == (position[1], -position[2])
+    assert (first.header.frame_id, first.child_frame_id) == ("odom", "base_link")
+
+
+def test_a_topic_in_another_frame_is_left_out(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        for name, frame in (("/good", "map"), ("/wrong", "world_ned")):
+            bag.write(name, ros.PoseStamped(ros.Header(ros.Time(), frame)), 1_000_000_000)
+    said = r"Left out: 1 messages of /wrong. The first: `/wrong header.frame_id` must be .*, but is 'world_ned'"
+    with pytest.warns(UserWarning, match=said):
+        found = read_rosbag2(tmp_path / "bag")
+    assert found.keys() == {"/good/pose"} and found["/good/pose"][0].tolist() == [1.0]
+    assert read_rosbag2(tmp_path / "bag", frames=Frames(("map", "world_ned"))).keys() == {"/good/pose", "/wrong/pose"}
+
+
+def test_a_message_that_cannot_be_used_costs_no_other(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        for x in (1.0, np.nan, 3.0):
+            bag.write("/t", ros.PoseStamped(ros.Header(ros.Time(), "map"), ros.Pose(ros.Point(x))), 10**9)
+    with pytest.warns(UserWarning, match="Left out: 1 messages of /t"):
+        assert read_rosbag2(tmp_path / "bag")["/t/pose"][1][:, 1].tolist() == [1.0, 3.0]
+
+
+def test_topics_are_chosen(run, tmp_path):
+    write_rosbag2(run, tmp_path / "bag")
+    assert read_rosbag2(tmp_path / "bag", ["/thrusters"]).keys() == {"/thrusters"}
+    with pytest.raises(BadInput, match="must have messages that can be used of /nothing"):
+        read_rosbag2(tmp_path / "bag", ["/nothing"])
+
+
+def test_wrenches_and_imu_readings_are_read(tmp_path):
+    frames, stamp = Frames(), ros.Time(1, 0)
+    with BagWriter(tmp_path / "bag") as bag:
+        bag.write("/wrench", to_messages.wrench_of(np.arange(6.0), stamp, frames), 10**9)
+        bag.write("/imu", ros.Imu(linear_acceleration=ros.Vector3(1.0, 2.0, 9.81)), 10**9)
+    found = read_rosbag2(tmp_path / "bag")
+    np.testing.assert_array_equal(found["/wrench/wrench"][1], [np.arange(6.0)])
+    np.testing.assert_array_equal(found["/imu/specific_force"][1], [[1.0, -2.0, -9.81]])
+
+
+def test_a_bag_is_complete_after_an_exception(tmp_path):
+    with pytest.raises(KeyboardInterrupt), BagWriter(tmp_path / "bag") as bag:
+        bag.write("/t", ros.Float64MultiArray(data=[1.0]), 10**9)
+        raise KeyboardInterrupt
+    assert read_rosbag2(tmp_path / "bag")["/t"][1].tolist() == [[1.0]]
+
+
+def test_what_is_no_bag(run, tmp_path):
+    with pytest.raises(BadInput, match="must be the folder of a rosbag2, but is without metadata"):
+        read_rosbag2(tmp_path)
+    with pytest.raises(BadInput, match="must be a new folder, but is there already"):
+        write_rosbag2(run, tmp_path)
+    with pytest.raises(BadInput, match="`storage` must be one of mcap, sqlite3"):
+        write_rosbag2(run, tmp_path / "bag", "db3")
+    with BagWriter(tmp_path / "odd") as bag:
+        for data in ([1.0], [1.0, 2.0]):
+            bag.write("/t", ros.Float64MultiArray(data=data), 10**9)
+    with pytest.raises(BadInput, match="`/t` must have arrays of one length, but is 1, 2 long"):
+        read_rosbag2(tmp_path / "odd")
+
+
+def test_a_run_of_something_else(tmp_path):
+    pendulum = {
+        "plant": "inverted_pendulum",
+        "reference": {"kind": "setpoint", "position": [0]},
+        "loop": {"duration": 0.1},
+    }
+    with pytest.raises(BadInput, match="`run` must be of a vehicle"):
+        write_rosbag2(ut.simulate_scenario(pendulum), tmp_path / "bag")
+    assert not (tmp_path / "bag").exists()
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_damaged_bags_are_one_line(run, tmp_path, storage):
+    """Seeded mutations and truncations of the data and of metadata.yaml."""
+    short = run.dataset.isel(time=slice(0, 3))
+    write_rosbag2(short, tmp_path / "bag", storage)
+    files = sorted((tmp_path / "bag").iterdir())
+    whole, chance, refused = {path: path.read_bytes() for path in files}, np.random.default_rng(4), 0
+    for _ in range(150):
+        path = files[chance.integers(len(files))]
+        data = bytearray(whole[path])
+        for place in chance.integers(0, len(data), 1 + chance.integers(8)):
+            data[place] = chance.integers(256)
+        path.write_bytes(data[: chance.integers(len(data))] if chance.random() < 0.4 else data)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                read_rosbag2(tmp_path / "bag")
+        except (BadInput, OSError) as error:
+            refused += 1
+            assert "\n" not in str(error)
+        path.write_bytes(whole[path])
+    assert refused > 30
+    assert read_rosbag2(tmp_path / "bag")["/thrusters"][1].shape == (3, 8)

@@ -1,0 +1,131 @@
+"""Vehicle and controller as nodes, in lock step over the loopback interface, give the run of a simulation."""
+
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import undertow as ut
+from undertow.core.status import Status
+from undertow.interop.ros2 import from_messages, read_rosbag2, to_messages
+from undertow.interop.ros2.controller_node import CompiledController, ControllerNode, ControllerSettings
+from undertow.interop.ros2.link import Link
+from undertow.interop.ros2.node import Reporter
+from undertow.interop.ros2.simulated_vehicle import SimulatedVehicle
+from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
+from undertow.interop.ros2.write_bag import BagWriter
+from undertow.scenario.build import build
+from undertow.scenario.reading import read
+
+# Thrusters reach their limits at the start.
+SCENARIO = """
+plant: {vehicle: bluerov2_heavy, thruster: {kind: t200, supply: 16}}
+controller: {kind: rcaf, preset: robust}
+reference: {kind: setpoint, position: [4, 1, 1, 0, 0, 0.5], settling: 2}
+disturbance: {kind: current, velocity: [0.3, 0.2, 0]}
+loop: {duration: 2, dt: 0.01, record: 0.01}
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("parity") / "heavy.yaml"
+    path.write_text(SCENARIO)
+    return path
+
+
+@pytest.fixture(scope="module")
+def controller(scenario):
+    return CompiledController(scenario)
+
+
+@pytest.fixture(scope="module")
+def vehicle(scenario):
+    return SimulatedVehicle(build(read(scenario)))
+
+
+@pytest.fixture(scope="module")
+def simulated(scenario):
+    return ut.simulate_scenario(scenario).dataset
+
+
+def lock_step(controller, vehicle, domain, folder):
+    """Run both nodes, and return what the vehicle's side saw; in its own thread the controller answers."""
+    quiet, done = Reporter(lambda line: None), threading.Event()
+    with BagWriter(folder) as bag, Link(domain, True) as one, Link(domain, True, bag=bag) as other:
+        node = ControllerNode(controller, one, ControllerSettings(use_sim_time=True), quiet)
+        running = VehicleNode(vehicle, other, VehicleSettings("lock-step"), quiet)
+
+        def answer():
+            while not done.is_set():
+                node.spin(0.05)
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        try:
+            assert running.run() is Status.OK
+        finally:
+            done.set()
+            thread.join()
+    assert not any(quiet.counts.values())
+    return {name: values for name, (_, values) in read_rosbag2(folder).items()}
+
+
+def test_all_bits_but_the_rounding_of_attitudes(controller, vehicle, simulated, domain, tmp_path, monkeypatch):
+    """With attitudes passed on as they are (which is wrong in ROS), every bit is that of the simulation."""
+    for module in (from_messages, to_messages):
+        monkeypatch.setattr(module, "between_attitudes", lambda quaternion: np.asarray(quaternion, dtype=float))
+    found = lock_step(controller, vehicle, domain, tmp_path / "bag")
+    np.testing.assert_array_equal(found["/odom/position"], simulated["position"].values[:, :3])
+    np.testing.assert_array_equal(found["/thrusters"], simulated["input"].values)
+    assert simulated["saturated"].values.any()
+
+
+def test_a_run_over_ros_is_that_of_a_simulation(controller, vehicle, simulated, scenario, domain, tmp_path):
+    """ENU attitudes round by some 1e-16. Volts of 16 then differ by less than 1e-9, and positions by less than 1e-12 m.
+
+    What each node is given, it answers with the bits of the package: the odometry of the bag, stepped through an
+    Autopilot, gives the commands of the bag, and those commands, stepped through the vehicle, its positions.
+    """
+    found = lock_step(controller, vehicle, domain, tmp_path / "bag")
+    np.testing.assert_allclose(found["/thrusters"], simulated["input"].values, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found["/odom/position"], simulated["position"].values[:, :3], rtol=0, atol=1e-12)
+
+    motions = list(zip(*(found[f"/odom/{name}"] for name in ("position", "velocity", "quaternion")), strict=True))
+    autopilot = ut.Autopilot(scenario, attitude="quaternion")
+    commands = [np.clip(autopilot.start(*motions[0]), -16, 16)]
+    for motion in motions[1:]:
+        commands.append(np.clip(autopilot.step(*motion, applied=commands[-1]), -16, 16))
+    np.testing.assert_array_equal(commands, found["/thrusters"])
+
+    positions = [vehicle.start().position, *(vehicle.step(one).position for one in found["/thrusters"][:-1])]
+    np.testing.assert_array_equal(positions, found["/odom/position"])
+
+
+def test_noise_and_substeps_are_those_of_a_simulation():
+    scenario = {
+        "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "shaft", "supply": 24}},
+        "controller": {"kind": "pid", "frequency": 1.0},
+        "reference": {"kind": "setpoint", "position": [1, 0, 1, 0, 0, 0.5], "settling": 2},
+        "navigation": {"kind": "white_noise", "position": 0.001, "velocity": 0.01},
+        "loop": {"duration": 1, "dt": 0.01, "record": 0.01, "substeps": 3},
+    }
+    record = ut.simulate_scenario(scenario).dataset
+    vehicle = SimulatedVehicle(build(scenario))
+    observed = [vehicle.start(), *map(vehicle.step, record["commanded_input"].values[:-1])]
+    measured = np.array([one.position for one in observed])
+    np.testing.assert_array_equal(measured, record["measured_position"].values[:, :3])
+    np.testing.assert_array_equal([one.applied for one in observed[1:]], record["input"].values[:-1])
+    assert np.abs(measured - record["position"].values[:, :3]).max() > 1e-3  # there is noise
+
+
+def test_an_imu_measures_what_the_motion_says(vehicle, simulated):
+    """Specific force: the change of the true velocity over a step, less gravity, in body axes."""
+    from scipy.spatial.transform import Rotation
+
+    observed = [vehicle.start(), *map(vehicle.step, simulated["commanded_input"].values[:-1])]
+    rate = np.diff(simulated["velocity"].values[:, :3], axis=0) / 0.01
+    turned = Rotation.from_quat([one.quaternion for one in observed[1:]], scalar_first=True)
+    expected = turned.inv().apply(rate - [0, 0, 9.81])
+    np.testing.assert_allclose([one.specific_force for one in observed[1:]], expected, atol=1e-9)

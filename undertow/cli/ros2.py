@@ -1,0 +1,138 @@
+"""`undertow ros2`: the controller of a scenario, or its simulated vehicle, as a ROS 2 node."""
+
+import contextlib
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
+from undertow.cli.interruptible import interruptible
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.status import Status
+
+ROLES = ("controller", "vehicle")
+
+Run = Callable[[Any], int]  # runs a node over a link until it ends
+
+
+class Options(NamedTuple):
+    """Options of the command, as given; None where one was not."""
+
+    role: str
+    output: str | None
+    pace: str | None
+    use_sim_time: bool
+    remap: list[str]
+    rate: float | None
+    duration: float | None
+    max_age: float
+    domain: int | None
+    localhost: bool
+    reliability: str
+    world_frame: list[str]
+    body_frame: str
+    bag: Path | None
+    storage: str
+    allow_code: bool
+
+
+def ros2(scenario: Path, options: Options) -> int:
+    """Run a node until it ends or is interrupted; return the exit code."""
+    checks.choice("--as", options.role, ROLES)
+    for name, role, value in (
+        ("--pace", "vehicle", options.pace),
+        ("--output", "controller", options.output),
+        ("--use-sim-time", "controller", options.use_sim_time or None),
+    ):
+        if value is not None and role != options.role:
+            raise BadInput(name, f"be left out with --as {options.role}", value)
+    try:
+        return _run(scenario, options)
+    except ModuleNotFoundError as error:  # the extra is missing
+        if error.name not in ("cyclonedds", "rosbags"):
+            raise
+        raise BadInput("", "", str(error)) from None
+
+
+def _run(scenario: Path, options: Options) -> int:
+    from undertow.interop.ros2.from_messages import Frames
+    from undertow.interop.ros2.link import Link
+    from undertow.interop.ros2.node import Reporter, Topics
+    from undertow.interop.ros2.write_bag import BagWriter
+
+    names = Topics().remapped(options.remap)
+    frames = Frames(tuple(options.world_frame) or Frames().world, options.body_frame)
+    reporter = Reporter(lambda line: print(line, flush=True))
+    domain, localhost = _domain(options.domain), options.localhost or _environment_says_localhost()
+    bag = None if options.bag is None else BagWriter(options.bag, options.storage)
+    reporter.say(f"compiling the {options.role}")
+    compiled = _compiled_controller if options.role == "controller" else _compiled_vehicle
+    run = compiled(scenario, options, names, frames, reporter)
+    with bag or contextlib.nullcontext(), Link(domain, localhost, options.reliability, bag) as link:
+        return run(link)
+
+
+def _compiled_controller(scenario: Path, options: Options, names: Any, frames: Any, reporter: Any) -> Run:
+    from undertow.interop.ros2.controller_node import CompiledController, ControllerNode, ControllerSettings
+
+    duration = math.inf if options.duration is None else options.duration
+    checks.positive("--duration", duration, "s", finite=False)
+    output, rate, allow_code = options.output or "input", options.rate, options.allow_code
+    controller = interruptible(lambda: CompiledController(scenario, output, rate, allow_code))
+    settings = ControllerSettings(options.max_age, options.use_sim_time, names, frames)
+
+    def run(link: Any) -> int:
+        node = ControllerNode(controller, link, settings, reporter)
+        reporter.say(f"{names.odom}, {names.target_pose} -> {node.topic}. To end: Ctrl-C")
+        try:
+            node.run(duration)
+        finally:
+            reporter.say(f"ended: {node.status()}. The last command is zero thrust")
+        return DONE
+
+    return run
+
+
+def _compiled_vehicle(scenario: Path, options: Options, names: Any, frames: Any, reporter: Any) -> Run:
+    from undertow.interop.ros2.simulated_vehicle import SimulatedVehicle
+    from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
+    from undertow.scenario.build import build
+    from undertow.scenario.reading import read
+
+    if options.rate is not None:
+        checks.positive("--rate", options.rate, "Hz")
+    period = None if options.rate is None else 1 / options.rate
+    pace, duration = options.pace or "real-time", options.duration
+    settings = VehicleSettings(pace, duration, options.max_age, topics=names, frames=frames)
+    vehicle = interruptible(lambda: SimulatedVehicle(build(read(scenario, allow_code=options.allow_code)), period))
+
+    def run(link: Any) -> int:
+        node = VehicleNode(vehicle, link, settings, reporter)
+        reporter.say(f"{names.thrusters} -> {names.odom}, {names.imu}, {names.clock}. To end: Ctrl-C")
+        try:
+            status = node.run()
+        finally:
+            reporter.say(f"ended: {node.status()}")
+        if status is Status.OK:
+            return DONE
+        complain(f"the run ended as `{status.word}`. {status.sentence}")
+        return RUN_FAILED
+
+    return run
+
+
+def _domain(given: int | None) -> int:
+    """The domain: as given, or that of ROS_DOMAIN_ID, or 0."""
+    text = os.environ.get("ROS_DOMAIN_ID") or "0"
+    if given is None and not text.isdecimal():
+        raise BadInput("ROS_DOMAIN_ID", "be a whole number", repr(text))
+    return int(text) if given is None else given
+
+
+def _environment_says_localhost() -> bool:
+    """Whether the variables of ROS 2 keep its nodes on this machine."""
+    there = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+    return there or os.environ.get("ROS_LOCALHOST_ONLY") == "1"

@@ -1,0 +1,67 @@
+"""Axes: north, east, down and forward, starboard, down inside; east, north, up and forward, port, up in ROS (REP 103).
+
+Each conversion is its own inverse. Those of vectors exchange entries and signs, so that they are exact; the one of
+quaternions rounds, by two units in the last place.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_HALF_ROOT = np.sqrt(0.5)
+
+
+def between_ned_and_enu(vector: ArrayLike) -> NDArray:
+    """A vector in world axes, or several along the last axis: (north, east, down) <-> (east, north, up)."""
+    north, east, down = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
+    return np.stack([east, north, -down], axis=-1)
+
+
+def between_frd_and_flu(vector: ArrayLike) -> NDArray:
+    """A vector in body axes, or several along the last axis: (forward, starboard, down) <-> (forward, port, up).
+
+    Velocities, angular velocities, forces and moments alike.
+    """
+    forward, starboard, down = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
+    return np.stack([forward, -starboard, -down], axis=-1)
+
+
+def between_attitudes(quaternion: ArrayLike) -> NDArray:
+    """A quaternion (w, x, y, z) body -> world, or several: from FRD to NED <-> from FLU to ENU.
+
+    The product of half a turn about (1, 1, 0), the quaternion, and half a turn about (1, 0, 0); the sign is the one
+    with which a vehicle that points north has yaw pi/2 in ENU.
+    """
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
+    return _HALF_ROOT * np.stack([w + z, x + y, x - y, w - z], axis=-1)
+
+
+def quaternion_of_euler(angles: ArrayLike) -> NDArray:
+    """Unit quaternion (w, x, y, z) of roll, pitch, yaw (rad); Fossen (2021), ch. 2."""
+    halves = np.moveaxis(np.asarray(angles, dtype=float), -1, 0) / 2
+    (sr, sp, sy), (cr, cp, cy) = np.sin(halves), np.cos(halves)
+    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    return np.stack([w, x, y, z], axis=-1)
+
+
+def euler_of_quaternion(quaternion: ArrayLike) -> NDArray:
+    """Roll, pitch, yaw (rad) of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
+    roll = np.arctan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+    yaw = np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+    return np.stack([roll, np.arcsin(np.clip(2 * (w * y - x * z), -1.0, 1.0)), yaw], axis=-1)
+
+
+def body_velocity_of_rates(angles: ArrayLike, rates: ArrayLike) -> NDArray:
+    """(u, v, w, p, q, r) of the rates of (north, east, down, roll, pitch, yaw) at roll, pitch, yaw; m/s and rad/s.
+
+    Fossen (2021), Eqs. (2.18) and (2.26).
+    """
+    (roll, pitch, yaw), moving = (np.moveaxis(np.asarray(one, dtype=float), -1, 0) for one in (angles, rates))
+    (sr, sp, sy), (cr, cp, cy) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
+    north, east, down, roll_rate, pitch_rate, yaw_rate = moving
+    forward, across = cy * north + sy * east, cy * east - sy * north
+    lower = sp * forward + cp * down
+    linear = cp * forward - sp * down, cr * across + sr * lower, cr * lower - sr * across
+    turning = roll_rate - sp * yaw_rate, cr * pitch_rate + sr * cp * yaw_rate, cr * cp * yaw_rate - sr * pitch_rate
+    return np.stack([*linear, *turning], axis=-1)

@@ -1,0 +1,85 @@
+"""What both nodes have in common: names of topics, a status line once a second, and each trouble said once."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from undertow.core.errors import BadInput, did_you_mean
+
+STATUS_PERIOD = 1.0  # s, between status lines
+WAIT = 0.1  # s, longest wait for a message: after it Ctrl-C is noticed
+
+
+class Topics(NamedTuple):
+    """Names of the topics of the nodes."""
+
+    odom: str = "/odom"
+    target_pose: str = "/target_pose"
+    thrusters: str = "/thrusters"
+    wrench: str = "/wrench"
+    imu: str = "/imu"
+    clock: str = "/clock"
+
+    def remapped(self, rules: Iterable[str]) -> "Topics":
+        """These names with rules `odom:=/vehicle/odometry` applied, as ROS 2 writes them.
+
+        Raises:
+            BadInput: a rule has no `:=`, or names no topic of a node.
+        """
+        names = self._asdict()
+        for rule in rules:
+            old, separator, new = rule.partition(":=")
+            old = old.removeprefix("/")
+            if not separator:
+                raise BadInput("--remap", "be of the form odom:=/vehicle/odometry", rule)
+            if old not in names:
+                raise BadInput("--remap", "name a topic of a node", f"`{old}`", hint=did_you_mean(old, names))
+            names[old] = new if new.startswith("/") else f"/{new}"
+        return Topics(**names)
+
+
+class Reporter:
+    """Counts what happens and tells about it.
+
+    Args:
+        say: prints a line.
+
+    Attributes:
+        counts: number of each event.
+    """
+
+    def __init__(self, say: Callable[[str], None]):
+        self._say, self.counts = say, Counter[str]()
+        self._said: set[str] = set()
+        self._next = time.monotonic() + STATUS_PERIOD
+
+    def say(self, sentence: str) -> None:
+        """Print a line."""
+        self._say(sentence)
+
+    def warn(self, event: str, sentence: str) -> None:
+        """Explain an event, if it is the first one of its kind."""
+        if event not in self._said:
+            self._said.add(event)
+            self._say(f"Warning: {' '.join(sentence.split())}")
+
+    def trouble(self, event: str, sentence: str) -> None:
+        """Count an event; the first one of its kind is explained."""
+        self.counts[event] += 1
+        self.warn(event, sentence)
+
+    def over(self, event: str) -> None:
+        """An event has ended: the next one of its kind is explained again."""
+        self._said.discard(event)
+
+    def status(self, line: Callable[[], str]) -> None:
+        """Print a status line, if the last one was a second ago."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + STATUS_PERIOD
+            self._say(line())
+
+    def events(self) -> str:
+        """The counts as text; empty without any."""
+        return "".join(f", {number} {event}" for event, number in sorted(self.counts.items()) if number)
