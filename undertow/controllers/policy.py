@@ -1,6 +1,6 @@
 """A policy, learned or written by hand, as a controller: a function of an observation that gives an action."""
 
-import zipfile
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -77,7 +77,7 @@ def policy(model: Model, function: Annotated[str, catalogue.FILE], action: str =
     Args:
         model: nominal model, from `plant.model()`.
         function: ./file.py:function, in terms of jax.numpy; or an .npz file of a network with tanh between its layers,
-            weight_0 (of shape out, in), bias_0, weight_1, and so on. From Python also a function.
+            weight_0 (of shape out, in), bias_0, weight_1, and so on.
         action: normalised (one number per actuator within [-1, 1]), input (one input per actuator in its unit), or
             wrench (six numbers within [-1, 1]).
         scale: input that a normalised action of 1 stands for, in the unit of the input; None for its limit, or the
@@ -87,7 +87,7 @@ def policy(model: Model, function: Annotated[str, catalogue.FILE], action: str =
         BadInput: no such function or file, a network that does not fit, or an action of another length.
     """
     interface = policy_interface_of(model, action, scale)
-    found = Function(function) if callable(function) else _found(function)
+    found = _found(function)
     zero = jnp.zeros(len(model.coordinates.angles))
     seen = interface.observation(model.coordinates.measurement(zero, zero), Target(zero, zero, zero), interface.first())
     if isinstance(found, Network) and found.weights[0].shape[1] != seen.size:
@@ -115,9 +115,9 @@ def _network(path: Path) -> Network:
         BadInput: it cannot be read, or its layers do not fit.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile) as error:
+    except Exception as error:  # whatever the readers of zip files and of arrays raise
         raise BadInput("function", "be an .npz file of numbers", f"{path.name}: {error}") from None
     count = len(arrays) // 2
     names = [name.format(number) for number in range(count) for name in _LAYER]
