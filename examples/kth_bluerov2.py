@@ -1,10 +1,11 @@
-"""Fly KTH's BlueROV2 Heavy, a simulator by other people, with the controller of undertow.
+"""Control KTH's BlueROV2 Heavy, a simulator by other people, with the controller of undertow.
 
     curl -LO https://raw.githubusercontent.com/ViktorNfa/bluerov2_dynamics/main/fossen/BlueROV2.py
     python examples/kth_bluerov2.py BlueROV2.py
 
-Their class is used as it is; `fly` is all there is between the two. The controller knows the same published numbers
-(von Benzon et al. 2022, Table A1, which undertow has as `bluerov2_heavy`), and of the thrusters only that thrust lags.
+Their class is used as it is; `simulate` is all there is between the two. The controller knows the same published
+numbers (von Benzon et al. 2022, Table A1, which undertow has as `bluerov2_heavy`), and of the thrusters only that their
+thrust lags.
 """
 
 import importlib.util
@@ -35,7 +36,7 @@ SCENARIO = {
 }
 
 
-def fly(rov: Any, autopilot: ut.Autopilot, seconds: float) -> np.ndarray:
+def simulate(rov: Any, autopilot: ut.Autopilot, seconds: float) -> np.ndarray:
     """States (position, angles, u v w p q r) at every control step, shape (K, 12), from rest at zero."""
     for lag in rov.thruster_lags:  # NumPy 2.4 makes no number of an array with one entry
         lag._Cc = np.ravel(lag._Cc)
@@ -64,7 +65,7 @@ def simulator(path: str | Path) -> Any:
 def main(rov: Any, seconds: float = 30.0) -> tuple[float, float]:
     """Print and return the errors of the last 5 s: largest distance (m) and largest error of an angle (rad)."""
     rov.current_speed = CURRENT
-    states = fly(rov, ut.Autopilot(SCENARIO), seconds)
+    states = simulate(rov, ut.Autopilot(SCENARIO), seconds)
     late = states[-round(5.0 / SCENARIO["loop"]["dt"]) :, :6] - TARGET
     distance, angle = np.linalg.norm(late[:, :3], axis=1).max(), np.abs(late[:, 3:]).max()
     print(

@@ -243,5 +243,5 @@ def test_what_is_given_wrongly(env):
         vector.step(np.zeros((2, 1)))
     with pytest.raises(BadInput, match="`seed` must be one, or 2 of them"):
         vector.reset(seed=[1, 2, 3])
-    with pytest.raises(BadInput, match="`reset_mask` must be 2 truths"):
+    with pytest.raises(BadInput, match="`reset_mask` must be 2 booleans"):
         vector.reset(options={"reset_mask": np.ones(3)})

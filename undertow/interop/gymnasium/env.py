@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -29,7 +29,7 @@ class Env(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
     Arguments are those of `Episodes`, without `count`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Env(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         render_mode: None = None,
     ):
         if render_mode is not None:
-            hint = "`undertow simulate` draws figures and a replay of the same run under a controller"
+            hint = "`undertow simulate` writes figures and a replay of the same run under a controller"
             raise BadInput("render_mode", "be None", render_mode, hint=hint)
         self._episodes = Episodes(scenario, 1, action, scale, cost, vary, variants, allow_code)
         self.interface, self.dt = self._episodes.interface, self._episodes.dt
@@ -63,7 +63,7 @@ class Env(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         """Hold an action for one sampling time."""
         if self._over:
             raise BadInput("reset", "be called before `step`", "not")
-        given = actions_of(action, self.action_space.shape)
+        given = actions_of(action, (self.interface.actions,))
         seen = self._episodes.step(given[None])
         self._step += 1
         terminated = bool(seen.status[0] != Status.OK)
@@ -77,7 +77,7 @@ def make(scenario: str | Path | Mapping[str, Any], **options: Any) -> Env:
     return Env(scenario, **options)
 
 
-def spaces_of(interface: PolicyInterface) -> tuple[spaces.Box, spaces.Box]:
+def spaces_of(interface: PolicyInterface) -> tuple[Any, Any]:
     """Spaces of observations and of actions."""
     low, high = interface.action_bounds()
     bounds = interface.bounds()
@@ -103,6 +103,6 @@ def actions_of(given: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
 
 
 def info_of(seen: Seen, number: int) -> dict[str, Any]:
-    """What is told beside the observation: true outputs, tracking error, and how the episode goes."""
+    """What the agent does not observe: true outputs, tracking error, and the status of the run."""
     status = Status(int(seen.status[number]))
     return {"position": seen.position[number], "error": seen.error[number], "status": status.word}

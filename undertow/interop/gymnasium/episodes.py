@@ -84,11 +84,11 @@ class _State(NamedTuple):
 class Seen(NamedTuple):
     """What a step shows, with a leading axis over episodes."""
 
-    observation: NDArray
-    reward: NDArray
-    status: NDArray  # a Status code
-    position: NDArray  # true outputs, m and rad
-    error: NDArray  # tracking error of the true state, m and rad
+    observation: Any
+    reward: Any
+    status: Any  # a Status code
+    position: Any  # true outputs, m and rad
+    error: Any  # tracking error of the true state, m and rad
 
 
 class Episodes:
@@ -158,14 +158,14 @@ class Episodes:
             return eqx.filter(realization, eqx.is_array), _begin(plan, realization, start)
 
         self._starter = Starter(prepare, begin, arrays, [*constant, False])
-        drawn, (state, _) = self._starter(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
-        drawn, state = jax.tree.map(lambda leaf: leaf[0], (drawn, state))
+        realized, (state, _) = self._starter(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
+        realized, state = jax.tree.map(lambda leaf: leaf[0], (realized, state))
         still = eqx.filter(known.loop.realize(known.key), eqx.is_array, inverse=True)
         of_loop = len(jax.tree.leaves(eqx.filter(known.loop, eqx.is_array)))
-        self._same = [*constant[:of_loop], *[False] * (len(jax.tree.leaves(drawn)) - of_loop)]
+        self._same = [*constant[:of_loop], *[False] * (len(jax.tree.leaves(realized)) - of_loop)]
         action = np.asarray(plan.interface.first())
-        function = lambda drawn, state, action: _step(plan, eqx.combine(drawn, still), state, action)
-        self._stepper = BatchStep(function, drawn, state, action, count, self._same)
+        function = lambda realized, state, action: _step(plan, eqx.combine(realized, still), state, action)
+        self._stepper = BatchStep(function, realized, state, action, count, self._same)
         self.backend = self._stepper.backend
 
     def start(self, seeds: NDArray, which: NDArray) -> Seen:
@@ -178,8 +178,8 @@ class Episodes:
         variant = seeds % len(self._numbers[0])
         numbers = [*(column[variant] for column in self._numbers), _keys(seeds)]
         with runtime.on_processor(), runtime.in_precision(self._precision):
-            drawn, (state, seen) = self._starter(jax.tree.unflatten(self._form, numbers))
-        varying = [leaf for leaf, same in zip(jax.tree.leaves(drawn), self._same, strict=True) if not same]
+            realized, (state, seen) = self._starter(jax.tree.unflatten(self._form, numbers))
+        varying = [leaf for leaf, same in zip(jax.tree.leaves(realized), self._same, strict=True) if not same]
         self._stepper.put("numbers", varying, which)
         self._stepper.put("state", state, which)
         return seen

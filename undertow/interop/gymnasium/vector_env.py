@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium import vector
@@ -29,7 +29,7 @@ class VectorEnv(vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], NDArr
     Arguments are those of `Env`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": vector.AutoresetMode.NEXT_STEP}
+    metadata = {"render_modes": [], "autoreset_mode": vector.AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class VectorEnv(vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], NDArr
         super().reset(seed=seed if isinstance(seed, int) else None)
         runs = np.array([self._run(number, seeds[number]) for number in which.tolist()], dtype=np.uint32)
         if not self._started:
-            self._observation = np.zeros((self.num_envs, *self.single_observation_space.shape))
+            self._observation = np.zeros(self.observation_space.shape or ())
         seen = self._episodes.start(runs, which)
         self._observation[which] = seen.observation
         self._steps[which], self._over[which], self._started = 0, False, True
@@ -74,7 +74,7 @@ class VectorEnv(vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], NDArr
         """Hold an action for one sampling time in every environment, and reset those whose episode is over."""
         if not self._started:
             raise BadInput("reset", "be called before `step`", "not")
-        given = actions_of(actions, self.action_space.shape)
+        given = actions_of(actions, (self.num_envs, self.interface.actions))
         renewed = np.flatnonzero(self._over)
         seen = self._episodes.step(given)
         self._steps += 1
@@ -94,7 +94,7 @@ class VectorEnv(vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], NDArr
         if mask is None:
             return np.arange(self.num_envs)
         if np.shape(mask) != (self.num_envs,) or np.asarray(mask).dtype != bool:
-            raise BadInput("reset_mask", f"be {self.num_envs} truths", f"of shape {np.shape(mask)}")
+            raise BadInput("reset_mask", f"be {self.num_envs} booleans", f"of shape {np.shape(mask)}")
         if not (self._started or np.all(mask)):
             raise BadInput("reset_mask", "choose all environments the first time", "fewer")
         return np.flatnonzero(mask)

@@ -133,8 +133,8 @@ def _controller(built: Built, at: Equilibrium) -> ct.StateSpace:
 
 
 def _named(
-    system: ct.StateSpace, name: str, units: dict[str, str], inputs: list[str], outputs: list[str], states: list[str]
+    system: Any, name: str, units: dict[str, str], inputs: list[str], outputs: list[str], states: list[str]
 ) -> ct.StateSpace:
-    named = ct.ss(system, inputs=inputs, outputs=outputs, states=states, name=name)
+    named: Any = ct.ss(system, inputs=inputs, outputs=outputs, states=states, name=name)
     named.units = units
     return named

@@ -301,7 +301,7 @@ def _system(
         return call
 
     updated, shown = map(called, functions)
-    system = ct.nlsys(
+    system: Any = ct.nlsys(
         updated, shown, inputs=list(inputs), outputs=list(outputs), states=states, dt=period or 0, name=name
     )
     system.units, system.start = inputs | outputs, np.asarray(start, dtype=float)
