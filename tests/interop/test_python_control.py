@@ -181,6 +181,6 @@ def test_what_no_system_can_be_made_of():
         upc.linear_plant(PENDULUM, load=[0.0])
     with pytest.raises(BadInput, match="`load` must leave the loop an equilibrium"):
         upc.linear_plant(AUV, position=np.zeros(6), load=[1e3] * 6)
-    for time in (0.5, [[0.0]], [np.nan]):
-        with pytest.raises(BadInput, match="`time` must be a list of finite instants"):
+    for time, said in ((0.5, "shape"), ([[0.0]], "shape"), (["soon"], "numbers"), ([np.nan], "finite")):
+        with pytest.raises(BadInput, match=rf"`time(\[0\])?` must .*{said}"):
             upc.reference(PENDULUM, time)

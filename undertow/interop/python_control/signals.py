@@ -33,7 +33,8 @@ def signals_of(plant: AbstractPlant) -> Signals:
     units = dict(zip(plant.outputs, plant.output_units, strict=True))
     suffixed = lambda suffix, per: {f"{name}_{suffix}": f"{unit}{per}" for name, unit in units.items()}
     report = plant.output(jnp.zeros(()), plant.initial_state()).actuator
-    measured = units | suffixed("rate", "/s") | dict.fromkeys(state_names(report), "rad/s")
+    reported = {name: "rad/s^2" if name.startswith("acceleration") else "rad/s" for name in state_names(report)}
+    measured = units | suffixed("rate", "/s") | reported
     desired = suffixed("desired", "") | suffixed("rate_desired", "/s") | suffixed("acceleration_desired", "/s^2")
     inputs = range(1, plant.inputs() + 1)
     each = lambda name: {f"{name}_{number}": plant.input_unit for number in inputs}

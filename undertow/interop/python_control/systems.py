@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from undertow.autopilot.numbers import step_of
-from undertow.core import runtime
+from undertow.autopilot.numbers import numbers, step_of
+from undertow.core import checks, runtime
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
 from undertow.interop.python_control.signals import (
@@ -144,8 +144,8 @@ def closed_loop(scenario: Scenario) -> ct.NonlinearIOSystem:
         kinematic = dict(list(of.measured.items())[: 2 * len(built.closed_loop.plant.outputs)])
         prefixed = zip(("plant", "law", "measuring"), states, strict=True)
         names = [name for prefix, tree in prefixed for name in state_names(tree, prefix)]
-        functions = (stepped, shown)
-        return _system("closed_loop", built, realization, functions, start, (of.desired, kinematic | of.applied, names))
+        signals = of.desired, kinematic | of.applied, names
+        return _system("closed_loop", built, realization, (stepped, shown), start, signals, by_number=True)
 
 
 def connected(
@@ -178,18 +178,15 @@ def reference(scenario: Scenario, time: Any) -> NDArray:
     Raises:
         BadInput: the scenario cannot be used, or the instants are no list of numbers.
     """
-    built = built_of(scenario)
-    if np.ndim(time) != 1 or not np.isfinite(np.asarray(time, dtype=float)).all():
-        raise BadInput("time", "be a list of finite instants, s", f"of shape {np.shape(time)}")
+    built, instants = built_of(scenario), numbers("time", time, (np.size(time),))
+    checks.finite("time", instants, "s")
     with computing(built):
-        at = step_of(
-            lambda part, _, t: ((), jnp.concatenate(part.at(t))), built.closed_loop.reference, (), np.zeros(())
-        )
-        found = []
-        for instant in time:  # one after the other, for the bits of a simulation
-            at.inputs[...] = instant
-            at()
-            found.append(at.outputs.copy())
+        desired = lambda part, _, t: ((), jnp.concatenate(part.at(t)))
+        at, found = step_of(desired, built.closed_loop.reference, (), np.zeros(())), []
+    for now in instants:  # by the program of a step, for the bits of a simulation
+        at.inputs[...] = now
+        at()
+        found.append(at.outputs.copy())
     return np.array(found).T
 
 
@@ -271,8 +268,9 @@ def _system(
     start: Any,
     signals: tuple[Units, Units, list[str]],
     dt: float | None = None,
+    by_number: bool = False,
 ) -> ct.NonlinearIOSystem:
-    """A system of compiled functions (realization, t, state, input); the closed loop takes the number of the step.
+    """A system of compiled functions (realization, t, state, input).
 
     Args:
         name: of the system.
@@ -282,10 +280,10 @@ def _system(
         start: state at t = 0.
         signals: inputs, outputs, names of the states.
         dt: sampling time, s, 0 for continuous time; None for that of the scenario.
+        by_number: whether the functions take the number of the step in place of t.
     """
     inputs, outputs, states = signals
     period = built.scenario.loop.dt if dt is None else dt
-    by_number = name == "closed_loop"
     instant = jnp.zeros((), dtype=int) if by_number else jnp.zeros(())
     given = (instant, start, jnp.zeros(len(inputs)))
 
