@@ -7,7 +7,8 @@ includes everything that a caller waits for: checks of the numbers given, the la
 
 `wall` is the time that passes, `processor` that in which the step computes: they differ where other processes take the
 processor away (`preempted`), which on a busy machine makes the longest steps.
-`compile_cold` starts with an empty folder of compiled code, `compile_kept` with what the first one left there.
+`compile_cold` starts with an empty folder of compiled code, `compile_kept` with what the first one left there; both
+include the import of undertow and of JAX.
 """
 
 import argparse

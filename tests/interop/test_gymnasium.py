@@ -42,7 +42,7 @@ def pendulum():
 def test_gymnasiums_checker_has_nothing_to_say(env, pendulum):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for one in (env, pendulum):
+        for one in (env, pendulum, ug.make(PENDULUM | {"precision": "float32"})):
             check_env(one, skip_render_check=True)
 
 

@@ -48,7 +48,7 @@ class Env(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
             raise BadInput("render_mode", "be None", render_mode, hint=hint)
         self._episodes = Episodes(scenario, 1, action, scale, cost, vary, variants, allow_code)
         self.interface, self.dt = self._episodes.interface, self._episodes.dt
-        self.observation_space, self.action_space = spaces_of(self.interface)
+        self.observation_space, self.action_space = spaces_of(self.interface, self._episodes.dtype)
         self._step, self._over = 0, True
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
@@ -77,12 +77,13 @@ def make(scenario: str | Path | Mapping[str, Any], **options: Any) -> Env:
     return Env(scenario, **options)
 
 
-def spaces_of(interface: PolicyInterface) -> tuple[Any, Any]:
+def spaces_of(interface: PolicyInterface, dtype: Any) -> tuple[Any, Any]:
     """Spaces of observations and of actions."""
     low, high = interface.action_bounds()
     bounds = interface.bounds()
     seen = np.concatenate([-bounds, low]), np.concatenate([bounds, high])
-    return spaces.Box(*seen, dtype=np.float64), spaces.Box(low, high, dtype=np.float64)
+    low, high, *seen = (bound.astype(dtype) for bound in (low, high, *seen))
+    return spaces.Box(*seen, dtype=dtype), spaces.Box(low, high, dtype=dtype)
 
 
 def actions_of(given: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ from undertow.loop.recording import freeze_on_failure, instant
 from undertow.loop.stepped_batch import BatchStep, Starter
 from undertow.numerics.integrators import METHODS
 from undertow.numerics.random_keys import key_of_seed
+from undertow.scenario import factory
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 
@@ -108,6 +109,7 @@ class Episodes:
         interface: meaning of observations and actions.
         steps: of an episode, until its time is over.
         dt: sampling time, s.
+        dtype: of observations, by the precision of the scenario.
         backend: `simd` or `xla`.
 
     Raises:
@@ -131,13 +133,12 @@ class Episodes:
         if settings.kind != "sampled":
             raise BadInput("loop.kind", "be sampled for an environment", settings.kind)
         weights = _cost(cost)
-        self.dt, self.steps, self._precision = (
-            settings.dt,
-            round(settings.duration / settings.dt),
-            built.scenario.precision,
-        )
+        self.dt, self.steps = settings.dt, round(settings.duration / settings.dt)
+        self._precision = built.scenario.precision
+        self.dtype = np.dtype(self._precision)
         with runtime.on_processor(), runtime.in_precision(self._precision):
-            self.interface = policy_interface_of(built.closed_loop.plant.model(), action, scale)
+            model, _ = factory.call(built.closed_loop.plant.model, built.scenario.model, folder=text.folder)
+            self.interface = policy_interface_of(model, action, scale)
             plan = Plan(self.interface, weights, settings.dt, settings.method, settings.substeps)
             found, constant = variants_of(built, vary or {}, variants)
             leaves = [jax.tree.leaves(eqx.filter(one, eqx.is_array)) for one in found]

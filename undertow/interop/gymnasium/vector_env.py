@@ -50,7 +50,7 @@ class VectorEnv(vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], NDArr
             raise BadInput("num_envs", "be a positive integer", num_envs)
         self._episodes = Episodes(scenario, num_envs, action, scale, cost, vary, variants, allow_code)
         self.interface, self.dt, self.num_envs = self._episodes.interface, self._episodes.dt, num_envs
-        self.single_observation_space, self.single_action_space = spaces_of(self.interface)
+        self.single_observation_space, self.single_action_space = spaces_of(self.interface, self._episodes.dtype)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._generators = [seeding.np_random(None)[0] for _ in range(num_envs)]
@@ -64,7 +64,7 @@ class VectorEnv(vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], NDArr
         super().reset(seed=seed if isinstance(seed, int) else None)
         runs = np.array([self._run(number, seeds[number]) for number in which.tolist()], dtype=np.uint32)
         if not self._started:
-            self._observation = np.zeros(self.observation_space.shape or ())
+            self._observation = np.zeros(self.observation_space.shape or (), self._episodes.dtype)
         seen = self._episodes.start(runs, which)
         self._observation[which] = seen.observation
         self._steps[which], self._over[which], self._started = 0, False, True
