@@ -18,7 +18,7 @@ from undertow.interop.gymnasium.variants import Vary
 _SEEDS = 2**32  # of runs
 
 
-class Env(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
+class Env(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     """A vehicle, or another plant, whose inputs an agent chooses at every sampling time.
 
     Observations and actions are described at `PolicyInterface`, the reward at `Cost`. An episode is `terminated` where
@@ -59,7 +59,7 @@ class Env(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         self._step, self._over = 0, False
         return seen.observation[0], info_of(seen, 0) | {"seed": run}
 
-    def step(self, action: NDArray[np.float64]):
+    def step(self, action: NDArray[Any]):
         """Hold an action for one sampling time."""
         if self._over:
             raise BadInput("reset", "be called before `step`", "not")
@@ -82,8 +82,8 @@ def spaces_of(interface: PolicyInterface, dtype: Any) -> tuple[Any, Any]:
     low, high = interface.action_bounds()
     bounds = interface.bounds()
     seen = np.concatenate([-bounds, low]), np.concatenate([bounds, high])
-    low, high, *seen = (bound.astype(dtype) for bound in (low, high, *seen))
-    return spaces.Box(*seen, dtype=dtype), spaces.Box(low, high, dtype=dtype)
+    box = lambda low, high: spaces.Box(low.astype(dtype), high.astype(dtype), dtype=dtype)
+    return box(*seen), box(low, high)
 
 
 def actions_of(given: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from undertow.interop.gymnasium.variants import Vary
 _SEEDS = 2**32  # of runs
 
 
-class VectorEnv(vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], NDArray[Any]]):
+class VectorEnv(vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     """`num_envs` environments of one scenario, each with the bits of an `Env` by itself.
 
     An environment whose episode is over is reset by the next step, which ignores its action and has reward zero
@@ -70,7 +70,7 @@ class VectorEnv(vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], NDArr
         self._steps[which], self._over[which], self._started = 0, False, True
         return self._observation.copy(), self._info(seen, which) | self._of("seed", runs, which)
 
-    def step(self, actions: NDArray[np.float64]):
+    def step(self, actions: NDArray[Any]):
         """Hold an action for one sampling time in every environment, and reset those whose episode is over."""
         if not self._started:
             raise BadInput("reset", "be called before `step`", "not")
