@@ -21,6 +21,10 @@ SHORT = {
     "loop": {"duration": 0.5, "dt": 0.01, "record": 0.01},
     "seed": 7,
 }
+SEA = SHORT | {
+    "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0]}, {"kind": "waves", "height": 0.5, "depth": 3.0}],
+    "navigation": {"kind": "observer"},
+}
 PENDULUM = {
     "plant": {"kind": "inverted_pendulum", "limit": 30.0},
     "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},
@@ -48,8 +52,8 @@ def test_gymnasiums_checker_has_nothing_to_say(env, pendulum):
 
 @pytest.mark.parametrize(
     "scenario, action",
-    [(SHORT, "normalised"), (SHORT, "input"), (PENDULUM, "input")],
-    ids=["shares", "volts", "newtons"],
+    [(SHORT, "normalised"), (SHORT, "input"), pytest.param(SEA, "input", marks=pytest.mark.slow), (PENDULUM, "input")],
+    ids=["shares", "volts", "sea", "newtons"],
 )
 def test_the_laws_commands_give_the_run_of_a_simulation(scenario, action):
     """Bit for bit; normalised too, because 16 V is a power of two."""
