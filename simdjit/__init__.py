@@ -4,11 +4,11 @@
     f = simdjit.compile(lambda x: jnp.sin(x) * x, np.zeros(()))
     f(np.linspace(0.0, 1.0, 1000))
 
-`compile` is for a function, `Loop` for a loop over steps, `Step` for one step at a time. They take examples of the
-numbers of one run, and the first two run on this processor or on an NVIDIA GPU. A result has the same bits on every
-processor, in every lane, and whatever the other runs of the batch are: sums and products are never contracted, and
-elementary functions are made of them and of explicit fused products. What the compiler has no rule for raises
-`Unsupported`; `jax.vmap` still does it.
+`compile` is for a function, `Loop` for a loop over steps, `Step` and `BatchStep` for one step at a time, of one run
+or of many. They take examples of the numbers of one run, and the first two run on this processor or on an NVIDIA GPU.
+A result has the same bits on every processor, in every lane, and whatever the other runs of the batch are: sums and
+products are never contracted, and elementary functions are made of them and of explicit fused products. What the
+compiler has no rule for raises `Unsupported`; `jax.vmap` still does it.
 
 How it works: a traced function becomes a graph of scalar operations (`lowering`, `graph`, `simplify`), that becomes
 LLVM's assembly in which every scalar is a vector over lanes (`codegen`, `instructions`), and LLVM makes machine code of
@@ -23,6 +23,7 @@ import jax
 import numpy as np
 
 from simdjit import c99 as c99
+from simdjit.batch_step import BatchStep as BatchStep
 from simdjit.cache import default_folder as default_folder
 from simdjit.cpu import simd_width as simd_width
 from simdjit.cuda import Driver as Driver

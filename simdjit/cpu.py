@@ -36,13 +36,16 @@ class Code:
             self._run(*(memory[group].ctypes.data for memory in (numbers, carry, series)), steps, every)
 
     def repeated(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray) -> Callable[[], None]:
-        """A function that records one instant of the first group, with as little ado as possible."""
+        """A function that records one instant of all groups, with as little ado as possible."""
         memories = numbers, carry, series
-        places = [ctypes.c_void_p(memory[0].ctypes.data) for memory in memories]
+        at = lambda group: [ctypes.c_void_p(memory[group].ctypes.data) for memory in memories]
         run, steps, every = self._run, ctypes.c_int64(0), ctypes.c_int64(1)
+        first, *others = map(at, range(len(numbers)))
 
         def again(kept: tuple[Any, ...] = (self, *memories)) -> None:  # nothing of it may be freed
-            run(*places, steps, every)
+            run(*first, steps, every)
+            for places in others:
+                run(*places, steps, every)
 
         return again
 

@@ -55,6 +55,11 @@ class Layout:
         """The arrays of the first run themselves, not copies: writing into them writes into the memory."""
         return [self._slots(memory, i)[0, 0, :, 0].reshape(shape) for i, shape in enumerate(self._shapes)]
 
+    def views_of_groups(self, memory: np.ndarray) -> list[np.ndarray]:
+        """The arrays of all runs themselves, (groups, lanes, ...): writing into them writes into the memory."""
+        slots = [np.moveaxis(self._slots(memory, i)[:, 0], 1, 2) for i in range(len(self._shapes))]
+        return [some.reshape(*some.shape[:2], *shape) for some, shape in zip(slots, self._shapes, strict=True)]
+
     def _slots(self, memory: np.ndarray, i: int) -> np.ndarray:
         """Slots of one array as numbers, (groups, rows, slots, lanes); truths are whole numbers there."""
         kind = np.dtype(np.int64) if self._types[i].kind == "b" else self._types[i]

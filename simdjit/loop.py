@@ -89,6 +89,7 @@ class Loop:
             nvidia.Kernel(program.assembly, driver, cache) if driver else Code(program.assembly, cache, lanes > 1)
         )
         several = (self._prologue.inputs, begun.leaves, self._record.leaves)
+        self._lanes = lanes
         self._numbers_layout, self._carry_layout, self._record_layout = (Layout(leaves, lanes) for leaves in several)
 
     def run(self, numbers: Any, steps: int, every: int = 0) -> tuple[Any, Any]:
@@ -120,16 +121,20 @@ class Loop:
         Raises:
             Unsupported: XLA computes what comes before the first step, or a GPU the steps.
         """
+        call, given, series = self._kept(1)
+        return call, self._numbers_layout.views(given), self._record_layout.views(series)
+
+    def kept_runs(self, runs: int) -> tuple[Callable[[], None], list[np.ndarray], list[np.ndarray]]:
+        """`kept` of many runs: arrays of shape (groups, runs of a group, ...), the last runs of which may be idle."""
+        call, given, series = self._kept(-(-runs // self._lanes))
+        return call, self._numbers_layout.views_of_groups(given), self._record_layout.views_of_groups(series)
+
+    def _kept(self, groups: int) -> tuple[Callable[[], None], np.ndarray, np.ndarray]:
         if self._prologue.lacking or not isinstance(self._code, Code):
-            raise Unsupported(self._prologue.lacking or "a GPU that computes one step of one run")
-        given, carry, series = (
-            layout.memory(1) for layout in (self._numbers_layout, self._carry_layout, self._record_layout)
-        )
-        return (
-            self._code.repeated(given, carry, series),
-            self._numbers_layout.views(given),
-            self._record_layout.views(series),
-        )
+            raise Unsupported(self._prologue.lacking or "a GPU that computes one step at a time")
+        layouts = self._numbers_layout, self._carry_layout, self._record_layout
+        given, carry, series = (layout.memory(groups) for layout in layouts)
+        return self._code.repeated(given, carry, series), given, series
 
 
 class Program(NamedTuple):

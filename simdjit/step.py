@@ -9,6 +9,7 @@ import numpy as np
 
 from simdjit.graph import Unsupported
 from simdjit.loop import Loop
+from simdjit.tracing import same_types
 
 
 class Step:
@@ -37,10 +38,7 @@ class Step:
         record = lambda arguments, carry, k: function(*arguments)
         loop = Loop(lambda n: n, lambda n: nothing, lambda n, carry, k: carry, record, given, lanes=1, cache=cache)
         results = jax.eval_shape(function, *given)
-        alike = lambda a, b: np.shape(a) == b.shape and np.asarray(a).dtype == b.dtype
-        if jax.tree.structure(state) != jax.tree.structure(results[0]) or not all(
-            map(alike, jax.tree.leaves(state), jax.tree.leaves(results[0]))
-        ):
+        if not same_types(state, results[0]):
             raise Unsupported("a state that changes its type")
         self._call, arguments, found = loop.kept()
         self.numbers, self.state, self.inputs = jax.tree.unflatten(jax.tree.structure(given), arguments)

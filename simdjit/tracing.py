@@ -66,3 +66,10 @@ class Traced:
     def types(self) -> list[np.dtype]:
         """Types of the results."""
         return [leaf.dtype for leaf in self.leaves]
+
+
+def same_types(given: Any, shapes: Any) -> bool:
+    """Whether a tree of arrays has the structure of a tree of shapes, and their sizes and types."""
+    alike = lambda a, b: np.shape(a) == b.shape and np.asarray(a).dtype == b.dtype
+    leaves = jax.tree.leaves(given), jax.tree.leaves(shapes)
+    return jax.tree.structure(given) == jax.tree.structure(shapes) and all(map(alike, *leaves))

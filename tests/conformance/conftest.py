@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ def required(argument):
         "samples": lambda: rows,
         "sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()],
         "points": lambda: rows[:, 1:4],
+        "function": lambda: f"{Path(__file__).with_name('proportional_policy.py')}:act",
     }[argument]()
 
 

@@ -51,6 +51,9 @@ _OTHER_WORDS |= {"wave": "waves", "ocean_current": "current", "cable": "tether",
 
 Part = Callable[..., Any]
 
+# In the annotation of an option, `Annotated[str, FILE]`: it names a file, relative to the folder of the scenario.
+FILE = "file"
+
 
 @functools.cache
 def collect(package: ModuleType) -> dict[str, Part]:

@@ -9,7 +9,7 @@ campaign/batch_runner.py for a campaign.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
@@ -28,7 +28,7 @@ from undertow.numerics.integrators import COMPACT_METHODS, METHODS
 from undertow.process_setup import cache_folder
 
 if TYPE_CHECKING:
-    from simdjit import Driver, Unsupported
+    from simdjit import BatchStep, Driver, Unsupported
 else:
     try:
         from simdjit import Unsupported
@@ -86,6 +86,43 @@ def kept_step(function: Callable, numbers: Any, state: Any, inputs: Any) -> Any:
     from simdjit import Step
 
     return Step(function, numbers, state, inputs, cache_folder() / "native")
+
+
+def kept_steps(
+    function: Callable, numbers: Any, state: Any, inputs: Any, runs: int, constant: Sequence[bool]
+) -> "BatchStep":
+    """`simdjit.BatchStep`: one step of many runs, called by somebody else's clock.
+
+    Raises:
+        Unsupported: as of `kept_step`.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    from simdjit import BatchStep
+
+    return BatchStep(function, numbers, state, inputs, runs, constant, cache_folder() / "native")
+
+
+def starter(prepare: Callable, begin: Callable, numbers: Any, constant: Sequence[bool]) -> Callable[[Any], Any]:
+    """The start of runs as `BatchRunner` makes it: from numbers with a leading axis over runs to results with one.
+
+    Args:
+        prepare: numbers -> everything random and what else does not change, as in a run.
+        begin: prepared -> results.
+        numbers: of one run.
+        constant: which of its arrays are equal in all runs.
+
+    Raises:
+        Unsupported: as of `kept_step`.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    from simdjit import Loop
+
+    begun = lambda known, carry, k: begin(known)
+    cache, nothing = cache_folder() / "native", np.zeros(())
+    loop = Loop(prepare, lambda known: nothing, lambda known, carry, k: carry, begun, numbers, constant, cache=cache)
+    return lambda numbers: jax.tree.map(lambda leaf: leaf[:, 0], loop.run(numbers, 0, 1)[1])
 
 
 class Run(NamedTuple):

@@ -125,7 +125,10 @@ def call(
             made = (None, None) if description is parameter.default is None else _inner(name, description, folder)
             arguments[name], resolved[name] = made
         elif name in options:
-            arguments[name] = resolved[name] = checked(name, options[name], hints.get(name), parameter.default)
+            value = checked(name, options[name], hints.get(name), parameter.default)
+            if catalogue.FILE in getattr(parameter.annotation, "__metadata__", ()):
+                value = whole_name(value, folder or Path())
+            arguments[name] = resolved[name] = value
         elif parameter.default is inspect.Parameter.empty:
             raise _missing(function, name, given)
         else:
@@ -319,5 +322,10 @@ def portable_name(name: str, folder: Path) -> str:
     """A part by a name that is the same in every folder: one of a file gets its whole path."""
     if ".py:" not in name:
         return name
-    path, attribute = name.rsplit(":", 1)
-    return f"{(folder / path).resolve()}:{attribute}"
+    return whole_name(name, folder)
+
+
+def whole_name(name: str, folder: Path) -> str:
+    """The name of a file, or of a function in one, with its whole path."""
+    path, mark, attribute = name.rpartition(":") if ".py:" in name else (name, "", "")
+    return f"{(folder / path).resolve()}{mark}{attribute}"

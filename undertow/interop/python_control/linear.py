@@ -1,0 +1,140 @@
+"""Plant, controller and closed loop of a scenario, linearised exactly, as `StateSpace`s of python-control.
+
+The derivatives are those of automatic differentiation, at the equilibrium that `undertow analyze` uses. Limits, dead
+zones and measurement errors are left out, as there: signals are deviations from the equilibrium, inside the limits.
+"""
+
+from typing import Any
+
+import control as ct
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.core.errors import BadInput
+from undertow.interop.python_control.signals import signals_of, state_names, target_of, vector_of, vector_of_measurement
+from undertow.interop.python_control.systems import Scenario, built_of, computing, measurement_of, sampled_of
+from undertow.prediction.operating_point import operating_point
+from undertow.scenario.build import Built
+
+
+def linear_plant(scenario: Scenario, *, sampled: bool = False, position: Any = None, load: Any = None) -> ct.StateSpace:
+    """The plant of a scenario, linearised at an equilibrium.
+
+    Args:
+        scenario: a .yaml file or an earlier run.nc, the same as a mapping, or built.
+        sampled: False for continuous time; True for the sampling time, exact for an input that is held.
+        position: reference at which the loop rests, m and rad; None for that of `undertow analyze`.
+        load: constant acceleration of the outputs, m/s^2 and rad/s^2; None for zero, or for the mean one of
+            `undertow analyze` where there is no position either.
+
+    Raises:
+        BadInput: the scenario cannot be used, or its loop has no equilibrium there.
+    """
+    built = built_of(scenario)
+    return _plant(built, _equilibrium(built, position, load), sampled)
+
+
+def linear_controller(scenario: Scenario, *, position: Any = None, load: Any = None) -> ct.StateSpace:
+    """The controller of a scenario at its sampling time, linearised at an equilibrium; for arguments see above.
+
+    Raises:
+        BadInput: as of `linear_plant`, or the loop is continuous.
+    """
+    built = sampled_of(scenario, "controller")
+    return _controller(built, _equilibrium(built, position, load))
+
+
+def linear_closed_loop(scenario: Scenario, *, position: Any = None, load: Any = None) -> ct.StateSpace:
+    """The closed loop of a scenario at its sampling time, linearised at an equilibrium; for arguments see above.
+
+    Raises:
+        BadInput: as of `linear_controller`.
+    """
+    built = sampled_of(scenario, "closed loop")
+    at = _equilibrium(built, position, load)
+    plant, law, of = _plant(built, at, sampled=True), _controller(built, at), signals_of(built.closed_loop.plant)
+    ends = np.cumsum([len(of.measured), len(of.desired)])
+    (b_y, b_r, b_u), (d_y, d_r, _) = np.split(law.B, ends, axis=1), np.split(law.D, ends, axis=1)
+    u_x, shown = np.hstack([d_y @ plant.C, law.C]), np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
+    own = np.block([[plant.A, np.zeros((plant.nstates, law.nstates))], [b_y @ plant.C, law.A]])
+    a, b = own + np.vstack([plant.B, b_u]) @ u_x, np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
+    c, d = np.vstack([shown, u_x]), np.vstack([np.zeros((len(shown), len(of.desired))), d_r])
+    outputs, states = of.measured | of.command, plant.state_labels + law.state_labels
+    system = ct.ss(a, b, c, d, built.scenario.loop.dt)
+    return _named(system, "closed_loop", of.desired | outputs, list(of.desired), list(outputs), states)
+
+
+def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
+    loop, dt = built.closed_loop, built.scenario.loop.dt
+    axes = len(loop.plant.outputs)
+    for name, given in (("position", position), ("load", load)):
+        if given is not None and np.shape(given) != (axes,):
+            raise BadInput(
+                name, f"have {axes} entries ({', '.join(loop.plant.outputs)})", f"of shape {np.shape(given)}"
+            )
+    with computing(built):
+        if position is None:
+            if load is not None:
+                raise BadInput("position", "be given with a load")
+            at = operating_point(built).mean
+        else:
+            at = equilibrium(loop, dt, position, np.zeros(axes) if load is None else load)
+    if not at.found:
+        raise BadInput(
+            "load", "leave the loop an equilibrium", f"one in which a state changes by {at.moving:.2g} per s"
+        )
+    return at
+
+
+def _plant(built: Built, at: Equilibrium, sampled: bool) -> ct.StateSpace:
+    loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
+    plant, zero = loop.plant, jnp.zeros(())
+
+    def moved(state: Any, u: Any) -> Any:
+        unloaded = plant.no_load()
+        pushed = unloaded._replace(acceleration=unloaded.acceleration + jnp.asarray(at.at["load"]))
+        return vector_of(plant.dynamics(zero, at.parts.plant_state(state), u, pushed))
+
+    def shown(state: Any) -> Any:
+        return vector_of_measurement(plant.output(zero, at.parts.plant_state(state)))
+
+    with computing(built):
+        state, u = jnp.asarray(at.at["plant"]), jnp.asarray(at.at["u"])
+        a, b = map(np.asarray, jax.jit(jax.jacfwd(moved, argnums=(0, 1)))(state, u))
+        c = np.asarray(jax.jit(jax.jacfwd(shown))(state))
+        names = state_names(at.parts.plant_state(state), "plant")
+    system = ct.ss(a, b, c, np.zeros((len(c), b.shape[1])))
+    if sampled:
+        system = ct.sample_system(system, built.scenario.loop.dt, "zoh")
+    return _named(system, "plant", of.applied | of.measured, list(of.applied), list(of.measured), names)
+
+
+def _controller(built: Built, at: Equilibrium) -> ct.StateSpace:
+    loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
+    law, dt = loop.controller, jnp.asarray(built.scenario.loop.dt)
+    sizes = np.cumsum([len(of.measured), len(of.desired)])
+
+    def both(state: Any, given: Any) -> Any:
+        measured, desired, applied = jnp.split(given, sizes)
+        z, y, r = at.parts.law_state(state), measurement_of(loop, measured), target_of(desired)
+        return vector_of(law.advance(z, y, r, applied, dt)), law.command(z, y, r)[0]
+
+    with computing(built):
+        x = at.parts.plant_state(jnp.asarray(at.at["plant"]))
+        state, y = jnp.asarray(at.at["law"]), loop.plant.output(jnp.zeros(()), x)
+        given = jnp.concatenate([vector_of_measurement(y), *at.parts.target, jnp.asarray(at.at["u"])])
+        (a, b), (c, d) = jax.jit(jax.jacfwd(both, argnums=(0, 1)))(state, given)
+        names = state_names(at.parts.law_state(state), "law")
+    inputs = of.measured | of.desired | of.applied
+    system = ct.ss(*map(np.asarray, (a, b, c, d)), built.scenario.loop.dt)
+    return _named(system, "controller", inputs | of.command, list(inputs), list(of.command), names)
+
+
+def _named(
+    system: Any, name: str, units: dict[str, str], inputs: list[str], outputs: list[str], states: list[str]
+) -> ct.StateSpace:
+    named: Any = ct.ss(system, inputs=inputs, outputs=outputs, states=states, name=name)
+    named.units = units
+    return named
