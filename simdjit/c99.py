@@ -3,6 +3,7 @@
 No heap, no state of its own, no library but libm: fma, sqrt, floor and the like, which IEEE 754 rounds correctly.
 """
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -317,8 +318,10 @@ static {kind} {whole}({kind} x, {kind} n) {{
             inner.lines += [
                 f"const {kind} {name}n = {value};" for kind, name, value in zip(kinds, names, after, strict=True)
             ]
+            read = set(re.findall(r"\w+", "\n".join(inner.lines)))
             inner.lines += [f"{name} = {name}n;" for name in names]
-            self.lines += ["for (;;) {", *_indented(inner.lines), "}"]
+            # Compilers warn of what is carried from round to round and never read.
+            self.lines += ["for (;;) {", *_indented(inner.lines), "}", *(f"(void){n};" for n in names if n not in read)]
         else:
             self.lines += [f"{kind} {name} = 0;" for kind, name in zip(kinds, names, strict=True)]
             inner._names |= zip(region.inputs, given, strict=True)

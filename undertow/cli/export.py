@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from undertow.autopilot.c99_export import export_c99
+from undertow.export.controller import export_controller
 from undertow.cli.exit_codes import DONE
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
@@ -29,7 +29,7 @@ def export(
     with stage(console, "reading and building"):
         built = build(read(scenario, allow_code=allow_code))
     with stage(console, "C99 and its test"):
-        exported = export_c99(built, name, precision=precision, attitude=attitude, velocity=velocity, output=output)
+        exported = export_controller(built, name, precision=precision, attitude=attitude, velocity=velocity, output=output)
     exported.write(folder, overwrite)
     size = sum(map(len, exported.files.values())) / 1e3
     console.print(f"{len(exported.files)} files, {size:.0f} kB: {folder}", highlight=False, soft_wrap=True)
