@@ -32,7 +32,7 @@ typedef struct {
 
 #define VARIABLES_COUNT (sizeof VARIABLES / sizeof VARIABLES[0])
 
-typedef enum { INSTANTIATED = 1, INITIALISING = 2, STEPPING = 4, TERMINATED = 8, FAILED = 16 } fmu_phase;
+typedef enum { INSTANTIATED = 1, INITIALISING = 2, STEPPING = 4, TERMINATED = 8 } fmu_phase;
 
 typedef struct {
     uint64_t identity; /* of the unit, because a state may come from elsewhere */
@@ -168,14 +168,18 @@ FMI2_EXPORT fmi2Status FMI2(fmi2EnterInitializationMode)(fmi2Component c) {
     return fmi2OK;
 }
 
-/* The first number that must be finite and is not; NULL where all are. */
-static const fmu_variable *not_finite(const fmu_kept *kept, fmu_role up_to) {
+static fmi2Real real_of(const fmu_kept *kept, const fmu_variable *one) {
+    fmu_real number;
+    (void)memcpy(&number, (const char *)&kept->model + one->place, sizeof number);
+    return (fmi2Real)number;
+}
+
+/* The first number that must be finite and is not, among inputs, parameters and those of a role; NULL where all are. */
+static const fmu_variable *not_finite(const fmu_kept *kept, fmu_role role) {
     for (size_t i = 0; i < VARIABLES_COUNT; ++i) {
         const fmu_variable *one = &VARIABLES[i];
-        const int checked = one->role == FMU_INPUT || one->role == FMU_PARAMETER || one->role == up_to;
-        fmu_real value;
-        (void)memcpy(&value, (const char *)&kept->model + one->place, (one->type == FMU_REAL) ? sizeof value : 0);
-        if (checked && one->type == FMU_REAL && !isfinite(value)) {
+        const int checked = one->role == FMU_INPUT || one->role == FMU_PARAMETER || one->role == role;
+        if (checked && one->type == FMU_REAL && !isfinite(real_of(kept, one))) {
             return one;
         }
     }
@@ -197,7 +201,7 @@ FMI2_EXPORT fmi2Status FMI2(fmi2ExitInitializationMode)(fmi2Component c) {
 }
 
 FMI2_EXPORT fmi2Status FMI2(fmi2Terminate)(fmi2Component c) {
-    fmu_instance *unit = ready(c, STEPPING | FAILED, "fmi2Terminate");
+    fmu_instance *unit = ready(c, STEPPING, "fmi2Terminate");
     if (unit == NULL) {
         return fmi2Error;
     }
@@ -246,7 +250,7 @@ static char *writable(fmu_instance *unit, fmi2ValueReference reference, fmu_type
     return (char *)&unit->kept.model + one->place;
 }
 
-#define ANY_PHASE (INSTANTIATED | INITIALISING | STEPPING | TERMINATED | FAILED)
+#define ANY_PHASE (INSTANTIATED | INITIALISING | STEPPING | TERMINATED)
 
 FMI2_EXPORT fmi2Status FMI2(fmi2GetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t count,
                                          fmi2Real value[]) {
@@ -260,9 +264,7 @@ FMI2_EXPORT fmi2Status FMI2(fmi2GetReal)(fmi2Component c, const fmi2ValueReferen
         if (one == NULL) {
             return fmi2Error;
         }
-        fmu_real number;
-        (void)memcpy(&number, (const char *)&unit->kept.model + one->place, sizeof number);
-        value[i] = (fmi2Real)number;
+        value[i] = real_of(&unit->kept, one);
     }
     return fmi2OK;
 }
@@ -470,11 +472,22 @@ FMI2_EXPORT fmi2Status FMI2(fmi2FreeFMUstate)(fmi2Component c, fmi2FMUstate *sta
     return fmi2OK;
 }
 
+/* Ends a serialised state, because files may be damaged: Fowler, Noll and Vo, variant 1a. */
+static uint64_t checksum(const char *bytes) {
+    uint64_t sum = 14695981039346656037ULL;
+    for (size_t i = 0; i < sizeof(fmu_kept); ++i) {
+        sum = (sum ^ (unsigned char)bytes[i]) * 1099511628211ULL;
+    }
+    return sum;
+}
+
+#define SERIALISED (sizeof(fmu_kept) + sizeof(uint64_t))
+
 FMI2_EXPORT fmi2Status FMI2(fmi2SerializedFMUstateSize)(fmi2Component c, fmi2FMUstate state, size_t *size) {
     if (c == NULL || state == NULL || size == NULL) {
         return fmi2Error;
     }
-    *size = sizeof(fmu_kept);
+    *size = SERIALISED;
     return fmi2OK;
 }
 
@@ -483,10 +496,12 @@ FMI2_EXPORT fmi2Status FMI2(fmi2SerializeFMUstate)(fmi2Component c, fmi2FMUstate
     if (unit == NULL || state == NULL || bytes == NULL) {
         return fmi2Error;
     }
-    if (size < sizeof(fmu_kept)) {
-        return FAILED_CALL(unit, "A state takes %u bytes, not %u.", (unsigned)sizeof(fmu_kept), (unsigned)size);
+    if (size < SERIALISED) {
+        return FAILED_CALL(unit, "A state takes %u bytes, not %u.", (unsigned)SERIALISED, (unsigned)size);
     }
+    const uint64_t sum = checksum(state);
     (void)memcpy(bytes, state, sizeof(fmu_kept));
+    (void)memcpy(bytes + sizeof(fmu_kept), &sum, sizeof sum);
     return fmi2OK;
 }
 
@@ -496,9 +511,13 @@ FMI2_EXPORT fmi2Status FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2
     if (unit == NULL || bytes == NULL || state == NULL) {
         return fmi2Error;
     }
-    const uint64_t expected = FMU_IDENTITY;
-    if (size != sizeof(fmu_kept) || memcmp(bytes, &expected, sizeof expected) != 0) {
-        return FAILED_CALL(unit, "These %u bytes are not a state of this unit.", (unsigned)size);
+    uint64_t identity = 0, sum = 0;
+    if (size == SERIALISED) {
+        (void)memcpy(&identity, bytes, sizeof identity);
+        (void)memcpy(&sum, bytes + sizeof(fmu_kept), sizeof sum);
+    }
+    if (identity != FMU_IDENTITY || sum != checksum(bytes)) {
+        return FAILED_CALL(unit, "These %u bytes are not a state of this unit, or they are damaged.", (unsigned)size);
     }
     if (*state == NULL) {
         *state = allocate(&unit->callbacks, sizeof(fmu_kept));
