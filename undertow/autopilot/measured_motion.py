@@ -16,7 +16,7 @@ Vector3 = Float[Array, "3"]
 ATTITUDES = ("euler", "quaternion")
 VELOCITIES = ("body", "world", "rates")
 
-_UNIT = 1e-12  # a quaternion whose square departs from 1 by less is taken as it is
+_UNIT = 1e-9  # a quaternion whose square departs from 1 by less is taken as it is: one that was integrated does
 
 
 class Format(NamedTuple):

@@ -214,9 +214,7 @@ def fields(tree: Any) -> list[Field]:
 def places(struct: str, members: list[Field]) -> list[str]:
     """Where each number of some members lies."""
     return [
-        f"{struct}->{one.name}{''.join(f'[{i}]' for i in index)}"
-        for one in members
-        for index in np.ndindex(*one.shape)
+        f"{struct}->{one.name}{''.join(f'[{i}]' for i in index)}" for one in members for index in np.ndindex(*one.shape)
     ]
 
 

@@ -64,8 +64,11 @@ static fmi2Status failed(const fmi2CallbackFunctions *callbacks, const char *nam
     va_start(values, format);
     (void)vsnprintf(sentence, sizeof sentence, format, values);
     va_end(values);
+    for (char *each = sentence; *each != '\0'; ++each) {
+        *each = (*each == '%') ? '/' : *each; /* To a logger the sentence is a format. */
+    }
     if (callbacks->logger != NULL) {
-        callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "logStatusError", "%s", sentence);
+        callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "logStatusError", sentence);
     }
     return fmi2Error;
 }

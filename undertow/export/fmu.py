@@ -18,7 +18,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from undertow.autopilot.functions import Functions

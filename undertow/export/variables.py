@@ -60,7 +60,9 @@ class Names(NamedTuple):
         yield from group("attitude", struct, "motion_attitude", role, turned, angle, attitude, start[1])
         yield from group("velocity", struct, "motion_velocity", role, moving, rates, velocity, start[2])
 
-    def outputs(self, name: str, member: str, role: str, start: Any, meaning: str, order: int = 0) -> Iterator[Variable]:
+    def outputs(
+        self, name: str, member: str, role: str, start: Any, meaning: str, order: int = 0
+    ) -> Iterator[Variable]:
         """The outputs of the plant, or their derivatives of an order, in a member of the input."""
         units = self.plant.output_units
         for _ in range(order):

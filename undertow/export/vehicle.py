@@ -9,18 +9,17 @@ import numpy as np
 from undertow.autopilot.measured_motion import Format, Motion
 from undertow.core import runtime
 from undertow.core.arrays import in_present_precision
-from undertow.core.contracts import AbstractDisturbance, Load, Measurement
+from undertow.core.contracts import Load, Measurement
 from undertow.core.errors import BadInput
 from undertow.disturbances.adding import Together
 from undertow.export.c_program import Exported, Program, System, made_from
 from undertow.export.controller import checked, described
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import status_of
-from undertow.loop.simd_batch import Unsupported
-from undertow.loop.stepped import Step
+from undertow.loop.simd_batch import Unsupported, realized_disturbance
 from undertow.numerics.integrators import COMPACT_METHODS
 from undertow.numerics.linear_algebra import matvec
-from undertow.numerics.random_keys import key_of_seed, keys_for
+from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
 
 _SPREAD = 2.0  # of the random commands of a test, V
@@ -87,21 +86,17 @@ def vehicle_program(built: Built, name: str, form: Format) -> Program:
     if built.scenario.loop.method not in COMPACT_METHODS:
         must = f"be one of {', '.join(COMPACT_METHODS)} for a vehicle in C"
         raise BadInput("loop.method", must, built.scenario.loop.method)
-    realization = _realized(loop.disturbance, built.scenario.seed)
+    try:
+        realization = jax.tree.map(jnp.asarray, realized_disturbance(loop, key_of_seed(built.scenario.seed)))
+    except Unsupported as error:
+        must = "be made of operations that the batch compiler has"
+        raise BadInput("disturbance", must, f"one that needs others: {error}") from None
     try:
         return Program(_system(built, name, loop, form, realization))
     except Unsupported as error:
         where = _not_exported(loop, realization, built) or "plant"
         must = "be made of operations that the batch compiler has"
         raise BadInput(where, must, f"one that needs others: {error}") from None
-
-
-def _realized(disturbance: AbstractDisturbance, seed: int) -> Any:
-    """What is random of a disturbance, with the bits of a simulation of that seed."""
-    key = keys_for(key_of_seed(seed), "disturbance", "navigation")["disturbance"]
-    step = Step(lambda _, __, key: ((), disturbance.realize(key)), (), (), key)
-    step()
-    return jax.tree.map(jnp.asarray, step.outputs)
 
 
 def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization: Any) -> System:
@@ -149,8 +144,8 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
         "state": "State of the vehicle; keep it between the steps.",
         "input": "Input of a step: position and velocity at the start, which the first step takes; "
         f"command, {plant.input_unit}; force and moment from outside, N and N m; time at the beginning of the step, s.",
-        "output": f"Output of a step: the true motion at its end, the input that was applied, {plant.input_unit}, and a "
-        f"status, 0 while the motion is valid. {described(None if truth.body is None else form)}",
+        "output": f"Output of a step: true motion at its end, input that was applied, {plant.input_unit}, and status, 0 "
+        f"while the motion is valid. {described(None if truth.body is None else form)}",
         "start": "The first output: sets the state.",
         "step": "A step of one sampling time from input->t on, with the command held.",
     }
