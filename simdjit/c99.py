@@ -1,6 +1,7 @@
 """A graph as C99: the same operations one after another, for one run, with the same bits in the same precision.
 
-No heap, no state of its own, no library but libm: fma, sqrt, floor and the like, which IEEE 754 rounds correctly.
+No heap, no state of its own, no library but libm: sqrt, floor and the like, which IEEE 754 rounds correctly, and fma
+where the library rounds it once.
 """
 
 import re
@@ -11,6 +12,7 @@ import jax
 import numpy as np
 
 from simdjit.calls import ARGUMENT, FORMULAS
+from simdjit.fused_c99 import FUSED
 from simdjit.graph import BOOL, Graph, Node, Unsupported, flat
 from simdjit.lowering import evaluate
 from simdjit.matrix_loop import Product
@@ -31,7 +33,7 @@ TYPES = {
 _OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "rem": "%", "and": "&", "or": "|", "xor": "^"}
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 _TURNED = {"lt": "gt", "gt": "lt", "le": "ge", "ge": "le"}
-_LIBM = {"fma": "fma", "rem": "fmod", "copysign": "copysign", "abs": "fabs", "sqrt": "sqrt"}
+_LIBM = {"rem": "fmod", "copysign": "copysign", "abs": "fabs", "sqrt": "sqrt"}
 _LIBM |= {"floor": "floor", "ceil": "ceil", "round": "nearbyint"}
 
 HEAD = """\
@@ -184,6 +186,8 @@ class _Body:
             return self._converted(before, dtype, given[0])
         if name in _COMPARED:
             return self._comparison(name, operands, given, before)
+        if name == "fma":
+            return f"{self._source.helper(f'fused_{before}', lambda: FUSED[before])}({', '.join(given)})"
         if floating and name in _LIBM:
             return f"{_LIBM[name]}{'f' if before == 'float32' else ''}({', '.join(given)})"
         if name == "neg":

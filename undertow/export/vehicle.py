@@ -144,7 +144,7 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
         "state": "State of the vehicle; keep it between the steps.",
         "input": "Input of a step: position and velocity at the start, which the first step takes; "
         f"command, {plant.input_unit}; force and moment from outside, N and N m; time at the beginning of the step, s.",
-        "output": f"Output of a step: true motion at its end, input that was applied, {plant.input_unit}, and status, 0 "
+        "output": f"Output of a step: true motion at its end, applied input, {plant.input_unit}, and status, 0 "
         f"while the motion is valid. {described(None if truth.body is None else form)}",
         "start": "The first output: sets the state.",
         "step": "A step of one sampling time from input->t on, with the command held.",
