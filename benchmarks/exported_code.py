@@ -1,9 +1,8 @@
 """What exported controllers and vehicles take: python benchmarks/exported_code.py [--json]
 
 The controllers of the Heavy and of the paper's Example 2 run their test vectors on a Cortex-M4 that QEMU emulates
-(machine mps2-an386). QEMU counts executed instructions; it knows no cycles, no waits for memory and no pipeline, so
-that instructions are a lower bound of the cycles of a real processor. Debian: gcc-arm-none-eabi,
-libnewlib-arm-none-eabi, qemu-system-arm.
+(machine mps2-an386). QEMU counts executed instructions; it knows no cycles, no waits for memory and no pipeline.
+Debian: gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm.
 
 The FMUs of the Heavy and of ODIN with full motors are validated by FMPy, and a step of each is timed on this machine.
 """
@@ -29,7 +28,7 @@ CONTROLLERS = ("bluerov2_heavy", "paper_example2")
 TOOLS = ("arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm")
 PROCESSOR = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 MACHINE = ("-machine", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none", "-icount", "shift=6")
-TICKS = 1.6  # of the timer per instruction: 64 ns at 25 MHz
+COUNTS = 1.6  # of the timer per instruction: 64 ns at 25 MHz
 
 ODIN = {
     "description": "ODIN, electromechanical thrusters, suite U1",
@@ -66,9 +65,9 @@ def on_cortex_m4(scenario: str, precision: str, level: str) -> dict[str, Any]:
         code = int(done(TOOLS[1], "controller.o").splitlines()[1].split()[0])
         semihosting = ("-semihosting-config", "enable=on,target=native", "-kernel", "test.elf")
         found = json.loads(done(TOOLS[2], *MACHINE, *semihosting))
-    if abs(found.pop("ticks_of_2000") - 2000 * TICKS) > 8:
+    if abs(found.pop("counts_of_2000") - 2000 * COUNTS) > 8:
         sys.exit("QEMU's timer does not count instructions as expected.")
-    mean, most = (round(found.pop(f"ticks_{which}") / TICKS) for which in ("mean", "most"))
+    mean, most = (round(found.pop(f"counts_{which}") / COUNTS) for which in ("mean", "most"))
     return {
         "scenario": scenario,
         "precision": precision,

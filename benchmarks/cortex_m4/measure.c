@@ -39,13 +39,13 @@ static void stopped(void) { _exit(3); }
 __attribute__((section(".vectors"), used)) static void *const VECTOR_TABLE[] = {
     &stack_top, (void *)reset, (void *)stopped, (void *)stopped, (void *)stopped, (void *)stopped, (void *)stopped};
 
-static uint32_t ticks(uint32_t from) { return (from - TIMER_VALUE) & 0xFFFFFFu; }
+static uint32_t counts(uint32_t from) { return (from - TIMER_VALUE) & 0xFFFFFFu; }
 
 /* 2000 instructions. */
 static uint32_t known(void) {
     const uint32_t from = TIMER_VALUE;
     __asm volatile("movw r3, #1000\n1: subs r3, r3, #1\n bne 1b" ::: "r3", "cc");
-    return ticks(from);
+    return counts(from);
 }
 
 static CALLED(_state) state;
@@ -70,7 +70,7 @@ int main(void) {
         } else {
             CALLED(_step)(&state, &INPUTS[k], &output);
         }
-        taken[k] = ticks(from);
+        taken[k] = counts(from);
         different += memcmp(&output, &OUTPUTS[k], sizeof output) != 0;
     }
     uint32_t untouched = 0;
@@ -81,7 +81,7 @@ int main(void) {
         total += taken[k];
         most = (taken[k] > most) ? taken[k] : most;
     }
-    printf("{\"different\": %d, \"steps\": %d, \"ticks_of_2000\": %u, \"ticks_mean\": %u, \"ticks_most\": %u, ", different,
+    printf("{\"different\": %d, \"steps\": %d, \"counts_of_2000\": %u, \"counts_mean\": %u, \"counts_most\": %u, ", different,
            STEPS, (unsigned)unit, (unsigned)(total / (STEPS - 1)), (unsigned)most);
     printf("\"state\": %u, \"stack\": %u}\n", (unsigned)sizeof state, (unsigned)(PAINTED + 256u - 4 * untouched));
     return (different == 0) ? 0 : 1;

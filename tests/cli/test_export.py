@@ -20,7 +20,7 @@ def test_the_code_meets_its_test(tmp_path, precision, capsys):
     assert made(tmp_path / "c", "--precision", precision, "--name", "odin", "--attitude", "quaternion") == 0
     assert "6 files" in capsys.readouterr().out
     for compiler in COMPILERS:
-        for flags in ("-O2", "-O1 -fsanitize=undefined -fno-sanitize-recover=all"):
+        for flags in ("-O2", "-O1 -fsanitize=undefined,address -fno-sanitize-recover=all"):
             done = subprocess.run(
                 ["make", "clean", "test", f"CC={compiler}", f"CFLAGS={flags}"],
                 cwd=tmp_path / "c",

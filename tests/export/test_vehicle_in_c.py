@@ -212,7 +212,7 @@ def test_a_disturbance_that_cannot_be_exported_is_named(tmp_path, capsys, severa
 
 def test_an_adaptive_loop_has_no_steps(tmp_path):
     scenario = PENDULUM | {"loop": {"kind": "continuous", "method": "adaptive"}}
-    with pytest.raises(BadInput, match="`loop.method` must be one of euler, rk4 for a vehicle in C"):
+    with pytest.raises(BadInput, match="must be one of euler, rk4 for a vehicle in C, but is adaptive"):
         export_vehicle(build(scenario))
 
 
