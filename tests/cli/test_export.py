@@ -77,6 +77,19 @@ def test_an_earlier_export_is_kept(tmp_path, capsys):
     assert made(tmp_path / "c", "--attitude", "quaternion", "--overwrite") == 0
 
 
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["--fmu", "out", "--vehicle"], "`--vehicle` must stand beside --c99, but is without it"),
+        (["--fmu", "out", "--name", "odin"], "`--name` must stand beside --c99, but is without it"),
+        (["--c99", "out", "--vehicle", "--output", "wrench"], "`--output` must be left out with --vehicle"),
+    ],
+)
+def test_options_that_do_not_go_together(capsys, arguments, said):
+    assert run(["export", "examples/paper_example2.yaml", *arguments]) == 2
+    assert said in capsys.readouterr().err
+
+
 def test_without_a_folder(capsys):
     assert run(["export", "examples/paper_example2.yaml"]) == 2
     assert "`--c99` must be given: the folder for the files" in capsys.readouterr().err

@@ -62,6 +62,16 @@ def test_the_closed_loop_has_the_bits_of_a_simulation(odin, tmp_path):
     assert compared(ODIN, odin, [tmp_path / "c", tmp_path / "v"]) == (0.0, 0.0)
 
 
+def test_signals_of_the_plant_are_outputs(odin, tmp_path):
+    """The energies of the thrusters after 300 steps."""
+    record = ut.simulate_scenario(ODIN).dataset.isel(time=300)
+    controller, vehicle = (Unit(path, tmp_path / path.stem) for path in odin)
+    closed_loop(controller, vehicle, 300)
+    energies = vehicle.names("energy_")
+    assert len(energies) == 9 and vehicle.variables["energy_source"].unit == "J" and vehicle["energy_source"] > 1
+    np.testing.assert_array_equal(vehicle.get(energies), [record[name].item() for name in energies])
+
+
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_another_plant_has_them_too(tmp_path, precision):
     scenario = PENDULUM | {"precision": precision}

@@ -44,6 +44,10 @@ def export(
     """
     if c99 is None and fmu is None:
         raise BadInput("--c99", "be given: the folder for the files", hint="Or --fmu for units of co-simulation")
+    if c99 is None and (vehicle or name):
+        raise BadInput("--vehicle" if vehicle else "--name", "stand beside --c99", "without it")
+    if vehicle and output != "input":
+        raise BadInput("--output", "be left out with --vehicle, which takes its input", output)
     console = wide_console()
     say: Callable[[str], None] = lambda text: console.print(text, highlight=False, soft_wrap=True)
     with stage(console, "reading and building"):

@@ -28,8 +28,8 @@ from undertow.core.status import Status
 from undertow.export.c_program import Exported, Program
 from undertow.export.controller import checked, controller_program, functions_of
 from undertow.export.model_description import Unit, model_description
-from undertow.export.variables import Names, Variable, group
-from undertow.export.vehicle import vehicle_program
+from undertow.export.variables import Names, Variable, group, signals
+from undertow.export.vehicle import numbers_of, vehicle_program
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built
 
@@ -119,6 +119,7 @@ def _of_vehicle(built: Built, of: Functions) -> list[Variable]:
         *names.reports("output", "output", report, "true"),
         *names.actuators("applied", "output", "applied", "output", "input applied over the last step to"),
         Variable("status", ("output", "status", 0), "output", "Integer", "", status),
+        *signals("output", "signals", numbers_of(plant)),
     ]
 
 

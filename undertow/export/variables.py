@@ -1,6 +1,6 @@
 """Variables of a unit of co-simulation: names, units and meanings of the numbers in the structs of a C program."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from undertow.autopilot.measured_motion import Format
 from undertow.core.contracts import AbstractPlant
 from undertow.core.measurement import BODY_AXES, BODY_OUTPUTS
+from undertow.core.signals import Signal
 from undertow.plants.hybrid_vehicle import HybridVehicle
 
 _WORLD = (*BODY_OUTPUTS[:3], "about_north", "about_east", "about_down")
@@ -118,6 +119,13 @@ def numbered(
     start = None if role == "output" else 0.0
     for i, owner in enumerate(owners):
         yield Variable(f"{name}[{i + 1}]", (struct, member, i), role, "Real", unit, f"{meaning} {owner}", start)
+
+
+def signals(struct: str, member: str, declared: Mapping[str, Signal]) -> Iterator[Variable]:
+    """Outputs for signals that are numbers."""
+    for name, one in declared.items():
+        unit = "" if one.unit == "1" else one.unit
+        yield Variable(name, (struct, f"{member}_{name}", 0), "output", "Real", unit, one.meaning)
 
 
 def _per_second(units: Sequence[str]) -> tuple[str, ...]:

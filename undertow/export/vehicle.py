@@ -9,8 +9,9 @@ import numpy as np
 from undertow.autopilot.measured_motion import Format, Motion
 from undertow.core import runtime
 from undertow.core.arrays import in_present_precision
-from undertow.core.contracts import Load, Measurement
+from undertow.core.contracts import AbstractPlant, Load, Measurement
 from undertow.core.errors import BadInput
+from undertow.core.signals import Signal
 from undertow.disturbances.adding import Together
 from undertow.export.c_program import Exported, Program, System, made_from
 from undertow.export.controller import checked, described
@@ -42,12 +43,16 @@ class VehicleInput(NamedTuple):
 
 
 class VehicleOutput(NamedTuple):
-    """Output of a step: true motion and report of the actuators at its end, input that was applied, status code."""
+    """Output of a step: true motion and report of the actuators at its end, input that was applied, status code.
+
+    `signals` are those numbers that the plant declares, such as the voltage of a battery.
+    """
 
     motion: Motion
     actuator: Any
     applied: Any
     status: Any
+    signals: dict[str, Any]
 
 
 def export_vehicle(
@@ -86,15 +91,12 @@ def vehicle_program(built: Built, name: str, form: Format) -> Program:
     if built.scenario.loop.method not in COMPACT_METHODS:
         must = f"be one of {', '.join(COMPACT_METHODS)} for a vehicle in C"
         raise BadInput("loop.method", must, built.scenario.loop.method)
+    realization = None
     try:
         realization = jax.tree.map(jnp.asarray, realized_disturbance(loop, key_of_seed(built.scenario.seed)))
-    except Unsupported as error:
-        must = "be made of operations that the batch compiler has"
-        raise BadInput("disturbance", must, f"one that needs others: {error}") from None
-    try:
         return Program(_system(built, name, loop, form, realization))
     except Unsupported as error:
-        where = _not_exported(loop, realization, built) or "plant"
+        where = "disturbance" if realization is None else _not_exported(loop, realization, built) or "plant"
         must = "be made of operations that the batch compiler has"
         raise BadInput(where, must, f"one that needs others: {error}") from None
 
@@ -112,8 +114,9 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
     h = dt / settings.substeps
 
     def shown(t: Any, x: Any, applied: Any) -> VehicleOutput:
-        truth = plant.output(t, x)
-        return VehicleOutput(motion_of(truth, form), truth.actuator, applied, status_of(loop, x, ()))
+        truth, values = plant.output(t, x), plant.diagnostics(x, applied)
+        numbers = {name: jnp.asarray(values[name], dtype=float) for name in numbers_of(plant)}
+        return VehicleOutput(motion_of(truth, form), truth.actuator, applied, status_of(loop, x, ()), numbers)
 
     def start(inputs: VehicleInput):
         x = plant.initial_state(*inputs.initial)
@@ -152,6 +155,11 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
     what = "Plant" if truth.body is None else "Underwater vehicle with its thrusters"
     about = made_from(f"{what}, under its disturbance", built.scenario.description)
     return System(name, about, meanings, start, step, inputs, sample, settings.dt)
+
+
+def numbers_of(plant: AbstractPlant) -> dict[str, Signal]:
+    """The signals of a plant that are numbers, by name."""
+    return {name: signal for name, signal in plant.signals().items() if signal.dimensions == ()}
 
 
 def motion_of(truth: Measurement, form: Format) -> Motion:
