@@ -17,10 +17,10 @@ ODIN = {
     "loop": {"duration": 2.0, "dt": 0.001, "record": 0.001, "substeps": 2},
 }
 PENDULUM = {
+    "description": 'a pendulum /* in a "comment" */ at 5\u00b0, 50 % \\',  # which C and XML must survive
     "plant": "inverted_pendulum",
     "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},
-    "disturbance": "random_suite",
+    "disturbance": {"kind": "random_suite", "axes": 1, "span": 4},
     "initial": {"position": [0.05]},
     "loop": {"duration": 1.0, "dt": 0.001, "record": 0.001},
 }
-PENDULUM["disturbance"] = {"kind": "random_suite", "axes": 1, "span": 4}

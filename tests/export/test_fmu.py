@@ -304,6 +304,12 @@ def test_without_a_compiler(monkeypatch):
     assert compiled({}, "vehicle") == (None, "there is no C compiler on this machine (no-such-compiler)")
 
 
+def test_a_compiler_that_fails(monkeypatch):
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(BadInput, match="`CC`: the C compiler false failed on the unit vehicle"):
+        compiled({}, "vehicle")
+
+
 @pytest.mark.parametrize("compiler", [name for name in ("gcc", "clang") if shutil.which(name)])
 def test_compilers_agree(monkeypatch, tmp_path, compiler):
     monkeypatch.setenv("CC", compiler)

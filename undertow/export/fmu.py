@@ -3,17 +3,16 @@
 A unit is an archive of modelDescription.xml, the sources, and the library that this machine's compiler makes of them.
 """
 
-import hashlib
 import io
 import os
 import platform
+import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
-import uuid
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -25,16 +24,15 @@ from undertow.autopilot.measured_motion import Format
 from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.export.c_program import Exported, Program
+from undertow.export.c_program import Exported
 from undertow.export.controller import checked, controller_program, functions_of
+from undertow.export.fmu_sources import sources_of
 from undertow.export.model_description import Unit, model_description
 from undertow.export.variables import Names, Variable, group, signals
 from undertow.export.vehicle import numbers_of, vehicle_program
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built
 
-_HERE = Path(__file__).parent
-_ROLES = {role: f"FMU_{role.upper()}" for role in ("output", "input", "measured", "parameter", "tunable")}
 _FLAGS = ("-O2", "-std=c99", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
 
 
@@ -76,7 +74,7 @@ def export_fmu(
         }
     files, without = {}, ""
     for name, (program, variables) in programs.items():
-        sources, unit = _sources(program, variables, built.scenario.loop.duration)
+        sources, unit = sources_of(program, variables, built.scenario.loop.duration)
         library, without = compiled(sources, name)
         files[f"{name}.fmu"] = _archive(sources, unit, library)
     return Units(Exported(files), without)
@@ -123,50 +121,22 @@ def _of_vehicle(built: Built, of: Functions) -> list[Variable]:
     ]
 
 
-def _sources(program: Program, variables: Sequence[Variable], duration: float) -> tuple[dict[str, str], Unit]:
-    """The files of the folder `sources`, and the unit."""
-    system = program.system
-    rows = ",\n    ".join(_row(program, one) for one in variables)
-    integer = "int64_t" if program.kind == "double" else "int32_t"
-    filled = {"NAME": system.name, "REAL": program.kind, "INTEGER": integer, "VARIABLES_ROWS": rows}
-    model = (_CONTROLLER if "target" in program.fields else _VEHICLE) + _COMMON
-    filled["STATUS_ROWS"] = ",\n        ".join(f'"{code.sentence}"' for code in Status)
-    for word, text in filled.items():
-        model = model.replace(f"@{word}@", text)
-    sources = {f"{system.name}.c": program.text(), f"{system.name}.h": program.header(), "fmu_model.h": model}
-    sources |= {name: (_HERE / name).read_text("utf-8") for name in ("fmi2.c", "fmi2.h")}
-    digest = hashlib.sha256(repr((sorted(sources.items()), list(variables))).encode()).digest()
-    guid, identity = f"{{{uuid.UUID(bytes=digest[:16])}}}", int.from_bytes(digest[16:24], "little")
-    sources["fmu_model.h"] = model.replace("@GUID@", guid).replace("@IDENTITY@", f"{identity}ULL")
-    compiled_ones = [name for name in sources if name.endswith(".c")]
-    return sources, Unit(system.name, guid, system.about, variables, compiled_ones, system.period, duration)
-
-
-def _row(program: Program, one: Variable) -> str:
-    """The row of a variable in the table in C."""
-    struct, member, index = one.place
-    place = f"offsetof(fmu_model, {member if struct == 'model' else struct})"
-    if struct != "model":
-        place += f" + offsetof({program.system.name}_{struct}, {member}) + {index} * sizeof(fmu_real)"
-    return f'{{"{one.name}", FMU_{one.kind.upper()}, {_ROLES[one.role]}, {place}}}'
-
-
 def compiled(sources: Mapping[str, str], name: str) -> tuple[bytes | None, str]:
     """The shared library of some sources, and why there is none; "" where there is one."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return None, f"no library is made on {sys.platform}, {platform.machine()}"
-    chosen = os.environ.get("CC")
-    compiler = next(filter(None, map(shutil.which, (chosen,) if chosen else ("cc", "gcc", "clang"))), None)
-    if compiler is None:
+    chosen = os.environ.get("CC", "")
+    command = shlex.split(chosen) or [next(filter(shutil.which, ("cc", "gcc", "clang")), "cc")]
+    if shutil.which(command[0]) is None:
         return None, f"there is no C compiler on this machine ({chosen or 'cc, gcc or clang'})"
     with tempfile.TemporaryDirectory() as folder:
         for file, text in sources.items():
             (Path(folder) / file).write_text(text, encoding="utf-8")
         files = [file for file in sources if file.endswith(".c")]
-        command = [compiler, *_FLAGS, *files, "-o", f"{name}.so", "-lm"]
+        command += [*_FLAGS, *files, "-o", f"{name}.so", "-lm"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         if done.returncode != 0:
-            raise BadInput("", "", f"{compiler} could not compile the unit `{name}`: {done.stderr}")
+            raise BadInput("CC", "", f"the C compiler {command[0]} failed on the unit {name}: {done.stderr}")
         return (Path(folder) / f"{name}.so").read_bytes(), ""
 
 
@@ -183,96 +153,3 @@ def _archive(sources: Mapping[str, str], unit: Unit, library: bytes | None) -> b
         for name, content in contents.items():
             archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
-
-
-_COMMON = """
-static const fmu_variable VARIABLES[] = {
-    @VARIABLES_ROWS@
-};
-"""
-
-_HEAD = """\
-/* Variables of the unit, and what a step does. */
-#include "@NAME@.h"
-
-#define FMU_IDENTIFIER "@NAME@"
-#define FMU_GUID "@GUID@"
-#define FMU_IDENTITY @IDENTITY@
-#define FMU_PERIOD @NAME@_PERIOD
-
-typedef @REAL@ fmu_real;
-typedef @INTEGER@ fmu_integer;
-"""
-
-_CONTROLLER = (
-    _HEAD
-    + """
-typedef struct {
-    @NAME@_state state;
-    @NAME@_input input;
-    @NAME@_output output;
-    int scenario_reference;
-} fmu_model;
-
-static void fmu_defaults(fmu_model *model) {
-    static const @NAME@_input defaults = @NAME@_DEFAULTS;
-    model->input = defaults;
-    model->scenario_reference = 1;
-}
-
-/* The outputs at the start: no command until the first step. */
-static void fmu_initialise(fmu_model *model) { (void)model; }
-
-/* The sentence why the step failed; NULL where it did not. */
-static const char *fmu_step(fmu_model *model, int64_t steps) {
-    @NAME@_input input = model->input;
-    if (model->scenario_reference != 0) {
-        @NAME@_target target;
-        @NAME@_reference((fmu_real)steps * (fmu_real)FMU_PERIOD, &target);
-        (void)memcpy(input.target_position, target.position, sizeof target.position);
-        (void)memcpy(input.target_velocity, target.velocity, sizeof target.velocity);
-        (void)memcpy(input.target_acceleration, target.acceleration, sizeof target.acceleration);
-    }
-    if (steps == 0) {
-        @NAME@_start(&model->state, &input, &model->output);
-    } else {
-        @NAME@_step(&model->state, &input, &model->output);
-    }
-    for (size_t i = 0; i < sizeof model->output.command / sizeof model->output.command[0]; ++i) {
-        if (!isfinite(model->output.command[i])) {
-            return "The controller commanded an input that is infinite or undefined.";
-        }
-    }
-    return NULL;
-}
-"""
-)
-
-_VEHICLE = (
-    _HEAD
-    + """
-typedef struct {
-    @NAME@_state state;
-    @NAME@_input input;
-    @NAME@_output output;
-} fmu_model;
-
-static void fmu_defaults(fmu_model *model) {
-    static const @NAME@_input defaults = @NAME@_DEFAULTS;
-    model->input = defaults;
-}
-
-/* The outputs at the start, which follow from the parameters. */
-static void fmu_initialise(fmu_model *model) { @NAME@_start(&model->state, &model->input, &model->output); }
-
-/* The sentence why the step failed; NULL where it did not. */
-static const char *fmu_step(fmu_model *model, int64_t steps) {
-    static const char *const sentences[] = {
-        @STATUS_ROWS@
-    };
-    model->input.t = (fmu_real)steps * (fmu_real)FMU_PERIOD;
-    @NAME@_step(&model->state, &model->input, &model->output);
-    return (model->output.status == 0) ? NULL : sentences[model->output.status];
-}
-"""
-)
