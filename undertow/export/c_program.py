@@ -13,7 +13,7 @@ import jax
 import numpy as np
 
 from undertow.core.errors import BadInput
-from undertow.loop.simd_batch import unavailable
+from undertow.loop.simd_batch import Unsupported, unavailable
 from undertow.loop.stepped import Step, put
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
@@ -104,8 +104,7 @@ class Program:
     def __init__(self, system: System, functions: Sequence[Function] = ()):
         if not _NAME.fullmatch(system.name):
             raise BadInput("name", "be lower-case letters, digits and underscores, at most 31", repr(system.name))
-        if unavailable():
-            raise BadInput("c99", "have the batch compiler installed", unavailable())
+        check_compiler()
         from simdjit import c99
 
         self.system, self._c99, self._source = system, c99, c99.Source()
@@ -200,6 +199,29 @@ class Program:
             return "{" + ", ".join(map(written, value)) + "}"
 
         return "{" + ", ".join(written(np.asarray(leaf)) for leaf in leaves if leaf.size) + "}"
+
+
+def check_compiler() -> None:
+    """Check that there is a batch compiler, whose operations are written in C.
+
+    Raises:
+        BadInput: there is none.
+    """
+    if unavailable():
+        raise BadInput("", "", f"nothing can be exported: {unavailable()}")
+
+
+def has_counterpart(function: Callable, *arguments: Any) -> bool:
+    """Whether a function of arrays can be written in C."""
+    from simdjit import c99
+
+    count = sum(leaf.size for leaf in jax.tree.leaves(jax.eval_shape(function, *arguments)))
+    given = sum(np.size(leaf) for leaf in jax.tree.leaves(arguments))
+    try:
+        c99.Source().add("void tried(void)", function, arguments, ["x"] * given, ["x"] * count)
+    except Unsupported:
+        return False
+    return True
 
 
 def fields(tree: Any) -> list[Field]:

@@ -13,7 +13,7 @@ from undertow.core.contracts import AbstractPlant, Load, Measurement
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.disturbances.adding import Together
-from undertow.export.c_program import Exported, Program, System, made_from
+from undertow.export.c_program import Exported, Program, System, check_compiler, has_counterpart, made_from
 from undertow.export.controller import checked, described
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import status_of
@@ -87,6 +87,7 @@ def vehicle_program(built: Built, name: str, form: Format) -> Program:
     Raises:
         BadInput: the name is none for C, or the plant or the disturbance needs something that has no counterpart in C.
     """
+    check_compiler()
     loop = in_present_precision(built.closed_loop)
     if built.scenario.loop.method not in COMPACT_METHODS:
         must = f"be one of {', '.join(COMPACT_METHODS)} for a vehicle in C"
@@ -177,8 +178,6 @@ def motion_of(truth: Measurement, form: Format) -> Motion:
 
 def _not_exported(loop: ClosedLoop, realization: Any, built: Built) -> str:
     """Key of the disturbance that has no counterpart in C; "" where all have one."""
-    from simdjit import c99
-
     several = isinstance(loop.disturbance, Together)
     members = loop.disturbance.members if isinstance(loop.disturbance, Together) else (loop.disturbance,)
     realized = realization if several else (realization,)
@@ -186,10 +185,7 @@ def _not_exported(loop: ClosedLoop, realization: Any, built: Built) -> str:
     x = loop.plant.initial_state()
     for i, (member, own) in enumerate(zip(members, realized, strict=True)):
         load = lambda t, member=member, own=own: member.at(own, t, loop.plant.pose(x), loop.plant.no_load())
-        count = sum(leaf.size for leaf in jax.tree.leaves(jax.eval_shape(load, jnp.zeros(()))))
-        try:
-            c99.Source().add("void load(void)", load, (jnp.zeros(()),), ["t"], ["load"] * count)
-        except Unsupported:
+        if not has_counterpart(load, jnp.zeros(())):
             return f"disturbance{f'[{i}]' if several else ''} ({parts[i].kind})"
     return ""
 
