@@ -1,7 +1,8 @@
 /* Functions of FMI 2.0 for co-simulation around a system that takes steps of one sampling time.
 
    fmu_model.h, which is written for each system, states its variables and what a step does. Everything that changes
-   lies in one struct, so that an instance is saved, restored and reset by copying it. */
+   lies in one struct, so that an instance is saved, restored and reset by copying it. The file is as long as the
+   interface, whose functions must all be there. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
