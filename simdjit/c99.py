@@ -1,8 +1,10 @@
 """A graph as C99: the same operations one after another, for one run, with the same bits in the same precision.
 
-No heap, no state of its own, no library but libm: fma, sqrt, floor and the like, which IEEE 754 rounds correctly.
+No heap, no state of its own, no library but libm: sqrt, floor and the like, which IEEE 754 rounds correctly, and fma
+where the library rounds it once.
 """
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -10,6 +12,7 @@ import jax
 import numpy as np
 
 from simdjit.calls import ARGUMENT, FORMULAS
+from simdjit.fused_c99 import FUSED
 from simdjit.graph import BOOL, Graph, Node, Unsupported, flat
 from simdjit.lowering import evaluate
 from simdjit.matrix_loop import Product
@@ -30,7 +33,7 @@ TYPES = {
 _OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "rem": "%", "and": "&", "or": "|", "xor": "^"}
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 _TURNED = {"lt": "gt", "gt": "lt", "le": "ge", "ge": "le"}
-_LIBM = {"fma": "fma", "rem": "fmod", "copysign": "copysign", "abs": "fabs", "sqrt": "sqrt"}
+_LIBM = {"rem": "fmod", "copysign": "copysign", "abs": "fabs", "sqrt": "sqrt"}
 _LIBM |= {"floor": "floor", "ceil": "ceil", "round": "nearbyint"}
 
 HEAD = """\
@@ -183,6 +186,8 @@ class _Body:
             return self._converted(before, dtype, given[0])
         if name in _COMPARED:
             return self._comparison(name, operands, given, before)
+        if name == "fma":
+            return f"{self._source.helper(f'fused_{before}', lambda: FUSED[before])}({', '.join(given)})"
         if floating and name in _LIBM:
             return f"{_LIBM[name]}{'f' if before == 'float32' else ''}({', '.join(given)})"
         if name == "neg":
@@ -317,8 +322,10 @@ static {kind} {whole}({kind} x, {kind} n) {{
             inner.lines += [
                 f"const {kind} {name}n = {value};" for kind, name, value in zip(kinds, names, after, strict=True)
             ]
+            read = set(re.findall(r"\w+", "\n".join(inner.lines)))
             inner.lines += [f"{name} = {name}n;" for name in names]
-            self.lines += ["for (;;) {", *_indented(inner.lines), "}"]
+            # Compilers warn of what is carried from round to round and never read.
+            self.lines += ["for (;;) {", *_indented(inner.lines), "}", *(f"(void){n};" for n in names if n not in read)]
         else:
             self.lines += [f"{kind} {name} = 0;" for kind, name in zip(kinds, names, strict=True)]
             inner._names |= zip(region.inputs, given, strict=True)

@@ -91,6 +91,12 @@ def newton(x):
     return jax.lax.while_loop(lambda y: jnp.abs(y * y - x) > 1e-12 * x, lambda y: (y + x / y) / 2, x)
 
 
+def carried(carry):
+    """A round of a loop that carries, beside a count, a number that it only writes."""
+    count, x, _ = carry
+    return count + 1, 2 * x, x
+
+
 def test_loops_branches_tables_and_products(tmp_path):
     """What is more than one operation: regions, called functions, entries of tables, products that are loops."""
     chance = np.random.default_rng(0)
@@ -105,6 +111,7 @@ def test_loops_branches_tables_and_products(tmp_path):
         (lambda a, b: (a @ a) @ b, [matrix, vector]),
         (lambda x: jax.lax.cond(x[0] > 5e5, lambda: jnp.cumsum(x), lambda: jnp.sort(x)), [positive]),
         (lambda x: x.astype("float32") * jnp.float32(1.1), [positive]),
+        (lambda x: jax.lax.while_loop(lambda c: c[0] < 3, carried, (0, x, x))[1], [positive]),
     ]
     functions = [(function, [jnp.asarray(x[0]) for x in rows]) for function, rows in cases]
     for compiler in COMPILERS:

@@ -20,7 +20,7 @@ def test_the_code_meets_its_test(tmp_path, precision, capsys):
     assert made(tmp_path / "c", "--precision", precision, "--name", "odin", "--attitude", "quaternion") == 0
     assert "6 files" in capsys.readouterr().out
     for compiler in COMPILERS:
-        for flags in ("-O2", "-O1 -fsanitize=undefined -fno-sanitize-recover=all"):
+        for flags in ("-O2", "-O1 -fsanitize=undefined,address -fno-sanitize-recover=all"):
             done = subprocess.run(
                 ["make", "clean", "test", f"CC={compiler}", f"CFLAGS={flags}"],
                 cwd=tmp_path / "c",
@@ -36,7 +36,8 @@ def test_no_heap_and_no_globals(tmp_path):
     text = (tmp_path / "c/controller.c").read_text()
     assert not re.search(r"\b(malloc|calloc|free|printf|static (?!const)\w+ \w+(\[|;| =))", text)
     called = set(re.findall(r"\b([a-z]+)f?\(", text)) - {"if", "sizeof", "switch", "for"}
-    known = {"fma", "fmod", "copysign", "fabs", "sqrt", "floor", "ceil", "nearbyint", "memcpy", "defined", "optimize"}
+    known = {"fma", "fmod", "copysign", "fabs", "sqrt", "floor", "ceil", "nearbyint", "memcpy", "isfinite"}
+    known |= {"defined", "optimize"}
     assert called <= known | {"void"}
 
 
@@ -74,6 +75,19 @@ def test_an_earlier_export_is_kept(tmp_path, capsys):
     assert "Use --overwrite" in capsys.readouterr().err
     assert (tmp_path / "c/controller.c").read_text() == before
     assert made(tmp_path / "c", "--attitude", "quaternion", "--overwrite") == 0
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["--fmu", "out", "--vehicle"], "`--vehicle` must stand beside --c99, but is without it"),
+        (["--fmu", "out", "--name", "odin"], "`--name` must stand beside --c99, but is without it"),
+        (["--c99", "out", "--vehicle", "--output", "wrench"], "`--output` must be left out with --vehicle"),
+    ],
+)
+def test_options_that_do_not_go_together(capsys, arguments, said):
+    assert run(["export", "examples/paper_example2.yaml", *arguments]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_without_a_folder(capsys):

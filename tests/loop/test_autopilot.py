@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 import undertow as ut
 from undertow.autopilot.clock import Clock
+from undertow.autopilot.measured_motion import Format, Motion
 from undertow.core.errors import BadInput
 from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 
@@ -90,6 +91,18 @@ def test_formats_describe_one_motion(heavy):
     for (attitude, velocity), (turned, moving) in forms.items():
         found = ut.Autopilot(HEAVY, attitude=attitude, velocity=velocity).start(position, moving, turned)
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_a_quaternion_that_was_integrated_is_taken_as_it_is():
+    """So a controller has the bits of a simulation, whose quaternion departs a little from unit length."""
+    unit = np.asarray(quaternion_from_euler(np.array([0.3, -0.4, 1.2])))
+    for longer, same in ((1 + 1e-11, True), (1 + 1e-6, False)):
+        motion = Motion(np.zeros(3), longer * unit, np.zeros(6))
+        measured = Format("quaternion", "body").measurement(motion, None)
+        assert measured.body is not None
+        found = np.asarray(measured.body.attitude)
+        assert (found == longer * unit).all() == same
+        np.testing.assert_allclose(np.linalg.norm(found), 1.0, rtol=1e-10)
 
 
 def test_outputs_are_one_command(heavy):

@@ -47,6 +47,7 @@ COMMANDS = {
     "check": ["scenario.yaml"],
     "list": [],
     "analyze": ["scenario.yaml", "--out", "prediction"],
+    "export": ["scenario.yaml", "--c99", "code", "--vehicle"],
 }
 
 
@@ -68,7 +69,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def done(folder):
-    return without("simdjit", folder, "simulate", "campaign", "check", "list")
+    return without("simdjit", folder, "simulate", "campaign", "check", "list", "export")
 
 
 def compare_runs(folder, code, said, hidden):
@@ -135,6 +136,12 @@ def test_check_and_list(done):
     assert done["check"][0] == done["list"][0] == 0
 
 
+def test_nothing_is_exported(folder, done):
+    code, said = done["export"]
+    assert code == 2 and not (folder / "code").exists()
+    assert "Nothing can be exported: the batch compiler cannot be imported" in " ".join(said.split())
+
+
 def test_two_modules_know_the_compiler():
     """What runs and what is exported, and of the compiler only its public face."""
     import ast
@@ -154,7 +161,7 @@ def test_two_modules_know_the_compiler():
             for module, name in imported:
                 if module.split(".")[0] in ("simdjit", "llvmlite"):
                     found.setdefault(str(path.relative_to(root)), set()).add((module, name))
-    assert set(found) == {"loop/simd_batch.py", "autopilot/c99_export.py"}
+    assert set(found) == {"loop/simd_batch.py", "export/c_program.py"}
     used = set.union(*found.values())
     assert all(module == "simdjit" and (not name or hasattr(simdjit, name)) for module, name in used)
 

@@ -330,7 +330,23 @@ def export(
     c99: Annotated[
         Path | None, typer.Option("--c99", metavar="DIR", help="Write the controller as C99 into this folder.")
     ] = None,
-    name: Annotated[str, typer.Option(metavar="NAME", help="Begins the names of files and functions.")] = "controller",
+    vehicle: Annotated[
+        bool, typer.Option("--vehicle", help="With --c99, write the vehicle and its disturbance instead.")
+    ] = False,
+    fmu: Annotated[
+        Path | None,
+        typer.Option(
+            "--fmu",
+            metavar="DIR",
+            help="Write controller.fmu and vehicle.fmu, FMI 2.0 co-simulation, into this folder.",
+        ),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Begins the names of files and functions in C. Default: controller or vehicle."
+        ),
+    ] = None,
     precision: Annotated[
         str | None, typer.Option(metavar="WORD", help="float64 or float32. Default: that of the scenario.")
     ] = None,
@@ -343,14 +359,15 @@ def export(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files of an earlier export.")] = False,
     allow_code: AllowCode = False,
 ) -> int:
-    """Export the controller of a scenario, to run it on a vehicle.
+    """Export the controller and the vehicle of a scenario, to run them outside Python.
 
     The C code needs no heap and no library but libm, and in double precision it has the bits of a simulation: `make
-    test` in the folder compares them.
+    test` in the folder compares them. The FMUs hold this code, and a library for Linux where there is a C compiler.
     """
     from undertow.cli.export import export
 
-    return export(scenario, c99, name, precision, attitude, velocity, output, overwrite, allow_code)
+    formats = {"precision": precision, "attitude": attitude, "velocity": velocity}
+    return export(scenario, c99, fmu, vehicle, name, output, overwrite, allow_code, formats)
 
 
 @app.command()

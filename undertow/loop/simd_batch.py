@@ -243,6 +243,29 @@ class BatchRunner:
         return Outcome(time, signals, accumulated, states[:2], status, until, wrong)
 
 
+def realized_disturbance(loop: ClosedLoop, key: PRNGKeyArray) -> Any:
+    """What is random of the disturbance of a run with this key, to the last bit.
+
+    Raises:
+        Unsupported: as of `simulate`.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    from simdjit import Loop
+
+    numbers, rest = eqx.partition((loop, key), eqx.is_array)
+
+    def realize(numbers):
+        loop, key = eqx.combine(numbers, rest)
+        return loop.realize(key).disturbance_realization
+
+    constant = [_decides(leaf) for leaf in jax.tree.leaves(numbers)]
+    kept, nothing = lambda known, carry, k: carry, lambda known, carry, k: jnp.zeros(())
+    program = Loop(realize, lambda known: known, kept, nothing, numbers, constant, 1, None, cache_folder() / "native")
+    carry, _ = program.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], numbers), 1, 0)
+    return jax.tree.map(lambda leaf: leaf[0], carry)
+
+
 def simulate(
     loop: ClosedLoop,
     *,

@@ -1,0 +1,217 @@
+"""The plant of a scenario - a vehicle with its thrusters - under its disturbance as a system to export, and as C99."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.autopilot.measured_motion import Format, Motion
+from undertow.core import runtime
+from undertow.core.arrays import in_present_precision
+from undertow.core.contracts import AbstractPlant, Load, Measurement
+from undertow.core.errors import BadInput
+from undertow.core.signals import Signal
+from undertow.disturbances.adding import Together
+from undertow.export.c_program import Exported, Program, System, check_compiler, has_counterpart, made_from
+from undertow.export.controller import checked, described
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.outcome import status_of
+from undertow.loop.simd_batch import Unsupported, realized_disturbance
+from undertow.numerics.integrators import COMPACT_METHODS
+from undertow.numerics.linear_algebra import matvec
+from undertow.numerics.random_keys import key_of_seed
+from undertow.scenario.build import Built
+
+_SPREAD = 2.0  # of the random commands of a test, V
+
+
+class Initial(NamedTuple):
+    """Outputs of the plant at the start, and their rates."""
+
+    position: Any
+    velocity: Any
+
+
+class VehicleInput(NamedTuple):
+    """Input of a step: start, command, force and moment from outside, and time at which the step begins."""
+
+    initial: Initial
+    command: Any
+    external_wrench: Any
+    t: Any
+
+
+class VehicleOutput(NamedTuple):
+    """Output of a step: true motion and report of the actuators at its end, input that was applied, status code.
+
+    `signals` are those numbers that the plant declares, such as the voltage of a battery.
+    """
+
+    motion: Motion
+    actuator: Any
+    applied: Any
+    status: Any
+    signals: dict[str, Any]
+
+
+def export_vehicle(
+    built: Built,
+    name: str = "vehicle",
+    *,
+    precision: str | None = None,
+    attitude: str = "euler",
+    velocity: str = "body",
+) -> Exported:
+    """The plant of a scenario under its disturbance in C99.
+
+    Args:
+        built: the scenario; its seed realizes what is random of the disturbance.
+        name: begins the names of files, types and functions; lower-case letters, digits and underscores.
+        precision: float64 or float32; None for that of the scenario.
+        attitude, velocity: formats of motions, as for `Autopilot`.
+
+    Raises:
+        BadInput: a format is unknown, or the plant or the disturbance needs something that has no counterpart in C99.
+    """
+    form = Format(attitude, velocity)
+    chosen = checked(precision or built.scenario.precision, form)
+    with runtime.on_processor(), runtime.in_precision(chosen):
+        files = vehicle_program(built, name, form).files()
+    return Exported(files | {"example.c": _EXAMPLE.replace("NAME", name)})
+
+
+def vehicle_program(built: Built, name: str, form: Format) -> Program:
+    """The C program of a plant under its disturbance, in the present precision.
+
+    Raises:
+        BadInput: the name is none for C, or the plant or the disturbance needs something that has no counterpart in C.
+    """
+    check_compiler()
+    loop = in_present_precision(built.closed_loop)
+    if built.scenario.loop.method not in COMPACT_METHODS:
+        must = f"be one of {', '.join(COMPACT_METHODS)} for a vehicle in C"
+        raise BadInput("loop.method", must, built.scenario.loop.method)
+    realization = None
+    try:
+        realization = jax.tree.map(jnp.asarray, realized_disturbance(loop, key_of_seed(built.scenario.seed)))
+        return Program(_system(built, name, loop, form, realization))
+    except Unsupported as error:
+        where = "disturbance" if realization is None else _not_exported(loop, realization, built) or "plant"
+        must = "be made of operations that the batch compiler has"
+        raise BadInput(where, must, f"one that needs others: {error}") from None
+
+
+def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization: Any) -> System:
+    plant, settings = loop.plant, built.scenario.loop
+    truth = plant.output(jnp.zeros(()), plant.initial_state())
+    zero, none = np.zeros(len(plant.outputs)), np.zeros(plant.inputs())
+    given = built.scenario.initial
+    at = lambda values: zero if values is None else np.asarray(values)
+    kind = jax.dtypes.canonicalize_dtype(float)
+    whole = VehicleInput(Initial(at(given.position), at(given.velocity)), none, zero, np.zeros(()))
+    inputs = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), whole)
+    integrate, dt = COMPACT_METHODS[settings.method], jnp.asarray(settings.dt, dtype=float)
+    h = dt / settings.substeps
+
+    def shown(t: Any, x: Any, applied: Any) -> VehicleOutput:
+        truth, values = plant.output(t, x), plant.diagnostics(x, applied)
+        numbers = {name: jnp.asarray(values[name], dtype=float) for name in numbers_of(plant)}
+        return VehicleOutput(motion_of(truth, form), truth.actuator, applied, status_of(loop, x, ()), numbers)
+
+    def start(inputs: VehicleInput):
+        x = plant.initial_state(*inputs.initial)
+        return x, shown(inputs.t, x, jnp.zeros_like(inputs.command))
+
+    def step(x: Any, inputs: VehicleInput):
+        """As `sampled.control_step` moves the plant."""
+        applied = plant.admissible(x, inputs.command)
+
+        def motion(t: Any, x: Any) -> Any:
+            no_load = plant.no_load()
+            outside: Load = no_load._replace(wrench=no_load.wrench - inputs.external_wrench)
+            return plant.dynamics(t, x, applied, loop.disturbance.at(realization, t, plant.pose(x), outside))
+
+        if settings.substeps == 1:
+            x = integrate(motion, inputs.t, x, h)
+        else:
+            part = lambda i, x: integrate(motion, inputs.t + jnp.asarray(i, dtype=float) * h, x, h)
+            x = jax.lax.fori_loop(0, settings.substeps, part, x)
+        return x, shown(inputs.t + dt, x, applied)
+
+    def sample(chance: np.random.Generator, k: int) -> VehicleInput:
+        random = lambda leaf: np.asarray(_SPREAD * chance.normal(size=leaf.shape), dtype=leaf.dtype)
+        time = np.asarray(max(k - 1, 0) * settings.dt, dtype=kind)
+        return inputs._replace(command=random(inputs.command), external_wrench=random(zero), t=time)
+
+    meanings = {
+        "state": "State of the vehicle; keep it between the steps.",
+        "input": "Input of a step: position and velocity at the start, which the first step takes; "
+        f"command, {plant.input_unit}; force and moment from outside, N and N m; time at the beginning of the step, s.",
+        "output": f"Output of a step: true motion at its end, applied input, {plant.input_unit}, and status, 0 "
+        f"while the motion is valid. {described(None if truth.body is None else form)}",
+        "start": "The first output: sets the state.",
+        "step": "A step of one sampling time from input->t on, with the command held.",
+    }
+    what = "Plant" if truth.body is None else "Underwater vehicle with its thrusters"
+    about = made_from(f"{what}, under its disturbance", built.scenario.description)
+    return System(name, about, meanings, start, step, inputs, sample, settings.dt)
+
+
+def numbers_of(plant: AbstractPlant) -> dict[str, Signal]:
+    """The signals of a plant that are numbers, by name."""
+    return {name: signal for name, signal in plant.signals().items() if signal.dimensions == ()}
+
+
+def motion_of(truth: Measurement, form: Format) -> Motion:
+    """A true motion in a format: what `Motion.measurement` turns back."""
+    if truth.body is None:
+        return Motion(truth.position, jnp.zeros(0), truth.velocity)
+    body, velocity = truth.body, truth.velocity
+    if form.velocity == "body":
+        velocity = body.nu
+    elif form.velocity == "world":
+        velocity = jnp.concatenate([matvec(body.rotation, body.nu[:3]), matvec(body.rotation, body.nu[3:])])
+    attitude = body.attitude if form.attitude == "quaternion" else truth.position[3:]
+    return Motion(truth.position[:3], attitude, velocity)
+
+
+def _not_exported(loop: ClosedLoop, realization: Any, built: Built) -> str:
+    """Key of the disturbance that has no counterpart in C; "" where all have one."""
+    several = isinstance(loop.disturbance, Together)
+    members = loop.disturbance.members if isinstance(loop.disturbance, Together) else (loop.disturbance,)
+    realized = realization if several else (realization,)
+    parts = built.scenario.disturbance if isinstance(built.scenario.disturbance, list) else [built.scenario.disturbance]
+    x = loop.plant.initial_state()
+    for i, (member, own) in enumerate(zip(members, realized, strict=True)):
+        load = lambda t, member=member, own=own: member.at(own, t, loop.plant.pose(x), loop.plant.no_load())
+        if not has_counterpart(load, jnp.zeros(())):
+            return f"disturbance{f'[{i}]' if several else ''} ({parts[i].kind})"
+    return ""
+
+
+_EXAMPLE = """\
+/* The vehicle with a constant command, for ten seconds. */
+#include <stdio.h>
+
+#include "NAME.h"
+
+int main(void) {
+    static NAME_state state;
+    NAME_input input = NAME_DEFAULTS;
+    NAME_output output;
+    NAME_start(&state, &input, &output);
+    for (int k = 0; (k * NAME_PERIOD < 10) && (output.status == 0); ++k) {
+        for (unsigned i = 0; i < sizeof input.command / sizeof input.command[0]; ++i) {
+            input.command[i] = 1;
+        }
+        input.t = k * NAME_PERIOD;
+        NAME_step(&state, &input, &output);
+    }
+    for (unsigned i = 0; i < sizeof output.motion_position / sizeof output.motion_position[0]; ++i) {
+        printf("%g ", (double)output.motion_position[i]);
+    }
+    printf("\\n");
+    return 0;
+}
+"""
