@@ -17,6 +17,7 @@ from undertow.export.c_program import Exported, Program, System, check_compiler,
 from undertow.export.controller import checked, described
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import status_of
+from undertow.loop.sampled import moved
 from undertow.loop.simd_batch import Unsupported, realized_disturbance
 from undertow.numerics.integrators import COMPACT_METHODS
 from undertow.numerics.linear_algebra import matvec
@@ -112,7 +113,6 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
     whole = VehicleInput(Initial(at(given.position), at(given.velocity)), none, zero, np.zeros(()))
     inputs = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), whole)
     integrate, dt = COMPACT_METHODS[settings.method], jnp.asarray(settings.dt, dtype=float)
-    h = dt / settings.substeps
 
     def shown(t: Any, x: Any, applied: Any) -> VehicleOutput:
         truth, values = plant.output(t, x), plant.diagnostics(x, applied)
@@ -124,7 +124,6 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
         return x, shown(inputs.t, x, jnp.zeros_like(inputs.command))
 
     def step(x: Any, inputs: VehicleInput):
-        """As `sampled.control_step` moves the plant."""
         applied = plant.admissible(x, inputs.command)
 
         def motion(t: Any, x: Any) -> Any:
@@ -132,11 +131,7 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
             outside: Load = no_load._replace(wrench=no_load.wrench - inputs.external_wrench)
             return plant.dynamics(t, x, applied, loop.disturbance.at(realization, t, plant.pose(x), outside))
 
-        if settings.substeps == 1:
-            x = integrate(motion, inputs.t, x, h)
-        else:
-            part = lambda i, x: integrate(motion, inputs.t + jnp.asarray(i, dtype=float) * h, x, h)
-            x = jax.lax.fori_loop(0, settings.substeps, part, x)
+        x = moved(motion, inputs.t, x, dt, integrate, settings.substeps)
         return x, shown(inputs.t + dt, x, applied)
 
     def sample(chance: np.random.Generator, k: int) -> VehicleInput:

@@ -1,6 +1,7 @@
 """The sampled loop: controller steps with the plant integrated between them, compiled as one scan."""
 
 import abc
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -95,6 +96,23 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
     return Outcome(time, samples, gathered, final[:2], *ending.until(steps * dt))
 
 
+def moved(motion: Callable, t, x: PyTree, dt, integrate: Callable, substeps: int) -> PyTree:
+    """State of the plant one control step after t, with the input held.
+
+    Args:
+        motion: (t, x) -> dx/dt under that input.
+        t: s.
+        x: state at t.
+        dt: sampling time, s.
+        integrate: step of a method of `numerics.integrators`.
+        substeps: how many of them.
+    """
+    h = dt / substeps
+    if substeps == 1:
+        return integrate(motion, t, x, h)
+    return jax.lax.fori_loop(0, substeps, lambda i, x: integrate(motion, t + instant(i, h), x, h), x)
+
+
 def begin(realization: Realization, start: tuple[Outputs, Outputs], accumulators) -> PyTree:
     """Carry before the first control step."""
     x, z = realization.start(*start)
@@ -109,16 +127,11 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     (x, z, measuring), gathered, ending = carry
     loop, t = realization.loop, instant(k, dt)
     decision = realization.decide(t, x, z, measuring)
-    h = dt / substeps
     if accumulators:
         # Of the first stage, whose acceleration is then computed once; where the load jumps, it has jumped.
-        signals = realization.signals(jnp.asarray(first_stage(t, h)), x, z, decision)
+        signals = realization.signals(jnp.asarray(first_stage(t, dt / substeps)), x, z, decision)
         gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
-    motion = lambda t, x: realization.motion(t, x, decision.applied)
-    if substeps == 1:
-        new_x = integrate(motion, t, x, h)
-    else:
-        new_x = jax.lax.fori_loop(0, substeps, lambda i, x: integrate(motion, t + instant(i, h), x, h), x)
+    new_x = moved(lambda t, x: realization.motion(t, x, decision.applied), t, x, dt, integrate, substeps)
     y, law = decision.y, loop.controller
     new_z = law.advance(z, y, decision.r, decision.applied, dt)
     check_state(law, new_z, z)

@@ -19,6 +19,7 @@ from undertow.interop.gymnasium.variants import Vary, variants_of
 from undertow.loop.closed_loop import ClosedLoop, MeasurementState, Realization
 from undertow.loop.outcome import Ending, going
 from undertow.loop.recording import freeze_on_failure, instant
+from undertow.loop.sampled import moved
 from undertow.loop.stepped_batch import BatchStep, Starter
 from undertow.numerics.integrators import METHODS
 from undertow.numerics.random_keys import key_of_seed
@@ -208,19 +209,12 @@ def _begin(plan: Plan, realization: Realization, start: Any) -> tuple[_State, Se
 def _step(plan: Plan, realization: Realization, state: _State, action: Any) -> tuple[_State, Seen]:
     """As `sampled.control_step`, with the command of an action in place of a law's."""
     loop, dt, interface = realization.loop, jnp.asarray(plan.dt), plan.interface
-    integrate, h, t = (
-        METHODS[plan.method],
-        jnp.asarray(plan.dt) / plan.substeps,
-        instant(state.step, jnp.asarray(plan.dt)),
-    )
+    t = instant(state.step, dt)
     action = interface.within_bounds(action)
     command = interface.command(action)
     applied = loop.plant.admissible(state.x, command)
     motion = lambda t, x: realization.motion(t, x, applied)
-    if plan.substeps == 1:
-        x = integrate(motion, t, state.x, h)
-    else:
-        x = jax.lax.fori_loop(0, plan.substeps, lambda i, x: integrate(motion, t + instant(i, h), x, h), state.x)
+    x = moved(motion, t, state.x, dt, METHODS[plan.method], plan.substeps)
     (x, _), ending = freeze_on_failure(loop, (state.x, ()), (x, ()), state.ending, t, dt, command)
     now = instant(state.step + 1, dt)
     truth, r = loop.plant.output(now, x), loop.reference.at(now)

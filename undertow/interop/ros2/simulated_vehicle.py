@@ -15,6 +15,7 @@ from undertow.core.measurement import body_of
 from undertow.loop.closed_loop import ClosedLoop, MeasurementState, Realization
 from undertow.loop.outcome import status_of
 from undertow.loop.recording import instant
+from undertow.loop.sampled import moved
 from undertow.loop.stepped import put
 from undertow.numerics.integrators import METHODS
 from undertow.numerics.random_keys import key_of_seed
@@ -114,16 +115,9 @@ class SimulatedVehicle:
         return jax.tree.map(np.copy, self._go_on.outputs)
 
     def _next(self, part: Realization, state: _State, command: Float[Array, " m"]):
-        """As `sampled.control_step` moves the plant."""
         dt, loop, before = jnp.asarray(self.sampling_time), part.loop, state.plant
-        t, h = instant(state.steps, dt), dt / self._substeps
-        applied = loop.plant.admissible(before, command)
-        motion = lambda t, x: part.motion(t, x, applied)
-        if self._substeps == 1:
-            x = self._method(motion, t, before, h)
-        else:
-            one = lambda i, x: self._method(motion, t + instant(i, h), x, h)
-            x = jax.lax.fori_loop(0, self._substeps, one, before)
+        t, applied = instant(state.steps, dt), loop.plant.admissible(before, command)
+        x = moved(lambda t, x: part.motion(t, x, applied), t, before, dt, self._method, self._substeps)
         return _observed(part, _State(x, state.navigation, state.steps + 1), before, applied, dt)
 
 
