@@ -15,7 +15,7 @@ from undertow.core.status import Status
 from undertow.interop.pulse_driven import pulse_driven
 from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.readings import all_finite
-from undertow.loop.stepped import put
+from undertow.loop.stepped import put, realized
 from undertow.numerics.integrators import COMPACT_METHODS
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.random_keys import key_of_seed
@@ -171,14 +171,9 @@ class SteppedVehicle:
 def _begun(loop: ClosedLoop, key: Any, start: Any) -> tuple[Realization, VehicleState]:
     """The loop with its disturbances sampled, and the state at t = 0, by the compiler that takes the steps."""
 
-    def begin(loop: ClosedLoop, _, given: Any):
-        key, start = given
-        return (), (loop.realize(key).disturbance_realization, loop.plant.initial_state(*start))
-
-    first = step_of(begin, loop, (), (key, start))
+    first = step_of(lambda loop, _, start: ((), loop.plant.initial_state(*start)), loop, (), start)
     first()
-    disturbance, x = jax.tree.map(jnp.array, first.outputs)
-    return Realization(loop, disturbance, ()), x
+    return realized(loop, key), jax.tree.map(jnp.array, first.outputs)
 
 
 def applied_voltage(plant: HybridVehicle, speed_controllers: ESC, x: VehicleState, pulses: Inputs) -> Inputs:

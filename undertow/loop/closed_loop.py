@@ -89,9 +89,11 @@ class ClosedLoop(eqx.Module):
 
     def realize(self, key: PRNGKeyArray) -> "Realization":
         """Sample everything random once."""
-        keys = keys_for(key, "disturbance", "navigation")
-        disturbance = self.disturbance.realize(keys["disturbance"])
-        return Realization(self, disturbance, self.navigation.realize(keys["navigation"]))
+        return self.realized_with(self.disturbance.realize(_keys(key)["disturbance"]), key)
+
+    def realized_with(self, disturbance: PyTree, key: PRNGKeyArray) -> "Realization":
+        """The same with a realization of the disturbance that is known."""
+        return Realization(self, disturbance, self.navigation.realize(_keys(key)["navigation"]))
 
 
 class Realization(NamedTuple):
@@ -225,3 +227,7 @@ def _moved(realization: Realization, t: Time, x: PyTree, applied: Inputs) -> PyT
 
 def _completed(measured: tuple[Measurement, PyTree], truth: Measurement) -> tuple[Measurement, PyTree]:
     return completed(measured[0], truth), measured[1]
+
+
+def _keys(key: PRNGKeyArray) -> dict[str, PRNGKeyArray]:
+    return keys_for(key, "disturbance", "navigation")

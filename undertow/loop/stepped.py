@@ -4,9 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from undertow.loop.simd_batch import Unsupported, kept_step
+from undertow.loop.closed_loop import ClosedLoop, Realization
+from undertow.loop.simd_batch import Unsupported, kept_step, realized_disturbance
 
 
 class Step:
@@ -54,6 +56,15 @@ class _ByXla:
         found = self._function(self.numbers, self.state, self.inputs)
         for place, value in zip(jax.tree.leaves((self.state, self.outputs)), jax.tree.leaves(found), strict=True):
             place[...] = value
+
+
+def realized(loop: ClosedLoop, key: Any) -> Realization:
+    """A closed loop with everything random as a simulation samples it: bit for bit where the batch compiler can."""
+    try:
+        disturbance = jax.tree.map(jnp.asarray, realized_disturbance(loop, key))
+    except Unsupported:
+        return loop.realize(key)
+    return loop.realized_with(disturbance, key)
 
 
 def put(places: Any, values: Any) -> None:

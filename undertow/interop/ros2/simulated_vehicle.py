@@ -16,7 +16,7 @@ from undertow.loop.closed_loop import ClosedLoop, MeasurementState, Realization
 from undertow.loop.outcome import status_of
 from undertow.loop.recording import instant
 from undertow.loop.sampled import moved
-from undertow.loop.stepped import put
+from undertow.loop.stepped import put, realized
 from undertow.numerics.integrators import METHODS
 from undertow.numerics.random_keys import key_of_seed
 from undertow.plants.hybrid_vehicle import HybridVehicle
@@ -56,7 +56,7 @@ class SimulatedVehicle:
     """The vehicle of a scenario without its controller: `step` holds an input for one sampling time.
 
     Given the inputs of a simulation it has the motion of that simulation, bit for bit where the batch compiler knows
-    all of its parts (`backend`). Waves, whose sampling it does not know here, agree to rounding.
+    all of its parts (`backend`).
 
     Args:
         built: a scenario with a vehicle and a sampled loop.
@@ -87,9 +87,7 @@ class SimulatedVehicle:
     def _compile(self, loop: ClosedLoop, built: Built) -> None:
         initial = built.scenario.initial
         start = loop.outputs_at_start(initial.position, initial.velocity)
-        realize = step_of(lambda loop, _, key: ((), loop.realize(key)[1:]), loop, (), key_of_seed(built.scenario.seed))
-        realize()
-        part = Realization(loop, *jax.tree.map(jnp.asarray, realize.outputs))
+        part = realized(loop, key_of_seed(built.scenario.seed))
         begin = step_of(lambda part, _, start: ((), _first(part, start)), part, (), start)
         begin()
         self._first_state, self._first = begin.outputs
