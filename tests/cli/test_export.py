@@ -80,9 +80,15 @@ def test_an_earlier_export_is_kept(tmp_path, capsys):
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        (["--fmu", "out", "--vehicle"], "`--vehicle` must stand beside --c99, but is without it"),
+        (["--fmu", "out", "--part", "vehicle"], "`--part` must stand beside --c99, but is without it"),
+        (["--c99", "out", "--part", "hull"], "`--part` must be one of controller, navigation, vehicle"),
+        (["--c99", "out", "--part", "navigation"], "`navigation` must be one of sensors: `kalman` or `observer`"),
+        (["--c99", "out", "--part", "navigation", "--velocity", "world"], "`--attitude, --velocity` must be left out"),
         (["--fmu", "out", "--name", "odin"], "`--name` must stand beside --c99, but is without it"),
-        (["--c99", "out", "--vehicle", "--output", "wrench"], "`--output` must be left out with --vehicle"),
+        (
+            ["--c99", "out", "--part", "vehicle", "--output", "wrench"],
+            "`--output` must be left out with --part vehicle",
+        ),
     ],
 )
 def test_options_that_do_not_go_together(capsys, arguments, said):

@@ -47,7 +47,7 @@ COMMANDS = {
     "check": ["scenario.yaml"],
     "list": [],
     "analyze": ["scenario.yaml", "--out", "prediction"],
-    "export": ["scenario.yaml", "--c99", "code", "--vehicle"],
+    "export": ["scenario.yaml", "--c99", "code", "--part", "vehicle"],
 }
 
 

@@ -1,4 +1,4 @@
-"""`undertow export`: controller and vehicle for other places than undertow."""
+"""`undertow export`: controller, navigation filter and vehicle for other places than undertow."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,32 +7,36 @@ from typing import Any
 from undertow.cli.exit_codes import DONE
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
+from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.export.c_program import Exported
 from undertow.export.controller import export_controller
 from undertow.export.fmu import export_fmu
+from undertow.export.navigation import export_navigation
 from undertow.export.vehicle import export_vehicle
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import read
+
+_PARTS = ("controller", "navigation", "vehicle")
 
 
 def export(
     scenario: Path,
     c99: Path | None,
     fmu: Path | None,
-    vehicle: bool,
+    part: str,
     name: str | None,
     output: str,
     overwrite: bool,
     allow_code: bool,
     formats: dict[str, Any],
 ) -> int:
-    """Write the controller or the vehicle of a scenario as C99, or both as FMUs, to folders; return the exit code.
+    """Write a part of a scenario as C99, or controller and vehicle as FMUs, to folders; return the exit code.
 
     Args:
         scenario: file.
         c99, fmu: folders; None for none.
-        vehicle: whether the C99 is that of the vehicle instead of the controller.
+        part: that is written as C99.
         name: begins the names in C; None for the usual one.
         output: what the vehicle takes, as for `Autopilot`.
         overwrite: whether to replace the files of an earlier export.
@@ -44,17 +48,21 @@ def export(
     """
     if c99 is None and fmu is None:
         raise BadInput("--c99", "be given: the folder for the files", hint="Or --fmu for units of co-simulation")
-    if c99 is None and (vehicle or name):
-        raise BadInput("--vehicle" if vehicle else "--name", "stand beside --c99", "without it")
-    if vehicle and output != "input":
-        raise BadInput("--output", "be left out with --vehicle, which takes its input", output)
+    checks.choice("--part", part, _PARTS)
+    if c99 is None and (part != "controller" or name):
+        raise BadInput("--name" if name else "--part", "stand beside --c99", "without it")
+    if part != "controller" and output != "input":
+        raise BadInput("--output", f"be left out with --part {part}", output)
+    if part == "navigation" and (formats["attitude"], formats["velocity"]) != ("euler", "body"):
+        must = "be left out with --part navigation, which gives quaternions and body velocities"
+        raise BadInput("--attitude, --velocity", must, f"{formats['attitude']}, {formats['velocity']}")
     console = wide_console()
     say: Callable[[str], None] = lambda text: console.print(text, highlight=False, soft_wrap=True)
     with stage(console, "reading and building"):
         built = build(read(scenario, allow_code=allow_code))
     if c99 is not None:
         with stage(console, "C99 and its test"):
-            exported = _in_c(built, vehicle, name, output, formats)
+            exported = _in_c(built, part, name or part, output, formats)
         exported.write(c99, overwrite)
         say(f"{len(exported.files)} files, {_kilobytes(exported)}: {c99}")
         say(f"To compile and test them: make -C {c99} test")
@@ -68,10 +76,12 @@ def export(
     return DONE
 
 
-def _in_c(built: Built, vehicle: bool, name: str | None, output: str, formats: dict[str, Any]) -> Exported:
-    if vehicle:
-        return export_vehicle(built, name or "vehicle", **formats)
-    return export_controller(built, name or "controller", output=output, **formats)
+def _in_c(built: Built, part: str, name: str, output: str, formats: dict[str, Any]) -> Exported:
+    if part == "vehicle":
+        return export_vehicle(built, name, **formats)
+    if part == "navigation":
+        return export_navigation(built, name, precision=formats["precision"])
+    return export_controller(built, name, output=output, **formats)
 
 
 def _kilobytes(exported: Exported) -> str:

@@ -328,11 +328,14 @@ def export(
         Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or the run.nc of an earlier run.")
     ],
     c99: Annotated[
-        Path | None, typer.Option("--c99", metavar="DIR", help="Write the controller as C99 into this folder.")
+        Path | None, typer.Option("--c99", metavar="DIR", help="Write a part of the scenario as C99 into this folder.")
     ] = None,
-    vehicle: Annotated[
-        bool, typer.Option("--vehicle", help="With --c99, write the vehicle and its disturbance instead.")
-    ] = False,
+    part: Annotated[
+        str,
+        typer.Option(
+            metavar="WORD", help="Part for --c99: controller, navigation (its filter), or vehicle (with disturbances)."
+        ),
+    ] = "controller",
     fmu: Annotated[
         Path | None,
         typer.Option(
@@ -344,7 +347,7 @@ def export(
     name: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Begins the names of files and functions in C. Default: controller or vehicle."
+            metavar="NAME", help="Begins the names of files and functions in C. Default: the name of the part."
         ),
     ] = None,
     precision: Annotated[
@@ -359,7 +362,7 @@ def export(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files of an earlier export.")] = False,
     allow_code: AllowCode = False,
 ) -> int:
-    """Export the controller and the vehicle of a scenario, to run them outside Python.
+    """Export the controller, the navigation filter and the vehicle of a scenario, to run them outside Python.
 
     The C code needs no heap and no library but libm, and in double precision it has the bits of a simulation: `make
     test` in the folder compares them. The FMUs hold this code, and a library for Linux where there is a C compiler.
@@ -367,7 +370,7 @@ def export(
     from undertow.cli.export import export
 
     formats = {"precision": precision, "attitude": attitude, "velocity": velocity}
-    return export(scenario, c99, fmu, vehicle, name, output, overwrite, allow_code, formats)
+    return export(scenario, c99, fmu, part, name, output, overwrite, allow_code, formats)
 
 
 @app.command()
