@@ -1,0 +1,152 @@
+"""Writes logs as MCAP: JSON messages with a schema, in chunks, which Foxglove opens and `read_mcap` reads back.
+
+The package `mcap` is imported by the functions that write.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from undertow.logs import foxglove
+from undertow.logs.log import Log, Series
+from undertow.logs.messages import MessageForm, grouped
+
+METADATA = "undertow"  # name of the record with the facts of a log
+
+# Bytes of a chunk. A program that is killed loses the one that is not full.
+_CHUNK, _LIVE_CHUNK = 2**20, 2**14
+
+
+class _Writer:
+    """An MCAP file that is being written."""
+
+    def __init__(self, stream: IO[bytes], chunk: int, facts: Mapping[str, str]):
+        from mcap.writer import Writer
+
+        self._stream, self._writer, self._ids = stream, Writer(stream, chunk_size=chunk), {}
+        self._writer.start(profile="", library="undertow")
+        self._writer.add_metadata(METADATA, {key: str(value) for key, value in facts.items()})
+
+    def channel(self, topic: str, schema_name: str, schema: str) -> int:
+        """Number of a new channel."""
+        if schema_name not in self._ids:
+            self._ids[schema_name] = self._writer.register_schema(schema_name, "jsonschema", schema.encode())
+        return self._writer.register_channel(topic, "json", self._ids[schema_name])
+
+    def foxglove_channel(self, topic: str, schema_name: str) -> int:
+        return self.channel(topic, schema_name, json.dumps({"title": schema_name} | foxglove.SCHEMAS[schema_name]))
+
+    def write(self, channel: int, time: float, message: bytes) -> None:
+        stamp = foxglove.nanoseconds(time)
+        self._writer.add_message(channel, stamp, message, stamp)
+
+    def finish(self) -> None:
+        """Write the index, without which the file can be read too."""
+        self._writer.finish()
+        self._stream.flush()
+
+
+def write_mcap(log: Log, path: Path, size: Any = None) -> None:
+    """Write a log to a file.
+
+    Args:
+        log: with the signals.
+        path: of the file, which is replaced.
+        size: length, width and height of the vehicle, m, for the view in three dimensions; None for usual ones.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with path.open("wb") as stream:
+        facts = {"source": log.source, "format": log.format, "notes": "\n".join(log.notes)} | dict(log.facts)
+        writer = _Writer(stream, _CHUNK, facts)
+        for topic, signals in grouped(log.signals).items():
+            form = MessageForm(topic.strip("/").replace("/", "."), signals)
+            channel = writer.channel(topic, form.schema_name, form.schema())
+            for time, message in form.of_samples():
+                writer.write(channel, time, message)
+        _write_view(writer, log, size)
+        writer.finish()
+
+
+def _write_view(writer: _Writer, log: Log, size: Any) -> None:
+    """Transforms and scene of a log that has the pose of a vehicle in one signal, or in two sampled together."""
+    pose = pose_of(log.signals)
+    if pose is None or not len(pose[0]):
+        return
+    time, outputs = pose
+    transforms = writer.foxglove_channel("/tf", "foxglove.FrameTransform")
+    writer.write(transforms, time[0], foxglove.axes(time[0]))
+    followed = [(outputs, foxglove.VEHICLE)]
+    reference = log.signals.get("reference")
+    if reference is not None and reference.values.shape == outputs.shape:
+        followed.append((reference.values, foxglove.REFERENCE))
+    for values, child in followed:
+        for when, message in foxglove.poses(time, values, child):
+            writer.write(transforms, when, message)
+    view = writer.foxglove_channel("/scene", "foxglove.SceneUpdate")
+    writer.write(view, time[0], foxglove.scene(time[0], outputs[:, :3], size))
+
+
+def pose_of(signals: Mapping[str, Series]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Time and rows north, east, down, roll, pitch, yaw of a vehicle; None without them."""
+    position, attitude = signals.get("position"), signals.get("attitude")
+    if position is None or position.columns[:3] != ("north", "east", "down"):
+        return None
+    if position.values.shape[1:] == (6,):
+        return position.time, position.values
+    if attitude is None or not len(attitude.time) or not len(position.time):
+        return None
+    continuous = np.unwrap(attitude.values, axis=0)
+    angles = [np.interp(position.time, attitude.time, column) for column in continuous.T]
+    return position.time, np.column_stack([position.values, *angles])
+
+
+class LiveLog:
+    """A log of a controller that runs, written step by step. What was written survives `kill -9`.
+
+    Args:
+        path: of the file, which is replaced.
+        signals: whose columns, units and meanings the steps have; their samples do not matter.
+        facts: text by name.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+
+    def __init__(self, path: Path, signals: Mapping[str, Series], facts: Mapping[str, str]):
+        self._stream = path.open("wb")
+        self._writer = _Writer(self._stream, _LIVE_CHUNK, facts | {"format": "undertow", "source": path.name})
+        self._topics = []
+        for topic, several in grouped(signals).items():
+            form = MessageForm(topic.strip("/"), several)
+            self._topics.append((self._writer.channel(topic, form.schema_name, form.schema()), form, tuple(several)))
+        self._tf = self._writer.foxglove_channel("/tf", "foxglove.FrameTransform")
+        self._begun = False
+
+    def append(self, time: float, values: Mapping[str, Any]) -> None:
+        """Write the values of one step, all signals by name."""
+        for channel, form, names in self._topics:
+            flat = np.concatenate([np.ravel(values[name]).astype(float) for name in names]).tolist()
+            self._writer.write(channel, time, form.of_sample(time, flat))
+        if len(pose := np.ravel(values.get("position", ()))) == 6 and np.isfinite(pose).all():
+            self._view(time, pose)
+        self._stream.flush()  # a full chunk, where there is one
+
+    def _view(self, time: float, pose: np.ndarray) -> None:
+        if not self._begun:
+            scene = self._writer.foxglove_channel("/scene", "foxglove.SceneUpdate")
+            self._writer.write(scene, time, foxglove.scene(time, np.zeros((0, 3))))
+            self._writer.write(self._tf, time, foxglove.axes(time))
+            self._begun = True
+        for when, message in foxglove.poses(np.array([time]), pose[None], foxglove.VEHICLE):
+            self._writer.write(self._tf, when, message)
+
+    def close(self) -> None:
+        """Write the end of the file; nothing may be appended afterwards."""
+        if not self._stream.closed:
+            self._writer.finish()
+            self._stream.close()

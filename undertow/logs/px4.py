@@ -1,0 +1,50 @@
+"""Reads PX4's .ulg files by pyulog."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from undertow.core.errors import BadInput
+from undertow.logs.extra import check_installed, quiet
+from undertow.logs.recording import Recording, Table
+
+
+def read_px4(path: Path) -> Recording:
+    """Tables of the topics; further instances of one as `sensor_combined[1]`.
+
+    Times are those of the sample (`timestamp_sample`) where a topic has them, since the start of the autopilot.
+
+    Raises:
+        BadInput: damaged, or pyulog is not installed.
+    """
+    check_installed("pyulog", "pyulog")
+    from pyulog import ULog
+
+    notes: list[str] = []
+    stream = io.BytesIO(path.read_bytes())
+    try:
+        with quiet(notes):
+            found = ULog(stream)
+        tables = {}
+        for data in found.data_list:
+            topic = data.name if data.multi_id == 0 else f"{data.name}[{data.multi_id}]"
+            tables[topic] = _table(data)
+    except Exception as error:  # whatever bytes may cause
+        place = 0 if stream.closed else stream.tell()
+        got = f"{path.name}, near byte {place}: {error or type(error).__name__}"
+        raise BadInput("log", "be an undamaged .ulg file of PX4", got) from None
+    if not tables:
+        raise BadInput("log", "have topics", f"{path.name}, which has none")
+    if found.file_corruption:
+        notes.append("parts of the file are damaged or missing, and left out")
+    if found.dropouts:
+        notes.append(f"{len(found.dropouts)} dropouts while it was recorded")
+    return Recording(tables, path.name, "PX4", tuple(notes))
+
+
+def _table(data) -> Table:
+    fields = {name: np.asarray(values, dtype=float) for name, values in data.data.items()}
+    sampled = data.data.get("timestamp_sample")
+    stamps = data.data["timestamp"] if sampled is None or not sampled.size or (sampled == 0).any() else sampled
+    return Table(np.asarray(stamps, dtype=float) * 1e-6, fields, data.name)
