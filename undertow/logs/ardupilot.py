@@ -1,5 +1,6 @@
 """Reads ArduPilot's .bin files (DataFlash logs) by pymavlink."""
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
@@ -29,10 +30,10 @@ def read_ardupilot(path: Path) -> Recording:
     notes: list[str] = []
     rows: dict[tuple[str, str], list[list[float]]] = {}
     fields: dict[str, list[str]] = {}
-    reader = None
+    reader = DFReader_binary.__new__(DFReader_binary)  # its constructor may fail with the file open
     try:
         with quiet(notes):
-            reader = DFReader_binary(str(path), zero_time_base=True)
+            reader.__init__(str(path), zero_time_base=True)
             while (message := reader.recv_msg()) is not None:
                 _keep(message, rows, fields)
     except Exception as error:  # whatever bytes may cause
@@ -40,8 +41,9 @@ def read_ardupilot(path: Path) -> Recording:
         got = f"{path.name}, near byte {place} of {size}: {error or type(error).__name__}"
         raise BadInput("log", "be an undamaged .bin file of ArduPilot", got) from None
     finally:
-        if reader is not None:
-            reader.close()
+        for name in ("data_map", "filehandle"):
+            with contextlib.suppress(AttributeError, BufferError):  # where it was not opened, or is still looked at
+                getattr(reader, name).close()
     tables = {}
     for (kind, topic), numbers in rows.items():
         array = np.array(numbers, dtype=float)

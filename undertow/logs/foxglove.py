@@ -1,7 +1,7 @@
 """Messages that Foxglove shows in three dimensions: transforms of the vehicle, its hull, its path.
 
-Schemas: docs.foxglove.dev/docs/sdk/schemas. Foxglove's axes point up: frame `world` is east, north, up, and `ned` within
-it is ours.
+Schemas: docs.foxglove.dev/docs/sdk/schemas. Foxglove's axes point up: frame `world` is east, north, up, and `ned`
+within it is ours.
 """
 
 import json
@@ -136,7 +136,7 @@ def scene(time: float, path: np.ndarray, size: Any = None) -> bytes:
 def _entity(time: float, frame: str, name: str, **shapes: Any) -> dict[str, Any]:
     kinds = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models")
     place = {"timestamp": _stamp(time), "frame_id": frame, "id": name, "lifetime": {"sec": 0, "nsec": 0}}
-    return place | {"frame_locked": True, "metadata": []} | dict.fromkeys(kinds, []) | shapes
+    return place | {"frame_locked": True, "metadata": []} | {kind: [] for kind in kinds} | shapes
 
 
 def _stamp(time: float) -> dict[str, int]:

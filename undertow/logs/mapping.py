@@ -8,6 +8,7 @@ signals:
   input: {columns: [pwm1, pwm2, pwm3, pwm4], unit: us, supply: 16}
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -22,14 +23,18 @@ from undertow.logs.recording import Recording, Table, cleaned
 # Pulses and duties become volts with these, as `undertow describe esc` has them.
 _ESC = {"neutral": 1500.0, "span": 400.0, "dead_band": 25.0}
 
-_VOLTS = ("input", "commanded_input")
+# Units in which an input is a share of the supply, and their factor.
+_VOLTS, _SHARES = ("input", "commanded_input"), {"us": 1.0, "1": 1.0, "%": 0.01}
+
+_NUMBERED = re.compile(r"(?P<head>.*?)(?P<number>\d{1,4})(?P<tail>\D*)")
+_MOST = 64  # columns of a signal
 
 
 class Entry(NamedTuple):
     """Where a signal stands in a file.
 
     Attributes:
-        columns: of the file, in our order; `C[1..8]` stands for C1, C2, ..., C8.
+        columns: of the file, in our order; `C1..C8` stands for C1, C2, ..., C8.
         topic: whose columns they are, or the type of its messages; "" for the only one.
         unit: of the columns; "" for ours.
         frame: world and body axes of the file.
@@ -141,28 +146,33 @@ def _number(given: Mapping[str, Any], key: str, usual: Any) -> Any:
 
 
 def _spread(columns: Iterable[str]) -> tuple[str, ...]:
-    """`C[1..8]` as C1, C2, ..., C8."""
+    """`C1..C8` as C1, C2, ..., C8, and `data[0]..data[7]` likewise."""
     found: list[str] = []
     for name in columns:
-        head, dots, tail = name.partition("..")
-        begin, bracket, first = head.rpartition("[")
-        last, _, rest = tail.partition("]")
-        if dots and bracket and first.isdecimal() and last.isdecimal() and int(last) - int(first) < 100:
-            found += [f"{begin}{number}{rest}" for number in range(int(first), int(last) + 1)]
-        else:
+        first, _, last = name.partition("..")
+        begin, end = _NUMBERED.fullmatch(first), _NUMBERED.fullmatch(last)
+        if not begin or not end or begin["head"] != end["head"] or begin["tail"] != end["tail"]:
             found.append(name)
+            continue
+        numbers = range(int(begin["number"]), int(end["number"]) + 1)
+        if not 0 < len(numbers) <= _MOST:
+            raise BadInput("columns", f"be from 1 to {_MOST} columns", name)
+        found += [f"{begin['head']}{number}{begin['tail']}" for number in numbers]
     return tuple(found)
 
 
 def _factor(name: str, entry: Entry) -> float:
     """Factor of the unit; that of pulses and duties, which become volts, is 1 or that of the duty."""
     known = SIGNALS[name]
-    if name in _VOLTS and entry.unit in ("us", "1", "%", "N"):
-        if entry.unit == "N":
-            return 1.0
-        if entry.supply is None:
-            raise BadInput("supply", f"be given, V, for an input in {entry.unit or known.unit}")
-        return 0.01 if entry.unit == "%" else 1.0
+    shares = name in _VOLTS and entry.unit in _SHARES
+    if shares and entry.supply is None:
+        raise BadInput("supply", "be given, V: the input is a share of it", f"{name} in {entry.unit}, without")
+    if entry.supply is not None and not shares:
+        raise BadInput("supply", f"be left out unless the unit is {', '.join(_SHARES)}", entry.supply)
+    if shares:
+        return _SHARES[entry.unit]
+    if name in _VOLTS and entry.unit == "N":  # of thrusters that are commanded in newtons
+        return 1.0
     return units.factor(entry.unit or known.unit, known.unit, name)
 
 
@@ -225,8 +235,8 @@ def _series(name: str, entry: Entry, topic: str, table: Table, recording: Record
     if known.columns == ("thruster",):
         titles = thruster_columns(len(columns))
         unit = "N" if entry.unit == "N" else unit
-        if name in _VOLTS and entry.unit in ("us", "1", "%"):
-            values = volts_of_pulses(values, entry) if entry.unit == "us" else np.clip(values, -1, 1) * entry.supply
+        if name in _VOLTS and entry.supply is not None:
+            values = volts(values, entry, entry.supply)
     elif known.kind == "quaternion":
         ours, unit, titles = "attitude", "rad", SIGNALS["attitude"].columns
         values = frames.attitudes_of_quaternions(values, *entry.frame)
@@ -255,8 +265,9 @@ def _frame_note(known: Known, frame: tuple[str, str]) -> str:
     return f", {note}" if note else ""
 
 
-def volts_of_pulses(pulses: np.ndarray, entry: Entry) -> np.ndarray:
-    """Volts of pulses in us: the share of the supply beyond the dead band, as `ESC.voltage` has it."""
-    offset = pulses - entry.esc["neutral"]
-    duty = np.where(np.abs(offset) > entry.esc["dead_band"], offset / entry.esc["span"], 0.0)
-    return np.clip(duty, -1.0, 1.0) * entry.supply
+def volts(commands: np.ndarray, entry: Entry, supply: float) -> np.ndarray:
+    """Volts of pulses in us, as `ESC.voltage` has them: the share of the supply beyond the dead band; or of a duty."""
+    if entry.unit == "us":
+        offset = commands - entry.esc["neutral"]
+        commands = np.where(np.abs(offset) > entry.esc["dead_band"], offset / entry.esc["span"], 0.0)
+    return np.clip(commands, -1.0, 1.0) * supply

@@ -119,7 +119,7 @@ class LiveLog:
 
     def __init__(self, path: Path, signals: Mapping[str, Series], facts: Mapping[str, str]):
         self._stream = path.open("wb")
-        self._writer = _Writer(self._stream, _LIVE_CHUNK, facts | {"format": "undertow", "source": path.name})
+        self._writer = _Writer(self._stream, _LIVE_CHUNK, dict(facts) | {"format": "undertow", "source": path.name})
         self._topics = []
         for topic, several in grouped(signals).items():
             form = MessageForm(topic.strip("/"), several)

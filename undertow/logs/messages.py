@@ -57,7 +57,7 @@ class MessageForm:
 
     def __init__(self, group: str, signals: Mapping[str, Series]):
         self.schema_name, self._signals = _OUR_SCHEMA + group, dict(signals)
-        parts = ", ".join(f"{json.dumps(name)}: {_template(one)}" for name, one in signals.items())
+        parts = ", ".join(f"{_key(name)}: {_template(one)}" for name, one in signals.items())
         self._template = '{"time": %r, ' + parts + "}"
 
     def schema(self) -> str:
@@ -73,21 +73,21 @@ class MessageForm:
 
     def of_sample(self, time: float, values: list[Any]) -> bytes:
         """The message of one sample: the numbers of all signals, flattened, in their order."""
-        text = self._template % (time, *values)
-        return (text if "n" not in _only_numbers(values) else self._with_words(time, values)).encode()
+        finite = np.isfinite(values).all()
+        return (self._template % (time, *values) if finite else self._with_words(time, values)).encode()
 
     def of_samples(self) -> Iterator[tuple[float, bytes]]:
         """Time and message of each sample of the signals."""
         first = next(iter(self._signals.values()))
         matrix = np.concatenate([one.flat().astype(float) for one in self._signals.values()], axis=1)
-        finite, template = np.isfinite(matrix).all(axis=1).tolist(), self._template
+        finite, template = np.isfinite(matrix).all(axis=1), self._template
         for good, time, row in zip(finite, first.time.tolist(), matrix.tolist(), strict=True):
             yield time, (template % (time, *row) if good else self._with_words(time, row)).encode()
 
     def _with_words(self, time: float, values: list[float]) -> str:
         """The message of a sample that has numbers that are not finite."""
         words = {np.inf: '"Infinity"', -np.inf: '"-Infinity"'}
-        marked = self._template.replace("%d", "%r")
+        marked = self._template.replace("%d", "%r")  # integers are always finite, but share the row
         shown = [
             _Word("null") if value != value else _Word(words[value]) if value in words else value for value in values
         ]
@@ -104,10 +104,6 @@ class _Word:
         return self._text
 
 
-def _only_numbers(values: list[Any]) -> str:
-    return "n" if not np.isfinite(values).all() else ""
-
-
 def _columns(series: Series) -> tuple[str, ...]:
     number = series.values.shape[1]
     return series.columns if len(series.columns) == number else tuple(str(i + 1) for i in range(number))
@@ -119,7 +115,12 @@ def _template(series: Series) -> str:
     if series.values.ndim == 1:
         return number
     inner = _list_template(number, series.values.shape[2:])
-    return "{" + ", ".join(f"{json.dumps(name)}: {inner}" for name in _columns(series)).replace("%%", "%") + "}"
+    return "{" + ", ".join(f"{_key(name)}: {inner}" for name in _columns(series)) + "}"
+
+
+def _key(name: str) -> str:
+    """A name in a template."""
+    return json.dumps(name).replace("%", "%%")
 
 
 def _list_template(number: str, shape: tuple[int, ...]) -> str:

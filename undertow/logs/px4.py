@@ -10,6 +10,25 @@ from undertow.logs.extra import check_installed, quiet
 from undertow.logs.recording import Recording, Table
 
 
+# Reads at the end of a file from which on pyulog goes round in circles, as it does where the definitions are cut off.
+_MOST_AT_END = 1000
+
+
+class _Stream(io.BytesIO):
+    """The bytes of a file, of which pyulog cannot read the end again and again."""
+
+    def __init__(self, data: bytes):
+        super().__init__(data)
+        self._at_end = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        data = super().read(size)
+        self._at_end += size is not None and len(data) < size
+        if self._at_end > _MOST_AT_END:
+            raise RuntimeError("the file ends within its definitions")
+        return data
+
+
 def read_px4(path: Path) -> Recording:
     """Tables of the topics; further instances of one as `sensor_combined[1]`.
 
@@ -22,7 +41,7 @@ def read_px4(path: Path) -> Recording:
     from pyulog import ULog
 
     notes: list[str] = []
-    stream = io.BytesIO(path.read_bytes())
+    stream = _Stream(path.read_bytes())
     try:
         with quiet(notes):
             found = ULog(stream)
@@ -46,5 +65,5 @@ def read_px4(path: Path) -> Recording:
 def _table(data) -> Table:
     fields = {name: np.asarray(values, dtype=float) for name, values in data.data.items()}
     sampled = data.data.get("timestamp_sample")
-    stamps = data.data["timestamp"] if sampled is None or not sampled.size or (sampled == 0).any() else sampled
+    stamps = data.data["timestamp"] if sampled is None or not sampled.any() else sampled
     return Table(np.asarray(stamps, dtype=float) * 1e-6, fields, data.name)

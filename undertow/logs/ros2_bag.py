@@ -16,7 +16,7 @@ _LONGEST = 64  # numbers of an array that become columns; images and point cloud
 def read_ros2_bag(path: Path) -> Recording:
     """Tables of the numbers of each topic, by path: `pose.pose.position.x`, `data[3]`.
 
-    Times are those of the header where a message has a stamp, otherwise those of recording; both since the first of all.
+    Times are those of the header where a message has a stamp, otherwise those of recording; both since the first.
 
     Raises:
         BadInput: damaged, a message of unknown type only, or rosbags is not installed.
