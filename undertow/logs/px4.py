@@ -9,7 +9,6 @@ from undertow.core.errors import BadInput
 from undertow.logs.extra import check_installed, quiet
 from undertow.logs.recording import Recording, Table
 
-
 # Reads at the end of a file from which on pyulog goes round in circles, as it does where the definitions are cut off.
 _MOST_AT_END = 1000
 

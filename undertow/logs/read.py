@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, within
 from undertow.logs.ardupilot import read_ardupilot
 from undertow.logs.csv_file import read_csv
 from undertow.logs.default_mappings import DEFAULTS
@@ -19,12 +19,13 @@ from undertow.logs.run_log import read_run
 _NO_MAPPING = LogMapping({})
 
 
-def read_log(path: Path, mapping: LogMapping | None = None) -> Log:
+def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[str], str] = lambda name: "") -> Log:
     """The log in a file.
 
     Args:
         path: .mcap, .csv, .nc (a run), .bin (ArduPilot), .ulg (PX4), .db3, or the folder of a bag of ROS 2.
         mapping: where signals stand; they go before those that the format itself explains.
+        location: file and line of a key of the mapping.
 
     Raises:
         BadInput: no such file, damaged, of no known format, or without what the mapping names.
@@ -38,10 +39,10 @@ def read_log(path: Path, mapping: LogMapping | None = None) -> Log:
             got = f"given for {found.source}, which holds them by name"
             raise BadInput("mapping", "be left out for a log whose signals are known", got)
         return found
-    return _mapped(found, mapping)
+    return _mapped(found, mapping, location)
 
 
-def _mapped(found: Recording, mapping: LogMapping | None) -> Log:
+def _mapped(found: Recording, mapping: LogMapping | None, location: Callable[[str], str]) -> Log:
     usual = suited(found, DEFAULTS.get(found.format, _NO_MAPPING))
     if mapping is None:
         if not usual.signals:
@@ -52,7 +53,8 @@ def _mapped(found: Recording, mapping: LogMapping | None) -> Log:
             raise BadInput("mapping", "be given", got, hint=hint)
         return log_of(found, usual)
     given = {name: entries for name, entries in usual.signals.items() if not _replaced(name, mapping)}
-    return log_of(found, mapping._replace(signals=given | dict(mapping.signals)))
+    with within("mapping", location):
+        return log_of(found, mapping._replace(signals=given | dict(mapping.signals)))
 
 
 def _replaced(name: str, mapping: LogMapping) -> bool:
