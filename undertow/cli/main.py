@@ -147,16 +147,21 @@ def simulate(
         Path | None,
         typer.Option(metavar="FILE.mp4", help="Also write a video of the run, at most 30 s long. It needs ffmpeg."),
     ] = None,
+    rerun: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.rrd", help="Also write the run for the viewer Rerun. It needs the extra `viz`."),
+    ] = None,
 ) -> int:
     """Simulate one scenario.
 
-    The command writes run.nc, metrics.json, scenario.yaml, figures/ and run.html when the run has ended. run.html holds
-    metrics, figures and a replay in three dimensions, and needs no network. If SCENARIO is a result file, its run is
-    repeated, and the command reports whether the results are identical bit for bit. Other files in DIR are not changed.
+    The command writes run.nc, metrics.json, scenario.yaml, run.mcap, figures/ and run.html when the run has ended.
+    run.mcap holds the series for Foxglove and other viewers. run.html holds metrics, figures and a replay in three
+    dimensions, and needs no network. If SCENARIO is a result file, its run is repeated, and the command reports whether
+    the results are identical bit for bit. Other files in DIR are not changed.
     """
     from undertow.cli.simulate import simulate
 
-    return simulate(scenario, out, overwrite, prediction, allow_code, pdf, video)
+    return simulate(scenario, out, overwrite, prediction, allow_code, pdf, video, rerun)
 
 
 @app.command()
