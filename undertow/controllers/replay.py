@@ -34,9 +34,9 @@ class Replay(AbstractController):
     """
 
     model: Model
+    linear: bool = eqx.field(static=True)
     commands: Float[Param, "rows columns"] = param("s, then V or N", "rows (t, u1, u2, ...)")
     early: Float[Param, ""] = param("s", "time by which a sample counts early, computed from all rows")
-    linear: bool = eqx.field(static=True)
 
     def __init__(self, model: Model, commands, linear: bool):
         rows = np.asarray(commands, dtype=float)

@@ -174,7 +174,7 @@ def _predicted(realization: Realization, windows: _Windows, dt, limited: bool, s
         u = plant.admissible(x, u) if limited else u
         h = dt / substeps
         for i in range(substeps):
-            x = integrate(lambda t, x: realization.motion(t, x, u), t + i * h, x, h)
+            x = integrate(lambda t, x: realization.motion(jnp.asarray(t), x, u), t + i * h, x, h)
         return x, None
 
     def several(x: VehicleState, given: tuple[Any, Inputs]):

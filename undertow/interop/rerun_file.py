@@ -84,5 +84,3 @@ def _write_view(rerun: Any, recording: Any, log: Log, size: Any) -> None:
     turned = np.roll(quaternions(outputs[:, 3:]), -1, axis=1)  # x, y, z, w
     moved = rerun.Transform3D.columns(translation=outputs[:, :3], quaternion=turned)
     rerun.send_columns("world/vehicle", [rerun.TimeColumn("time", duration=time)], moved, recording=recording)
-
-

@@ -6,13 +6,14 @@ from typing import Any
 from undertow.logs import foxglove
 
 # Panel -> its title, and what it plots: topic, signal and columns.
+_BODY = ("surge", "sway", "heave")  # of a law in body axes
 _OUTPUTS = ("north", "east", "down", "roll", "pitch", "yaw")
 _PLOTS = {
     "Plot!position": ("Position, m", "/motion", ("position", "reference"), _OUTPUTS[:3]),
     "Plot!attitude": ("Attitude, rad", "/motion", ("position", "reference"), _OUTPUTS[3:]),
     "Plot!error": ("Tracking error, m and rad", "/motion", ("error",), _OUTPUTS),
     "Plot!input": ("Input of the thrusters", "/thrusters", ("input",), tuple(f"T{i}" for i in range(1, 9))),
-    "Plot!estimate": ("Estimate of the uncertainty", "/controller", ("estimate",), _OUTPUTS),
+    "Plot!estimate": ("Estimate of the uncertainty", "/controller", ("estimate",), (*_BODY, *_OUTPUTS)),
 }
 _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999")
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -118,6 +119,22 @@ class Log:
         """Time from the first sample of any signal to the last, s."""
         ends = [time for one in self.signals.values() if len(one.time) for time in (one.time[0], one.time[-1])]
         return float(max(ends) - min(ends)) if ends else 0.0
+
+    def save(self, path: str | Path) -> None:
+        """Write all signals to a file: .mcap, which keeps everything, or .csv, which keeps the numbers.
+
+        Raises:
+            BadInput: another kind of file.
+            OSError: it cannot be written.
+        """
+        from undertow.logs.csv_file import write_csv
+        from undertow.logs.mcap_writer import write_mcap
+
+        writers = {".mcap": write_mcap, ".csv": write_csv}
+        path = Path(path)
+        if path.suffix not in writers:
+            raise BadInput("path", f"be a file whose name ends in {' or '.join(writers)}", str(path))
+        writers[path.suffix](self, path)
 
     def __repr__(self) -> str:
         lines = [f"Log of {self.source} ({self.format}), {self.duration():g} s"]

@@ -92,8 +92,9 @@ def _write_view(writer: _Writer, log: Log, size: Any) -> None:
 
 
 def pose_of(signals: Mapping[str, Series]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Time and rows north, east, down, roll, pitch, yaw of a vehicle; None without them."""
-    position, attitude = signals.get("position"), signals.get("attitude")
+    """Time and rows north, east, down, roll, pitch, yaw of a vehicle, measured ones without true ones; else None."""
+    position = signals.get("position", signals.get("measured_position"))
+    attitude = signals.get("attitude")
     if position is None or position.columns[:3] != ("north", "east", "down"):
         return None
     if position.values.shape[1:] == (6,):
@@ -103,6 +104,15 @@ def pose_of(signals: Mapping[str, Series]) -> tuple[np.ndarray, np.ndarray] | No
     continuous = np.unwrap(attitude.values, axis=0)
     angles = [np.interp(position.time, attitude.time, column) for column in continuous.T]
     return position.time, np.column_stack([position.values, *angles])
+
+
+def _pose_names(signals: Mapping[str, Series]) -> tuple[str, ...] | None:
+    """Names of the signals that are the pose of a vehicle; None without them."""
+    for names in (("position", "attitude"), ("position",), ("measured_position",)):
+        columns = [column for name in names if name in signals for column in signals[name].columns]
+        if columns == ["north", "east", "down", "roll", "pitch", "yaw"]:
+            return names
+    return None
 
 
 class LiveLog:
@@ -125,15 +135,17 @@ class LiveLog:
             form = MessageForm(topic.strip("/"), several)
             self._topics.append((self._writer.channel(topic, form.schema_name, form.schema()), form, tuple(several)))
         self._tf = self._writer.foxglove_channel("/tf", "foxglove.FrameTransform")
-        self._begun = False
+        self._pose, self._begun = _pose_names(signals), False
 
     def append(self, time: float, values: Mapping[str, Any]) -> None:
         """Write the values of one step, all signals by name."""
         for channel, form, names in self._topics:
             flat = np.concatenate([np.ravel(values[name]).astype(float) for name in names]).tolist()
             self._writer.write(channel, time, form.of_sample(time, flat))
-        if len(pose := np.ravel(values.get("position", ()))) == 6 and np.isfinite(pose).all():
-            self._view(time, pose)
+        if self._pose is not None:
+            outputs = np.concatenate([np.ravel(values[name]) for name in self._pose])
+            if np.isfinite(outputs).all():
+                self._view(time, outputs)
         self._stream.flush()  # a full chunk, where there is one
 
     def _view(self, time: float, pose: np.ndarray) -> None:

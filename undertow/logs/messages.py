@@ -80,9 +80,9 @@ class MessageForm:
         """Time and message of each sample of the signals."""
         first = next(iter(self._signals.values()))
         matrix = np.concatenate([one.flat().astype(float) for one in self._signals.values()], axis=1)
-        finite, template = np.isfinite(matrix).all(axis=1), self._template
+        finite: list[bool] = np.isfinite(matrix).all(axis=1).tolist()  # pyright: ignore[reportAssignmentType] - one per row
         for good, time, row in zip(finite, first.time.tolist(), matrix.tolist(), strict=True):
-            yield time, (template % (time, *row) if good else self._with_words(time, row)).encode()
+            yield time, (self._template % (time, *row) if good else self._with_words(time, row)).encode()
 
     def _with_words(self, time: float, values: list[float]) -> str:
         """The message of a sample that has numbers that are not finite."""

@@ -51,7 +51,7 @@ def motion_of(log: Log) -> LoggedMotion:
     Raises:
         BadInput: position, attitude or a velocity is missing, or they do not overlap.
     """
-    position = log["position"]
+    position = log["measured_position" if "position" not in log and "measured_position" in log else "position"]
     whole = position.values.shape[1:] == (6,)
     attitude = position._replace(values=position.values[:, 3:]) if whole else log["attitude"]
     turning = attitude._replace(values=_without_jumps(attitude.values))
@@ -75,8 +75,9 @@ def motion_of(log: Log) -> LoggedMotion:
 
 def _velocities(log: Log) -> tuple[Series, Series]:
     """Linear and angular velocity, in the forms in which the log has them."""
-    if "velocity" in log and log["velocity"].values.shape[1:] == (6,):
-        return log["velocity"], log["velocity"]
+    for name in ("velocity", "measured_velocity"):
+        if name in log and log[name].values.shape[1:] == (6,):
+            return log[name], log[name]
     linear = log["body_velocity"] if "body_velocity" in log else log["velocity"]
     return linear, log["angular_velocity"]
 

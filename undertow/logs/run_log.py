@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from undertow.core.errors import BadInput
 from undertow.logs.known_signals import thruster_columns
 from undertow.logs.log import Log, Series
+from undertow.logs.messages import group_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,7 +22,7 @@ def log_of_run(run: "xr.Dataset", source: str = "run.nc") -> Log:
         name: Series(
             time,
             variable.values,
-            _columns(run, variable),
+            _columns(run, str(name), variable),
             variable.attrs.get("units", "1"),
             variable.attrs.get("long_name", ""),
         )
@@ -35,12 +36,14 @@ def log_of_run(run: "xr.Dataset", source: str = "run.nc") -> Log:
     )
 
 
-def _columns(run: "xr.Dataset", variable: "xr.DataArray") -> tuple[str, ...]:
+def _columns(run: "xr.Dataset", name: str, variable: "xr.DataArray") -> tuple[str, ...]:
+    """Names of the columns; the law's signals, and what it estimates, are in its own axes."""
     if variable.ndim < 2:
         return ()
     dimension = variable.dims[1]
     if dimension == "axis":
-        return tuple(map(str, run["axis"].values))
+        own = run["axis"].attrs.get("controller_axes", "") if group_of(name) == "controller" else ""
+        return tuple(own.split(", ")) if own else tuple(map(str, run["axis"].values))
     if dimension == "actuator":
         return thruster_columns(variable.shape[1])
     return tuple(str(i + 1) for i in range(variable.shape[1]))
