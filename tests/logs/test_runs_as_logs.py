@@ -195,10 +195,11 @@ def test_foxglove_finds_what_it_needs(run, files):
             if channel.topic not in topics or message.sequence % 50 == 0:
                 kinds[schema.name].validate(content)
             topics.setdefault(channel.topic, content)
-            if schema.name == "foxglove.FrameTransform":
-                places.append((message.log_time, content))
-    assert set(topics) == {"/motion", "/thrusters", "/controller", "/energy", "/tf", "/scene"}
+            if schema.name == "foxglove.FrameTransforms":
+                places += [(message.log_time, one) for one in content["transforms"]]
+    assert set(topics) == {"/motion", "/thrusters", "/controller", "/tf", "/scene"}
     up, *moving = places
+    assert (up[1]["parent_frame_id"], up[1]["child_frame_id"]) == ("world", "ned")
     axes = Rotation.from_quat([up[1]["rotation"][axis] for axis in "xyzw"])
     np.testing.assert_allclose(axes.apply(np.eye(3)), [[0, 1, 0], [1, 0, 0], [0, 0, -1]], atol=1e-15)  # east, north, up
     motion = [(stamp, one) for stamp, one in moving if one["child_frame_id"] == "vehicle"]

@@ -5,6 +5,7 @@ within it is ours.
 """
 
 import json
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,8 @@ from undertow.logs.frames import quaternions
 
 WORLD, NED, VEHICLE, REFERENCE = "world", "ned", "vehicle", "reference"
 
-# Half a turn about the diagonal of north and east.
-_NED_IN_WORLD = (0.0, 2**-0.5, 2**-0.5, 0.0)
+# Quaternion x, y, z, w: half a turn about the diagonal of north and east.
+_NED_IN_WORLD = (2**-0.5, 2**-0.5, 0.0, 0.0)
 
 _SIZE = (0.5, 0.4, 0.3)  # m, of a vehicle whose size is unknown
 _POINTS = 2000  # of the path, at most
@@ -75,10 +76,12 @@ _ENTITY = _object(
     models=_NONE,
 )
 
+_FRAME = _object(
+    timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_VECTOR, rotation=_QUATERNION
+)
+
 SCHEMAS = {
-    "foxglove.FrameTransform": _object(
-        timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_VECTOR, rotation=_QUATERNION
-    ),
+    "foxglove.FrameTransforms": _object(transforms=_several(_FRAME)),
     "foxglove.SceneUpdate": _object(deletions=_NONE, entities=_several(_ENTITY)),
 }
 
@@ -88,23 +91,25 @@ def nanoseconds(time: float) -> int:
     return max(0, round(time * 1e9))
 
 
-def transform(time: float, parent: str, child: str, position: Any, quaternion: Any) -> bytes:
-    """`foxglove.FrameTransform` of a frame in another: position in m, quaternion (w, x, y, z), child to parent."""
-    stamp = _stamp(time)
-    (x, y, z), (qw, qx, qy, qz) = map(float, position), map(float, quaternion)
-    return (_TRANSFORM % (stamp["sec"], stamp["nsec"], parent, child, x, y, z, qx, qy, qz, qw)).encode()
+def transforms(time: np.ndarray, motions: Mapping[str, np.ndarray]) -> Iterator[tuple[float, bytes]]:
+    """Time and `foxglove.FrameTransforms` of each sample: our axes in the world's, and frames that move in ours.
 
-
-def axes(time: float) -> bytes:
-    """The transform that turns our axes into those of the screen."""
-    return transform(time, WORLD, NED, (0, 0, 0), _NED_IN_WORLD)
-
-
-def poses(time: np.ndarray, outputs: np.ndarray, child: str) -> list[tuple[float, bytes]]:
-    """Transforms of a frame along a motion: rows north, east, down, roll, pitch, yaw; those not finite are left out."""
-    good = np.isfinite(outputs).all(axis=1)
-    rows = zip(time[good].tolist(), outputs[good, :3].tolist(), quaternions(outputs[good, 3:]).tolist(), strict=True)
-    return [(t, transform(t, NED, child, place, turned)) for t, place, turned in rows]
+    Args:
+        time: s.
+        motions: rows north, east, down (m), roll, pitch, yaw (rad) of each frame; rows not finite are left out.
+    """
+    parts = []
+    for outputs in motions.values():
+        good = np.isfinite(outputs).all(axis=1).tolist()
+        turned = quaternions(outputs[:, 3:])[:, [1, 2, 3, 0]].tolist()
+        parts.append(zip(good, outputs[:, :3].tolist(), turned, strict=True))
+    for when, *frames in zip(time.tolist(), *parts, strict=True):
+        stamp = divmod(nanoseconds(when), 10**9)
+        found = [_TRANSFORM % (*stamp, WORLD, NED, 0, 0, 0, *_NED_IN_WORLD)]
+        for name, (good, place, turn) in zip(motions, frames, strict=True):
+            if good:
+                found.append(_TRANSFORM % (*stamp, NED, name, *place, *turn))
+        yield when, f'{{"transforms": [{", ".join(found)}]}}'.encode()
 
 
 def scene(time: float, path: np.ndarray, size: Any = None) -> bytes:

@@ -78,15 +78,13 @@ def _write_view(writer: _Writer, log: Log, size: Any) -> None:
     if pose is None or not len(pose[0]):
         return
     time, outputs = pose
-    transforms = writer.foxglove_channel("/tf", "foxglove.FrameTransform")
-    writer.write(transforms, time[0], foxglove.axes(time[0]))
-    followed = [(outputs, foxglove.VEHICLE)]
+    channel = writer.foxglove_channel("/tf", "foxglove.FrameTransforms")
+    motions = {foxglove.VEHICLE: outputs}
     reference = log.signals.get("reference")
     if reference is not None and reference.values.shape == outputs.shape:
-        followed.append((reference.values, foxglove.REFERENCE))
-    for values, child in followed:
-        for when, message in foxglove.poses(time, values, child):
-            writer.write(transforms, when, message)
+        motions[foxglove.REFERENCE] = reference.values
+    for when, message in foxglove.transforms(time, motions):
+        writer.write(channel, when, message)
     view = writer.foxglove_channel("/scene", "foxglove.SceneUpdate")
     writer.write(view, time[0], foxglove.scene(time[0], outputs[:, :3], size))
 
@@ -134,7 +132,7 @@ class LiveLog:
         for topic, several in grouped(signals).items():
             form = MessageForm(topic.strip("/"), several)
             self._topics.append((self._writer.channel(topic, form.schema_name, form.schema()), form, tuple(several)))
-        self._tf = self._writer.foxglove_channel("/tf", "foxglove.FrameTransform")
+        self._tf = self._writer.foxglove_channel("/tf", "foxglove.FrameTransforms")
         self._pose, self._begun = _pose_names(signals), False
 
     def append(self, time: float, values: Mapping[str, Any]) -> None:
@@ -152,9 +150,8 @@ class LiveLog:
         if not self._begun:
             scene = self._writer.foxglove_channel("/scene", "foxglove.SceneUpdate")
             self._writer.write(scene, time, foxglove.scene(time, np.zeros((0, 3))))
-            self._writer.write(self._tf, time, foxglove.axes(time))
             self._begun = True
-        for when, message in foxglove.poses(np.array([time]), pose[None], foxglove.VEHICLE):
+        for when, message in foxglove.transforms(np.array([time]), {foxglove.VEHICLE: pose[None]}):
             self._writer.write(self._tf, when, message)
 
     def close(self) -> None:

@@ -29,9 +29,9 @@ _OUR_SCHEMA = "undertow."
 
 
 def group_of(name: str) -> str:
-    """Group of a signal: `motion`, `thrusters`, `energy` or `controller`."""
-    if name.startswith("energy"):
-        return "energy"
+    """Group of a signal: `motion`, `thrusters` (with their energy) or `controller`."""
+    if name.startswith("energy_"):
+        return "thrusters"
     return next((group for group, names in GROUPS.items() if name in names), "controller")
 
 
