@@ -91,7 +91,7 @@ def test_a_line_of_the_mapping_is_named(tmp_path, capsys, monkeypatch):
     (tmp_path / "dive.csv").write_text(TABLE)
     for change, said in (
         (("unit: cm", "unit: deg"), "`mapping.signals.depth.unit` must be one of m, cm, mm for `depth`, but is deg (m.yaml, line 4)"),
-        (("depth_cm", "depth_m"), "`mapping.signals.depth.columns` must be columns of dive.csv, but is depth_m (m.yaml, line 4)"),
+        (("depth_cm", "depth_m"), "`mapping.signals.depth.columns` must be in dive.csv, but is depth_m (m.yaml, line 4)"),
         (("unit: us, supply: 16", "unit: us"), "`mapping.signals.input.supply` must be given, V"),
         (("signals:", "signal:"), "`mapping.signal` must be a key here, but is unknown (m.yaml, line 3). Did you mean `signals`?"),
     ):  # fmt: skip

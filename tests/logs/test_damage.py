@@ -147,8 +147,8 @@ def test_a_file_that_ends_early(tmp_path):
         ("t,x\n0,1\n,2\n", r"have finite times, but is a.csv, depth, sample 2: nan"),
         ("t,x\n", r"have a header and at least one row"),
         ("t,x,x\n1,2,3\n", r"columns of different names, but is a.csv, where `x` occurs twice"),
-        ("t,y\n1,2\n", r"`signals.depth.columns` must be columns of a.csv, but is x. Known: t, y"),
-        ("s,x\n1,2\n", r"`signals.depth.time.columns` must be columns of a.csv, but is t"),
+        ("t,y\n1,2\n", r"`mapping.signals.depth.columns` must be in a.csv, but is x. Known: t, y"),
+        ("s,x\n1,2\n", r"`mapping.time.column` must be in a.csv, but is t"),
     ],
 )
 def test_wrong_csv(tmp_path, text, said):
@@ -225,8 +225,11 @@ def test_a_mapping_for_a_file_that_needs_none(tmp_path):
 def test_missing_topics_and_columns(tmp_path):
     path, _ = good_file("json", tmp_path)
     for signals, said in (
-        ({"topic": "/q", "columns": "y"}, r"`signals.depth.topic` must name one of the 1 topics of the log, but is /q"),
-        ({"topic": "/p", "columns": "z"}, r"`signals.depth.columns` must be columns of j.mcap, but is z"),
+        (
+            {"topic": "/q", "columns": "y"},
+            r"`mapping.signals.depth.topic` must name one of the 1 topics of the log, but is /q",
+        ),
+        ({"topic": "/p", "columns": "z"}, r"`mapping.signals.depth.columns` must be in j.mcap, but is z"),
     ):
         with pytest.raises(BadInput, match=said):
             read_log(path, mapping_of({"signals": {"depth": signals}}))

@@ -131,6 +131,32 @@ def test_ardupilot(tmp_path, core):
     assert units["attitude"] == "rad" and units["angular_velocity"] == "rad/s" and units["pulses"] == "us"
 
 
+def test_ardupilot_as_pymavlink_reads_it(tmp_path):
+    """Every number of every message, by the reader of ArduPilot's own tools."""
+    from pymavlink.DFReader import DFReader_binary
+
+    from undertow.logs.ardupilot import read_ardupilot
+
+    path = bin_file(tmp_path / "dive.bin")
+    tables, found = read_ardupilot(path).tables, {}
+    with DFReader_binary(str(path), zero_time_base=True) as reader:
+        while (message := reader.recv_msg()) is not None:
+            kind, instance = message.get_type(), message.fmt.instance_field
+            topic = kind if instance is None else f"{kind}[{getattr(message, instance)}]"
+            found.setdefault(topic, []).append({name: getattr(message, name) for name in message.get_fieldnames()})
+    assert (
+        set(tables)
+        == {"ATT", "XKF1[0]", "XKF1[1]", "IMU[0]", "IMU[1]", "BARO[0]", "RCOU"} | {"FMTU"}
+        <= set(found) | {"FMTU"}
+    )
+    for topic in set(tables) - {"FMTU"}:
+        assert list(tables[topic].fields) == list(found[topic][0])
+        for name, values in tables[topic].fields.items():
+            np.testing.assert_array_equal(
+                values, [message[name] for message in found[topic]], err_msg=f"{topic}.{name}"
+            )
+
+
 @pytest.mark.parametrize("odometry", [False, True])
 def test_px4(tmp_path, odometry):
     log = read_log(ulg_file(tmp_path / "dive.ulg", odometry))

@@ -161,7 +161,7 @@ def test_logs_that_cannot_be_scored(run):
         ({"file": "six.csv"}, r"`controller.commands` must have 8 inputs, as many as the vehicle has thrusters, but is those of 6"),
         ({"file": "pulses.csv"}, r"`controller.file` must have the signal `commanded_input` or `input`.* map them to `input`"),
         ({"file": "own.csv"}, r"`controller.mapping` must be given, but is own.csv"),
-        ({"file": "own.csv", "mapping": {"signals": {"input": {"columns": "z"}}}}, r"`controller.mapping.signals.input.columns` must be columns of own.csv, but is z"),
+        ({"file": "own.csv", "mapping": {"signals": {"input": {"columns": "z"}}}}, r"`controller.mapping.signals.input.columns` must be in own.csv, but is z"),
         ({"file": "own.csv", "mapping": "m.yaml"}, r"`controller.mapping.signals.input.unit` must be one of V, mV for `input`, but is rad \(m.yaml, line 2\)"),
         ({"file": "own.csv", "mapping": "none.yaml"}, r"`controller.mapping` must be an existing file"),
         ({}, r"`controller.commands` must be given"),

@@ -187,10 +187,10 @@ def log_of(recording: Recording, mapping: LogMapping) -> Log:
         with within("signals"), within(name):
             entry = next((one for one in entries if _has(recording, one)), entries[-1])
             topic, table = recording.table(entry.topic)
-            used = _timed(table, mapping.time, recording.source) if mapping.time[0] else table
-            used, repeated = cleaned(used)
-            if repeated:
-                notes.append(f"{topic or 'the file'}: {repeated} samples of the time of the one before are left out")
+        used, repeated = cleaned(_timed(table, mapping.time, recording.source) if mapping.time[0] else table)
+        if repeated:
+            notes.append(f"{topic or 'the file'}: {repeated} samples of the time of the one before are left out")
+        with within("signals"), within(name):
             ours, series = _series(name, entry, topic, used, recording)
             signals[ours] = series
     return Log(signals, recording.source, recording.format, tuple(dict.fromkeys(notes)))
@@ -211,13 +211,13 @@ def _timed(table: Table, time: tuple[str, str], source: str) -> Table:
     """The table with the time of one of its columns."""
     column, unit = time
     with within("time"):
-        values = _column(table, column, source)
+        values = _column(table, column, source, "column")
     return table._replace(time=np.asarray(values, dtype=float) * units.seconds(unit))
 
 
-def _column(table: Table, name: str, source: str) -> np.ndarray:
+def _column(table: Table, name: str, source: str, key: str = "columns") -> np.ndarray:
     if name not in table.fields:
-        raise BadInput("columns", f"be columns of {source}", name, hint=did_you_mean(name, table.fields))
+        raise BadInput(key, f"be in {source}", name, hint=did_you_mean(name, table.fields))
     return table.fields[name]
 
 
