@@ -5,7 +5,6 @@ import pytest
 from other_programs import ardupilot_bin, json_mcap, px4_ulg, ros2_bag
 from scipy.spatial.transform import Rotation
 
-from undertow.core.errors import BadInput
 from undertow.logs.mapping import mapping_of
 from undertow.logs.read import read_log
 
@@ -66,7 +65,7 @@ def bin_file(path, clock=MICROSECONDS, core=("XKF1", "#")):
     return path
 
 
-def ulg_file(path, odometry=False):
+def ulg_file(path, odometry=False, velocity=VELOCITY, frame=1):
     floats = lambda several: [tuple(map(float, row)) for row in several]
     quaternion = np.roll(TURNED.as_quat(), 1, axis=1)
     clock = MICROSECONDS.tolist()
@@ -76,11 +75,11 @@ def ulg_file(path, odometry=False):
     padded = np.hstack([duty, np.full((ROWS, 4), np.nan)])
     topics = [("actuator_motors", 0, head + "float[12] control;", rows(padded))]
     if odometry:
-        flags = [(1, 1)] * ROWS
+        flags = [(1, frame)] * ROWS
         mixed = [
             (t + 7, t, frame, *p, *q, other, *v, *w)
             for t, (frame, other), p, q, v, w in zip(
-                clock, flags, floats(POSITION), floats(quaternion), floats(VELOCITY), floats(RATES), strict=True
+                clock, flags, floats(POSITION), floats(quaternion), floats(velocity), floats(RATES), strict=True
             )
         ]
         fields = "uint8_t pose_frame;float[3] position;float[4] q;uint8_t velocity_frame;float[3] velocity;float[3] angular_velocity;"
@@ -144,11 +143,7 @@ def test_ardupilot_as_pymavlink_reads_it(tmp_path):
             kind, instance = message.get_type(), message.fmt.instance_field
             topic = kind if instance is None else f"{kind}[{getattr(message, instance)}]"
             found.setdefault(topic, []).append({name: getattr(message, name) for name in message.get_fieldnames()})
-    assert (
-        set(tables)
-        == {"ATT", "XKF1[0]", "XKF1[1]", "IMU[0]", "IMU[1]", "BARO[0]", "RCOU"} | {"FMTU"}
-        <= set(found) | {"FMTU"}
-    )
+    assert set(tables) - {"FMTU"} == {"ATT", "XKF1[0]", "XKF1[1]", "IMU[0]", "IMU[1]", "BARO[0]", "RCOU"}
     for topic in set(tables) - {"FMTU"}:
         assert list(tables[topic].fields) == list(found[topic][0])
         for name, values in tables[topic].fields.items():
@@ -168,17 +163,16 @@ def test_px4(tmp_path, odometry):
     close(log["duty"]._replace(values=log["duty"].values[:, :8]), (PULSES - 1500) / 400)
 
 
-def test_px4_odometry_of_another_frame_is_refused(tmp_path):
-    """velocity_frame 3 is FRD of the body, not NED."""
-    whole = ulg_file(tmp_path / "dive.ulg", odometry=True).read_bytes()
-    quaternion = np.roll(TURNED.as_quat(), 1, axis=1)[0]
-    place = whole.index(np.float32(quaternion).tobytes()) + 16
-    assert whole[place] == 1
-    (tmp_path / "other.ulg").write_bytes(whole[:place] + b"\x03" + whole[place + 1 :])
-    with pytest.raises(
-        BadInput, match=r"must have velocity_frame 1 in vehicle_odometry, but is other.ulg, where it is 3"
-    ):
-        read_log(tmp_path / "other.ulg")
+@pytest.mark.parametrize(("frame", "read"), [(1, "velocity"), (3, "body_velocity"), (2, "")])
+def test_px4_odometry_says_its_frame(tmp_path, frame, read):
+    """1 is NED and 3 FRD of the body; 2, with any heading, is left out with a note."""
+    velocity = BODY_VELOCITY if frame == 3 else VELOCITY
+    log = read_log(ulg_file(tmp_path / "dive.ulg", odometry=True, velocity=velocity, frame=frame))
+    assert [name for name in ("velocity", "body_velocity") if name in log] == [read] * bool(read)
+    if read:
+        close(log[read], velocity)
+    else:
+        assert "vehicle_odometry is not read as velocity: its velocity_frame is 2, not 1" in log.notes
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

@@ -149,7 +149,8 @@ def _number(data: bytes, at: int, kind: _Kind, kinds: dict[int, _Kind], numbered
 def _tables(kind: _Kind, rows: np.ndarray, instance: str) -> dict[str, Table]:
     """The table of a kind, or one per sensor or core."""
     columns = zip(kind.fields.names or (), kind.divisors, strict=True)
-    fields = {name: rows[name] / divisor for name, divisor in columns if divisor}
+    with np.errstate(invalid="ignore"):  # signalling NaNs
+        fields = {name: rows[name] / divisor for name, divisor in columns if divisor}
     time = rows["TimeUS"] * 1e-6
     if instance not in fields:
         return {kind.name: Table(time, fields, kind.name)}

@@ -48,6 +48,7 @@ PX4 = LogMapping(
             Entry(("vx", "vy", "vz"), "vehicle_local_position"),
             Entry(_indexed("velocity", 3), "vehicle_odometry", must=(("velocity_frame", 1.0),)),
         ),
+        "body_velocity": (Entry(_indexed("velocity", 3), "vehicle_odometry", must=(("velocity_frame", 3.0),)),),
         "quaternion": (
             Entry(_indexed("q", 4), "vehicle_attitude"),
             Entry(_indexed("q", 4), "vehicle_odometry", must=(("pose_frame", 1.0),)),

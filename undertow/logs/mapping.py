@@ -196,15 +196,35 @@ def log_of(recording: Recording, mapping: LogMapping) -> Log:
     return Log(signals, recording.source, recording.format, tuple(dict.fromkeys(notes)))
 
 
-def suited(recording: Recording, mapping: LogMapping) -> LogMapping:
-    """The mapping without the signals that a file does not have."""
-    kept = {name: tuple(one for one in entries if _has(recording, one)) for name, entries in mapping.signals.items()}
-    return mapping._replace(signals={name: entries for name, entries in kept.items() if entries})
+def suited(recording: Recording, mapping: LogMapping) -> tuple[LogMapping, tuple[str, ...]]:
+    """The mapping without what a file does not have, and a sentence for each topic that has another frame."""
+    kept, notes = {}, []
+    for name, entries in mapping.signals.items():
+        fitting = []
+        for entry in entries:
+            other = _other_frame(recording, entry) if _has(recording, entry) else ""
+            if other:
+                notes.append(f"{entry.topic} is not read as {name}: {other}")
+            elif _has(recording, entry):
+                fitting.append(entry)
+        if fitting:
+            kept[name] = tuple(fitting)
+    return mapping._replace(signals=kept), tuple(notes)
 
 
 def _has(recording: Recording, entry: Entry) -> bool:
     found = recording.find(entry.topic) if entry.topic else None
     return found is not None and all(column in found[1].fields for column in entry.columns)
+
+
+def _other_frame(recording: Recording, entry: Entry) -> str:
+    """Where a column has not the number that it must have: which one, and what it is. "" where all have."""
+    _, table = recording.table(entry.topic)
+    for column, number in entry.must:
+        values = table.fields.get(column, np.array([np.nan]))
+        if (values != number).any():
+            return f"its {column} is {values[np.argmax(values != number)]:g}, not {number:g}"
+    return ""
 
 
 def _timed(table: Table, time: tuple[str, str], source: str) -> Table:
@@ -224,11 +244,6 @@ def _column(table: Table, name: str, source: str, key: str = "columns") -> np.nd
 def _series(name: str, entry: Entry, topic: str, table: Table, recording: Recording) -> tuple[str, Series]:
     """A signal in our unit and frame, and its name: quaternions become an attitude."""
     known, source = SIGNALS[name], recording.source
-    for column, number in entry.must:
-        values = _column(table, column, source)
-        if (values != number).any():
-            other = values[np.argmax(values != number)]
-            raise BadInput("log", f"have {column} {number:g} in {topic}", f"{source}, where it is {other:g}")
     columns = [np.asarray(_column(table, column, source), dtype=float) for column in entry.columns]
     values = _factor(name, entry) * np.stack(columns, axis=1)
     unit, ours, titles = known.unit, name, known.columns

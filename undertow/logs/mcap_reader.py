@@ -146,7 +146,7 @@ def _records(path: Path, notes: list[str]) -> Iterator[Any]:
             if place and stream.tell() >= size:
                 notes.append(f"the file ends early, within the record at byte {place} of {size}")
                 return
-            raise _damaged(path, f"at byte {place}: {error or type(error).__name__}") from None
+            raise _damaged(path, f"at byte {place}: {str(error) or type(error).__name__}") from None
         if record is None or type(record).__name__ == "DataEnd":
             return
         place = stream.tell()

@@ -50,7 +50,7 @@ def read_px4(path: Path) -> Recording:
             tables[topic] = _table(data)
     except Exception as error:  # whatever bytes may cause
         place = 0 if stream.closed else stream.tell()
-        got = f"{path.name}, near byte {place}: {error or type(error).__name__}"
+        got = f"{path.name}, near byte {place}: {str(error) or type(error).__name__}"
         raise BadInput("log", "be an undamaged .ulg file of PX4", got) from None
     if not tables:
         raise BadInput("log", "have topics", f"{path.name}, which has none")
@@ -62,7 +62,8 @@ def read_px4(path: Path) -> Recording:
 
 
 def _table(data) -> Table:
-    fields = {name: np.asarray(values, dtype=float) for name, values in data.data.items()}
+    with np.errstate(invalid="ignore"):  # signalling NaNs
+        fields = {name: np.asarray(values, dtype=float) for name, values in data.data.items()}
     sampled = data.data.get("timestamp_sample")
     stamps = data.data["timestamp"] if sampled is None or not sampled.any() else sampled
     return Table(np.asarray(stamps, dtype=float) * 1e-6, fields, data.name)

@@ -43,7 +43,8 @@ def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[
 
 
 def _mapped(found: Recording, mapping: LogMapping | None, location: Callable[[str], str]) -> Log:
-    usual = suited(found, DEFAULTS.get(found.format, _NO_MAPPING))
+    usual, frames = suited(found, DEFAULTS.get(found.format, _NO_MAPPING))
+    found = found._replace(notes=(*found.notes, *frames))
     if mapping is None:
         if not usual.signals:
             hint = f"Give a mapping. It has {_listed(found)}"

@@ -43,7 +43,7 @@ def read_ros2_bag(path: Path) -> Recording:
                 stamps.setdefault(connection.topic, []).append(_stamp(message) or recorded)
                 rows.setdefault(connection.topic, []).append(dict(_leaves(message, "")))
     except Exception as error:  # whatever bytes may cause
-        got = f"{path.name}, at {place}: {error or type(error).__name__}"
+        got = f"{path.name}, at {place}: {str(error) or type(error).__name__}"
         raise BadInput("log", "be an undamaged bag of ROS 2", got) from None
     if not rows:
         got = f"{path.name}, which has {', '.join(sorted(unknown)) or 'none'}"

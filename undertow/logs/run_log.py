@@ -63,4 +63,4 @@ def read_run(path: Path) -> Log:
     except BadInput:
         raise
     except Exception as error:  # whatever bytes may cause
-        raise BadInput("log", "be the run.nc of a run", f"{path.name}: {error or type(error).__name__}") from None
+        raise BadInput("log", "be the run.nc of a run", f"{path.name}: {str(error) or type(error).__name__}") from None
