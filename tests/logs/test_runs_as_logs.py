@@ -182,12 +182,12 @@ def test_replays_that_cannot_be_made(tmp_path, change, said):
 
 def test_foxglove_finds_what_it_needs(run, files):
     """Read by the package of MCAP's authors: every message fits its schema, and the view shows the motion."""
-    kinds, places, topics = {}, [], {}
+    kinds, places, topics, stamps = {}, [], {}, []
     with (files / "run.mcap").open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         summary = reader.get_summary()
         assert summary is not None and summary.statistics is not None
-        for schema, channel, message in reader.iter_messages():
+        for schema, channel, message in reader.iter_messages(log_time_order=False):
             assert schema is not None and (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
             content = json.loads(message.data)
             if schema.name not in kinds:
@@ -195,9 +195,11 @@ def test_foxglove_finds_what_it_needs(run, files):
             if channel.topic not in topics or message.sequence % 50 == 0:
                 kinds[schema.name].validate(content)
             topics.setdefault(channel.topic, content)
+            stamps.append(message.log_time)
             if schema.name == "foxglove.FrameTransforms":
                 places += [(message.log_time, one) for one in content["transforms"]]
     assert set(topics) == {"/motion", "/thrusters", "/controller", "/tf", "/scene"}
+    assert stamps == sorted(stamps)
     up, *moving = places
     assert (up[1]["parent_frame_id"], up[1]["child_frame_id"]) == ("world", "ned")
     axes = Rotation.from_quat([up[1]["rotation"][axis] for axis in "xyzw"])
@@ -268,6 +270,18 @@ def test_an_autopilot_logs_its_steps(tmp_path):
         ut.Autopilot(HEAVY, log=tmp_path / "a.csv")
     with pytest.raises(BadInput, match=r"`log` must be a file that can be written"):
         ut.Autopilot(HEAVY, log=tmp_path / "none" / "a.mcap")
+
+
+def test_a_full_disk_does_not_stop_a_controller(tmp_path):
+    (tmp_path / "full.mcap").symlink_to("/dev/full")
+    autopilot = ut.Autopilot(HEAVY, log=tmp_path / "full.mcap")
+    silent, at = ut.Autopilot(HEAVY), (np.zeros(3), np.zeros(6), np.zeros(3))
+    silent.start(*at)
+    with pytest.warns(UserWarning, match=r"full.mcap: No space left on device; later steps are not logged"):
+        autopilot.start(*at)
+        found = [autopilot.step(*at) for _ in range(200)]
+    np.testing.assert_array_equal(found, [silent.step(*at) for _ in range(200)])
+    autopilot.close_log()
 
 
 def test_a_navigation_filter_logs_its_steps(tmp_path):

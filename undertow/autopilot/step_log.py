@@ -1,5 +1,6 @@
 """Writes every step of an autopilot or a navigation filter to an MCAP file."""
 
+import warnings
 import weakref
 from collections.abc import Mapping
 from pathlib import Path
@@ -25,6 +26,7 @@ _STEPS = {
 class StepLog:
     """A log of steps. The file is whole up to the last full chunk at any time, and ends when its owner does.
 
+    Where the file cannot be written any more, a warning says so once, and the owner goes on.
     Where the time of the owner goes back, as after another `start`, that of the log goes on.
 
     Args:
@@ -39,6 +41,7 @@ class StepLog:
 
     def __init__(self, path: str | Path, signals: Mapping[str, Series], period: float, owner: Any):
         path = Path(path)
+        self._path = path
         self._period, self._offset, self._last = period, 0.0, -np.inf
         if path.suffix != ".mcap":
             raise BadInput("log", "be a file whose name ends in .mcap", str(path))
@@ -46,7 +49,7 @@ class StepLog:
             self._file = LiveLog(path, signals, {"sampling_time": f"{period!r} s"})
         except OSError as error:
             raise BadInput("log", "be a file that can be written", f"{path}: {error.strerror}") from None
-        self.close = weakref.finalize(owner, self._file.close)
+        self.close = weakref.finalize(owner, _close, self._file, path)
 
     def append(self, time: float, values: Mapping[str, Any]) -> None:
         """Write the values of a step at a time, s; nothing after `close`."""
@@ -55,7 +58,20 @@ class StepLog:
         if time + self._offset <= self._last:
             self._offset = self._last + self._period - time
         self._last = time + self._offset
-        self._file.append(self._last, values)
+        try:
+            self._file.append(self._last, values)
+        except OSError as error:  # a full disk does not stop the controller
+            self.close.detach()
+            self._file.abandon()
+            warnings.warn(f"{self._path}: {error.strerror}; later steps are not logged", stacklevel=2)
+
+
+def _close(file: LiveLog, path: Path) -> None:
+    """Finish a log; a full disk is a warning, as for steps."""
+    try:
+        file.close()
+    except OSError as error:
+        warnings.warn(f"{path}: {error.strerror}; the log has no end, and can be read without it", stacklevel=2)
 
 
 def law_signals(

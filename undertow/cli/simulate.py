@@ -56,7 +56,7 @@ def simulate(
         if rerun is not None:
             from undertow.interop.rerun_file import check_rerun
 
-            check_rerun(rerun, "--rerun", overwrite)
+            check_rerun(rerun, folder, overwrite)
         executed = _run(scenario, console, allow_code, video is not None)
         write(executed, draft.path)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None

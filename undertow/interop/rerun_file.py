@@ -20,22 +20,22 @@ _SIZE = (0.5, 0.4, 0.3)  # m, of a vehicle whose size is unknown
 _VEHICLE, _PATH = [0, 114, 178], [224, 123, 0]
 
 
-def check_rerun(path: Path, option: str, overwrite: bool) -> None:
-    """Check, before anything is run, that a recording can be written.
+def check_rerun(path: Path, folder: Path, overwrite: bool) -> None:
+    """Check, before anything is run, that a recording can be written; `folder` will exist by then.
 
     Raises:
         BadInput: Rerun is not installed, the name does not end in .rrd, its folder does not exist, or it would replace
             one.
     """
     if path.suffix != ".rrd":
-        raise BadInput(option, "be a file whose name ends in .rrd", str(path))
+        raise BadInput("--rerun", "be a file whose name ends in .rrd", str(path))
     if importlib.util.find_spec("rerun") is None:
         remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[viz]'"
         raise BadInput("", "", f"Rerun is not installed. {remedy}")
-    if not path.parent.is_dir():
-        raise BadInput(option, "be in an existing folder", str(path))
+    if not path.parent.is_dir() and path.parent.resolve() != folder.resolve():
+        raise BadInput("--rerun", "be in an existing folder", str(path))
     if path.exists() and not overwrite:
-        raise BadInput(option, "be a new file", f"{path}, which exists", hint="Add --overwrite to replace it")
+        raise BadInput("--rerun", "be a new file", f"{path}, which exists", hint="Add --overwrite to replace it")
 
 
 def write_rerun(log: Log, path: Path, size: Any = None) -> None:

@@ -100,7 +100,7 @@ def transforms(time: np.ndarray, motions: Mapping[str, np.ndarray]) -> Iterator[
     """
     parts = []
     for outputs in motions.values():
-        good = np.isfinite(outputs).all(axis=1).tolist()
+        good = np.atleast_1d(np.isfinite(outputs).all(axis=1))
         turned = quaternions(outputs[:, 3:])[:, [1, 2, 3, 0]].tolist()
         parts.append(zip(good, outputs[:, :3].tolist(), turned, strict=True))
     for when, *frames in zip(time.tolist(), *parts, strict=True):

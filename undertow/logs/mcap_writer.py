@@ -3,8 +3,11 @@
 The package `mcap` is imported by the functions that write.
 """
 
+import contextlib
+import heapq
+import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -63,30 +66,32 @@ def write_mcap(log: Log, path: Path, size: Any = None) -> None:
     with path.open("wb") as stream:
         facts = {"source": log.source, "format": log.format, "notes": "\n".join(log.notes)} | dict(log.facts)
         writer = _Writer(stream, _CHUNK, facts)
+        streams = []
         for topic, signals in grouped(log.signals).items():
             form = MessageForm(topic.strip("/").replace("/", "."), signals)
             channel = writer.channel(topic, form.schema_name, form.schema())
-            for time, message in form.of_samples():
-                writer.write(channel, time, message)
-        _write_view(writer, log, size)
+            streams.append(zip(itertools.repeat(channel), form.of_samples()))
+        # In the order of time, so that a viewer need not read the whole file for one moment.
+        for channel, (time, message) in heapq.merge(*streams, *_view(writer, log, size), key=lambda one: one[1][0]):
+            writer.write(channel, time, message)
         writer.finish()
 
 
-def _write_view(writer: _Writer, log: Log, size: Any) -> None:
-    """Transforms and scene of a log that has the pose of a vehicle in one signal, or in two sampled together."""
+def _view(writer: _Writer, log: Log, size: Any) -> list[Iterable[tuple[int, tuple[float, bytes]]]]:
+    """Channels and messages of the transforms and the scene, of a log that has the pose of a vehicle."""
     pose = pose_of(log.signals)
     if pose is None or not len(pose[0]):
-        return
+        return []
     time, outputs = pose
     channel = writer.foxglove_channel("/tf", "foxglove.FrameTransforms")
     motions = {foxglove.VEHICLE: outputs}
     reference = log.signals.get("reference")
     if reference is not None and reference.values.shape == outputs.shape:
         motions[foxglove.REFERENCE] = reference.values
-    for when, message in foxglove.transforms(time, motions):
-        writer.write(channel, when, message)
     view = writer.foxglove_channel("/scene", "foxglove.SceneUpdate")
-    writer.write(view, time[0], foxglove.scene(time[0], outputs[:, :3], size))
+    start = float(time[0])
+    moving = zip(itertools.repeat(channel), foxglove.transforms(time, motions))
+    return [[(view, (start, foxglove.scene(start, outputs[:, :3], size)))], moving]
 
 
 def pose_of(signals: Mapping[str, Series]) -> tuple[np.ndarray, np.ndarray] | None:
@@ -155,7 +160,18 @@ class LiveLog:
             self._writer.write(self._tf, when, message)
 
     def close(self) -> None:
-        """Write the end of the file; nothing may be appended afterwards."""
+        """Write the end of the file; nothing may be appended afterwards.
+
+        Raises:
+            OSError: it cannot be written; the file is closed all the same.
+        """
         if not self._stream.closed:
-            self._writer.finish()
+            try:
+                self._writer.finish()
+            finally:
+                self.abandon()
+
+    def abandon(self) -> None:
+        """Close the file without its end."""
+        with contextlib.suppress(OSError):
             self._stream.close()

@@ -80,7 +80,7 @@ class MessageForm:
         """Time and message of each sample of the signals."""
         first = next(iter(self._signals.values()))
         matrix = np.concatenate([one.flat().astype(float) for one in self._signals.values()], axis=1)
-        finite: list[bool] = np.isfinite(matrix).all(axis=1).tolist()  # pyright: ignore[reportAssignmentType] - one per row
+        finite = np.atleast_1d(np.isfinite(matrix).all(axis=1))
         for good, time, row in zip(finite, first.time.tolist(), matrix.tolist(), strict=True):
             yield time, (self._template % (time, *row) if good else self._with_words(time, row)).encode()
 
