@@ -170,6 +170,7 @@ def test_wrong_csv(tmp_path, text, said):
         ({"input": {"columns": ["x"], "unit": "us", "supply": -1}}, r"`signals.input.supply` must be a positive number"),
         ({"input": {"columns": ["x1..x999"]}}, r"`signals.input.columns` must be from 1 to 64 columns"),
         ({"position": {"columns": list("xyz"), "world": "NWU"}}, r"`signals.position.world` must be NED or ENU, but is NWU"),
+        ({"attitude": {"columns": list("xyz")}, "quaternion": {"columns": list("wxyz")}}, r"`signals.quaternion` must be left out where"),
         ({}, r"`signals` must be a mapping of signals"),
     ],
 )  # fmt: skip
@@ -220,6 +221,16 @@ def test_a_mapping_for_a_file_that_needs_none(tmp_path):
     write_mcap(a_log(), tmp_path / "a.mcap")
     with pytest.raises(BadInput, match="`mapping` must be left out for a log whose signals are known"):
         read_log(tmp_path / "a.mcap", mapping_of({"signals": {"depth": {"columns": "x"}}}))
+
+
+def test_times_that_are_missing_or_too_many(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x\n0,1\n1,2\n")
+    with pytest.raises(BadInput, match=r"`mapping.time` must be given: the column of the time, and its unit"):
+        read_log(tmp_path / "a.csv", mapping_of({"signals": {"depth": {"columns": "x"}}}))
+    path, _ = good_file("json", tmp_path)
+    signals = {"depth": {"topic": "/p", "columns": "y"}}
+    with pytest.raises(BadInput, match=r"`mapping.time` must be left out: the messages of j.mcap have times"):
+        read_log(path, mapping_of({"time": "x", "signals": signals}))
 
 
 def test_missing_topics_and_columns(tmp_path):

@@ -81,6 +81,8 @@ def mapping_of(data: Any) -> LogMapping:
                 raise BadInput(str(name), "be a known signal", "unknown", hint=did_you_mean(str(name), SIGNALS))
             with within(str(name)):
                 signals[name] = (_entry(name, described, frame),)
+        if {"attitude", "quaternion"} <= set(signals):
+            raise BadInput("quaternion", "be left out where `attitude` is given", "given too")
     return LogMapping(signals, _time(data.get("time", "")))
 
 
@@ -173,7 +175,7 @@ def _factor(name: str, entry: Entry) -> float:
         return _SHARES[entry.unit]
     if name in _VOLTS and entry.unit == "N":  # of thrusters that are commanded in newtons
         return 1.0
-    return units.factor(entry.unit or known.unit, known.unit, name)
+    return units.factor(entry.unit or known.unit, known.unit, name, ("N", *_SHARES) if name in _VOLTS else ())
 
 
 def log_of(recording: Recording, mapping: LogMapping) -> Log:

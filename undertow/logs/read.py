@@ -55,7 +55,17 @@ def _mapped(found: Recording, mapping: LogMapping | None, location: Callable[[st
         return log_of(found, usual)
     given = {name: entries for name, entries in usual.signals.items() if not _replaced(name, mapping)}
     with within("mapping", location):
+        _check_time(found, mapping)
         return log_of(found, mapping._replace(signals=given | dict(mapping.signals)))
+
+
+def _check_time(found: Recording, mapping: LogMapping) -> None:
+    """Check that the mapping names the time of a table, and of nothing whose messages have times of their own."""
+    column = mapping.time[0]
+    if found.format == "CSV" and not column:
+        raise BadInput("time", "be given: the column of the time, and its unit", hint="`time: {column: t, unit: s}`")
+    if found.format != "CSV" and column:
+        raise BadInput("time", f"be left out: the messages of {found.source} have times", column)
 
 
 def _replaced(name: str, mapping: LogMapping) -> bool:

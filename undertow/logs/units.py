@@ -1,6 +1,7 @@
 """Units that logs use, as multiples of ours."""
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from undertow.core.errors import BadInput
@@ -47,15 +48,15 @@ UNITS = {
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
-def factor(unit: str, ours: str, signal: str) -> float:
-    """Factor that turns values of a unit into ours.
+def factor(unit: str, ours: str, signal: str, others: Iterable[str] = ()) -> float:
+    """Factor that turns values of a unit into ours; `others` are further units of the signal, for messages.
 
     Raises:
         BadInput: the unit is unknown, or measures something else.
     """
     fitting = [name for name, one in UNITS.items() if one.ours == ours]
     if unit not in fitting:
-        raise BadInput("unit", f"be one of {', '.join(fitting)} for `{signal}`", unit)
+        raise BadInput("unit", f"be one of {', '.join((*fitting, *others))} for `{signal}`", unit)
     return UNITS[unit].factor
 
 
