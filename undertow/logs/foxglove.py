@@ -120,7 +120,7 @@ def scene(time: float, path: np.ndarray, size: Any = None) -> bytes:
         path: rows north, east, down, m; none for no path.
         size: length, width and height of the vehicle, m; None for a usual one.
     """
-    box = {"pose": _pose(), "size": _vector(size or _SIZE), "color": _colour(0.0, 0.45, 0.7, 0.8)}
+    box = {"pose": _pose(), "size": _vector(_SIZE if size is None else size), "color": _colour(0.0, 0.45, 0.7, 0.8)}
     entities = [_entity(time, VEHICLE, "hull", cubes=[box])]
     points = path[np.isfinite(path).all(axis=1)][:: 1 + len(path) // _POINTS]
     if len(points) > 1:

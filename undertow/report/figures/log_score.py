@@ -21,7 +21,7 @@ def log_score_figure(times: NDArray, growth: NDArray) -> Figure:
         times: since the start, s, shape (times,).
         growth: errors, shape (times, 12).
     """
-    figure = style.blank(9.6, 2.6)
+    figure = style.blank(9.8, 2.6)
     style.head(figure, "Error of the predicted motion", {})
     for number, (title, axes) in enumerate(_PANELS):
         panel = style.place(figure, 0.62 + 2.4 * number, 0.62, 1.75, 1.4)
