@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from undertow.run import simulate as simulate
     from undertow.run import simulate_scenario as simulate_scenario
     from undertow.scenario.csv_table import read_samples as read_samples
+    from undertow.scenario.log_file import read_log as read_log
 
     __version__: str
 
@@ -44,6 +45,7 @@ _HOMES = {
     "Run": "undertow.run",
     "compare": "undertow.comparison.comparison",
     "rcaf": "undertow.controllers.rcaf",
+    "read_log": "undertow.scenario.log_file",
     "read_samples": "undertow.scenario.csv_table",
     "simulate": "undertow.run",
     "simulate_scenario": "undertow.run",

@@ -39,6 +39,8 @@ from undertow.scenario.step_size import step_failure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from undertow.logs.log import Log
+
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Run:
@@ -85,6 +87,12 @@ class Run:
         write_run_page(Path(path), self.dataset, parts)
         for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)
+
+    def log(self) -> "Log":
+        """The series as a log, which can be saved as .mcap or .csv, and scored."""
+        from undertow.logs.run_log import log_of_run
+
+        return log_of_run(self.dataset)
 
     def save(self, path: str | Path) -> None:
         """Write the dataset as netCDF; the file appears whole or not at all.

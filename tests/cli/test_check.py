@@ -120,7 +120,10 @@ def test_bad_scenario(refused, tmp_path):
     ("kind", "name"), [pytest.param(*one, marks=pytest.mark.slow) if one in SLOW else one for one in PARTS]
 )
 def test_parts_of_the_catalogue_keep_their_contract(undertow, kind, name):
-    needed = {"table": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]"]}
+    needed = {
+        "table": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]"],
+        "replay": ["--option", "commands=[[0, 0, 0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1, 1, 1]]"],
+    }
     said = undertow("check", f"{kind}/{name}", *needed.get(name, []))
     assert said.code == 0, said
 

@@ -173,6 +173,7 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
         "figures",
         "metrics.json",
         "run.html",
+        "run.mcap",
         "run.nc",
         "scenario.yaml",
     ]

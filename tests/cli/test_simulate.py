@@ -26,7 +26,7 @@ def ran(undertow, tmp_path, request):
 def test_files_of_a_run(ran, whole_figures, tmp_path):
     folder = tmp_path / "runs" / "s"
     names = sorted(path.name for path in folder.iterdir())
-    assert names == ["figures", "metrics.json", "run.html", "run.nc", "scenario.yaml"]
+    assert names == ["figures", "metrics.json", "run.html", "run.mcap", "run.nc", "scenario.yaml"]
     assert 'class="replay"' in (folder / "run.html").read_text()
     assert {".png", ".svg"} == {path.suffix for path in (folder / "figures").iterdir()}
     metrics = json.loads((folder / "metrics.json").read_text())

@@ -26,6 +26,7 @@ def required(argument):
         "model": lambda: hybrid_vehicle(odin(), thruster).model(),
         "position": lambda: np.linspace(-0.5, 0.5, 6),
         "samples": lambda: rows,
+        "commands": lambda: np.column_stack([rows, rows[:, 1:3]]),  # for eight thrusters
         "sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()],
         "points": lambda: rows[:, 1:4],
         "function": lambda: f"{Path(__file__).with_name('proportional_policy.py')}:act",

@@ -80,7 +80,7 @@ def compared(arguments: list[str]) -> None:
 
 # Pages that run by default as users run them, those whose scenarios are simulated, and those whose campaign is built
 # but not run.
-WHOLE, SIMULATED = {"your-own-plant"}, {"README", "your-own-controller"}
+WHOLE, SIMULATED = {"your-own-plant"}, {"README", "your-own-controller", "logs"}
 BUILT = {"campaign", "compare"}
 
 

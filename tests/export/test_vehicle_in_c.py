@@ -201,7 +201,7 @@ def test_a_disturbance_that_cannot_be_exported_is_named(tmp_path, capsys, severa
     own = {"kind": "./own.py:sorted_load"}
     scenario = PENDULUM | {"disturbance": [PENDULUM["disturbance"], own] if several else own}
     (tmp_path / "scenario.yaml").write_text(dump(scenario))
-    for option in (["--part=vehicle", "--c99"], ["--fmu"]):
+    for option in (["--c99", "--part=vehicle"], ["--fmu"]):
         assert run(["export", str(tmp_path / "scenario.yaml"), *option[1:], option[0], str(tmp_path / "out")]) == 2
         error = capsys.readouterr().err.strip().splitlines()[-1]
         place = "disturbance[1]" if several else "disturbance"

@@ -15,6 +15,7 @@ from undertow.autopilot.measured_motion import Format, Motion
 from undertow.autopilot.numbers import numbers, step_of
 from undertow.autopilot.output import output_of
 from undertow.autopilot.saved_state import packed, unpacked
+from undertow.autopilot.step_log import StepLog, law_signals
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import Target, starting_at
@@ -53,6 +54,8 @@ class Autopilot:
         output: what the vehicle takes: `input`, `newtons`, `pulses` or `wrench`, see `output.Output`.
         esc: speed controllers for `pulses`; None for usual ones.
         blend: time constant, s, with which the output turns from that before the start into that of the law.
+        log: .mcap file for measurement, target, command and signals of every step; None for none. What was written
+            survives the end of the process, however it ends; `close_log` finishes it.
         allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
 
     Attributes:
@@ -76,6 +79,7 @@ class Autopilot:
         output: str = "input",
         esc: ESC | None = None,
         blend: float = 1.0,
+        log: str | Path | None = None,
         allow_code: bool = False,
     ):
         loop, precision, usual = _given(scenario, allow_code)
@@ -94,6 +98,17 @@ class Autopilot:
         self._clock = Clock(self.sampling_time)
         self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
         self._blended, self._started = np.zeros((), dtype=bool), np.zeros((), dtype=bool)
+        self._log = None if log is None else self._log_to(log)
+
+    def _log_to(self, path: str | Path) -> StepLog:
+        plant, law = self._loop.plant, self._loop.controller
+        written = law_signals(plant, law, law.signals(), self._go_on.outputs.signals)
+        return StepLog(path, written, self.sampling_time, self)
+
+    def close_log(self) -> None:
+        """Finish the log, if there is one; later steps are not written."""
+        if self._log is not None:
+            self._log.close()
 
     def _compile(self, of: Functions) -> None:
         self._form, zero = of.form, jnp.zeros(len(self._loop.plant.outputs))
@@ -298,7 +313,19 @@ class Autopilot:
             self._command[...] = share * self._before + (1 - share) * command if share else command
         self._convert.inputs[...] = self._command
         self._convert()
+        if self._log is not None:
+            self._write(self._log)
         return self._convert.outputs.copy()
+
+    def _write(self, log: StepLog) -> None:
+        memory = self._go_on.state
+        own = {
+            "measured_position": memory.y.position,
+            "measured_velocity": memory.y.velocity,
+            "reference": memory.r.position,
+            "commanded_input": self._command,
+        }
+        log.append(self._clock.time, own | self._go_on.outputs.signals)
 
 
 def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | None]:

@@ -13,10 +13,12 @@ import numpy as np
 from undertow.autopilot.clock import Clock
 from undertow.autopilot.numbers import numbers, step_of
 from undertow.autopilot.saved_state import packed, unpacked
+from undertow.autopilot.step_log import StepLog, filter_signals
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.measurement import measurement_of_pose
+from undertow.logs.frames import attitudes_of_quaternions
 from undertow.loop.stepped import put
 from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation
 from undertow.numerics.rotations import quaternion_from_euler
@@ -55,6 +57,7 @@ class NavigationFilter:
     Args:
         scenario: a .yaml file or an earlier run.nc, or the same as a mapping.
         sampling_time: s; None for that of the scenario.
+        log: .mcap file for the estimate and the signals of every step, as of `Autopilot`; None for none.
         allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
 
     Attributes:
@@ -67,7 +70,12 @@ class NavigationFilter:
     """
 
     def __init__(
-        self, scenario: str | Path | Mapping[str, Any], *, sampling_time: float | None = None, allow_code: bool = False
+        self,
+        scenario: str | Path | Mapping[str, Any],
+        *,
+        sampling_time: float | None = None,
+        log: str | Path | None = None,
+        allow_code: bool = False,
     ):
         text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
         built = build(text)
@@ -82,6 +90,14 @@ class NavigationFilter:
             plant = built.closed_loop.plant
             report = plant.output(jnp.zeros(()), plant.initial_state()).actuator
             self._compile(in_present_precision(navigation.filter), report)
+        declared, values = self.declared_signals(), self._go_on.outputs[2]
+        made = lambda path: StepLog(path, filter_signals(declared, values), self.sampling_time, self)
+        self._log = None if log is None else made(log)
+
+    def close_log(self) -> None:
+        """Finish the log, if there is one; later steps are not written."""
+        if self._log is not None:
+            self._log.close()
 
     def _compile(self, of: AbstractFilter, report: Any) -> None:
         still = measurement_of_pose(jnp.zeros(3), jnp.array([1.0, 0, 0, 0]), jnp.zeros(6), report)
@@ -220,7 +236,13 @@ class NavigationFilter:
     def _stepped(self, elapsed: float, received: list[tuple[Any, bool, float]]) -> EstimatedMotion:
         put(self._go_on.inputs, (elapsed, received))
         self._go_on()
-        return EstimatedMotion(*(part.copy() for part in self._go_on.outputs[0]))
+        motion = EstimatedMotion(*(part.copy() for part in self._go_on.outputs[0]))
+        if self._log is not None:
+            attitude = attitudes_of_quaternions(motion.attitude[None], "NED", "FRD")[0]
+            velocities = {"body_velocity": motion.velocity[:3], "angular_velocity": motion.velocity[3:]}
+            own = {"position": motion.position, "attitude": attitude} | velocities
+            self._log.append(self._clock.time, own | self._go_on.outputs[2])
+        return motion
 
 
 def _names(sensors: tuple[eqx.Module, ...]) -> list[str]:

@@ -147,16 +147,21 @@ def simulate(
         Path | None,
         typer.Option(metavar="FILE.mp4", help="Also write a video of the run, at most 30 s long. It needs ffmpeg."),
     ] = None,
+    rerun: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.rrd", help="Also write the run for the viewer Rerun. It needs the extra `viz`."),
+    ] = None,
 ) -> int:
     """Simulate one scenario.
 
-    The command writes run.nc, metrics.json, scenario.yaml, figures/ and run.html when the run has ended. run.html holds
-    metrics, figures and a replay in three dimensions, and needs no network. If SCENARIO is a result file, its run is
-    repeated, and the command reports whether the results are identical bit for bit. Other files in DIR are not changed.
+    The command writes run.nc, metrics.json, scenario.yaml, run.mcap, figures/ and run.html when the run has ended.
+    run.mcap holds the series for Foxglove and other viewers. run.html holds metrics, figures and a replay in three
+    dimensions, and needs no network. If SCENARIO is a result file, its run is repeated, and the command reports whether
+    the results are identical bit for bit. Other files in DIR are not changed.
     """
     from undertow.cli.simulate import simulate
 
-    return simulate(scenario, out, overwrite, prediction, allow_code, pdf, video)
+    return simulate(scenario, out, overwrite, prediction, allow_code, pdf, video, rerun)
 
 
 @app.command()
@@ -538,6 +543,40 @@ def ros2(
         world_frame or [], body_frame, bag, storage, allow_code,
     )  # fmt: skip
     return command.ros2(scenario, options)
+
+
+@app.command()
+def logs(
+    words: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE", help="A log; or `score SCENARIO FILE`; or the word `layout`, which writes one for Foxglove."
+        ),
+    ],
+    mapping: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.yaml", help="Which columns of the log are which signal, in which unit and frame."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH",
+            help="Write the log to this .mcap or .csv file. For `score`, the folder for the results (default: "
+            "runs/NAME-score); for `layout`, the .json file.",
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier file or result.")] = False,
+    allow_code: AllowCode = False,
+) -> int:
+    """Show what is in a log, and convert it.
+
+    The command reads MCAP, CSV, run.nc, bags of ROS 2, .bin files of ArduPilot and .ulg files of PX4, and shows the
+    signals with unit, rate and gaps. `undertow logs score SCENARIO FILE` starts the model of the vehicle every 5 s from
+    the logged motion, drives it with the logged commands, and reports how far it is from the log after 1, 5 and 10 s.
+    """
+    from undertow.cli.logs import logs
+
+    return logs(words, mapping, out, overwrite, allow_code)
 
 
 @app.command("list")

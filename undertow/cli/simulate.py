@@ -16,6 +16,7 @@ from undertow.cli.stages import shares, stage
 from undertow.cli.tables import terminal_table, wide_console
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
+from undertow.logs.run_log import log_of_run
 from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows
 from undertow.scenario.build import Built, build, own_parts
@@ -26,7 +27,7 @@ from undertow.scenario.reading import read
 if TYPE_CHECKING:
     from undertow.cli.run_presentation import PredictedMetrics
 
-_WRITTEN = ("run.nc", "metrics.json", "scenario.yaml", "figures", "run.html")
+_WRITTEN = ("run.nc", "run.mcap", "metrics.json", "scenario.yaml", "figures", "run.html")
 
 
 def simulate(
@@ -37,6 +38,7 @@ def simulate(
     allow_code: bool,
     pdf: str | None,
     video: Path | None,
+    rerun: Path | None,
 ) -> int:
     """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
     check_pdf(pdf)
@@ -51,6 +53,10 @@ def simulate(
             from undertow.report.replay.video import check_video
 
             check_video(video, folder, overwrite)
+        if rerun is not None:
+            from undertow.interop.rerun_file import check_rerun
+
+            check_rerun(rerun, folder, overwrite)
         executed = _run(scenario, console, allow_code, video is not None)
         write(executed, draft.path)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
@@ -68,6 +74,10 @@ def simulate(
 
         with shares(console) as progress:
             write_video(replay, video, progress)
+    if rerun is not None:
+        from undertow.interop.rerun_file import write_rerun
+
+        write_rerun(log_of_run(executed.dataset), rerun, None if replay is None else replay.size)
     return code
 
 

@@ -88,8 +88,8 @@ def _system(built: Built, name: str, of: FilterFunctions) -> System:
     meanings = {
         "state": "State of the filter; keep it between the steps.",
         "input": "Input of a step: motion, which the first step takes (position north, east, down, m; velocity u, v, "
-        "w, p, q, r, m/s and rad/s; attitude w, x, y, z, body to world); of each sensor its reading, whether it is new, "
-        "and its age, s; time since the last step, s.",
+        "w, p, q, r, m/s and rad/s; attitude w, x, y, z, body to world); of each sensor its reading, whether it is "
+        "new, and its age, s; time since the last step, s.",
         "output": "Output of a step: estimated motion, what propellers report, signals of the filter.",
         "start": "The first step: sets the state from input->motion.",
         "step": "A step input->dt after the last one. Entries of readings that were not measured are NAN.",

@@ -1,1 +1,1 @@
-"""Logs of runs and vehicles, in the formats of other programs, as named time series in our frames and units."""
+"""Recorded logs of runs and vehicles, in others' formats, as named time series in our frames and units."""

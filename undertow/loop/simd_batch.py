@@ -134,6 +134,10 @@ class Run(NamedTuple):
     key: PRNGKeyArray
 
 
+# Numbers of an array; of a larger one, such as the commands of a long log, the program would take a minute to compile.
+_LARGEST = 4_000
+
+
 class Plan(NamedTuple):
     """Time grid, recording and integration of a run.
 
@@ -192,6 +196,8 @@ class BatchRunner:
         from simdjit import Loop
 
         numbers, rest = eqx.partition(run, eqx.is_array)
+        if (largest := max(leaf.size for leaf in jax.tree.leaves(numbers))) > _LARGEST:
+            raise Unsupported(f"a table of {largest} numbers, more than {_LARGEST}")
         self._plan = plan
         # With its stages in a loop a program compiles in nine tenths of the time, and takes up to half as long again.
         compact = driver is None and (1 if width == 1 else runs) * plan.steps < _FEW

@@ -4,6 +4,8 @@ import csv
 import math
 from pathlib import Path
 
+import numpy as np
+
 from undertow.core.errors import BadInput
 
 
@@ -58,6 +60,12 @@ def samples_of(text: str, name: str) -> list[list[float]]:
         if not after[0] > before[0]:
             raise BadInput("file", "have increasing times", f"{name}, line {line}: {after[0]:g} after {before[0]:g}")
     return samples
+
+
+def csv_of(rows: np.ndarray) -> str:
+    """CSV text with the columns t, d1, d2, ..., whose numbers read back as the same."""
+    header = ",".join(["t", *(f"d{i}" for i in range(1, rows.shape[1]))])
+    return "\n".join([header, *(",".join(map(repr, row)) for row in rows.tolist())]) + "\n"
 
 
 def _numbers(name: str, line: int, row: list[str], columns: int) -> list[float]:

@@ -15,8 +15,10 @@ from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput, joined, known_key, within
 from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import fault_of, place_of
+from undertow.logs.log import Log
 from undertow.power import ESC, Battery
-from undertow.scenario.csv_table import read_csv, samples_of
+from undertow.scenario.csv_table import csv_of, read_csv, samples_of
+from undertow.scenario.log_file import read_log
 from undertow.scenario.values import checked
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 from undertow.sensors.sensor import AbstractSensor
@@ -31,6 +33,9 @@ INNER = {
     "esc": ("power", "esc"),
     "sensors": ("sensors", ("imu", "dvl", "depth", "compass", "position_fix")),
 }
+
+# Arguments that are tables of samples, which a file can give.
+_TABLES = ("samples", "commands")
 
 # Kinds that are data: a scenario may change every declared parameter by name.
 _ADJUSTABLE = ("vehicles", "thrusters")
@@ -83,8 +88,8 @@ def make(
     changes, table = {}, {}
     if kind in _ADJUSTABLE:
         changes = {key: options.pop(key) for key in list(options) if key not in own}
-    if "samples" in own:
-        table = _samples(options, folder)
+    if argument := next((name for name in _TABLES if name in own), ""):
+        table = _samples(options, folder, argument, getattr(function, "rows_of_log", None))
     part, resolved = call(function, options, given, folder)
     if not isinstance(part, _CONTRACTS[kind]):
         must = f"name a function that returns {_title(_CONTRACTS[kind])}"
@@ -93,7 +98,7 @@ def make(
         got = f"{name}, which returns {_described(part)}"
         raise BadInput("kind", must, got, hint=derive_hint(part) if place_of(part) else "")
     if table:
-        del resolved["samples"]
+        del resolved[argument]
     part = adjust(part, changes, tuple(own)) if changes else part
     return part, {"kind": portable_name(name, folder), **preset, **resolved, **changes, **table}
 
@@ -292,9 +297,18 @@ def _at(
         return make(kind, description, folder or Path())
 
 
-def _samples(options: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Turn `file` (a CSV file) or `csv` (its text, as results keep it) into `samples`; returns what results keep."""
-    given = [key for key in ("file", "csv", "samples") if key in options]
+def _samples(
+    options: dict[str, Any], folder: Path, argument: str, rows_of_log: Callable[[Log], np.ndarray] | None
+) -> dict[str, Any]:
+    """Turn `file` (a CSV file) or `csv` (its text, as results keep it) into samples; returns what results keep.
+
+    Args:
+        options: of the part, which are changed.
+        folder: folder of relative file names.
+        argument: of the part that takes the samples.
+        rows_of_log: rows of a log, for a part whose `file` is one, with a `mapping` if need be; None for others.
+    """
+    given = [key for key in ("file", "csv", argument) if key in options]
     if len(given) > 1:
         must = "be left out when there is another source of samples"
         raise BadInput(given[1], must, f"given together with `{given[0]}`")
@@ -303,13 +317,17 @@ def _samples(options: dict[str, Any], folder: Path) -> dict[str, Any]:
             raise BadInput(key, "be text", repr(options[key]))
     if "file" in options:
         name = options.pop("file")
-        options["csv"] = read_csv(folder / name)
+        if rows_of_log is None:
+            options["csv"] = read_csv(folder / name)
+        else:
+            with within(written=lambda key: "file" if key == "log" else key):
+                options["csv"] = csv_of(rows_of_log(read_log(name, options.pop("mapping", None), folder)))
     else:
         name = "csv"
     if "csv" not in options:
         return {}
     text = options.pop("csv")
-    options["samples"] = samples_of(text, Path(name).name)
+    options[argument] = samples_of(text, Path(name).name)
     return {"csv": text}
 
 

@@ -1,0 +1,118 @@
+"""Files as other programs write them, made byte by byte from the description of their formats.
+
+ArduPilot: libraries/AP_Logger/LogStructure.h (FMT, FMTU, and the messages). PX4: docs.px4.io/main/en/dev_log/
+ulog_file_format. ROS 2: rosbags, a package of others.
+"""
+
+import json
+import struct
+
+import numpy as np
+
+_STRUCT = {"Q": "Q", "f": "f", "c": "h", "C": "H", "H": "H", "B": "B", "b": "b", "d": "d", "I": "I"}
+
+
+def ardupilot_bin(tables):
+    """Bytes of a .bin file. `tables`: (name, format, columns, unit ids, rows) of each kind of message, rows in order."""
+    kinds = {"FMT": (0x80, "BBnNZ", "Type,Length,Name,Format,Columns", "")}
+    kinds["FMTU"] = (0x81, "QBNN", "TimeUS,FmtType,UnitIds,MultIds", "")
+    for number, (name, form, columns, units, _) in enumerate(tables, start=0x82):
+        kinds[name] = (number, form, columns, units)
+    out = b""
+    for number, form, columns, _ in kinds.values():
+        name = next(key for key, one in kinds.items() if one[0] == number)
+        size = 3 + sum({"n": 4, "N": 16, "Z": 64}.get(c) or struct.calcsize("<" + _STRUCT[c]) for c in form)
+        body = struct.pack("<BB4s16s64s", number, size, name.encode(), form.encode(), columns.encode())
+        out += b"\xa3\x95\x80" + body
+    for number, _, _, units in kinds.values():
+        if units:
+            out += b"\xa3\x95\x81" + struct.pack("<QB16s16s", 0, number, units.encode(), b"-" * len(units))
+    messages = []
+    for name, form, _, _, rows in tables:
+        for row in rows:
+            packed = struct.pack("<" + "".join(_STRUCT[c] for c in form), *row)
+            messages.append((row[0], b"\xa3\x95" + bytes([kinds[name][0]]) + packed))
+    return out + b"".join(message for _, message in sorted(messages, key=lambda one: one[0]))
+
+
+def px4_ulg(topics):
+    """Bytes of a .ulg file. `topics`: (name, instance, format fields, rows); a row begins with the timestamp in us."""
+    codes = {"uint64_t": "Q", "float": "f", "uint8_t": "B", "bool": "?"}
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    out = b"\x55\x4c\x6f\x67\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    out += message("B", bytes(40))
+    for name in dict.fromkeys(topic[0] for topic in topics):
+        fields = next(topic[2] for topic in topics if topic[0] == name)
+        out += message("F", f"{name}:{fields}".encode())
+    data = []
+    for number, (name, instance, fields, rows) in enumerate(topics):
+        out += message("A", struct.pack("<BH", instance, number) + name.encode())
+        form = ""
+        for field in filter(None, fields.split(";")):
+            kind = field.split(" ")[0]
+            base, _, several = kind.partition("[")
+            form += codes[base] * (int(several[:-1]) if several else 1)
+        for row in rows:
+            data.append((row[0], message("D", struct.pack("<H", number) + struct.pack("<" + form, *row))))
+    return out + b"".join(body for _, body in sorted(data, key=lambda one: one[0]))
+
+
+def ros2_bag(folder, storage, messages):
+    """A bag of Odometry, Imu and Float64MultiArray messages: (topic, ns, {...}) each."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.LATEST)
+    types = store.types
+    make = lambda name, *parts: types[name](*parts)
+
+    def header(ns, frame):
+        stamp = make("builtin_interfaces/msg/Time", ns // 10**9, ns % 10**9)
+        return make("std_msgs/msg/Header", stamp, frame)
+
+    def vector(values):
+        return make("geometry_msgs/msg/Vector3", *map(float, values))
+
+    def built(kind, ns, given):
+        if kind == "nav_msgs/msg/Odometry":
+            point = make("geometry_msgs/msg/Point", *map(float, given["position"]))
+            w, x, y, z = map(float, given["quaternion"])
+            pose = make("geometry_msgs/msg/Pose", point, make("geometry_msgs/msg/Quaternion", x, y, z, w))
+            twist = make("geometry_msgs/msg/Twist", vector(given["linear"]), vector(given["angular"]))
+            zero = np.zeros(36)
+            covered = make("geometry_msgs/msg/PoseWithCovariance", pose, zero)
+            return make(
+                kind,
+                header(ns, "odom"),
+                "base_link",
+                covered,
+                make("geometry_msgs/msg/TwistWithCovariance", twist, zero),
+            )
+        layout = make("std_msgs/msg/MultiArrayLayout", [], 0)
+        return make(kind, layout, np.asarray(given["data"], dtype=float))
+
+    plugin = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}[storage]
+    with Writer(folder, version=9, storage_plugin=plugin) as writer:
+        connections = {}
+        for topic, kind, ns, given in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], ns, store.serialize_cdr(built(kind, ns, given), kind))
+
+
+def json_mcap(path, channels, encoding="json"):
+    """An MCAP file of JSON messages: topic -> [(ns, message), ...]."""
+    from mcap.writer import Writer
+
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("Sample", "jsonschema", b'{"type": "object"}')
+        for topic, messages in channels.items():
+            channel = writer.register_channel(topic, encoding, schema)
+            for ns, message in messages:
+                writer.add_message(channel, ns, json.dumps(message).encode(), ns)
+        writer.finish()

@@ -1,0 +1,115 @@
+"""Writes every step of an autopilot or a navigation filter to an MCAP file."""
+
+import warnings
+import weakref
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from undertow.core.contracts import AbstractController, AbstractPlant
+from undertow.core.errors import BadInput
+from undertow.core.signals import Signal
+from undertow.logs.known_signals import SIGNALS, thruster_columns
+from undertow.logs.log import Series
+from undertow.logs.mcap_writer import LiveLog
+
+_STEPS = {
+    "measured_position": Signal(("axis",), "[axis]", "position that the controller receives"),
+    "measured_velocity": Signal(("axis",), "[axis]/s", "velocity that the controller receives"),
+    "reference": Signal(("axis",), "[axis]", "desired position x_d"),
+    "commanded_input": Signal(("actuator",), "[input]", "input commanded"),
+}
+
+
+class StepLog:
+    """A log of steps. The file is whole up to the last full chunk at any time, and ends when its owner does.
+
+    Where the file cannot be written any more, a warning says so once, and the owner goes on.
+    Where the time of the owner goes back, as after another `start`, that of the log goes on.
+
+    Args:
+        path: of the file, which is replaced; its name ends in .mcap.
+        signals: by name, with values of the right shape.
+        period: sampling time, s.
+        owner: with whose end the file is finished.
+
+    Raises:
+        BadInput: the file cannot be written.
+    """
+
+    def __init__(self, path: str | Path, signals: Mapping[str, Series], period: float, owner: Any):
+        path = Path(path)
+        self._path = path
+        self._period, self._offset, self._last = period, 0.0, -np.inf
+        if path.suffix != ".mcap":
+            raise BadInput("log", "be a file whose name ends in .mcap", str(path))
+        try:
+            self._file = LiveLog(path, signals, {"sampling_time": f"{period!r} s"})
+        except OSError as error:
+            raise BadInput("log", "be a file that can be written", f"{path}: {error.strerror}") from None
+        self.close = weakref.finalize(owner, _close, self._file, path)
+
+    def append(self, time: float, values: Mapping[str, Any]) -> None:
+        """Write the values of a step at a time, s; nothing after `close`."""
+        if not self.close.alive:
+            return
+        if time + self._offset <= self._last:
+            self._offset = self._last + self._period - time
+        self._last = time + self._offset
+        try:
+            self._file.append(self._last, values)
+        except OSError as error:  # a full disk does not stop the controller
+            self.close.detach()
+            self._file.abandon()
+            warnings.warn(f"{self._path}: {error.strerror}; later steps are not logged", stacklevel=2)
+
+
+def _close(file: LiveLog, path: Path) -> None:
+    """Finish a log; a full disk is a warning, as for steps."""
+    try:
+        file.close()
+    except OSError as error:
+        warnings.warn(f"{path}: {error.strerror}; the log has no end, and can be read without it", stacklevel=2)
+
+
+def law_signals(
+    plant: AbstractPlant, law: AbstractController, declared: Mapping[str, Signal], values: Mapping[str, Any]
+) -> dict[str, Series]:
+    """What an autopilot writes: what it measured, the target, its command, and the signals of the law.
+
+    Args:
+        plant: that is controlled.
+        law: the controller.
+        declared: signals of the law.
+        values: examples of them.
+    """
+    outputs, inputs = plant.outputs, thruster_columns(plant.inputs())
+    axes = law.model.coordinates.axes or outputs
+    found = {}
+    for name, signal in (_STEPS | dict(declared)).items():
+        ours, first = name in _STEPS, next(iter(signal.dimensions), "")
+        shape = (len(inputs if first == "actuator" else outputs),) if ours else np.shape(values[name])
+        columns = {"axis": outputs if ours else axes, "actuator": inputs}.get(first, ())
+        unit = signal.unit_for(plant.output_units, plant.input_unit)
+        found[name] = Series(np.zeros(1), np.zeros((1, *shape)), columns, unit, signal.meaning)
+    return found
+
+
+def filter_signals(declared: Mapping[str, Signal], values: Mapping[str, Any]) -> dict[str, Series]:
+    """What a navigation filter writes: the estimated motion, and its signals.
+
+    Args:
+        declared: signals of the filter.
+        values: examples of them.
+    """
+    known = {name: SIGNALS[name] for name in ("position", "attitude", "body_velocity", "angular_velocity")}
+    found = {
+        name: Series(np.zeros(1), np.zeros((1, len(one.columns))), one.columns, one.unit, f"estimated {one.meaning}")
+        for name, one in known.items()
+    }
+    for name, signal in declared.items():
+        unit = signal.unit_for(("m", "rad"), "")
+        found[name] = Series(np.zeros(1), np.asarray(values[name])[None], (), unit, signal.meaning)
+    return found

@@ -1,0 +1,126 @@
+"""`undertow logs`: what is in a log, conversion to MCAP or CSV, a layout for Foxglove, and the score of a model."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.text import Text
+
+from undertow.cli.exit_codes import DONE
+from undertow.cli.interruptible import interruptible
+from undertow.cli.results_folder import output_folder, results_folder
+from undertow.cli.stages import stage
+from undertow.cli.tables import numbers, titled, wide_console
+from undertow.core.errors import BadInput
+from undertow.logs.log import Log
+from undertow.scenario.log_file import read_log
+
+_LAYOUT = Path("undertow-foxglove.json")
+_NUMBERS = ("samples", "rate, Hz", "from, s", "to, s", "gaps", "longest, s", "missing")
+_SHOWN = 3  # names of columns
+_SCORED = ("score.json", "figures")
+
+
+def logs(words: Sequence[str], mapping: Path | None, out: Path | None, overwrite: bool, allow_code: bool) -> int:
+    """Do what the words say: FILE; `score` SCENARIO FILE; or `layout`. Return the exit code."""
+    first, *rest = words
+    if first == "layout" and not Path(first).exists():
+        _count(rest, 0, "layout")
+        return _layout(out or _LAYOUT, overwrite)
+    if first == "score" and not Path(first).exists():
+        _count(rest, 2, "score SCENARIO FILE")
+        return _score(Path(rest[0]), Path(rest[1]), mapping, out, overwrite, allow_code)
+    _count(rest, 0, "FILE")
+    return _described(Path(first), mapping, out, overwrite)
+
+
+def _count(rest: Sequence[str], number: int, form: str) -> None:
+    if len(rest) != number:
+        raise BadInput("logs", f"be followed by {form}", f"with {len(rest)} words after the first")
+
+
+def _described(path: Path, mapping: Path | None, out: Path | None, overwrite: bool) -> int:
+    if out is not None:
+        _check_new(out, (".mcap", ".csv"), overwrite)
+    log = read_log(path, mapping)
+    console = wide_console()
+    _print(log, console)
+    if out is not None:
+        log.save(out)
+        console.print(f"Written: {out}", highlight=False, soft_wrap=True)
+    return DONE
+
+
+def _check_new(out: Path, suffixes: tuple[str, ...], overwrite: bool) -> None:
+    if out.suffix not in suffixes:
+        raise BadInput("--out", f"be a file whose name ends in {' or '.join(suffixes)}", str(out))
+    if not out.parent.is_dir():
+        raise BadInput("--out", "be in an existing folder", str(out))
+    if out.exists() and not overwrite:
+        raise BadInput("--out", "be a new file", f"{out}, which exists", hint="Add --overwrite to replace it")
+
+
+def _print(log: Log, console: Console) -> None:
+    """Signals, how they were sampled, and where they come from."""
+    title = f"{log.source}: {log.format}, {len(log.signals)} signals, {log.duration():.6g} s"
+    rows = [_row(log, name) for name in log.signals]
+    heads = ("signal", "columns", "unit", *map(numbers, _NUMBERS), "taken from")
+    kept = [i for i in range(len(heads)) if any(row[i] for row in rows)]  # most logs have no gaps
+    table = titled(title, *(heads[i] for i in kept))
+    for row in rows:
+        table.add_row(*(Text(row[i]) for i in kept))
+    console.print(table)
+    console.print("World axes are north, east, down; body axes forward, starboard, down.", highlight=False)
+    for note in log.notes:
+        console.print(f"Note: {note}.", highlight=False, soft_wrap=True, markup=False)
+
+
+def _row(log: Log, name: str) -> tuple[str, ...]:
+    series, how = log[name], log.sampling(name)
+    names = series.column_names()
+    shown = ", ".join(names) if len(names) <= _SHOWN else f"{names[0]}, ..., {names[-1]} ({len(names)})"
+    times = f"{how.start:.6g}", f"{how.end:.6g}"
+    gaps = (str(how.gaps), f"{how.longest_gap:.3g}") if how.gaps else ("", "")
+    missing = f"{100 * how.missing:.3g} %" if how.missing else ""
+    return name, shown, series.unit, str(how.samples), f"{how.rate:.4g}", *times, *gaps, missing, series.origin
+
+
+def _layout(out: Path, overwrite: bool) -> int:
+    from undertow.logs.foxglove_layout import layout
+
+    _check_new(out, (".json",), overwrite)
+    out.write_text(layout(), encoding="utf-8")
+    wide_console().print(f"Layout for Foxglove: {out}", highlight=False, soft_wrap=True)
+    return DONE
+
+
+def _score(
+    scenario: Path, path: Path, mapping: Path | None, out: Path | None, overwrite: bool, allow_code: bool
+) -> int:
+    """Score the model of a scenario against a log, and write score.json and figures/ to a folder."""
+    from undertow.interop.log_score import AXES, UNITS, score
+    from undertow.report.figures import save
+    from undertow.report.figures.log_score import log_score_figure
+    from undertow.scenario.build import build
+    from undertow.scenario.finished_run import to_json
+    from undertow.scenario.reading import read
+
+    console = wide_console()
+    with (
+        output_folder(out, Path("runs") / f"{scenario.stem}-score") as folder,
+        results_folder(folder, _SCORED, "score.json", overwrite) as draft,
+    ):
+        with stage(console, "reading and building"):
+            log, built = read_log(path, mapping), build(read(scenario, allow_code=allow_code))
+        with stage(console, "predicting"):
+            found = interruptible(lambda: score(built, log))
+        summary = {"log": log.source} | found.summary()
+        (draft.path / "score.json").write_text(to_json(summary, indent=1) + "\n", encoding="utf-8")
+        save(log_score_figure(found.curve, found.growth), draft.path / "figures", "score")
+    title = f"Error of the predicted motion, rms over {len(found.starts)} starts"
+    table = titled(title, "axis", *(numbers(f"{horizon:g} s") for horizon in found.horizons), "unit")
+    for axis, unit, errors in zip(AXES, UNITS, found.rms.T, strict=True):
+        table.add_row(axis, *(f"{error:.4g}" for error in errors), unit)
+    console.print(table)
+    console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
+    return DONE

@@ -1,0 +1,119 @@
+"""CSV files: those with any header, as a table; those that `write_csv` wrote, as the log that they were.
+
+The header of ours is `time [s]`, then `signal.column [unit]` for each number. Signals that were sampled at other times
+leave their cells empty.
+"""
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+
+from undertow.core.errors import BadInput
+from undertow.logs.log import Log, Series
+from undertow.logs.recording import Recording, Table
+
+_TIME = "time [s]"
+_OURS = re.compile(r"(?P<signal>[a-z_0-9]+)(?:\.(?P<column>[^\[\]]+))? \[(?P<unit>[^\[\]]*)\]")
+
+
+def write_csv(log: Log, path: Path) -> None:
+    """Write a log to a file. Numbers are written so that they read back as the same; meanings are not kept.
+
+    Args:
+        log: with the signals.
+        path: of the file, which is replaced.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    times = np.unique(np.concatenate([series.time for series in log.signals.values()] or [np.zeros(0)]))
+    header, columns = [_TIME], [[repr(time) for time in times.tolist()]]
+    for name, series in log.signals.items():
+        rows = np.searchsorted(times, series.time)
+        for column, values in zip(series.column_names(), series.flat().T, strict=True):
+            header.append(f"{name}{'.' if column else ''}{column} [{series.unit}]")
+            cells = [""] * len(times)
+            for row, value in zip(rows.tolist(), values.tolist(), strict=True):
+                cells[row] = repr(value)
+            columns.append(cells)
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(header)
+        writer.writerows(zip(*columns, strict=True))
+
+
+def read_csv(path: Path) -> Log | Recording:
+    """What a file holds: a log where `write_csv` wrote it, otherwise one table of its columns.
+
+    Raises:
+        BadInput: not text, without rows, rows of different length, or cells that are no numbers.
+    """
+    header, numbers, empty = _read(path)
+    fields = {name: numbers[:, i] for i, name in enumerate(header)}
+    if header[0] == _TIME and all(_OURS.fullmatch(name) for name in header[1:]):
+        return _our_log(path, header, numbers, empty)
+    return Recording({"": Table(np.arange(len(numbers), dtype=float), fields)}, path.name, "CSV")
+
+
+def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarray) -> Log:
+    times, several = numbers[:, 0], {}
+    for i, name in enumerate(header[1:], start=1):
+        found = _OURS.fullmatch(name)
+        assert found is not None, "`read_csv` has looked"
+        several.setdefault((found["signal"], found["unit"]), []).append((found["column"] or "", i))
+    signals = {}
+    for (name, unit), columns in several.items():
+        titles, places = (tuple(part) for part in zip(*columns, strict=True))
+        kept = ~empty[:, list(places)].all(axis=1)
+        values = numbers[np.ix_(kept, places)]
+        alone = titles == ("",)
+        signals[name] = Series(times[kept], values[:, 0] if alone else values, () if alone else titles, unit)
+    return Log(signals, path.name, "CSV")
+
+
+def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Header, numbers, and which cells are empty."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise BadInput("log", "be a CSV text file", f"{path.name}: {error.reason} at byte {error.start}") from None
+    try:
+        rows = list(csv.reader(text.splitlines(), delimiter=_delimiter(text)))
+    except csv.Error as error:
+        raise BadInput("log", "be a CSV text file", f"{path.name}: {error}") from None
+    numbered = [
+        (line, [cell.strip() for cell in row]) for line, row in enumerate(rows, start=1) if any(map(str.strip, row))
+    ]
+    if len(numbered) < 2:
+        raise BadInput("log", "have a header and at least one row", f"{path.name} with {len(numbered)} rows")
+    header = numbered[0][1]
+    if len(set(header)) < len(header):
+        again = next(name for name in header if header.count(name) > 1)
+        raise BadInput("log", "have columns of different names", f"{path.name}, where `{again}` occurs twice")
+    numbers = np.array([_numbers(path.name, line, row, header) for line, row in numbered[1:]])
+    return header, numbers, np.array([[not cell for cell in row] for _, row in numbered[1:]])
+
+
+def _delimiter(text: str) -> str:
+    """The one of comma, semicolon and tabulator that the header has most often."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    return max(",;\t", key=first.count)
+
+
+def _numbers(name: str, line: int, row: list[str], header: list[str]) -> list[float]:
+    if len(row) != len(header):
+        raise BadInput("log", f"have {len(header)} cells in every row", f"{name}, line {line} with {len(row)}")
+    found = []
+    for title, cell in zip(header, row, strict=True):
+        try:
+            found.append(float(cell or "nan"))
+        except ValueError:
+            words = {"true": 1.0, "false": 0.0}
+            if cell.lower() not in words:
+                hint = "Write decimal points" if cell.replace(",", "").isdecimal() else ""
+                got = f"{name}, line {line}, column {title}: {cell}"
+                raise BadInput("log", "hold numbers", got, hint=hint) from None
+            found.append(words[cell.lower()])
+    return found

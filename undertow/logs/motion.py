@@ -1,0 +1,99 @@
+"""The motion of a vehicle and the input of its thrusters, from whichever signals a log has them in."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.core.errors import BadInput
+from undertow.logs import frames
+from undertow.logs.log import Log, Series
+
+_INPUTS = ("commanded_input", "input")
+
+
+class LoggedMotion(NamedTuple):
+    """Motion of a vehicle.
+
+    Attributes:
+        time: s, shape (rows,).
+        outputs: north, east, down (m), roll, pitch, yaw (rad, without jumps of a turn), shape (rows, 6).
+        nu: surge, sway, heave (m/s), p, q, r (rad/s), shape (rows, 6).
+    """
+
+    time: np.ndarray
+    outputs: np.ndarray
+    nu: np.ndarray
+
+
+def inputs_of(log: Log, names: tuple[str, ...] = _INPUTS) -> Series:
+    """The input of the thrusters: the first of the named signals that the log has.
+
+    Raises:
+        BadInput: it has none of them, or not enough samples.
+    """
+    found = next((log[name] for name in names if name in log), None)
+    if found is None:
+        hint = ""
+        if "pulses" in log or "duty" in log:
+            hint = "It has commands to the speed controllers: map them to `input`, with their unit and the `supply`"
+        raise BadInput("log", f"have the signal `{names[0]}` or `{names[-1]}`", f"{log.source}, without", hint=hint)
+    good = np.isfinite(found.values).all(axis=1)
+    if good.sum() < 2:
+        raise BadInput("log", "have two or more samples of the input", f"{log.source} with {int(good.sum())}")
+    return found._replace(time=found.time[good], values=found.values[good])
+
+
+def motion_of(log: Log) -> LoggedMotion:
+    """The motion at the times of the position, between the first and last samples of all signals that it is made of.
+
+    Other signals are interpolated linearly to these times.
+
+    Raises:
+        BadInput: position, attitude or a velocity is missing, or they do not overlap.
+    """
+    position = log["measured_position" if "position" not in log and "measured_position" in log else "position"]
+    whole = position.values.shape[1:] == (6,)
+    attitude = position._replace(values=position.values[:, 3:]) if whole else log["attitude"]
+    turning = attitude._replace(values=_without_jumps(attitude.values))
+    velocity, rates = _velocities(log)
+    used = [position, turning, velocity, rates]
+    start, end = (pick(one.time[place] for one in used if len(one.time)) for pick, place in ((max, 0), (min, -1)))
+    kept = (position.time >= start) & (position.time <= end) & np.isfinite(position.values).all(axis=1)
+    time = position.time[kept]
+    if len(time) < 2:
+        raise BadInput("log", "have position, attitude and velocities of the same times", log.source)
+    angles = _at(time, turning)
+    place = position.values[kept, :3]
+    linear = _at(time, velocity)
+    if velocity.columns[:3] == ("north", "east", "down"):  # world axes
+        linear = np.einsum("kij,ki->kj", frames.rotations(angles), linear[:, :3])
+    turned = _at(time, rates)
+    if rates.values.shape[1] == 6:  # rates of the Euler angles
+        turned = frames.angular_velocity_of_rates(angles, turned[:, 3:])
+    return LoggedMotion(time, np.hstack([place, angles]), np.hstack([linear, turned]))
+
+
+def _velocities(log: Log) -> tuple[Series, Series]:
+    """Linear and angular velocity, in the forms in which the log has them."""
+    for name in ("velocity", "measured_velocity"):
+        if name in log and log[name].values.shape[1:] == (6,):
+            return log[name], log[name]
+    linear = log["body_velocity"] if "body_velocity" in log else log["velocity"]
+    return linear, log["angular_velocity"]
+
+
+def _without_jumps(angles: np.ndarray) -> np.ndarray:
+    """Angles without jumps of a turn; rows that are not finite stay."""
+    found = angles.copy()
+    good = np.isfinite(angles).all(axis=1)
+    found[good] = np.unwrap(angles[good], axis=0)
+    return found
+
+
+def _at(time: np.ndarray, series: Series) -> np.ndarray:
+    """Values at other times, linear between samples that are finite; the samples themselves at their times."""
+    good = np.isfinite(series.values).all(axis=1)
+    known, values = series.time[good], series.values[good]
+    if not len(known):
+        return np.full((len(time), series.values.shape[1]), np.nan)
+    return np.stack([np.interp(time, known, column) for column in values.T], axis=1)

@@ -1,0 +1,105 @@
+"""Reads a log of any known format, with a mapping or with what the messages of that format mean."""
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+
+from undertow.core.errors import BadInput, within
+from undertow.logs.ardupilot import read_ardupilot
+from undertow.logs.csv_file import read_csv
+from undertow.logs.default_mappings import DEFAULTS
+from undertow.logs.log import Log
+from undertow.logs.mapping import LogMapping, log_of, suited
+from undertow.logs.mcap_reader import has_ros_messages, read_mcap
+from undertow.logs.px4 import read_px4
+from undertow.logs.recording import Recording
+from undertow.logs.ros2_bag import read_ros2_bag
+from undertow.logs.run_log import read_run
+
+_NO_MAPPING = LogMapping({})
+
+
+def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[str], str] = lambda name: "") -> Log:
+    """The log in a file.
+
+    Args:
+        path: .mcap, .csv, .nc (a run), .bin (ArduPilot), .ulg (PX4), .db3, or the folder of a bag of ROS 2.
+        mapping: where signals stand; they go before those that the format itself explains.
+        location: file and line of a key of the mapping.
+
+    Raises:
+        BadInput: no such file, damaged, of no known format, or without what the mapping names.
+    """
+    if not path.exists():
+        raise BadInput("log", "be an existing file", str(path))
+    with _readable(path):
+        found = _reader(path)(path)
+    if isinstance(found, Log):
+        if mapping is not None:
+            got = f"given for {found.source}, which holds them by name"
+            raise BadInput("mapping", "be left out for a log whose signals are known", got)
+        return found
+    return _mapped(found, mapping, location)
+
+
+def _mapped(found: Recording, mapping: LogMapping | None, location: Callable[[str], str]) -> Log:
+    usual, frames = suited(found, DEFAULTS.get(found.format, _NO_MAPPING))
+    found = found._replace(notes=(*found.notes, *frames))
+    if mapping is None:
+        if not usual.signals:
+            hint = f"Give a mapping. It has {_listed(found)}"
+            got = f"{found.source}, a {found.format} file whose columns may mean anything"
+            if found.format in DEFAULTS:
+                got = f"{found.source}, which has none of the messages that are known"
+            raise BadInput("mapping", "be given", got, hint=hint)
+        return log_of(found, usual)
+    given = {name: entries for name, entries in usual.signals.items() if not _replaced(name, mapping)}
+    with within("mapping", location):
+        _check_time(found, mapping)
+        return log_of(found, mapping._replace(signals=given | dict(mapping.signals)))
+
+
+def _check_time(found: Recording, mapping: LogMapping) -> None:
+    """Check that the mapping names the time of a table, and of nothing whose messages have times of their own."""
+    column = mapping.time[0]
+    if found.format == "CSV" and not column:
+        raise BadInput("time", "be given: the column of the time, and its unit", hint="`time: {column: t, unit: s}`")
+    if found.format != "CSV" and column:
+        raise BadInput("time", f"be left out: the messages of {found.source} have times", column)
+
+
+def _replaced(name: str, mapping: LogMapping) -> bool:
+    """Whether a mapping gives a signal itself; attitude and quaternion are the same one."""
+    same = ("attitude", "quaternion")
+    return any(one in mapping.signals for one in (same if name in same else (name,)))
+
+
+def _listed(found: Recording) -> str:
+    names = [
+        f"{topic or 'columns'} ({', '.join(list(table.fields)[:6])}, ...)" for topic, table in found.tables.items()
+    ]
+    return "; ".join(names[:4])
+
+
+def _reader(path: Path) -> Callable[[Path], Log | Recording]:
+    if path.is_dir():
+        if not (path / "metadata.yaml").is_file():
+            raise BadInput("log", "be a file, or the folder of a bag of ROS 2", f"{path}, without metadata.yaml")
+        return read_ros2_bag
+    suffix = path.suffix.lower()
+    if suffix == ".mcap":
+        return read_ros2_bag if has_ros_messages(path) else read_mcap
+    known = {".csv": read_csv, ".txt": read_csv, ".nc": read_run, ".bin": read_ardupilot, ".ulg": read_px4}
+    known |= {".db3": read_ros2_bag}
+    if suffix not in known:
+        raise BadInput("log", f"be one of .mcap, {', '.join(known)}, or the folder of a bag", path.name)
+    return known[suffix]
+
+
+@contextlib.contextmanager
+def _readable(path: Path):
+    """A file that cannot be opened is bad input."""
+    try:
+        yield
+    except OSError as error:
+        raise BadInput("log", "be a file that can be read", f"{path}: {error.strerror or error}") from None

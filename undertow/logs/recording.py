@@ -1,0 +1,73 @@
+"""What a file holds, as it stands there: tables of named columns, before frames and units are known."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.core.errors import BadInput, did_you_mean
+
+
+class Table(NamedTuple):
+    """Messages of one topic.
+
+    Attributes:
+        time: s, shape (rows,).
+        fields: columns by name, shape (rows,).
+        kind: type of the messages, by which a mapping may name them too.
+    """
+
+    time: np.ndarray
+    fields: Mapping[str, np.ndarray]
+    kind: str = ""
+
+
+class Recording(NamedTuple):
+    """What a file holds.
+
+    Attributes:
+        tables: by topic; "" names that of a file that has only one.
+        source: name of the file.
+        format: as in `Log`.
+        notes: as in `Log`.
+    """
+
+    tables: Mapping[str, Table]
+    source: str
+    format: str
+    notes: tuple[str, ...] = ()
+
+    def find(self, topic: str) -> tuple[str, Table] | None:
+        """The table of a topic, or the first whose messages are of a type; None without one."""
+        if topic in self.tables:
+            return topic, self.tables[topic]
+        same = [(name, table) for name, table in self.tables.items() if table.kind == topic]
+        return same[0] if same else None
+
+    def table(self, topic: str) -> tuple[str, Table]:
+        """As `find`; the only table where no topic is named.
+
+        Raises:
+            BadInput: there is no such topic.
+        """
+        if not topic and len(self.tables) == 1:
+            return next(iter(self.tables.items()))
+        found = self.find(topic)
+        if found is None:
+            got = f"not in {self.source}"
+            raise BadInput(
+                "topic",
+                f"name one of the {len(self.tables)} topics of the log",
+                f"{topic or 'left out'}, {got}",
+                hint=did_you_mean(topic, self.tables) if self.tables else "",
+            )
+        return found
+
+
+def cleaned(table: Table) -> tuple[Table, int]:
+    """The table without samples of the same time as the one before, and how many these were."""
+    again = np.concatenate([[False], np.diff(table.time) == 0])
+    if not again.any():
+        return table, 0
+    fields = {name: column[~again] for name, column in table.fields.items()}
+    return Table(table.time[~again], fields, table.kind), int(again.sum())

@@ -1,0 +1,66 @@
+"""A run of undertow as a log: the dataset of a result file."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from undertow.core.errors import BadInput
+from undertow.logs.known_signals import thruster_columns
+from undertow.logs.log import Log, Series
+from undertow.logs.messages import group_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Attributes of a run that a log keeps: what it takes to repeat it, and who made it.
+_KEPT = ("title", "seed", "status", "scenario", "scenario_hash", "content_hash", "version_undertow")
+
+
+def log_of_run(run: "xr.Dataset", source: str = "run.nc") -> Log:
+    """The series of a run, with its names, units and meanings."""
+    time = run["time"].values
+    signals = {
+        name: Series(
+            time,
+            variable.values,
+            _columns(run, str(name), variable),
+            variable.attrs.get("units", "1"),
+            variable.attrs.get("long_name", ""),
+        )
+        for name, variable in run.data_vars.items()
+        if variable.dims[:1] == ("time",)
+    }
+    facts = {key: str(run.attrs[key]) for key in _KEPT if key in run.attrs}
+    names = run["actuator"].attrs.get("names", "") if "actuator" in run.coords else ""
+    return Log(
+        {str(name): series for name, series in signals.items()}, source, "undertow", (), facts | {"actuators": names}
+    )
+
+
+def _columns(run: "xr.Dataset", name: str, variable: "xr.DataArray") -> tuple[str, ...]:
+    """Names of the columns; the law's signals, and what it estimates, are in its own axes."""
+    if variable.ndim < 2:
+        return ()
+    dimension = variable.dims[1]
+    if dimension == "axis":
+        own = run["axis"].attrs.get("controller_axes", "") if group_of(name) == "controller" else ""
+        return tuple(own.split(", ")) if own else tuple(map(str, run["axis"].values))
+    if dimension == "actuator":
+        return thruster_columns(variable.shape[1])
+    return tuple(str(i + 1) for i in range(variable.shape[1]))
+
+
+def read_run(path: Path) -> Log:
+    """The log of a result file.
+
+    Raises:
+        BadInput: it is none, or damaged.
+    """
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="netcdf4") as run:
+            return log_of_run(run.load(), path.name)
+    except BadInput:
+        raise
+    except Exception as error:  # whatever bytes may cause
+        raise BadInput("log", "be the run.nc of a run", f"{path.name}: {str(error) or type(error).__name__}") from None
