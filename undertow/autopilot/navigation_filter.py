@@ -1,44 +1,26 @@
 """One compiled navigation filter, stepped by somebody else's clock and fed with the readings of real sensors."""
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from undertow.autopilot.clock import Clock
+from undertow.autopilot.filter_functions import EstimatedMotion, FilterFunctions
 from undertow.autopilot.numbers import numbers, step_of
 from undertow.autopilot.saved_state import packed, unpacked
 from undertow.autopilot.step_log import StepLog, filter_signals
 from undertow.core import checks, runtime
-from undertow.core.arrays import in_present_precision
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.core.measurement import measurement_of_pose
 from undertow.logs.frames import attitudes_of_quaternions
 from undertow.loop.stepped import put
-from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation
+from undertow.navigation.from_sensors import SensorNavigation
 from undertow.numerics.rotations import quaternion_from_euler
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
-from undertow.sensors.motion import motion_of
-
-
-class EstimatedMotion(NamedTuple):
-    """Estimated motion; `autopilot.step(*motion)` takes it, if it was made with `attitude="quaternion"`.
-
-    Attributes:
-        position: north, east, down, m.
-        velocity: u, v, w, p, q, r in body axes, m/s and rad/s.
-        attitude: quaternion w, x, y, z, body -> world.
-    """
-
-    position: Any  # an array of 3, 6 and 4 numbers
-    velocity: Any
-    attitude: Any
 
 
 class NavigationFilter:
@@ -87,10 +69,8 @@ class NavigationFilter:
         self.sampling_time = float(period)
         self._clock, self._started = Clock(self.sampling_time), np.zeros((), dtype=bool)
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
-            plant = built.closed_loop.plant
-            report = plant.output(jnp.zeros(()), plant.initial_state()).actuator
-            self._compile(in_present_precision(navigation.filter), report)
-        declared, values = self.declared_signals(), self._go_on.outputs[2]
+            self._compile(FilterFunctions(navigation.filter, built.closed_loop.plant))
+        declared, values = self.declared_signals(), self._go_on.outputs.signals
         made = lambda path: StepLog(path, filter_signals(declared, values), self.sampling_time, self)
         self._log = None if log is None else made(log)
 
@@ -99,28 +79,11 @@ class NavigationFilter:
         if self._log is not None:
             self._log.close()
 
-    def _compile(self, of: AbstractFilter, report: Any) -> None:
-        still = measurement_of_pose(jnp.zeros(3), jnp.array([1.0, 0, 0, 0]), jnp.zeros(6), report)
-        readings = [sensor.reading(motion_of(still, jnp.zeros(3), jnp.zeros(()))) for sensor in of.sensors]
-        self._delays = [float(sensor.sampling.delay) for sensor in of.sensors]
-        self.sensors = {name: one.size for name, one in zip(_names(of.sensors), readings, strict=True)}
-        nothing = tuple(Received(0 * one, jnp.asarray(False), jnp.zeros(())) for one in readings)
-        pose = EstimatedMotion(jnp.zeros(3), jnp.zeros(6), jnp.array([1.0, 0, 0, 0]))
-
-        def begin(part: AbstractFilter, _, pose: EstimatedMotion):
-            return (), part.start(measurement_of_pose(pose.position, pose.attitude, pose.velocity, report))
-
-        def go_on(part: AbstractFilter, state, given):
-            state = part.update(state, *given)
-            y = part.measurement(state)
-            assert y.body is not None
-            motion = EstimatedMotion(y.position[:3], y.body.nu, y.body.attitude)
-            return state, (motion, y.actuator, part.diagnostics(state))
-
-        self._begin = step_of(begin, of, (), pose)
-        state = jax.tree.map(jnp.asarray, self._begin.outputs)
-        self._go_on = step_of(go_on, of, state, (jnp.zeros(()), nothing))
-        self._signals = of.signals()
+    def _compile(self, of: FilterFunctions) -> None:
+        self.sensors, self._delays, self._signals = of.sensors, of.delays, of.filter.signals()
+        self._begin = step_of(lambda own, _, pose: ((), of.first(own, pose)), of.filter, (), of.pose)
+        state, given = jax.tree.map(jnp.asarray, self._begin.outputs), (jnp.zeros(()), of.nothing)
+        self._go_on = step_of(lambda own, state, given: of.following(own, state, *given), of.filter, state, given)
         self.backend = self._go_on.backend
 
     def start(
@@ -180,7 +143,7 @@ class NavigationFilter:
 
     def signals(self) -> dict[str, np.ndarray]:
         """Values of the signals of the last step, such as the standard deviation of each output."""
-        return {name: value.copy() for name, value in self._go_on.outputs[2].items()}
+        return {name: value.copy() for name, value in self._go_on.outputs.signals.items()}
 
     def declared_signals(self) -> dict[str, Any]:
         """Unit and meaning of the signals, by name."""
@@ -189,7 +152,7 @@ class NavigationFilter:
     @property
     def propellers(self) -> tuple[np.ndarray, ...]:
         """Estimated speeds of the propellers, rad/s, and accelerations where the scenario has them; () without."""
-        return tuple(leaf.copy() for leaf in jax.tree.leaves(self._go_on.outputs[1]))
+        return tuple(leaf.copy() for leaf in jax.tree.leaves(self._go_on.outputs.actuator))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -236,20 +199,10 @@ class NavigationFilter:
     def _stepped(self, elapsed: float, received: list[tuple[Any, bool, float]]) -> EstimatedMotion:
         put(self._go_on.inputs, (elapsed, received))
         self._go_on()
-        motion = EstimatedMotion(*(part.copy() for part in self._go_on.outputs[0]))
+        motion = EstimatedMotion(*(part.copy() for part in self._go_on.outputs.motion))
         if self._log is not None:
             attitude = attitudes_of_quaternions(motion.attitude[None], "NED", "FRD")[0]
             velocities = {"body_velocity": motion.velocity[:3], "angular_velocity": motion.velocity[3:]}
             own = {"position": motion.position, "attitude": attitude} | velocities
-            self._log.append(self._clock.time, own | self._go_on.outputs[2])
+            self._log.append(self._clock.time, own | self._go_on.outputs.signals)
         return motion
-
-
-def _names(sensors: tuple[eqx.Module, ...]) -> list[str]:
-    """A name for each sensor: that of its class in lower case, with a number from the second on."""
-    found: list[str] = []
-    for sensor in sensors:
-        plain = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(sensor).__name__).lower()
-        same = sum(name == plain or name.startswith(f"{plain}_") for name in found)
-        found.append(f"{plain}_{same + 1}" if same else plain)
-    return found

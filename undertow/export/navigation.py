@@ -79,7 +79,7 @@ def _system(built: Built, name: str, of: FilterFunctions) -> System:
     def sample(chance: np.random.Generator, k: int) -> NavigationInput:
         def delivered(i: int, at_rest: Any, one: Received) -> Received:
             reading = at_rest + _SPREAD * chance.normal(size=one.reading.shape)
-            return Received(reading.astype(one.reading.dtype), np.asarray(k % (3 * i + 1) == 0), one.age)
+            return one._replace(reading=reading.astype(one.reading.dtype), fresh=np.asarray(k % (3 * i + 1) == 0))
 
         known = zip(of.sensors, map(np.asarray, of.at_rest), strict=True)
         readings = {sensor: delivered(i, rest, inputs.sensor[sensor]) for i, (sensor, rest) in enumerate(known)}
