@@ -1,0 +1,31 @@
+"""Options that several commands have, as typer declares them."""
+
+from typing import Annotated
+
+import typer
+
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code", help="Run the Python code that a result file names. Code that a .yaml file names always runs."
+    ),
+]
+
+Pdf = Annotated[
+    str | None,
+    typer.Option(
+        "--pdf",
+        metavar="WIDTH",
+        help="Also write every figure as PDF: wide (as on the page), or one-column (3.5 in, without its title).",
+    ),
+]
+
+Replay = Annotated[
+    bool,
+    typer.Option(
+        "--replay",
+        help="Run some trials again and show them on the page in three dimensions: `compare` the first trial of up to "
+        "four controllers or scenarios, `campaign` the three worst trials. Compiling takes up to a minute for each "
+        "controller. With --resume, add the replay to existing results.",
+    ),
+]
