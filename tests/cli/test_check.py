@@ -122,6 +122,7 @@ def test_bad_scenario(refused, tmp_path):
 def test_parts_of_the_catalogue_keep_their_contract(undertow, kind, name):
     needed = {
         "table": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]"],
+        "policy": ["--option", f"function={Path(__file__).parents[1]}/conformance/proportional_policy.py:act"],
         "replay": ["--option", "commands=[[0, 0, 0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1, 1, 1]]"],
     }
     said = undertow("check", f"{kind}/{name}", *needed.get(name, []))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from other_programs import json_mcap
-from test_formats import bag, bin_file, ulg_file
+from test_log_formats import bag, bin_file, ulg_file
 
 from undertow.core.errors import BadInput
 from undertow.logs.csv_file import write_csv

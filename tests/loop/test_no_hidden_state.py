@@ -17,7 +17,7 @@ from undertow.scenario.reading import dump
 # What other packages do to a process when they are imported is theirs; they are imported before.
 PROCESS = """
 import json, logging, os, signal, sys, threading, warnings
-import jax, matplotlib, numpy, xarray, netCDF4, diffrax, pydantic
+import jax, matplotlib, numpy, xarray, netCDF4, diffrax, pydantic, ruamel.yaml
 
 def state():
     return {
@@ -45,7 +45,8 @@ for name in dir(undertow):
     getattr(undertow, name)
     look(name)
 import importlib, pkgutil
-import dask, distributed, rich, ruamel.yaml, scipy.linalg, scipy.optimize, scipy.signal, scipy.sparse, scipy.stats, typer, zarr
+import control, cyclonedds, gymnasium, mcap, pymavlink, pyulog, rosbags
+import dask, distributed, rich, scipy.linalg, scipy.optimize, scipy.signal, scipy.sparse, scipy.stats, typer, zarr
 before.update(state())
 for package in ("undertow", "simdjit"):
     for module in pkgutil.walk_packages(importlib.import_module(package).__path__, package + "."):
