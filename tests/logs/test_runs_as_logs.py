@@ -243,7 +243,8 @@ def test_a_log_survives_kill_9(tmp_path):
     assert len(steps.time) > 250
     np.testing.assert_allclose(steps.time, np.arange(len(steps.time)) * 0.01, atol=1e-9)
     np.testing.assert_array_equal(steps.values[:, 0], np.arange(len(steps.time)) * 1e-3)
-    assert log["commanded_input"].values.shape == (len(steps.time), 8)
+    commands = log["commanded_input"].values  # of another channel: the last chunk may end between the two
+    assert len(steps.time) - len(commands) in (0, 1) and commands.shape[1] == 8
     assert any("ends early" in note for note in log.notes) or not path.read_bytes().endswith(b"\x89MCAP0\r\n")
 
 

@@ -60,6 +60,7 @@ def test_it_computes_what_undertow_computes(tmp_path, numbers):
     assert theirs.keys() == ours.keys() - left_out and not any(ours[name] for name in left_out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "factor", "said"),
     [("COMPOSITE", 1 + 1e-6, "undertow's trajectory to 1e-09"), ("SETTLED", 1.5, "undertow's metrics to 1e-09")],
@@ -79,6 +80,7 @@ def test_numbers_are_written_with_every_bit(numbers):
         np.testing.assert_array_equal([float.fromhex(one) for one in written], np.ravel(value), err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", [(), ("metrics",), ("metrics", "0", "1"), ("metrics", "10"), ("trajectory", "-1")]
 )
