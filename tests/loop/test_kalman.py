@@ -18,6 +18,7 @@ from undertow.navigation.from_sensors import Received
 from undertow.navigation.kalman import ATTITUDE, FORCE_BIAS, GYRO_BIAS, POSITION, VELOCITY, kalman
 from undertow.navigation.observability import Sensed, deviations, unobservable
 from undertow.sensors import compass, depth, dvl, imu, position_fix
+from undertow.sensors.imu import IMU
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractSensor
 
@@ -222,6 +223,24 @@ def test_an_angle_may_have_turned_once():
     state = update(own.start(turned(3.13)), jnp.asarray(0.0), with_reading(nothing(ALL), 3, -3.13))
     assert int(state.rejected) == 0
     assert abs(abs(float(state_angles(state)[2])) - np.pi) < 0.0117  # between both: half a turn
+
+
+class RawIMU(IMU):
+    """An IMU that does not fuse roll and pitch."""
+
+    def reading(self, motion):
+        return IMU.reading(self, motion).at[:2].set(jnp.nan)
+
+
+def test_tilt_is_observed_without_a_reading_of_it():
+    """Accelerometers tell it where velocities or positions are measured, as well as the filter says."""
+    keys = jax.random.split(jax.random.PRNGKey(6), 40)
+    sensors = [RawIMU(imu().sampling), *ALL[1:]]
+    found, covariances = followed(kalman(sensors, tilt_deviation=0.05), swinging, 2000, 0.01, keys)
+    tilt, of_tilt = np.asarray(found[:, -1, :2]), np.asarray(covariances[:, -1, :2, :2])
+    squares = np.einsum("ki,kij,kj->k", tilt, np.linalg.inv(of_tilt), tilt)
+    assert abs(squares.mean() - 2) < 4 * np.sqrt(2 * 2 / len(keys))
+    assert np.abs(tilt).max() < 0.02
 
 
 class Altimeter(AbstractSensor):
