@@ -1,7 +1,7 @@
-"""What exported controllers and vehicles take: python benchmarks/exported_code.py [--json]
+"""What exported controllers, filters and vehicles take: python benchmarks/exported_code.py [--json]
 
-The controllers of the Heavy and of the paper's Example 2 run their test vectors on a Cortex-M4 that QEMU emulates
-(machine mps2-an386). QEMU counts executed instructions; it knows no cycles, no waits for memory and no pipeline.
+The controller and a Kalman filter of the Heavy, and the controller of the paper's Example 2, run their test vectors on a
+Cortex-M4 that QEMU emulates (machine mps2-an386). QEMU counts executed instructions; it knows no cycles, no waits for memory and no pipeline.
 Debian: gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm.
 
 The FMUs of the Heavy and of ODIN with full motors are validated by FMPy, and a step of each is timed on this machine.
@@ -18,14 +18,17 @@ import time
 from pathlib import Path
 from typing import Any
 
+from undertow.export.c_program import Exported
 from undertow.export.controller import export_controller
 from undertow.export.fmu import export_fmu
+from undertow.export.navigation import export_navigation
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parent / "examples"
-CONTROLLERS = ("bluerov2_heavy", "paper_example2")
+# Scenario and part; the filter is `kalman` with the scenario's sensors.
+PROGRAMS = (("bluerov2_heavy", "controller"), ("bluerov2_heavy", "navigation"), ("paper_example2", "controller"))
 TOOLS = ("arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm")
 PROCESSOR = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 MACHINE = ("-machine", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none", "-icount", "shift=6")
@@ -46,12 +49,21 @@ def missing() -> list[str]:
     return [tool for tool in TOOLS if shutil.which(tool) is None]
 
 
-def on_cortex_m4(scenario: str, precision: str, level: str) -> dict[str, Any]:
-    """The controller of an example, compiled at a level of optimisation: size, memory, instructions."""
-    exported = export_controller(build(read(EXAMPLES / f"{scenario}.yaml")), precision=precision)
+def exported_part(scenario: str, part: str, precision: str) -> Exported:
+    """A part of an example in C."""
+    text = read(EXAMPLES / f"{scenario}.yaml")
+    if part == "controller":
+        return export_controller(build(text), precision=precision)
+    filtered = text.data | {"navigation": text.data["navigation"] | {"kind": "kalman"}}
+    return export_navigation(build(from_data(filtered)), precision=precision)
+
+
+def on_cortex_m4(scenario: str, part: str, precision: str, level: str) -> dict[str, Any]:
+    """A part of an example, compiled at a level of optimisation: size, memory, instructions."""
+    exported = exported_part(scenario, part, precision)
     with tempfile.TemporaryDirectory() as folder:
         exported.write(Path(folder))
-        definitions = ("-DNAME=controller", '-DVECTORS="controller_vectors.h"', "-I.")
+        definitions = (f"-DNAME={part}", f'-DVECTORS="{part}_vectors.h"', "-I.")
         compile_one = (TOOLS[0], *PROCESSOR, "-std=c99", level, "-ffp-contract=off")
         link = ("-nostartfiles", "-specs=rdimon.specs", "-T", HERE / "cortex_m4/memory.ld", "-lm", "-o", "test.elf")
 
@@ -61,9 +73,9 @@ def on_cortex_m4(scenario: str, precision: str, level: str) -> dict[str, Any]:
                 sys.exit(f"{command[0]} failed: {finished.stderr}{finished.stdout}")
             return finished.stdout
 
-        done(*compile_one, "-Wall", "-Wextra", "-Werror", "-pedantic", "-c", "controller.c", "-o", "controller.o")
-        done(*compile_one, *definitions, HERE / "cortex_m4/measure.c", "controller.o", *link)
-        code = int(done(TOOLS[1], "controller.o").splitlines()[1].split()[0])
+        done(*compile_one, "-Wall", "-Wextra", "-Werror", "-pedantic", "-c", f"{part}.c", "-o", "part.o")
+        done(*compile_one, *definitions, HERE / "cortex_m4/measure.c", "part.o", *link)
+        code = int(done(TOOLS[1], "part.o").splitlines()[1].split()[0])
         semihosting = ("-semihosting-config", "enable=on,target=native", "-kernel", "test.elf")
         found = json.loads(done(TOOLS[2], *MACHINE, *semihosting))
     if abs(found.pop("counts_of_2000") - 2000 * COUNTS) > 8:
@@ -71,6 +83,7 @@ def on_cortex_m4(scenario: str, precision: str, level: str) -> dict[str, Any]:
     mean, most = (round(found.pop(f"counts_{which}") / COUNTS) for which in ("mean", "most"))
     return {
         "scenario": scenario,
+        "part": part,
         "precision": precision,
         "optimisation": level,
         "code_bytes": code,
@@ -136,18 +149,18 @@ def main() -> None:
     if lacking := missing():
         sys.exit(f"{', '.join(lacking)} not found. Debian: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi "
                  "qemu-system-arm")  # fmt: skip
-    controllers = [
-        on_cortex_m4(scenario, precision, level)
-        for scenario in CONTROLLERS
+    programs = [
+        on_cortex_m4(*program, precision, level)
+        for program in PROGRAMS
         for precision in ("float32", "float64")
         for level in ("-Os", "-O2")
     ]
     heavy, odin = read(EXAMPLES / "bluerov2_heavy.yaml"), from_data(ODIN)
     units = [*of_fmus("bluerov2_heavy", heavy, 5000), *of_fmus("odin, full motors", odin, 5000)]
     if as_json:
-        print(json.dumps({"cortex_m4": controllers, "fmu": units}, indent=2))
+        print(json.dumps({"cortex_m4": programs, "fmu": units}, indent=2))
     else:
-        print(table(controllers), table(units), sep="\n\n")
+        print(table(programs), table(units), sep="\n\n")
 
 
 if __name__ == "__main__":

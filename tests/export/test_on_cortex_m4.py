@@ -19,10 +19,12 @@ def benchmark():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scenario", ["bluerov2_heavy", "paper_example2"])
-def test_the_same_bits_on_a_cortex_m4(benchmark, scenario):
+@pytest.mark.parametrize(
+    "program", [("bluerov2_heavy", "controller"), ("bluerov2_heavy", "navigation"), ("paper_example2", "controller")]
+)
+def test_the_same_bits_on_a_cortex_m4(benchmark, program):
     for precision in ("float32", "float64"):
-        small, fast = (benchmark.on_cortex_m4(scenario, precision, level) for level in ("-Os", "-O2"))
+        small, fast = (benchmark.on_cortex_m4(*program, precision, level) for level in ("-Os", "-O2"))
         for found in (small, fast):
             assert (found["steps_that_differ"], found["steps"]) == (0, 50)
             assert 0 < found["stack_bytes"] < 8192 and 0 < found["instructions_mean"] <= found["instructions_most"]
