@@ -1,7 +1,8 @@
 """What exported controllers, filters and vehicles take: python benchmarks/exported_code.py [--json]
 
-The controller and a Kalman filter of the Heavy, and the controller of the paper's Example 2, run their test vectors on a
-Cortex-M4 that QEMU emulates (machine mps2-an386). QEMU counts executed instructions; it knows no cycles, no waits for memory and no pipeline.
+The controller and a Kalman filter of the Heavy, and the controller of the paper's Example 2, run their test vectors on
+a Cortex-M4 that QEMU emulates (machine mps2-an386). QEMU counts executed instructions; it knows no cycles, no waits for
+memory and no pipeline.
 Debian: gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm.
 
 The FMUs of the Heavy and of ODIN with full motors are validated by FMPy, and a step of each is timed on this machine.
