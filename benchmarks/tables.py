@@ -79,7 +79,10 @@ def batch() -> list[tuple[str, ...]]:
     speed = result("-m", "undertow.cli.main", "bench", "--json")
     scaling = benchmark("compiler_scale.py")
     numpy = speed["numpy_ns"]
+    by_hand = benchmark("yardstick.py", "--json")
     rows: list[tuple[str, ...]] = [("W1, plain NumPy", "", "", f"{thousands(numpy)} ns", "1")]
+    ns = by_hand["yardstick_ns"]
+    rows.append(("W1, one run, hand-written C++", "", "", f"{thousands(ns)} ns", thousands(numpy / ns)))
     named = {
         "W1, one run, by XLA": ("single_xla_ns", "single_xla_compile_s", ""),
         "W1, one run": ("single_ns", "single_compile_s", ""),
