@@ -27,6 +27,8 @@ from undertow.power.esc import ESC
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 
+_NO_ROTATION = 1e-6  # length of a quaternion that is none
+
 
 class Autopilot:
     """A controller that is called once per sampling time, by whoever owns the clock. NumPy goes in and comes out::
@@ -264,7 +266,10 @@ class Autopilot:
     def _motion(self, position: Any, velocity: Any, attitude: Any) -> Motion:
         shapes = map(np.shape, self._begin.inputs.motion)
         given = zip(Motion._fields, (position, attitude, velocity), shapes, strict=True)
-        return Motion(*(numbers(name, value, shape) for name, value, shape in given))
+        motion = Motion(*(numbers(name, value, shape) for name, value, shape in given))
+        if np.shape(motion.attitude) == (4,) and np.linalg.norm(motion.attitude) < _NO_ROTATION:
+            raise BadInput("attitude", "be a quaternion of some length", "zero")
+        return motion
 
     def _report(self, propellers: Any, missing: float) -> Any:
         """What the propellers report, of the form that the plant has; `missing` stands for everything not given."""

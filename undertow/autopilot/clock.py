@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from undertow.autopilot.numbers import numbers
+
 # Sampling times from which on a step is late, and is missed.
 LATE, MISSED = 1.5, 5.0
 
@@ -41,9 +43,12 @@ class Clock:
 
         Args:
             dt: time since the last step, s; None for the sampling time.
+
+        Raises:
+            BadInput: it is no number.
         """
+        step = self._period if dt is None else float(numbers("dt", dt, ()))
         self._count("steps")
-        step = self._period if dt is None else float(dt)
         if not 0 < step < np.inf:
             self._count("repeated")
             return 0.0

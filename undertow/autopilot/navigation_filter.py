@@ -183,14 +183,19 @@ class NavigationFilter:
         return repr(form).encode() + b"".join(number.tobytes() for number in jax.tree.leaves(self._go_on.numbers))
 
     def _received(self, readings: Mapping[str, Any], ages: Mapping[str, float]) -> list[tuple[Any, bool, float]]:
-        for name in (*readings, *ages):
-            if name not in self.sensors:
-                hint = did_you_mean(name, self.sensors)
-                raise BadInput("readings", f"be of {', '.join(self.sensors)}", repr(name), hint=hint)
+        for what, given in (("readings", readings), ("ages", ages)):
+            if not isinstance(given, Mapping):
+                raise BadInput(what, "be a mapping from the name of a sensor", repr(given))
+            for name in given:
+                if name not in self.sensors:
+                    raise BadInput(
+                        what, "be of sensors of the scenario", repr(name), hint=did_you_mean(name, self.sensors)
+                    )
         found = []
         for (name, size), delay in zip(self.sensors.items(), self._delays, strict=True):
             new = name in readings and readings[name] is not None
-            value = numbers(f"readings[{name!r}]", readings[name], (size,)) if new else np.zeros(size)
+            given = readings[name] if new else np.zeros(size)
+            value = numbers(f"readings[{name!r}]", [given] if size == 1 and np.ndim(given) == 0 else given, (size,))
             age = ages.get(name, delay)
             checks.not_negative(f"ages[{name!r}]", age)
             found.append((value, new, age))

@@ -17,9 +17,11 @@ def numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
         BadInput: it has another one, or holds something else.
     """
     try:
+        if np.asarray(value).dtype.kind in "SU":  # NumPy takes "10" for a number
+            raise TypeError
         found = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        raise BadInput(name, "be numbers", repr(value)) from None
+        raise BadInput(name, "be numbers" if shape else "be a number", repr(value)) from None
     if found.shape != shape:
         raise BadInput(name, f"have shape {shape}", f"of shape {found.shape}")
     return found

@@ -1,5 +1,6 @@
 """Writes every step of an autopilot or a navigation filter to an MCAP file."""
 
+import itertools
 import warnings
 import weakref
 from collections.abc import Mapping
@@ -30,18 +31,22 @@ class StepLog:
     Where the time of the owner goes back, as after another `start`, that of the log goes on.
 
     Args:
-        path: of the file, which is replaced; its name ends in .mcap.
+        path: of the file, whose name ends in .mcap. Where there is one already, as after a restart, a number is added:
+            flight-2.mcap.
         signals: by name, with values of the right shape.
         period: sampling time, s.
         owner: with whose end the file is finished.
+
+    Attributes:
+        path: of the file that is written.
 
     Raises:
         BadInput: the file cannot be written.
     """
 
     def __init__(self, path: str | Path, signals: Mapping[str, Series], period: float, owner: Any):
-        path = Path(path)
-        self._path = path
+        path = _free(Path(path))
+        self.path = path
         self._period, self._offset, self._last = period, 0.0, -np.inf
         if path.suffix != ".mcap":
             raise BadInput("log", "be a file whose name ends in .mcap", str(path))
@@ -63,7 +68,13 @@ class StepLog:
         except OSError as error:  # a full disk does not stop the controller
             self.close.detach()
             self._file.abandon()
-            warnings.warn(f"{self._path}: {error.strerror}; later steps are not logged", stacklevel=2)
+            warnings.warn(f"{self.path}: {error.strerror}; later steps are not logged", stacklevel=2)
+
+
+def _free(path: Path) -> Path:
+    """The path, or, where a file is there, the next one with a number at which there is nothing."""
+    numbered = (path.with_stem(f"{path.stem}-{i}") for i in itertools.count(2))
+    return next(one for one in numbered if not one.exists()) if path.is_file() else path
 
 
 def _close(file: LiveLog, path: Path) -> None:

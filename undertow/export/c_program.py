@@ -26,7 +26,7 @@ class System(NamedTuple):
     Attributes:
         name: begins the names of files, types and functions.
         about: sentences for the head of each file.
-        meanings: of the structs `state`, `input` and `output`.
+        meanings: of the structs `state`, `input` and `output`, of members as in `input.dt`, and of both functions.
         start: inputs -> (state, outputs), trees of arrays.
         step: (state, inputs) -> (state, outputs).
         inputs: example of them, in the precision of the program.
@@ -162,6 +162,7 @@ class Program:
     def _struct(self, what: str, members: list[Field]) -> str:
         lines = [
             f"    {self._c99.TYPES[one.dtype]} {one.name}{''.join(f'[{size}]' for size in one.shape)};"
+            + (f" /* {said} */" if (said := self._meanings.get(f"{what}.{one.name}")) else "")
             for one in members
             if one.size
         ]

@@ -3,8 +3,10 @@
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
+from undertow.autopilot.clock import MISSED
 from undertow.autopilot.functions import Functions, Given
 from undertow.autopilot.measured_motion import Format
 from undertow.autopilot.output import output_of
@@ -17,6 +19,7 @@ from undertow.loop.simd_batch import Unsupported
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built
 
+_ATTITUDES = {"euler": "roll, pitch, yaw, rad", "quaternion": "w, x, y, z, body to world"}
 _SPREAD = 0.2  # of the random numbers of a test, m, rad, V
 
 
@@ -101,7 +104,7 @@ def controller_program(built: Built, name: str, of: Functions) -> Program:
 
 
 def _system(built: Built, name: str, of: Functions) -> System:
-    period = built.scenario.loop.dt
+    period, unit = built.scenario.loop.dt, built.closed_loop.plant.input_unit
     inputs = ControllerInput(*of.given, of.applied, np.asarray(period, dtype=of.time.dtype))
 
     def answered(memory, answer):
@@ -111,30 +114,52 @@ def _system(built: Built, name: str, of: Functions) -> System:
         return answered(*of.first(of.controller, Given(*inputs[:3])))
 
     def step(memory, inputs: ControllerInput):
-        given = Given(*inputs[:3])
-        return answered(*of.following(of.controller, memory, given, inputs.applied, inputs.dt))
+        """As `Autopilot` does: no further than a missed step; a time that is none leaves the state as it was."""
+        usual = jnp.asarray(period, dtype=inputs.dt.dtype)
+        passed = (inputs.dt > 0) & (inputs.dt < jnp.inf)
+        elapsed = jnp.where(passed, jnp.minimum(inputs.dt, MISSED * usual), usual)
+        after, answer = answered(*of.following(of.controller, memory, Given(*inputs[:3]), inputs.applied, elapsed))
+        return jax.tree.map(lambda new, old: jnp.where(passed, new, old), after, memory), answer
 
     def sample(chance: np.random.Generator, _: int) -> ControllerInput:
         random = lambda leaf: np.asarray(leaf + _SPREAD * chance.normal(size=leaf.shape), dtype=leaf.dtype)
         return jax.tree.map(random, inputs)._replace(dt=inputs.dt)
 
-    meanings = {
+    about = made_from("Controller of an underwater vehicle", built.scenario.description)
+    return System(name, about, _meanings(of, unit), start, step, inputs, sample, period)
+
+
+def _meanings(of: Functions, unit: str) -> dict[str, str]:
+    """What structs, members and functions mean; `unit` is that of the plant's input."""
+    outputs = "north, east, down, m, roll, pitch, yaw, rad" if of.form else "outputs of the plant"
+    return {
         "state": "State of the controller; keep it between the steps.",
         "input": f"Input of a step. {described(of.form)}",
         "output": f"Output of a step: the law's command and the output, {of.output.unit}.",
-        "start": "The first step: sets the state.",
-        "step": "A step input->dt after the last one, with input->applied applied since then. "
-        "What was not measured is NAN.",
+        "start": "The first step: sets the state; all of its input has to be finite.",
+        "step": "A step input->dt after the last one, with input->applied applied since then. What was not measured is "
+        f"NAN. After more than {MISSED:g} sampling times the law advances by {MISSED:g} of them; a dt that is zero, "
+        "negative or not finite leaves the state as it was.",
+        "input.motion_position": "north, east, down, m" if of.form else outputs,
+        "input.motion_attitude": "" if of.form is None else _ATTITUDES[of.form.attitude],
+        "input.motion_velocity": f"`{of.form.velocity}`, m/s and rad/s" if of.form else "rates of the outputs",
+        "input.actuator_speed": "of each propeller, rad/s; NAN where it is not measured",
+        "input.actuator_acceleration": "of each propeller, rad/s^2; NAN where it is not measured",
+        "input.target_position": f"to reach: {outputs}",
+        "input.target_velocity": "rates of the target",
+        "input.target_acceleration": "second derivatives of the target",
+        "input.applied": f"to be set at each step: what was applied since the last, {unit}; output->command, or less",
+        "input.dt": "time since the last step, s",
+        "output.command": f"of the law, in the order of the thrusters, {unit}; see that it is finite",
+        "output.output": f"for the vehicle, {of.output.unit}",
     }
-    about = made_from("Controller of an underwater vehicle", built.scenario.description)
-    return System(name, about, meanings, start, step, inputs, sample, period)
 
 
 def described(form: Format | None) -> str:
     """The format of a motion, in words; None for a plant that is no vehicle."""
     if form is None:
         return "Position and velocity are the outputs of the plant and their rates."
-    turned = {"euler": "roll, pitch, yaw, rad", "quaternion": "w, x, y, z, body to world"}[form.attitude]
+    turned = _ATTITUDES[form.attitude]
     return f"Position north, east, down, m; attitude {turned}; velocity `{form.velocity}`, m/s and rad/s."
 
 

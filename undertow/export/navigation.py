@@ -92,8 +92,21 @@ def _system(built: Built, name: str, of: FilterFunctions) -> System:
         "new, and its age, s; time since the last step, s.",
         "output": "Output of a step: estimated motion, what propellers report, signals of the filter.",
         "start": "The first step: sets the state from input->motion.",
+        "input.motion_position": "at the start: north, east, down, m",
+        "input.motion_velocity": "at the start: u, v, w, m/s, p, q, r, rad/s, body axes",
+        "input.motion_attitude": "at the start: w, x, y, z, body to world",
+        "input.dt": "time since the last step, s",
+        "output.motion_position": "north, east, down, m",
+        "output.motion_velocity": "u, v, w, m/s, p, q, r, rad/s, body axes",
+        "output.motion_attitude": "w, x, y, z, body to world",
         "step": "A step input->dt after the last one. Entries of readings that were not measured are NAN.",
     }
+    for sensor, part in zip(of.sensors, of.filter.sensors, strict=True):
+        meanings[f"input.sensor_{sensor}_reading"] = " ".join(str(type(part).__doc__).split("\n\n")[0].split())
+        meanings[f"input.sensor_{sensor}_fresh"] = "whether the reading is new"
+        meanings[f"input.sensor_{sensor}_age"] = "s since it was taken"
+    for signal, declared in of.filter.signals().items():
+        meanings[f"output.signals_{signal}"] = declared.meaning
     about = made_from("Navigation filter of an underwater vehicle", built.scenario.description)
     return System(name, about, meanings, start, step, inputs, sample, period)
 

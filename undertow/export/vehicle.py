@@ -12,6 +12,7 @@ from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import AbstractPlant, Load, Measurement
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
+from undertow.core.status import Status
 from undertow.disturbances.adding import Together
 from undertow.export.c_program import Exported, Program, System, check_compiler, has_counterpart, made_from
 from undertow.export.controller import checked, described
@@ -146,6 +147,13 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
         "output": f"Output of a step: true motion at its end, applied input, {plant.input_unit}, and status, 0 "
         f"while the motion is valid. {described(None if truth.body is None else form)}",
         "start": "The first output: sets the state.",
+        "input.initial_position": "at the start, of all outputs",
+        "input.initial_velocity": "at the start, rates of the outputs",
+        "input.command": f"to be held during the step, in the order of the thrusters, {plant.input_unit}",
+        "input.external_wrench": "force and moment from outside, body axes, N and N m",
+        "input.t": "at the beginning of the step, s",
+        "output.applied": f"the command within the limits, {plant.input_unit}",
+        "output.status": "; ".join(f"{int(one)} {one.word}" for one in Status),
         "step": "A step of one sampling time from input->t on, with the command held.",
     }
     what = "Plant" if truth.body is None else "Underwater vehicle with its thrusters"
