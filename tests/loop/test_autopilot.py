@@ -14,7 +14,8 @@ NOISY = {"kind": "white_noise", "position": 0.001, "velocity": 0.01}
 HEAVY = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
     "controller": {"kind": "rcaf", "preset": "robust"},
-    "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 5},
+    # Begins where the plant does, not at the noisy position that is measured there.
+    "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 5, "start": [0] * 6},
     "disturbance": {"kind": "current", "velocity": [0.3, 0.2, 0]},
     "navigation": NOISY,
     "loop": {"duration": 1.0, "dt": 0.01, "record": 0.01},
@@ -231,3 +232,42 @@ def test_what_an_autopilot_cannot_be_made_of():
         pendulum.step([0.0], [0.0])
     with pytest.raises(BadInput, match="`propellers` must be left out: the actuators of this plant report nothing"):
         pendulum.start([0.0], [0.0], propellers=[1.0])
+
+
+def test_the_reference_begins_where_the_vehicle_is_found():
+    """With an open start: at rest at 5 m there is nothing to correct yet, at another start likewise."""
+    reference = {"kind": "setpoint", "position": [0, 0, 0, 0, 0, 0], "settling": 100}
+    autopilot = ut.Autopilot(HEAVY | {"reference": reference, "disturbance": {"kind": "none"}})
+    at_origin = autopilot.start(np.zeros(3), np.zeros(6), np.zeros(3))
+    for place in ([5.0, 5.0, 5.0], [55.0, -3.0, 0.0]):
+        first = autopilot.start(place, np.zeros(6), np.zeros(3))
+        np.testing.assert_allclose(first, at_origin, atol=1e-9)
+        for _ in range(30):
+            later = autopilot.step(place, np.zeros(6), np.zeros(3))
+        assert np.abs(later).max() < 10.0  # a step of 5 m saturates at 16 V
+
+
+def test_a_start_that_is_none_holds_nothing_of_an_earlier_one(heavy):
+    """A quaternion of no length is refused, and the controller goes on; another start forgets the old command."""
+    autopilot = ut.Autopilot(HEAVY, attitude="quaternion")
+    upright = [1.0, 0, 0, 0]
+    autopilot.start(np.zeros(3), np.zeros(6), upright, target=[5.0, 0, 0, 0, 0, 0])
+    before = autopilot.step(np.zeros(3), np.zeros(6), upright, target=[5.0, 0, 0, 0, 0, 0])
+    state = autopilot.save()
+    for call in (autopilot.start, autopilot.step):
+        with pytest.raises(BadInput, match="quaternion of some length"):
+            call(np.zeros(3), np.zeros(6), np.zeros(4))
+    assert autopilot.save() == state and np.abs(before).max() > 1.0
+    autopilot.start(np.zeros(3), np.zeros(6), upright, target=[0.0] * 6)
+    after = autopilot.step(np.zeros(3), np.zeros(6), upright, target=[0.0] * 6)
+    fresh = ut.Autopilot(HEAVY, attitude="quaternion")
+    fresh.start(np.zeros(3), np.zeros(6), upright, target=[0.0] * 6)
+    np.testing.assert_array_equal(after, fresh.step(np.zeros(3), np.zeros(6), upright, target=[0.0] * 6))
+
+
+def test_a_target_may_be_a_tuple_of_numbers_and_not_ragged(heavy):
+    heavy.start(np.zeros(3), np.zeros(6), np.zeros(3))
+    flat = heavy.step(np.zeros(3), np.zeros(6), np.zeros(3), target=(1, 0, 0, 0, 0, 0))
+    assert np.isfinite(flat).all()
+    with pytest.raises(BadInput, match="`target`"):
+        heavy.step(np.zeros(3), np.zeros(6), np.zeros(3), target=[[1, 0, 0, 0, 0, 0], [0]])

@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from undertow.interop.ros2 import frames
+from undertow.logs.frames import attitudes_of_quaternions
 from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_from_euler, rotation_from_quaternion
 
 WORLD = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])  # NED -> ENU
@@ -59,9 +60,9 @@ def test_euler_angles_are_those_of_the_package(chance):
     quaternions = frames.quaternion_of_euler(angles)
     expected = np.array([quaternion_from_euler(jnp.asarray(one)) for one in angles])
     np.testing.assert_allclose(quaternions, expected, atol=1e-15)
-    np.testing.assert_allclose(frames.euler_of_quaternion(quaternions), angles, atol=1e-12)
+    np.testing.assert_allclose(attitudes_of_quaternions(quaternions, "NED", "FRD"), angles, atol=1e-12)
     back = [euler_from_rotation(rotation_from_quaternion(jnp.asarray(one))) for one in quaternions]
-    np.testing.assert_allclose(frames.euler_of_quaternion(quaternions), back, atol=1e-12)
+    np.testing.assert_allclose(attitudes_of_quaternions(quaternions, "NED", "FRD"), back, atol=1e-12)
 
 
 def test_body_velocity_is_that_of_the_package(chance):

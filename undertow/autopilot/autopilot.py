@@ -149,12 +149,12 @@ class Autopilot:
             The output, one entry per actuator, or six of a wrench.
 
         Raises:
-            BadInput: a shape is wrong, or a number is not finite.
+            BadInput: a shape is wrong, or a number is not finite, also of the command; the state stays as it was.
         """
         motion = self._motion(position, velocity, attitude)
         for name, value in zip(Motion._fields, motion, strict=True):
             checks.finite(name, value)
-        before = self._command if applied is None else self._input(applied)
+        before = np.zeros_like(self._command) if applied is None else self._input(applied)
         report = self._report(propellers, 0.0)
         for value in jax.tree.leaves(report):
             checks.finite("propellers", value)
@@ -165,7 +165,12 @@ class Autopilot:
             self._place_reference(self._begin.outputs[0].y.position)
             put(self._begin.inputs.target, self._target(None))
             self._begin()
+        if not np.isfinite(self._begin.outputs[1].command).all():
+            raise BadInput(
+                "start", "lead to a finite command of the law", "one that is not", hint="Check the measurement"
+            )
         put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
+        self._command[...] = before
         self._before[...], self._blended[...], self._started[...] = before, applied is not None, True
         return self._answered()
 
@@ -292,7 +297,8 @@ class Autopilot:
             self._at()
             return self._at.outputs
         shape = np.shape(self._begin.inputs.target.position)
-        parts = target if np.ndim(target) == 2 or isinstance(target, tuple) else (target,)
+        several = isinstance(target, tuple | list) and len(target) and np.ndim(target[0]) > 0
+        parts = target if several or np.ndim(target) == 2 else (target,)
         if len(parts) > 3:
             raise BadInput("target", "be outputs, or (outputs, rates, accelerations)", f"{len(parts)} parts")
         found: list[Any] = [numbers("target", part, shape) for part in parts]
@@ -341,4 +347,6 @@ def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | No
     built = build(text)
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
-    return built.closed_loop, built.scenario.precision, built.scenario.loop.dt
+    loop = built.closed_loop
+    open_loop = ClosedLoop(loop.plant, loop.controller, built.reference, loop.disturbance, loop.navigation)
+    return open_loop, built.scenario.precision, built.scenario.loop.dt

@@ -7,6 +7,8 @@ from undertow.autopilot.numbers import numbers
 # Sampling times from which on a step is late, and is missed.
 LATE, MISSED = 1.5, 5.0
 
+_NEVER = 1e9  # s: no time between two steps
+
 _COUNTS = ("steps", "late", "missed", "repeated")
 
 
@@ -49,7 +51,7 @@ class Clock:
         """
         step = self._period if dt is None else float(numbers("dt", dt, ()))
         self._count("steps")
-        if not 0 < step < np.inf:
+        if not 0 < step < _NEVER:
             self._count("repeated")
             return 0.0
         if step >= LATE * self._period:

@@ -15,10 +15,9 @@ from undertow.autopilot.saved_state import packed, unpacked
 from undertow.autopilot.step_log import StepLog, filter_signals
 from undertow.core import checks, runtime
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.logs.frames import attitudes_of_quaternions
+from undertow.logs.frames import attitudes_of_quaternions, quaternions
 from undertow.loop.stepped import put
 from undertow.navigation.from_sensors import SensorNavigation
-from undertow.numerics.rotations import quaternion_from_euler
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 
@@ -111,7 +110,7 @@ class NavigationFilter:
         length = 1.0 if turned else np.linalg.norm(given.attitude)
         if not length > 0:
             raise BadInput("attitude", "be a quaternion of some length", "zero")
-        angles = np.asarray(quaternion_from_euler(jnp.asarray(given.attitude))) if turned else given.attitude / length
+        angles = quaternions(given.attitude[None])[0] if turned else given.attitude / length
         received = self._received(readings or {}, {})
         put(self._begin.inputs, given._replace(attitude=angles))
         self._begin()

@@ -244,6 +244,7 @@ def places(struct: str, members: list[Field]) -> list[str]:
 def made_from(what: str, description: str) -> str:
     """The sentences at the head of a file."""
     scenario = " ".join((description or "scenario without a description").split())
+    scenario = "".join(letter for letter in scenario if letter.isprintable())
     for mark in ("/*", "*/"):  # of comments
         scenario = scenario.replace(mark, " ".join(mark))
     return f"{what}. Do not edit. Made by undertow from: {scenario}"

@@ -40,6 +40,9 @@ def attitudes_of_quaternions(quaternions: np.ndarray, world: str, body: str) -> 
     return euler_angles(_OF_WORLD[world] @ rotation @ _OF_BODY[body].T)
 
 
+_VERTICAL = 1e-9  # cosine of a pitch that counts as 90 degrees
+
+
 def rotations(angles: np.ndarray) -> np.ndarray:
     """Rotations body -> world of roll, pitch, yaw (rad), shape (rows, 3, 3)."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(angles).T, np.cos(angles).T
@@ -54,9 +57,12 @@ def rotations(angles: np.ndarray) -> np.ndarray:
 def euler_angles(rotation: np.ndarray) -> np.ndarray:
     """Roll, pitch, yaw (rad) of rotations body -> world, shape (rows, 3)."""
     level = np.hypot(rotation[:, 2, 1], rotation[:, 2, 2])
-    roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    upright = level < _VERTICAL  # then only the sum or difference of roll and yaw is there: roll is zero
+    roll = np.where(upright, 0.0, np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2]))
     pitch = np.arctan2(-rotation[:, 2, 0], level)
-    return np.stack([roll, pitch, np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])], axis=1)
+    yaw = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    yaw = np.where(upright, np.arctan2(-rotation[:, 0, 1], rotation[:, 1, 1]), yaw)
+    return np.stack([roll, pitch, yaw], axis=1)
 
 
 def quaternions(angles: np.ndarray) -> np.ndarray:

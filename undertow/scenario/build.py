@@ -14,7 +14,7 @@ from undertow.analysis.success import criterion_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array, in_present_precision
 from undertow.core.catalogue import KIND_OF
-from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation
+from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation, AbstractReference
 from undertow.core.errors import Advice, advice, within
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
@@ -58,6 +58,7 @@ class Built(NamedTuple):
     resolved: dict[str, Any]  # the scenario with every default filled in
     metrics: tuple[AbstractMetric, ...]  # the scenario's own
     text: Text  # of the scenario, whose lines advice names
+    reference: AbstractReference  # as the scenario gives it: that of the loop begins where its plant does
 
     @in_its_precision
     def advice(self) -> tuple[Advice, ...]:
@@ -186,7 +187,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     if several:
         resolved["metrics"] = [description for _, description in several]
     metrics = tuple(part for part, _ in several)
-    built = Built(loop.starting_at(scenario.initial.position), scenario, resolved, metrics, text)
+    placed = loop.starting_at(scenario.initial.position)
+    built = Built(placed, scenario, resolved, metrics, text, loop.reference)
     with within("controller.signals"):
         loop.signals()
     with within("success"):

@@ -77,11 +77,11 @@ class Session:
         if not other and packet.frame_count == self._last - 1:
             self.counts["late"] += 1
             return None
-        self.sender, self._received = sender, now
+        known, self.sender, self._received = self.sender, sender, now
         if packet.frame_count == self._last and not other:
             self.counts["repeated"] += 1
             return self._answer
-        self._place(packet.frame_count)
+        self._place(packet.frame_count, other and known is not None)
         self.undriven = undriven
         self._advance(packet, pulses)
         return self._answer
@@ -94,11 +94,13 @@ class Session:
         pulses = self._channels.of_thrusters(np.where(driven, pwm, self._neutral), self._neutral)
         return pulses, int((~driven[self._channels.numbers - 1]).sum())
 
-    def _place(self, frame_count: int) -> None:
-        """Note what the count of a new frame says: the first one, the next one, a restart, or a gap."""
-        if self._last < 0 or frame_count == self._last + 1:
+    def _place(self, frame_count: int, another: bool) -> None:
+        """Note what the count of a new frame says: the first one, the next one, a gap, or a restart, which another
+        autopilot always is.
+        """
+        if self._last < 0 or (frame_count == self._last + 1 and not another):
             return
-        if frame_count <= self._last:
+        if frame_count <= self._last or another:
             self.counts["restarts"] += 1
             self.vehicle.restart()
             self.ended = False

@@ -1,6 +1,7 @@
 """Many vehicles as one vector environment of Gymnasium, stepped as one program."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ class VectorEnv(vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         """Begin an episode of every environment, or of those in `options["reset_mask"]`; see the class."""
         which = self._chosen(options)
         seeds = self._seeds_of(seed)
-        super().reset(seed=seed if isinstance(seed, int) else None)
+        super().reset(seed=int(seed) if isinstance(seed, Integral) else None)
         runs = np.array([self._run(number, seeds[number]) for number in which.tolist()], dtype=np.uint32)
         if not self._started:
             self._observation = np.zeros(self.observation_space.shape or (), self._episodes.dtype)
@@ -100,8 +101,8 @@ class VectorEnv(vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return np.flatnonzero(mask)
 
     def _seeds_of(self, seed: Any) -> list[int | None]:
-        if seed is None or isinstance(seed, int):
-            return [None if seed is None else seed + number for number in range(self.num_envs)]
+        if seed is None or isinstance(seed, Integral):
+            return [None if seed is None else int(seed) + number for number in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise BadInput("seed", f"be one, or {self.num_envs} of them", f"{len(seed)} of them")
         return list(seed)

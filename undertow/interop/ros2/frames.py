@@ -44,14 +44,6 @@ def quaternion_of_euler(angles: ArrayLike) -> NDArray:
     return np.stack([w, x, y, z], axis=-1)
 
 
-def euler_of_quaternion(quaternion: ArrayLike) -> NDArray:
-    """Roll, pitch, yaw (rad) of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
-    roll = np.arctan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
-    yaw = np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
-    return np.stack([roll, np.arcsin(np.clip(2 * (w * y - x * z), -1.0, 1.0)), yaw], axis=-1)
-
-
 def body_velocity_of_rates(angles: ArrayLike, rates: ArrayLike) -> NDArray:
     """(u, v, w, p, q, r) of the rates of (north, east, down, roll, pitch, yaw) at roll, pitch, yaw; m/s and rad/s.
 

@@ -9,15 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from undertow.core.errors import BadInput
-from undertow.interop.ros2.frames import (
-    between_attitudes,
-    between_frd_and_flu,
-    between_ned_and_enu,
-    euler_of_quaternion,
-)
+from undertow.interop.ros2.frames import between_attitudes, between_frd_and_flu, between_ned_and_enu
+from undertow.logs.frames import attitudes_of_quaternions
 
 SECOND = 1_000_000_000  # ns
 
+_ROUNDED = 1e-9
 _UNIT = 1e-3  # a quaternion whose square departs from 1 by more was not meant as an attitude
 
 
@@ -85,7 +82,7 @@ def target_of(message: Any, frames: Frames, topic: str) -> NDArray:
     """
     frames.check_world(topic, message.header.frame_id)
     quaternion = _attitude(message.pose.orientation, topic)
-    found = np.concatenate([_ned(message.pose.position), euler_of_quaternion(quaternion)])
+    found = np.concatenate([_ned(message.pose.position), attitudes_of_quaternions(quaternion[None], "NED", "FRD")[0]])
     if not np.isfinite(found).all():
         raise BadInput(f"{topic} pose", "be finite numbers", found.tolist())
     return found
@@ -141,4 +138,5 @@ def _attitude(given: Any, topic: str) -> NDArray:
     if not abs(square - 1) < _UNIT:
         must = "be of unit length"
         raise BadInput(f"{topic} orientation", must, f"{numbers.tolist()} (w, x, y, z), of length {square**0.5:.4g}")
-    return between_attitudes(numbers)
+    # As it is where it was integrated, so that the bits of a simulation pass.
+    return between_attitudes(numbers if abs(square - 1) < _ROUNDED else numbers / square**0.5)
