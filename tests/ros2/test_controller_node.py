@@ -104,6 +104,22 @@ def test_answers_are_those_of_an_autopilot(setup, autopilot):
     assert not said.warnings and "3 odometry" in node.status() and "1 steps late" in node.status()
 
 
+def test_two_vehicles_on_one_topic_are_named(setup, domain):
+    """Their messages are mixed, which nothing else would say."""
+    node, peer, said = setup(use_sim_time=True)
+    peer.send(5.0, AWAY)
+    answers(node, peer)
+    other = Link(domain, True)
+    other.publisher("/odom", ros.Odometry)
+
+    def named():
+        node.spin(0.02)
+        return any("/odom has 2 publishers, whose messages are mixed. End all but one" in one for one in said.warnings)
+
+    until(named)
+    other.close()
+
+
 def test_a_target_is_reached_for(setup, autopilot):
     node, peer, _ = setup(use_sim_time=True)
     target = np.array([0.5, -1.0, 0.2, 0, 0, -0.3])

@@ -180,7 +180,7 @@ class ControllerNode:
             except BadInput as error:
                 self._reporter.trouble(f"ignored ({error.name})", f"{error}. The message is ignored")
         self._watch()
-        self._reporter.status(self.status)
+        self._reporter.status(self.status, self._odometry)
 
     def stop(self) -> None:
         """Command zero thrust, and wait a little until it has arrived."""

@@ -6,7 +6,9 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.interop.ros2.link import Inlet
 
+QUIET = 10.0  # s, within which a trouble that comes again is only counted
 STATUS_PERIOD = 1.0  # s, between status lines
 WAIT = 0.1  # s, longest wait for a message: after it Ctrl-C is noticed
 
@@ -51,7 +53,7 @@ class Reporter:
 
     def __init__(self, say: Callable[[str], None]):
         self._say, self.counts = say, Counter[str]()
-        self._said: set[str] = set()
+        self._said: dict[str, float] = {}  # when each was explained last, s
         self._next = time.monotonic() + STATUS_PERIOD
 
     def say(self, sentence: str) -> None:
@@ -61,7 +63,7 @@ class Reporter:
     def warn(self, event: str, sentence: str) -> None:
         """Explain an event, if it is the first one of its kind."""
         if event not in self._said:
-            self._said.add(event)
+            self._said[event] = time.monotonic()
             self._say(f"Warning: {' '.join(sentence.split())}")
 
     def trouble(self, event: str, sentence: str) -> None:
@@ -70,15 +72,19 @@ class Reporter:
         self.warn(event, sentence)
 
     def over(self, event: str) -> None:
-        """An event has ended: the next one of its kind is explained again."""
-        self._said.discard(event)
+        """An event has ended: the next one of its kind is explained again, unless it was a short while ago."""
+        if time.monotonic() - self._said.get(event, 0.0) > QUIET:
+            self._said.pop(event, None)
 
-    def status(self, line: Callable[[], str]) -> None:
-        """Print a status line, if the last one was a second ago."""
+    def status(self, line: Callable[[], str], only: Inlet | None = None) -> None:
+        """Print a status line, if the last one was a second ago; warn where `only` has several publishers."""
         now = time.monotonic()
         if now >= self._next:
             self._next = now + STATUS_PERIOD
             self._say(line())
+            if only is not None and (count := only.publishers()) > 1:
+                what = f"{only.topic} has {count} publishers, whose messages are mixed"
+                self.warn(what, f"{what}. End all but one, or give one another topic with --remap")
 
     def events(self) -> str:
         """The counts as text; empty without any."""

@@ -85,7 +85,7 @@ class VehicleNode:
             if lock_step and self._commands.take():
                 self._reporter.trouble("unasked commands", "a command came before its odometry: it is ignored")
             self._publish(observed, k)
-            self._reporter.status(self.status)
+            self._reporter.status(self.status, self._commands)
             if lock_step:
                 self._await_command()
             elif k < self._steps:
@@ -154,7 +154,7 @@ class VehicleNode:
                 why = f"no command came for {of} within {self._settings.patience:g} s"
                 raise BadInput("", "", why)
             self._link.wait(WAIT)
-            self._reporter.status(self.status)
+            self._reporter.status(self.status, self._commands)
 
     def _keep_pace(self, until: float) -> None:
         """Take commands until an instant of this machine's time; at once in `fast`."""
