@@ -15,6 +15,7 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.logs.mcap_writer import write_mcap
 from undertow.logs.read import read_log
+from undertow.scenario.build import build
 
 MAGIC = b"\x89MCAP0\r\n"
 MUCH = 2**28  # bytes; few enough for a machine of a build to survive the old code
@@ -105,7 +106,7 @@ def test_arrays_of_arrays_in_a_format(tmp_path):
 
 
 def test_networks_that_unpack_to_much(tmp_path):
-    model = ut.scenario.build.build(
+    model = build(
         {"plant": "inverted_pendulum", "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1}}
     ).closed_loop.plant.model()
     np.savez_compressed(tmp_path / "a.npz", weight_0=np.zeros((MUCH // 24, 3)), bias_0=np.zeros(1))
