@@ -294,3 +294,24 @@ def test_a_navigation_filter_logs_its_steps(tmp_path):
     np.testing.assert_array_equal(log["position"].values, [one.position for one in found])
     np.testing.assert_array_equal(log["body_velocity"].values, [one.velocity[:3] for one in found])
     np.testing.assert_allclose(log["attitude"].values[0], [0, 0, 0.5], atol=1e-15)
+
+
+def test_horizons_off_the_steps_of_the_curve(run):
+    """Between steps of the curve, 0.1 s apart, linear; none below the first."""
+    log = run.log()
+    plant = HEAVY["plant"] | {"vehicle": {"kind": "bluerov2_heavy", "parameters": "wu2018"}}
+    built = build(HEAVY | {"plant": plant})
+    found = score(built, log, horizons=(0.1, 0.25, 1.0), every=0.25)
+    np.testing.assert_allclose(found.rms[0], found.growth[0], rtol=1e-12)
+    np.testing.assert_allclose(found.rms[1], (found.growth[1] + found.growth[2]) / 2, rtol=1e-9)
+    np.testing.assert_allclose(found.rms[2], found.growth[9], rtol=1e-12)
+    with pytest.raises(BadInput, match=r"`horizons` must be 0.1 s or longer, the step of the curve, but is 0.04 s"):
+        score(built, log, horizons=(0.04, 1.0))
+
+
+def test_a_model_that_diverges_is_no_score(run):
+    log = run.log()
+    pulses = log["input"]._replace(values=1500.0 + log["input"].values * 1e9)
+    wrong = Log(dict(log.signals) | {"input": pulses}, "pwm.csv", "CSV")
+    with pytest.raises(BadInput, match=r"pwm.csv, with which it diverges within [\d.]+ s of a start. Check the units"):
+        score(build(HEAVY), wrong, horizons=(1.0,))

@@ -1,6 +1,7 @@
 """A policy, learned or written by hand, as a controller: a function of an observation that gives an action."""
 
 import io
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -18,6 +19,7 @@ from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.numerics.linear_algebra import matvec
 
+_LARGEST = 2**26  # bytes of the arrays of a network: small files can be made that unpack to any size
 _LAYER = "weight_{}", "bias_{}"
 
 
@@ -115,7 +117,13 @@ def _network(path: Path) -> Network:
         BadInput: it cannot be read, or its layers do not fit.
     """
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
+        data = io.BytesIO(path.read_bytes())
+        with zipfile.ZipFile(data) as file:
+            size = sum(one.file_size for one in file.infolist())
+        if size > _LARGEST:
+            raise ValueError(f"its arrays have {size} bytes, more than the {_LARGEST} that are read")
+        data.seek(0)
+        with np.load(data, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
     except Exception as error:  # whatever the readers of zip files and of arrays raise
         raise BadInput("function", "be an .npz file of numbers", f"{path.name}: {error}") from None

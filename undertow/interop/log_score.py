@@ -6,6 +6,7 @@ seconds before.
 """
 
 import json
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -35,6 +36,8 @@ EVERY = 5.0  # s between starts
 
 _RUN_IN = 2.0  # s; rotors forget within tenths of a second
 _CURVE = 0.1  # s between points of the error over the horizon
+_ROUNDING = 1e-9  # share of a horizon
+_ENDLESS = 1e15  # m, rad, m/s or rad/s; a prediction beyond it has diverged
 _EARLY = 1e-2  # share of the median interval by which a command counts early, as in controllers/replay.py
 
 
@@ -77,11 +80,12 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
     Args:
         built: the scenario.
         log: with the motion and the inputs.
-        horizons: s.
+        horizons: s; from the step of the curve on, about 0.1 s.
         every: s between starts.
 
     Raises:
-        BadInput: the plant is no vehicle, the log is of another one, or too short.
+        BadInput: the plant is no vehicle, the log is of another one or too short, horizons are too short, or the model
+            diverges.
     """
     plant, loop = built.closed_loop.plant, built.scenario.loop
     if not isinstance(plant, HybridVehicle):
@@ -89,12 +93,17 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
     checks.positive("horizons", horizons, "s")
     checks.positive("every", every, "s")
     motion, inputs = motion_of(log), inputs_of(log, ("input", "commanded_input"))
+    if not (np.isfinite(motion.outputs).all() and np.isfinite(motion.nu).all()):
+        raise BadInput("log", "have attitudes and velocities that are finite", f"{log.source}, where one never is")
     if inputs.values.shape[1] != plant.inputs():
         must = f"have {plant.inputs()} inputs, as many as the vehicle has thrusters"
         raise BadInput("log", must, f"{log.source} with {inputs.values.shape[1]}", hint="Is it of another vehicle?")
-    starts = _starts(motion, inputs, log, max(horizons), every)
     stride = max(1, round(_CURVE / loop.dt))
-    steps = -(-round(max(horizons) / loop.dt) // stride) * stride
+    spacing = loop.dt * stride
+    if min(horizons) < spacing * (1 - _ROUNDING):
+        raise BadInput("horizons", f"be {spacing:g} s or longer, the step of the curve", f"{min(horizons):g} s")
+    steps = math.ceil(max(horizons) / spacing * (1 - _ROUNDING)) * stride
+    starts = _starts(motion, inputs, log, loop.dt * steps, every)
     before = round(_RUN_IN / loop.dt)
     times = starts[:, None] + loop.dt * np.arange(-before, steps)
     with on_processor():
@@ -108,12 +117,26 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
         settings = (before, stride, loop.method if loop.method in METHODS else "rk4", loop.substeps)
         limited = "input" not in log
         predicted = jax.device_get(_predicted(realization, given, jnp.asarray(loop.dt, dtype=float), limited, settings))
-    after = loop.dt * stride * np.arange(1, steps // stride + 1)
+    after = spacing * np.arange(1, steps // stride + 1)
+    _check_finite(np.asarray(predicted), after, log)
     errors = np.asarray(predicted, dtype=float) - _logged(motion, starts[:, None] + after)
     errors[..., 3:6] -= 2 * np.pi * np.round(errors[..., 3:6] / (2 * np.pi))
     growth = np.sqrt((errors**2).mean(axis=0))
-    places = [min(round(horizon / (loop.dt * stride)), len(after)) - 1 for horizon in horizons]
-    return Score(tuple(map(float, horizons)), growth[places], starts, after, growth)
+    rms = np.stack([np.interp(horizons, after, column) for column in growth.T], axis=1)
+    return Score(tuple(map(float, horizons)), rms, starts, after, growth)
+
+
+def _check_finite(predicted: np.ndarray, after: np.ndarray, log: Log) -> None:
+    """Check that a prediction, of shape (starts, times, 12), stays below what can be squared.
+
+    Raises:
+        BadInput: it does not.
+    """
+    good = (np.abs(predicted) < _ENDLESS).all(axis=(0, 2))  # false for NaN
+    if not good.all():
+        got = f"{log.source}, with which it diverges within {after[np.argmin(good)]:.4g} s of a start"
+        hint = "Check the units of the inputs, and their order: pulses that are declared as volts are 1500 V"
+        raise BadInput("log", "have motions and inputs with which the model stays finite", got, hint=hint)
 
 
 class _Windows(NamedTuple):

@@ -85,7 +85,7 @@ def read_ardupilot(path: Path) -> Recording:
     Times are TimeUS, since the start of the autopilot. What belongs to no message is left out, with a note.
 
     Raises:
-        BadInput: no such file, or without messages that have a time.
+        BadInput: no such file, without messages that have a time, or with times that are text.
     """
     data = path.read_bytes()
     if not data.startswith(_HEAD):
@@ -94,6 +94,8 @@ def read_ardupilot(path: Path) -> Recording:
     for kind, places in scan.places.items():
         if kind.fields.names is None or kind.fields.names[0] != "TimeUS":
             continue
+        if not kind.divisors[0]:
+            raise BadInput("log", "have numbers as TimeUS", f"{path.name}, whose messages {kind.name} have text there")
         rows = np.frombuffer(b"".join(data[at + 3 : at + kind.size] for at in places), kind.fields)
         tables |= _tables(kind, rows, scan.numbered.get(kind.name, ""))
     if not tables:

@@ -1,7 +1,7 @@
 """CSV files: those with any header, as a table; those that `write_csv` wrote, as the log that they were.
 
 The header of ours is `time [s]`, then `signal.column [unit]` for each number. Signals that were sampled at other times
-leave their cells empty.
+leave their cells empty. Lines end in CR LF, so that one that was cut off is known.
 """
 
 import csv
@@ -50,14 +50,14 @@ def read_csv(path: Path) -> Log | Recording:
     Raises:
         BadInput: not text, without rows, rows of different length, or cells that are no numbers.
     """
-    header, numbers, empty = _read(path)
+    header, numbers, empty, notes = _read(path)
     fields = {name: numbers[:, i] for i, name in enumerate(header)}
     if header[0] == _TIME and all(_OURS.fullmatch(name) for name in header[1:]):
-        return _our_log(path, header, numbers, empty)
+        return _our_log(path, header, numbers, empty, notes)
     return Recording({"": Table(np.arange(len(numbers), dtype=float), fields)}, path.name, "CSV")
 
 
-def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarray) -> Log:
+def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarray, notes: tuple[str, ...]) -> Log:
     times, several = numbers[:, 0], {}
     for i, name in enumerate(header[1:], start=1):
         found = _OURS.fullmatch(name)
@@ -70,17 +70,20 @@ def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarr
         values = numbers[np.ix_(kept, places)]
         alone = titles == ("",)
         signals[name] = Series(times[kept], values[:, 0] if alone else values, () if alone else titles, unit)
-    return Log(signals, path.name, "CSV")
+    return Log(signals, path.name, "CSV", notes)
 
 
-def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Header, numbers, and which cells are empty."""
+def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Header, numbers, which cells are empty, and notes."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadInput("log", "be a CSV text file", f"{path.name}: {error.reason} at byte {error.start}") from None
+    lines, notes = text.splitlines(), ()
+    if text.startswith(_TIME) and "\r\n" in text and not text.endswith(("\r", "\n")):
+        lines, notes = lines[:-1], (f"the file ends early, within line {len(lines)}, which is left out",)
     try:
-        rows = list(csv.reader(text.splitlines(), delimiter=_delimiter(text)))
+        rows = list(csv.reader(lines, delimiter=_delimiter(text)))
     except csv.Error as error:
         raise BadInput("log", "be a CSV text file", f"{path.name}: {error}") from None
     numbered = [
@@ -93,7 +96,7 @@ def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
         again = next(name for name in header if header.count(name) > 1)
         raise BadInput("log", "have columns of different names", f"{path.name}, where `{again}` occurs twice")
     numbers = np.array([_numbers(path.name, line, row, header) for line, row in numbered[1:]])
-    return header, numbers, np.array([[not cell for cell in row] for _, row in numbered[1:]])
+    return header, numbers, np.array([[not cell for cell in row] for _, row in numbered[1:]]), notes
 
 
 def _delimiter(text: str) -> str:

@@ -1,5 +1,7 @@
 """A log: named time series with units, and how evenly they were sampled."""
 
+import os
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -123,6 +125,8 @@ class Log:
     def save(self, path: str | Path) -> None:
         """Write all signals to a file: .mcap, which keeps everything, or .csv, which keeps the numbers.
 
+        The file appears whole or not at all; one that was there stays until then.
+
         Raises:
             BadInput: another kind of file.
             OSError: it cannot be written.
@@ -134,7 +138,16 @@ class Log:
         path = Path(path)
         if path.suffix not in writers:
             raise BadInput("path", f"be a file whose name ends in {' or '.join(writers)}", str(path))
-        writers[path.suffix](self, path)
+        target = path.resolve()  # what a link points to, not the link
+        handle, temporary = tempfile.mkstemp(suffix=f"{path.suffix}.tmp", dir=target.parent)
+        os.close(handle)
+        try:
+            writers[path.suffix](self, Path(temporary))
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, target)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
 
     def __repr__(self) -> str:
         lines = [f"Log of {self.source} ({self.format}), {self.duration():g} s"]

@@ -3,9 +3,11 @@
 A file that ends early, as after `kill -9`, is read up to there.
 """
 
+import dataclasses
 import io
 import json
-from collections.abc import Iterator, Mapping
+import struct
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +20,10 @@ from undertow.logs.messages import is_ours, number, signals_of
 from undertow.logs.recording import Recording, Table
 
 _LARGEST = 2**28  # bytes of a record; none of ours comes near
+_LARGEST_CHUNK = 2**26  # bytes of an unpacked chunk: small files can be made that unpack to any size
+
+_HEAD = struct.Struct("<BQ")  # of a record: its kind, and the bytes that follow
+_DATA_END, _IN_CHUNKS = 0x0F, (0x03, 0x04, 0x05)  # kinds; chunks hold schemas, channels and messages
 
 
 class _Contents(NamedTuple):
@@ -51,10 +57,10 @@ def read_mcap(path: Path) -> Log | Recording:
     found = _contents(path)
     others = found.encodings - {"json"}
     if not found.messages:
-        got = (
-            f"{path.name}, whose messages are {', '.join(sorted(others))}" if others else f"{path.name}, which has none"
-        )
-        raise BadInput("log", "have messages in JSON", got)
+        got = f"whose messages are {', '.join(sorted(others))}" if others else "which has none"
+        if found.notes:
+            got = f"{got} before it ends: {found.notes[-1]}"
+        raise BadInput("log", "have messages in JSON", f"{path.name}, {got}")
     ours = {topic: messages for topic, messages in found.messages.items() if is_ours(found.schemas[topic][0])}
     if ours:
         return _our_log(path, found, ours)
@@ -135,22 +141,80 @@ def _records(path: Path, notes: list[str]) -> Iterator[Any]:
     """Records of the data section. A file that ends early gives those that are whole, and a note."""
     from mcap.stream_reader import StreamReader
 
-    stream = io.BytesIO(path.read_bytes())
-    size = stream.getbuffer().nbytes
-    records = iter(StreamReader(stream, validate_crcs=True, record_size_limit=_LARGEST).records)
+    data = path.read_bytes()
+    size, stream = len(data), io.BytesIO(_without_zeros(path, data))
+    end = stream.getbuffer().nbytes
+    reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=_LARGEST)
+    records = iter(reader.records)
     place = 0  # of the record that is read next
     while True:
         try:
             record = next(records, None)
+            parts = _broken_up(record) if type(record).__name__ == "Chunk" else [record]
         except Exception as error:  # whatever bytes may cause
-            if place and stream.tell() >= size:
+            if place and stream.tell() >= end:
                 notes.append(f"the file ends early, within the record at byte {place} of {size}")
                 return
             raise _damaged(path, f"at byte {place}: {str(error) or type(error).__name__}") from None
         if record is None or type(record).__name__ == "DataEnd":
             return
         place = stream.tell()
-        yield record
+        yield from parts
+
+
+def _without_zeros(path: Path, data: bytes) -> bytes:
+    """The bytes of a file without zeros at its end, which a failure of power leaves there.
+
+    Raises:
+        BadInput: zeros elsewhere, where a record should begin.
+    """
+    at = _first_other(data, 8, range(1, 256))  # after the bytes that mark the format
+    if data[at:].strip(b"\0") and at < len(data):
+        raise _damaged(path, f"at byte {at}: a record of kind 0, which there is not")
+    return data[:at]
+
+
+def _first_other(data: bytes, at: int, kinds: Collection[int]) -> int:
+    """Place of the first record of another kind, from a place on; the length of the data without one."""
+    while at + _HEAD.size <= len(data):
+        kind, size = _HEAD.unpack_from(data, at)
+        if kind not in kinds:
+            return at
+        if kind == _DATA_END:
+            break
+        at += _HEAD.size + size
+    return len(data)
+
+
+def _broken_up(chunk: Any) -> list[Any]:
+    """Records of a chunk.
+
+    Raises:
+        ValueError: it is too large, or holds what no chunk does.
+    """
+    from mcap.stream_reader import breakup_chunk
+
+    size = chunk.uncompressed_size
+    data = _unpacked(chunk.compression, chunk.data) if size <= _LARGEST_CHUNK else b""
+    if max(size, len(data)) > _LARGEST_CHUNK:
+        raise ValueError(f"a chunk of {max(size, len(data))} bytes, more than the {_LARGEST_CHUNK} that are read")
+    other = _first_other(data, 0, _IN_CHUNKS)
+    if other < len(data):
+        raise ValueError(f"a record of kind {data[other]} in a chunk, where there is none of it")
+    return breakup_chunk(dataclasses.replace(chunk, compression="", data=data), validate_crc=True)
+
+
+def _unpacked(compression: str, data: bytes) -> bytes:
+    """The data of a chunk, or a little more of it than is read. The size that the file declares may be a lie."""
+    if compression == "zstd":
+        import zstandard
+
+        return zstandard.ZstdDecompressor().stream_reader(data).read(_LARGEST_CHUNK + 1)
+    if compression == "lz4":
+        import lz4.frame
+
+        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=_LARGEST_CHUNK + 1)
+    return data
 
 
 def _damaged(path: Path, what: str) -> BadInput:

@@ -16,6 +16,7 @@ import numpy as np
 from undertow.logs import foxglove
 from undertow.logs.log import Log, Series
 from undertow.logs.messages import MessageForm, grouped
+from undertow.logs.motion import at_times, without_jumps
 
 METADATA = "undertow"  # name of the record with the facts of a log
 
@@ -104,9 +105,8 @@ def pose_of(signals: Mapping[str, Series]) -> tuple[np.ndarray, np.ndarray] | No
         return position.time, position.values
     if attitude is None or not len(attitude.time) or not len(position.time):
         return None
-    continuous = np.unwrap(attitude.values, axis=0)
-    angles = [np.interp(position.time, attitude.time, column) for column in continuous.T]
-    return position.time, np.column_stack([position.values, *angles])
+    angles = at_times(position.time, attitude._replace(values=without_jumps(attitude.values)))
+    return position.time, np.column_stack([position.values, angles])
 
 
 def _pose_names(signals: Mapping[str, Series]) -> tuple[str, ...] | None:

@@ -151,12 +151,19 @@ def signals_of(schema: Mapping[str, Any], messages: list[Mapping[str, Any]]) -> 
         if name == "time":
             continue
         columns = tuple(described.get("properties", ()))
-        kinds = json.dumps(described)
         rows = [[one[name][column] for column in columns] if columns else one[name] for one in messages]
-        values = _array(rows, int if '"integer"' in kinds else float)
+        values = _array(rows, _type(described))
         texts = (described.get("unit", "1"), described.get("description", ""), described.get("origin", ""))
         found[name] = Series(time, values, columns, *map(str, texts))
     return found
+
+
+def _type(described: Mapping[str, Any]) -> type:
+    """Type of the numbers that a schema describes, within its objects and arrays."""
+    while described.get("type") in ("object", "array"):
+        inner = described.get("properties", {}).values() if described["type"] == "object" else [described["items"]]
+        described = next(iter(inner), {})
+    return int if described.get("type") == "integer" else float
 
 
 def _array(rows: list[Any], kind: type) -> np.ndarray:

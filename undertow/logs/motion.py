@@ -54,7 +54,7 @@ def motion_of(log: Log) -> LoggedMotion:
     position = log["measured_position" if "position" not in log and "measured_position" in log else "position"]
     whole = position.values.shape[1:] == (6,)
     attitude = position._replace(values=position.values[:, 3:]) if whole else log["attitude"]
-    turning = attitude._replace(values=_without_jumps(attitude.values))
+    turning = attitude._replace(values=without_jumps(attitude.values))
     velocity, rates = _velocities(log)
     used = [position, turning, velocity, rates]
     start, end = (pick(one.time[place] for one in used if len(one.time)) for pick, place in ((max, 0), (min, -1)))
@@ -62,12 +62,12 @@ def motion_of(log: Log) -> LoggedMotion:
     time = position.time[kept]
     if len(time) < 2:
         raise BadInput("log", "have position, attitude and velocities of the same times", log.source)
-    angles = _at(time, turning)
+    angles = at_times(time, turning)
     place = position.values[kept, :3]
-    linear = _at(time, velocity)
+    linear = at_times(time, velocity)
     if velocity.columns[:3] == ("north", "east", "down"):  # world axes
         linear = np.einsum("kij,ki->kj", frames.rotations(angles), linear[:, :3])
-    turned = _at(time, rates)
+    turned = at_times(time, rates)
     if rates.values.shape[1] == 6:  # rates of the Euler angles
         turned = frames.angular_velocity_of_rates(angles, turned[:, 3:])
     return LoggedMotion(time, np.hstack([place, angles]), np.hstack([linear, turned]))
@@ -82,7 +82,7 @@ def _velocities(log: Log) -> tuple[Series, Series]:
     return linear, log["angular_velocity"]
 
 
-def _without_jumps(angles: np.ndarray) -> np.ndarray:
+def without_jumps(angles: np.ndarray) -> np.ndarray:
     """Angles without jumps of a turn; rows that are not finite stay."""
     found = angles.copy()
     good = np.isfinite(angles).all(axis=1)
@@ -90,7 +90,7 @@ def _without_jumps(angles: np.ndarray) -> np.ndarray:
     return found
 
 
-def _at(time: np.ndarray, series: Series) -> np.ndarray:
+def at_times(time: np.ndarray, series: Series) -> np.ndarray:
     """Values at other times, linear between samples that are finite; the samples themselves at their times."""
     good = np.isfinite(series.values).all(axis=1)
     known, values = series.time[good], series.values[good]

@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from undertow.logs.recording import Recording, Table
 
 # Reads at the end of a file from which on pyulog goes round in circles, as it does where the definitions are cut off.
 _MOST_AT_END = 1000
+
+# Numbers of a topic, and of all topics. Arrays of arrays in a file of a hundred bytes could be billions.
+_MOST_FIELDS, _MOST_IN_ALL = 2**16 - 1, 2**18
 
 
 class _Stream(io.BytesIO):
@@ -37,13 +41,11 @@ def read_px4(path: Path) -> Recording:
         BadInput: damaged, or pyulog is not installed.
     """
     check_installed("pyulog", "pyulog")
-    from pyulog import ULog
-
     notes: list[str] = []
     stream = _Stream(path.read_bytes())
     try:
         with quiet(notes):
-            found = ULog(stream)
+            found = _parsed(stream)
         tables = {}
         for data in found.data_list:
             topic = data.name if data.multi_id == 0 else f"{data.name}[{data.multi_id}]"
@@ -59,6 +61,38 @@ def read_px4(path: Path) -> Recording:
     if found.dropouts:
         notes.append(f"{len(found.dropouts)} dropouts while it was recorded")
     return Recording(tables, path.name, "PX4", tuple(notes))
+
+
+def _parsed(stream: _Stream) -> Any:
+    """What pyulog makes of a file whose topics are not too large."""
+    from pyulog import ULog
+
+    sizes: dict[str, int] = {}
+    total = 0
+
+    class Checked(ULog):
+        class _MessageAddLogged(ULog._MessageAddLogged):
+            def _parse_format(self, message_formats):
+                nonlocal total
+                size = _fields(self.message_name, message_formats, sizes)
+                total += size
+                if size > _MOST_FIELDS or total > _MOST_IN_ALL:
+                    most = f"{_MOST_FIELDS} of a topic and {_MOST_IN_ALL} in all"
+                    raise RuntimeError(
+                        f"{self.message_name} has {size} fields, {total} with those before; {most} are read"
+                    )
+                super()._parse_format(message_formats)
+
+    return Checked(stream)
+
+
+def _fields(name: str, formats: Any, sizes: dict[str, int]) -> int:
+    """Number of the fields of a format, those of the formats within it included; 1 for one that is not described."""
+    if name not in formats:
+        return 1
+    if name not in sizes:
+        sizes[name] = sum(max(1, several) * _fields(kind, formats, sizes) for kind, several, _ in formats[name].fields)
+    return sizes[name]
 
 
 def _table(data) -> Table:
