@@ -251,6 +251,7 @@ def test_a_log_survives_kill_9(tmp_path):
 def test_an_autopilot_logs_its_steps(tmp_path):
     """The bits of the simulation; after another start the time goes on; nothing is written after `close_log`."""
     noisy = HEAVY | {"navigation": {"kind": "white_noise", "position": 0.001, "velocity": 0.01}}
+    noisy["reference"] = HEAVY["reference"] | {"start": [0] * 6}  # not at the noisy position that is measured there
     run = ut.simulate_scenario(noisy | {"loop": HEAVY["loop"] | {"duration": 1.0}})
     autopilot = ut.Autopilot(noisy, velocity="rates", log=tmp_path / "a.mcap")
     names = ("measured_position", "measured_velocity", "input")
