@@ -12,9 +12,12 @@ from undertow.cli.results_folder import Draft
 from undertow.cli.stages import stage
 from undertow.cli.tables import terminal_table
 from undertow.core.user_code import python_says
+from undertow.logs.mcap_writer import write_mcap
+from undertow.logs.run_log import log_of_run
+from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.plotting import Plotted, PlottingProcess
-from undertow.report.replay.replay_data import Replay
+from undertow.report.replay.replay_data import Replay, hull_size
 from undertow.report.run_page import shown, write_run_page
 from undertow.report.run_tables import prediction_rows
 from undertow.scenario.build import Built, in_its_precision
@@ -61,7 +64,7 @@ def present(
     """
     page = draft.path / "run.html"
     with stage(console, "figures and page"):
-        looks = shown(executed.dataset, executed.built.closed_loop, lambda: _written(plotting, draft))
+        looks = shown(executed.dataset, executed.built.closed_loop, lambda: _written(executed, plotting, draft))
         warn_of(looks.failures)
         write_run_page(page, executed.dataset, looks)
     draft.publish()  # nobody waits for the prediction, which is added to the page
@@ -76,8 +79,11 @@ def present(
     return looks.replay
 
 
-def _written(plotting: PlottingProcess, draft: Draft) -> Plotted:
-    """The figures, once their files and the log are written."""
+def _written(executed: Executed, plotting: PlottingProcess, draft: Draft) -> Plotted:
+    """The figures, once their files are written; meanwhile the log, because another process plots them."""
+    plant = executed.built.closed_loop.plant
+    size = hull_size(plant.vehicle, executed.dataset).tolist() if isinstance(plant, HybridVehicle) else None
+    write_mcap(log_of_run(executed.dataset), draft.path / "run.mcap", size)
     plotted = plotting.plotted()
     plotted.write(draft.path / "figures")
     return plotted

@@ -17,8 +17,7 @@ from undertow.cli.tables import terminal_table, wide_console
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.logs.run_log import log_of_run
-from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.report.plotting import LogFile, plotting_process
+from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows
 from undertow.scenario.build import Built, build, own_parts
 from undertow.scenario.execute import Executed, execute, write
@@ -62,7 +61,7 @@ def simulate(
         write(executed, draft.path)
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
-        plotting.plot(folder / "run.nc", pdf, _log_file(executed, draft.path / "run.mcap"))
+        plotting.plot(folder / "run.nc", pdf)
         predicting = thread.submit(_predicted, executed.built) if prediction else None
         _print_results(executed, folder, console)
         code = max(_ending_code(executed), _repetition_code(repetition, console) if repetition else DONE)
@@ -96,14 +95,6 @@ def _run(path: Path, console: Console, allow_code: bool, video: bool) -> Execute
         typer.echo(f"Advice: {one.sentence}", err=True)
     with stage(console, "compiling and running"):
         return interruptible(lambda: execute(built))
-
-
-def _log_file(executed: Executed, path: Path) -> LogFile:
-    from undertow.report.replay.replay_data import hull_size
-
-    plant = executed.built.closed_loop.plant
-    size = hull_size(plant.vehicle, executed.dataset).tolist() if isinstance(plant, HybridVehicle) else None
-    return LogFile(path, size)
 
 
 def _predicted(built: Built) -> "PredictedMetrics":

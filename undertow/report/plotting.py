@@ -1,4 +1,4 @@
-"""Figures and log of a run, made by a process of their own while this one goes on.
+"""Figures of a run, plotted by a process of their own while this one goes on.
 
 Starting matplotlib takes as long as the start of JAX, and plotting as long as the prediction; a process that is started
 with the command does both on another core.
@@ -11,7 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 
 class Plotted(NamedTuple):
@@ -38,20 +38,8 @@ class Plotted(NamedTuple):
             (folder / name).write_bytes(data)
 
 
-class LogFile(NamedTuple):
-    """The log that is written with the figures.
-
-    Attributes:
-        path: of the .mcap file.
-        size: length, width and height of the vehicle, m; None for usual ones.
-    """
-
-    path: Path
-    size: Any = None
-
-
 class PlottingProcess:
-    """A process that plots one run, and writes its log.
+    """A process that plots one run.
 
     Args:
         process: runs `serve`; None where figures are plotted by this process.
@@ -59,21 +47,21 @@ class PlottingProcess:
 
     def __init__(self, process: subprocess.Popen[bytes] | None):
         self._process = process
-        self._asked: tuple[Path, str | None, LogFile | None] | None = None
+        self._asked: tuple[Path, str | None] | None = None
 
-    def plot(self, run: Path, width: str | None, log: LogFile | None = None) -> None:
-        """Begin to plot the run in a file `run.nc`, with PDF files where a width is given, and to write a log of it."""
-        self._asked = run, width, log
+    def plot(self, run: Path, width: str | None) -> None:
+        """Begin to plot the run in a file `run.nc`, with PDF files where a width is given."""
+        self._asked = run, width
         if self._process is not None and self._process.stdin is not None:
             with contextlib.suppress(OSError):  # it has ended; `plotted` then plots here
                 self._process.stdin.write(pickle.dumps(self._asked))
                 self._process.stdin.close()
 
     def plotted(self) -> Plotted:
-        """Wait for the figures and the log; they are made here where the process cannot.
+        """Wait for the figures; plotted here where the process cannot.
 
         Raises:
-            OSError: the file of the run cannot be read, or the log not be written.
+            OSError: the file of the run cannot be read.
         """
         assert self._asked is not None, "`plot` comes first"
         if self._process is not None and self._process.stdout is not None:
@@ -106,7 +94,7 @@ def plotting_process() -> Iterator[PlottingProcess]:
 
 
 def serve() -> None:
-    """Plot the run whose file standard input names, write its log, and give the figures to standard output.
+    """Plot the run whose file standard input names, and write the figures to standard output.
 
     Whatever else is printed goes to standard error.
     """
@@ -120,15 +108,10 @@ def serve() -> None:
         answer.close()
 
 
-def _plot(run: Path, width: str | None, log: LogFile | None) -> Plotted:
+def _plot(run: Path, width: str | None) -> Plotted:
     import xarray as xr
 
-    from undertow.logs.mcap_writer import write_mcap
-    from undertow.logs.run_log import log_of_run
     from undertow.report.run_figures import plotted
 
     with xr.open_dataset(run) as dataset:
-        found = plotted(dataset.load(), width)
-        if log is not None:
-            write_mcap(log_of_run(dataset), log.path, log.size)
-    return found
+        return plotted(dataset.load(), width)
