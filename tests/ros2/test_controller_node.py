@@ -14,11 +14,11 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.interop.ros2 import messages as ros
 from undertow.interop.ros2.controller_node import CompiledController, ControllerNode, ControllerSettings
-from undertow.interop.ros2.frames import quaternion_of_euler
 from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity
 from undertow.interop.ros2.link import Link, why_nothing
 from undertow.interop.ros2.node import Reporter, Topics
 from undertow.interop.ros2.to_messages import odometry_of, target_message
+from undertow.logs.frames import quaternions
 
 SCENARIO = """
 plant: {vehicle: odin, thruster: {kind: paper_table3, fidelity: shaft, supply: 24}}
@@ -26,9 +26,7 @@ controller: {kind: pid, frequency: 1.0}
 reference: {kind: setpoint, position: [1, 0.5, 0.3, 0, 0, 0.4], settling: 2}
 loop: {duration: 1, dt: 0.05, record: 0.05}
 """
-AWAY = PoseAndVelocity(
-    np.array([0.2, -0.1, 0.3]), quaternion_of_euler([0.02, 0.03, 0.1]), np.array([0.1, 0, 0, 0, 0, 0.05])
-)
+AWAY = PoseAndVelocity(np.array([0.2, -0.1, 0.3]), quaternions([0.02, 0.03, 0.1]), np.array([0.1, 0, 0, 0, 0, 0.05]))
 
 
 @pytest.fixture(scope="module")

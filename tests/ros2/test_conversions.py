@@ -6,13 +6,14 @@ import pytest
 from undertow.core.errors import BadInput
 from undertow.interop.ros2 import from_messages, to_messages
 from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.frames import between_attitudes, quaternion_of_euler
+from undertow.interop.ros2.frames import between_attitudes
 from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity
+from undertow.logs.frames import quaternions
 
 FRAMES = Frames()
 STAMP = ros.Time(12, 345)
 MOTION = PoseAndVelocity(
-    np.array([1.0, 2.0, 3.0]), quaternion_of_euler([0.1, -0.2, 0.3]), np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    np.array([1.0, 2.0, 3.0]), quaternions([0.1, -0.2, 0.3]), np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
 )
 
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from undertow.interop.ros2 import frames
-from undertow.logs.frames import attitudes_of_quaternions
+from undertow.logs.frames import attitudes_of_quaternions, quaternions
 from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_from_euler, rotation_from_quaternion
 
 WORLD = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])  # NED -> ENU
@@ -43,26 +43,26 @@ def test_an_attitude_is_one_rotation_in_either_axes(chance):
 )
 def test_yaw_counts_from_east_and_to_the_left(heading, yaw):
     """REP 103: a vehicle that points east has yaw zero."""
-    quaternion = frames.between_attitudes(frames.quaternion_of_euler([0, 0, heading]))
+    quaternion = frames.between_attitudes(quaternions([0, 0, heading]))
     found = Rotation.from_quat(quaternion, scalar_first=True).as_euler("ZYX")
     assert abs(np.exp(1j * found[0]) - np.exp(1j * yaw)) < 1e-15 and np.abs(found[1:]).max() < 1e-15
 
 
 def test_roll_is_the_same_and_pitch_turns_round():
     """Port, the axis of pitch here, is against starboard; forward, that of roll, is the same."""
-    quaternion = frames.between_attitudes(frames.quaternion_of_euler([0.2, 0.1, 0.0]))
+    quaternion = frames.between_attitudes(quaternions([0.2, 0.1, 0.0]))
     yaw, pitch, roll = Rotation.from_quat(quaternion, scalar_first=True).as_euler("ZYX")
     np.testing.assert_allclose([roll, pitch, yaw], [0.2, -0.1, np.pi / 2], atol=1e-15)
 
 
 def test_euler_angles_are_those_of_the_package(chance):
     angles = chance.uniform([-3, -1.5, -3], [3, 1.5, 3], (100, 3))
-    quaternions = frames.quaternion_of_euler(angles)
+    found = quaternions(angles)
     expected = np.array([quaternion_from_euler(jnp.asarray(one)) for one in angles])
-    np.testing.assert_allclose(quaternions, expected, atol=1e-15)
-    np.testing.assert_allclose(attitudes_of_quaternions(quaternions, "NED", "FRD"), angles, atol=1e-12)
-    back = [euler_from_rotation(rotation_from_quaternion(jnp.asarray(one))) for one in quaternions]
-    np.testing.assert_allclose(attitudes_of_quaternions(quaternions, "NED", "FRD"), back, atol=1e-12)
+    np.testing.assert_allclose(found, expected, atol=1e-15)
+    np.testing.assert_allclose(attitudes_of_quaternions(found, "NED", "FRD"), angles, atol=1e-12)
+    back = [euler_from_rotation(rotation_from_quaternion(jnp.asarray(one))) for one in found]
+    np.testing.assert_allclose(attitudes_of_quaternions(found, "NED", "FRD"), back, atol=1e-12)
 
 
 def test_body_velocity_is_that_of_the_package(chance):

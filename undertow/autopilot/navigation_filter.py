@@ -110,7 +110,7 @@ class NavigationFilter:
         length = 1.0 if turned else np.linalg.norm(given.attitude)
         if not length > 0:
             raise BadInput("attitude", "be a quaternion of some length", "zero")
-        angles = quaternions(given.attitude[None])[0] if turned else given.attitude / length
+        angles = quaternions(given.attitude) if turned else given.attitude / length
         received = self._received(readings or {}, {})
         put(self._begin.inputs, given._replace(attitude=angles))
         self._begin()

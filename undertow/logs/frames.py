@@ -4,6 +4,7 @@ ENU: x east, y north, z up; FLU: x forward, y left (port), z up, as of ROS (REP 
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 # Rows: our axes; columns: those of the log.
 _OF_WORLD = {"NED": np.eye(3), "ENU": np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])}
@@ -65,16 +66,13 @@ def euler_angles(rotation: np.ndarray) -> np.ndarray:
     return np.stack([roll, pitch, yaw], axis=1)
 
 
-def quaternions(angles: np.ndarray) -> np.ndarray:
-    """Unit quaternions (w, x, y, z), body to world, of roll, pitch, yaw (rad), shape (rows, 4)."""
-    (sr, sp, sy), (cr, cp, cy) = np.sin(angles / 2).T, np.cos(angles / 2).T
-    columns = [
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    ]
-    return np.stack(columns, axis=1)
+def quaternions(angles: ArrayLike) -> np.ndarray:
+    """Unit quaternions (w, x, y, z), body to world, of roll, pitch, yaw (rad) along the last axis."""
+    halves = np.moveaxis(np.asarray(angles, dtype=float), -1, 0) / 2
+    (sr, sp, sy), (cr, cp, cy) = np.sin(halves), np.cos(halves)
+    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    return np.stack([w, x, y, z], axis=-1)
 
 
 def angular_velocity_of_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:

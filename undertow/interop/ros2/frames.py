@@ -35,15 +35,6 @@ def between_attitudes(quaternion: ArrayLike) -> NDArray:
     return _HALF_ROOT * np.stack([w + z, x + y, x - y, w - z], axis=-1)
 
 
-def quaternion_of_euler(angles: ArrayLike) -> NDArray:
-    """Unit quaternion (w, x, y, z) of roll, pitch, yaw (rad); Fossen (2021), ch. 2."""
-    halves = np.moveaxis(np.asarray(angles, dtype=float), -1, 0) / 2
-    (sr, sp, sy), (cr, cp, cy) = np.sin(halves), np.cos(halves)
-    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
-    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
-    return np.stack([w, x, y, z], axis=-1)
-
-
 def body_velocity_of_rates(angles: ArrayLike, rates: ArrayLike) -> NDArray:
     """(u, v, w, p, q, r) of the rates of (north, east, down, roll, pitch, yaw) at roll, pitch, yaw; m/s and rad/s.
 

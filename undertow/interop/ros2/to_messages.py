@@ -5,13 +5,9 @@ from numpy.typing import ArrayLike
 
 from undertow.core.errors import BadInput
 from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.frames import (
-    between_attitudes,
-    between_frd_and_flu,
-    between_ned_and_enu,
-    quaternion_of_euler,
-)
+from undertow.interop.ros2.frames import between_attitudes, between_frd_and_flu, between_ned_and_enu
 from undertow.interop.ros2.from_messages import SECOND, Frames, PoseAndVelocity
+from undertow.logs.frames import quaternions
 
 
 def stamp_of(nanoseconds: int) -> ros.Time:
@@ -50,7 +46,7 @@ def imu_of(motion: PoseAndVelocity, specific_force: ArrayLike, stamp: ros.Time, 
 def target_message(outputs: ArrayLike, stamp: ros.Time, frames: Frames) -> ros.PoseStamped:
     """Pose message of outputs (north, east, down, m; roll, pitch, yaw, rad)."""
     outputs = np.asarray(outputs, dtype=float)
-    return ros.PoseStamped(ros.Header(stamp, frames.world[0]), _pose(outputs[:3], quaternion_of_euler(outputs[3:])))
+    return ros.PoseStamped(ros.Header(stamp, frames.world[0]), _pose(outputs[:3], quaternions(outputs[3:])))
 
 
 def wrench_of(wrench: ArrayLike, stamp: ros.Time, frames: Frames) -> ros.WrenchStamped:

@@ -13,9 +13,10 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_OUTPUTS
 from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.frames import body_velocity_of_rates, quaternion_of_euler
+from undertow.interop.ros2.frames import body_velocity_of_rates
 from undertow.interop.ros2.from_messages import SECOND, Frames, PoseAndVelocity, thruster_label
 from undertow.interop.ros2.to_messages import odometry_of, stamp_of, target_message, thrusters_of
+from undertow.logs.frames import quaternions
 
 STORAGES = ("mcap", "sqlite3")
 
@@ -92,4 +93,4 @@ def write_rosbag2(run: Any, folder: str | Path, storage: str = "mcap") -> None:
 
 def _motion(position: NDArray, rates: NDArray) -> PoseAndVelocity:
     angles = position[3:]
-    return PoseAndVelocity(position[:3], quaternion_of_euler(angles), body_velocity_of_rates(angles, rates))
+    return PoseAndVelocity(position[:3], quaternions(angles), body_velocity_of_rates(angles, rates))
