@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-_G = 9.81  # m/s^2
+from undertow.sensors.motion import gravity
+
 _SIZE = 15  # errors of attitude, gyro bias, velocity, force bias, position; three each
 _OUTPUTS = {"north": 12, "east": 13, "down": 14, "roll": 0, "pitch": 1, "yaw": 2}
 _REMEDIES = {"north": "position_fix", "east": "position_fix", "down": "depth", "yaw": "compass"}
@@ -27,7 +28,8 @@ class Sensed(NamedTuple):
 def error_dynamics() -> np.ndarray:
     """Matrix A of e_dot = A e at rest: gravity turns an error of the attitude into one of the acceleration."""
     a, one = np.zeros((_SIZE, _SIZE)), np.eye(3)
-    force = np.array([[0, _G, 0], [-_G, 0, 0], [0, 0, 0]])  # cross product with the specific force (0, 0, -g)
+    g = float(gravity()[2])
+    force = np.array([[0, g, 0], [-g, 0, 0], [0, 0, 0]])  # cross product with the specific force (0, 0, -g)
     a[0:3, 3:6], a[6:9, 0:3], a[6:9, 9:12], a[12:15, 6:9] = -one, -force, -one, one
     return a
 
