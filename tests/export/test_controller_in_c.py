@@ -67,7 +67,7 @@ def test_a_time_that_is_wrong_costs_one_step(folder, wrong, seconds):
     expected = autopilot.start(*at(0), target=target)
     for k in range(1, 60):
         if k == 30 and seconds is None:
-            continue  # what the last step gave is applied a step longer, which is what C was told
+            continue  # what the last step gave is applied a step longer, as in C
         expected = autopilot.step(*at(k), target=target, dt=seconds if k == 30 else None)
     found = commands(folder, wrong)
     assert np.isfinite(found).all()

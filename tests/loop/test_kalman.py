@@ -291,7 +291,7 @@ def test_what_sensors_cannot_observe_is_said_in_words(sensors, unseen):
         assert f"the sensors cannot observe {', '.join(unseen)} of a vehicle at rest" in said[0]
 
 
-def test_the_drift_that_is_foretold_is_that_of_the_filter():
+def test_the_drift_that_is_predicted_is_that_of_the_filter():
     """Without fixes and compass: the deviations after a minute are those of a filter that ran for a minute."""
     sensors = [imu(), dvl(resolution=0.0, delay=0.0), depth(resolution=0.0)]
     navigation = kalman(sensors)
@@ -299,11 +299,11 @@ def test_the_drift_that_is_foretold_is_that_of_the_filter():
     of_rates, of_force = (np.asarray(one) for one in own.inertial_noise(sensors[0]))
     drifts = np.repeat([1e-5**2, 1e-4**2], 3)
     noise = np.concatenate([of_rates, drifts[:3], of_force, drifts[3:], np.zeros(3)])
-    foretold = deviations(sensed(sensors), np.asarray(own.initial_deviations()), noise, 60.0)
+    predicted = deviations(sensed(sensors), np.asarray(own.initial_deviations()), noise, 60.0)
     _, covariances = followed(navigation, level, 6000, 0.01, jax.random.split(jax.random.PRNGKey(0), 1))
     of_filter = np.sqrt(np.diag(np.asarray(covariances[0, -1])))
     for name, i in {"north": 12, "east": 13, "down": 14, "yaw": 2, "roll": 0}.items():
-        np.testing.assert_allclose(foretold[name], of_filter[i], rtol=0.05, err_msg=name)
+        np.testing.assert_allclose(predicted[name], of_filter[i], rtol=0.05, err_msg=name)
 
 
 @pytest.mark.parametrize(

@@ -149,7 +149,7 @@ class Autopilot:
             The output, one entry per actuator, or six of a wrench.
 
         Raises:
-            BadInput: a shape is wrong, or a number is not finite, also of the command; the state stays as it was.
+            BadInput: a shape is wrong, or a number is not finite, or the law's command is not: then call `start` again.
         """
         motion = self._motion(position, velocity, attitude)
         for name, value in zip(Motion._fields, motion, strict=True):
