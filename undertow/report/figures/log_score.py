@@ -13,6 +13,8 @@ _PANELS = (
 )
 _LOOKS = (style.SOLID, style.DASHED, style.Look("#009e73", (0, (1, 1.2)), 1.3, 4))
 
+_HEADROOM = 1.55  # over the largest error, for the key
+
 
 def log_score_figure(times: NDArray, growth: NDArray) -> Figure:
     """Root mean square over all starts, of each axis.
@@ -28,7 +30,7 @@ def log_score_figure(times: NDArray, growth: NDArray) -> Figure:
         for i, (axis, look) in enumerate(zip(axes, _LOOKS, strict=True)):
             panel.plot(times, growth[:, 3 * number + i], label=axis, **look.line)
         panel.set_xlim(0, times[-1])
-        panel.set_ylim(bottom=0)
+        panel.set_ylim(0, _HEADROOM * max(panel.dataLim.y1, 1e-12))
         panel.legend(fontsize=style.TINY, frameon=False, loc="upper left", handlelength=2.4, borderaxespad=0.2)
         style.label(panel, "time since the start, s", "", title)
     return figure
