@@ -1,5 +1,6 @@
 """One compiled controller, stepped by somebody else's clock."""
 
+import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -348,5 +349,5 @@ def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | No
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
     loop = built.closed_loop
-    open_loop = ClosedLoop(loop.plant, loop.controller, built.reference, loop.disturbance, loop.navigation)
+    open_loop = dataclasses.replace(loop, reference=built.reference)
     return open_loop, built.scenario.precision, built.scenario.loop.dt

@@ -43,6 +43,9 @@ class Measurement(NamedTuple):
     velocity: Outputs  # m/s, rad/s
     actuator: Any = None  # report of the actuators; None where there is none
     body: BodyMotion | None = None  # None for a plant that is not a body in space
+    health: Any = (
+        None  # per actuator, 1, or 0 where it announced that it has failed; None where none announces anything
+    )
 
 
 class Target(NamedTuple):
@@ -303,6 +306,10 @@ class AbstractContinuousController(AbstractController):
         return z
 
 
+class AbstractGatedController(AbstractController):
+    """A controller that decides by itself what to do with readings that are not finite: it gets them as they are."""
+
+
 class AbstractInformedController(AbstractController):
     """A law that models more of the acceleration than F + G u, such as the dynamics of its motors."""
 
@@ -332,6 +339,43 @@ class AbstractDisturbance(eqx.Module):
     @abc.abstractmethod
     def jumps(self, duration: float) -> tuple[float, ...]:
         """Times in (0, duration), s, at which the load is not smooth."""
+
+
+class AbstractFaults(eqx.Module):
+    """Faults of sensors, actuators and plant, injected into a run. Each method does nothing before the first onset."""
+
+    @abc.abstractmethod
+    def realize(self, key: PRNGKeyArray) -> PyTree:
+        """Realization: everything random about one run."""
+
+    @abc.abstractmethod
+    def init(self, realization: PyTree, y: Measurement, u: Inputs) -> PyTree:
+        """State before the first step, for a measurement and an input of these shapes."""
+
+    @abc.abstractmethod
+    def measurement(self, realization: PyTree, state: PyTree, t: Time, y: Measurement) -> tuple[Measurement, PyTree]:
+        """Measurement that reaches the controller at time t, and the state afterwards."""
+
+    @abc.abstractmethod
+    def input(
+        self, realization: PyTree, state: PyTree, t: Time, u: Inputs, limits: tuple[Inputs, Inputs]
+    ) -> tuple[Inputs, PyTree]:
+        """Input that acts on the plant although `u` is applied, as far as the controller knows; and the state.
+
+        `limits` are the least and the largest input that the plant takes now.
+        """
+
+    @abc.abstractmethod
+    def load(self, realization: PyTree, t: Time, pose: Pose | None, load: Load) -> Load:
+        """The load with that of faults of the plant added to it."""
+
+    @abc.abstractmethod
+    def active(self, realization: PyTree, t: Time) -> Int[Array, ""]:
+        """Number of faults that are present at time t."""
+
+    @abc.abstractmethod
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        """Times in (0, duration), s, at which faults begin and end."""
 
 
 class AbstractReference(eqx.Module):

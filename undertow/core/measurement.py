@@ -55,5 +55,5 @@ def completed(y: Measurement, truth: Measurement) -> Measurement:
 def with_outputs(y: Measurement, position: Array, velocity: Array) -> Measurement:
     """The measurement of any plant with other outputs (m, rad) and rates, such as noisy ones."""
     if y.body is None:
-        return Measurement(position, velocity, y.actuator)
-    return measurement_of_outputs(position, velocity, y.actuator)
+        return y._replace(position=position, velocity=velocity)
+    return measurement_of_outputs(position, velocity, y.actuator)._replace(health=y.health)

@@ -1,5 +1,6 @@
 """The closed loop of plant, controller, reference, disturbance and navigation, and its signals at an instant."""
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -11,6 +12,8 @@ from undertow.core.arrays import as_array
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
+    AbstractFaults,
+    AbstractGatedController,
     AbstractInformedNavigation,
     AbstractNavigation,
     AbstractPlant,
@@ -29,15 +32,19 @@ from undertow.core.measurement import completed
 from undertow.core.returned import check_command
 from undertow.core.signals import Signal, check_declared
 from undertow.loop.readings import Expected, at_start
-from undertow.loop.recorded_signals import RECORDED, Signals
+from undertow.loop.recorded_signals import RECORDED, RECORDED_WITH_FAULTS, Signals
 from undertow.numerics.random_keys import keys_for
+
+# Input beyond the limit of any actuator, in its unit: what the plant makes of it is its limit.
+_LARGE = 1e6
 
 
 class MeasurementState(NamedTuple):
-    """State of measuring."""
+    """State of measuring, and of faults."""
 
     navigation: PyTree  # its state
     expected: Expected | None  # None for smooth navigation, whose readings are finite where the truth is
+    faults: PyTree = ()  # () without faults
 
 
 class Decision(NamedTuple):
@@ -46,19 +53,24 @@ class Decision(NamedTuple):
     y: Measurement
     r: Target
     command: Inputs
-    applied: Inputs
+    applied: Inputs  # as far as the controller knows
     signals: Signals  # that the controller declares
     measuring: Any  # MeasurementState afterwards; () where there is none
+    acting: Inputs  # on the plant: other than the applied one where an actuator has failed
 
 
 class ClosedLoop(eqx.Module):
-    """Plant, controller, reference, disturbance and navigation, ready to be run by either loop."""
+    """Plant, controller, reference, disturbance, navigation and faults, ready to be run by either loop.
+
+    Faults are decided at every control step, which only the sampled loop has.
+    """
 
     plant: AbstractPlant
     controller: AbstractController
     reference: AbstractReference
     disturbance: AbstractDisturbance
     navigation: AbstractNavigation
+    faults: AbstractFaults | None = None
 
     def outputs_at_start(self, position: Any, velocity: Any) -> tuple[Outputs, Outputs]:
         """Outputs at t = 0 as arrays, zero where None: one compiled program serves every start."""
@@ -70,7 +82,7 @@ class ClosedLoop(eqx.Module):
         """This loop with its reference beginning where the plant does; at zero where None."""
         start, _ = self.outputs_at_start(position, None)
         reference = starting_at(self.reference, start)
-        return ClosedLoop(self.plant, self.controller, reference, self.disturbance, self.navigation)
+        return dataclasses.replace(self, reference=reference)
 
     def signals(self) -> dict[str, Signal]:
         """Declarations of everything that is recorded of this loop, by name.
@@ -78,7 +90,7 @@ class ClosedLoop(eqx.Module):
         Raises:
             BadInput: two parts declare a signal of the same name.
         """
-        found = dict(RECORDED)
+        found = RECORDED | (RECORDED_WITH_FAULTS if self.faults is not None else {})
         informed = [self.navigation] if isinstance(self.navigation, AbstractInformedNavigation) else []
         for part in (self.plant, self.controller, *informed):
             for name, signal in part.signals().items():
@@ -93,7 +105,9 @@ class ClosedLoop(eqx.Module):
 
     def realized_with(self, disturbance: PyTree, key: PRNGKeyArray) -> "Realization":
         """The same with a realization of the disturbance that is known."""
-        return Realization(self, disturbance, self.navigation.realize(_keys(key)["navigation"]))
+        keys = _keys(key)
+        faults = () if self.faults is None else self.faults.realize(keys["faults"])
+        return Realization(self, disturbance, self.navigation.realize(keys["navigation"]), faults)
 
 
 class Realization(NamedTuple):
@@ -102,6 +116,7 @@ class Realization(NamedTuple):
     loop: ClosedLoop
     disturbance_realization: PyTree
     navigation_realization: PyTree
+    faults_realization: PyTree = ()
 
     def start(self, position: Outputs | None = None, velocity: Outputs | None = None) -> tuple[PyTree, PyTree]:
         """States of plant and controller at t = 0, from the outputs there."""
@@ -121,20 +136,28 @@ class Realization(NamedTuple):
         """State of measuring at t = 0."""
         zero, navigation = jnp.zeros(()), self.loop.navigation
         truth = self.loop.plant.output(zero, x)
-        state = navigation.init(self.navigation_realization, truth)
-        if navigation.smooth is True:  # where the field is not static it is traced, and treated as False
+        state, faults = navigation.init(self.navigation_realization, truth), self._faults_at_start(truth)
+        # Where the field is not static it is traced, and treated as False.
+        if navigation.smooth is True and self.loop.faults is None:
             return MeasurementState(state, None)
         y, _ = _measured(navigation, self.navigation_realization, state, zero, truth)
-        return MeasurementState(state, at_start(self.loop.controller.model.coordinates, truth, y))
+        return MeasurementState(state, at_start(self.loop.controller.model.coordinates, truth, y), faults)
+
+    def _faults_at_start(self, truth: Measurement) -> PyTree:
+        if self.loop.faults is None:
+            return ()
+        return self.loop.faults.init(self.faults_realization, truth, jnp.zeros(self.loop.plant.inputs()))
 
     def load(self, t: Time, x: PyTree) -> Load:
         """Load of the environment on the plant at time t."""
-        plant = self.loop.plant
-        return self.loop.disturbance.at(self.disturbance_realization, t, plant.pose(x), plant.no_load())
+        plant, faults = self.loop.plant, self.loop.faults
+        pose = plant.pose(x)
+        load = self.loop.disturbance.at(self.disturbance_realization, t, pose, plant.no_load())
+        return load if faults is None else faults.load(self.faults_realization, t, pose, load)
 
-    def motion(self, t: Time, x: PyTree, applied: Inputs) -> PyTree:
+    def motion(self, t: Time, x: PyTree, acting: Inputs) -> PyTree:
         """Rates of the plant's state, of the shape of that."""
-        return _moved(self, t, x, applied)
+        return _moved(self, t, x, acting)
 
     def decide(self, t: Time, x: PyTree, z: PyTree, measuring: Any = ()) -> Decision:
         """Measure, compute the command and limit it; `measuring` is that of the previous step."""
@@ -147,19 +170,23 @@ class Realization(NamedTuple):
         if not isinstance(measuring, MeasurementState):
             return _completed(_measured(loop.navigation, realization, measuring, t, truth), truth)
         y, state = _completed(_measured(loop.navigation, realization, measuring.navigation, t, truth), truth)
+        faults = measuring.faults
+        if loop.faults is not None:
+            y, faults = loop.faults.measurement(self.faults_realization, faults, t, y)
         if measuring.expected is None:
-            return y, MeasurementState(state, None)
-        y, expected = measuring.expected.repaired(loop.controller.model.coordinates, y)
-        return y, MeasurementState(state, expected)
+            return y, MeasurementState(state, None, faults)
+        repaired, expected = measuring.expected.repaired(loop.controller.model.coordinates, y)
+        gated = isinstance(loop.controller, AbstractGatedController)
+        return (y if gated else repaired), MeasurementState(state, expected, faults)
 
     def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
         """All recorded signals of time t. Errors are those of the true state, not of the measurement."""
         plant, controller = self.loop.plant, self.loop.controller
         truth = plant.output(t, x)
-        y, r, command, applied, of_controller, measuring = decision
-        acceleration = plant.acceleration(t, x, applied, self.load(t, x))
-        effort = plant.effort(x, applied)
-        of_plant = plant.diagnostics(x, applied)
+        y, r, command, applied, of_controller, measuring, acting = decision
+        acceleration = plant.acceleration(t, x, acting, self.load(t, x))
+        effort = plant.effort(x, acting)
+        of_plant = plant.diagnostics(x, acting)
         check_declared(plant, of_plant, "diagnostics")
         check_declared(controller, of_controller, "command")
         recorded = {
@@ -178,6 +205,8 @@ class Realization(NamedTuple):
             "saturated": effort.saturated,
             "bad_readings": self._bad_readings(measuring),
         }
+        if self.loop.faults is not None:
+            recorded |= {"acting_input": acting, "active_faults": self.loop.faults.active(self.faults_realization, t)}
         return recorded | of_plant | of_controller | self._of_navigation(measuring)
 
     def _of_navigation(self, measuring: Any) -> Signals:
@@ -212,7 +241,19 @@ def _decided(realization: Realization, t: Time, x: PyTree, z: PyTree, measuring:
     answer = loop.controller.command(z, y, r)
     check_command(loop.controller, answer, loop.plant.inputs())
     command, signals = answer
-    return Decision(y, r, command, loop.plant.admissible(x, command), signals, measuring)
+    applied = acting = loop.plant.admissible(x, command)
+    if loop.faults is not None and isinstance(measuring, MeasurementState):
+        acting, faults = _failed(realization, measuring.faults, t, x, applied)
+        measuring = measuring._replace(faults=faults)
+    return Decision(y, r, command, applied, signals, measuring, acting)
+
+
+def _failed(realization: Realization, faults: PyTree, t: Time, x: PyTree, applied: Inputs) -> tuple[Inputs, PyTree]:
+    """Input that acts on the plant, and the state of the faults."""
+    loop, most = realization.loop, jnp.full(applied.shape, _LARGE)
+    limits = loop.plant.admissible(x, -most), loop.plant.admissible(x, most)
+    assert loop.faults is not None
+    return loop.faults.input(realization.faults_realization, faults, t, applied, limits)
 
 
 @eqx.filter_jit
@@ -230,4 +271,4 @@ def _completed(measured: tuple[Measurement, PyTree], truth: Measurement) -> tupl
 
 
 def _keys(key: PRNGKeyArray) -> dict[str, PRNGKeyArray]:
-    return keys_for(key, "disturbance", "navigation")
+    return keys_for(key, "disturbance", "navigation", "faults")

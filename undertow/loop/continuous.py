@@ -27,7 +27,7 @@ def flow(t: Float[Array, ""], state: tuple[PyTree, PyTree], realization: Realiza
     x, z = state
     controller = cast(AbstractContinuousController, realization.loop.controller)
     decision = realization.decide(t, x, z)
-    x_rate = realization.motion(t, x, decision.applied)
+    x_rate = realization.motion(t, x, decision.acting)
     commanded = jnp.isfinite(decision.command).all()  # limits and dead zones would hide a NaN
     x_rate = jax.tree.map(lambda rate: jnp.where(commanded, rate, jnp.nan), x_rate)
     return x_rate, controller.flow(z, decision.y, decision.r, decision.applied)
@@ -123,11 +123,12 @@ def check(loop: ClosedLoop) -> None:
     """Check that a closed loop can be one ODE.
 
     Raises:
-        BadInput: the law exists only sampled, or the navigation is not smooth.
+        BadInput: the law exists only sampled, the navigation is not smooth, or there are faults.
     """
     for obstacle, what in (
         (not isinstance(loop.controller, AbstractContinuousController), "controller, which exists only sampled"),
         (not loop.navigation.smooth, "navigation, whose noise is new at every sample"),
+        (loop.faults is not None, "list of `faults`, which are decided at every sample"),
     ):
         if obstacle:
             raise BadInput("kind", f"be sampled with this {what}", "continuous")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from jaxtyping import PyTree
 
-from undertow.core.contracts import AbstractController, Inputs, Measurement, Target, Time
+from undertow.core.contracts import AbstractController, AbstractGatedController, Inputs, Measurement, Target, Time
 from undertow.loop.readings import Expected, at_start
 
 
@@ -46,12 +46,14 @@ def next_step(
 ) -> tuple[Memory, Answer]:
     """The step `dt` after the last one, since when `applied` was applied.
 
-    Entries of the measurement that are not finite are replaced by those that the law's model expects.
+    Entries of the measurement that are not finite are replaced by those that the law's model expects, unless the law
+    gets them as they are.
     """
     state, before, _, estimate, expected = memory
     advanced = law.advance(state, before, memory.r, applied, dt)
-    expected = expected.after(law, state, before, None if isinstance(estimate, tuple) else estimate, applied, dt)
-    y, expected = expected.repaired(law.model.coordinates, y)
+    if not isinstance(law, AbstractGatedController):
+        expected = expected.after(law, state, before, None if isinstance(estimate, tuple) else estimate, applied, dt)
+        y, expected = expected.repaired(law.model.coordinates, y)
     return _decided(law, advanced, y, r, expected)
 
 

@@ -22,3 +22,9 @@ RECORDED = {
     "saturated": Signal(("actuator",), "1", "1 where the input is at its limit"),
     "bad_readings": Signal((), "1", "readings so far that were not finite: ignored, or replaced by expected values"),
 }
+
+# Signals of a loop with faults.
+RECORDED_WITH_FAULTS = {
+    "acting_input": Signal(("actuator",), "[input]", "input that acts on the plant, faults included"),
+    "active_faults": Signal((), "1", "number of faults that are present"),
+}

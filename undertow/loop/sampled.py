@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
-from undertow.core.contracts import Outputs
+from undertow.core.contracts import AbstractGatedController, Outputs
 from undertow.core.errors import BadInput
 from undertow.core.returned import check_state
 from undertow.loop.closed_loop import ClosedLoop, Realization
@@ -131,12 +131,12 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
         # Of the first stage, whose acceleration is then computed once; where the load jumps, it has jumped.
         signals = realization.signals(jnp.asarray(first_stage(t, dt / substeps)), x, z, decision)
         gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
-    new_x = moved(lambda t, x: realization.motion(t, x, decision.applied), t, x, dt, integrate, substeps)
+    new_x = moved(lambda t, x: realization.motion(t, x, decision.acting), t, x, dt, integrate, substeps)
     y, law = decision.y, loop.controller
     new_z = law.advance(z, y, decision.r, decision.applied, dt)
     check_state(law, new_z, z)
     remembered = decision.measuring
-    if remembered.expected is not None:
+    if remembered.expected is not None and not isinstance(law, AbstractGatedController):
         expected = remembered.expected.after(law, z, y, decision.signals.get("estimate"), decision.applied, dt)
         remembered = remembered._replace(expected=expected)
     new = (new_x, new_z, remembered)

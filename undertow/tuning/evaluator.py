@@ -1,6 +1,7 @@
 """Evaluation of gains: many gains on many trials at once, and the gradient of their cost by forward differentiation."""
 
 import concurrent.futures
+import dataclasses
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -75,7 +76,7 @@ class TrainingLoop(NamedTuple):
     def with_parts(self, plant: AbstractPlant, law: AbstractController, size: Any = 1.0) -> ClosedLoop:
         """The loop with a plant, a controller, and a scaled disturbance."""
         loop = self.loop
-        return ClosedLoop(plant, law, loop.reference, Scaled(loop.disturbance, size), loop.navigation)
+        return dataclasses.replace(loop, plant=plant, controller=law, disturbance=Scaled(loop.disturbance, size))
 
     def run(
         self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""], smooth: bool = False
