@@ -31,11 +31,13 @@ KINDS = (
     "references",
     "sensors",
     "navigation",
+    "supervision",
 )
 
 # Key of a scenario -> kind of its part.
 KIND_OF = {"plant": "plants", "controller": "controllers", "reference": "references"}
 KIND_OF |= {"disturbance": "disturbances", "navigation": "navigation", "metrics": "metrics"}
+KIND_OF |= {"supervisor": "supervision"}
 
 # Kind of a part -> where it stands in a scenario.
 KEY_OF = {kind: key for key, kind in KIND_OF.items()}

@@ -306,16 +306,24 @@ class AbstractContinuousController(AbstractController):
         return z
 
 
-class AbstractGatedController(AbstractController):
-    """A controller that decides by itself what to do with readings that are not finite: it gets them as they are."""
-
-
 class AbstractInformedController(AbstractController):
     """A law that models more of the acceleration than F + G u, such as the dynamics of its motors."""
 
     @abc.abstractmethod
     def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
         """The acceleration that the law models; d is the rest."""
+
+
+class AbstractGatedController(AbstractInformedController):
+    """A controller that decides by itself what to do with readings that are not finite: it gets them as they are."""
+
+
+class AbstractRestartable(AbstractInformedController):
+    """A law with knowledge that a restart must not lose, such as which thrusters have failed."""
+
+    @abc.abstractmethod
+    def restarted(self, z: PyTree, y: Measurement, r: Target) -> PyTree:
+        """State of a law that begins again from a measurement."""
 
 
 def known_acceleration(law: AbstractController, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:

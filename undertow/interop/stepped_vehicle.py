@@ -11,10 +11,10 @@ from undertow.autopilot.numbers import numbers, step_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Inputs
+from undertow.core.expected_measurement import all_finite
 from undertow.core.status import Status
 from undertow.interop.pulse_driven import pulse_driven
 from undertow.loop.closed_loop import ClosedLoop, Realization
-from undertow.loop.readings import all_finite
 from undertow.loop.stepped import put, realized
 from undertow.numerics.integrators import COMPACT_METHODS
 from undertow.numerics.linear_algebra import matvec

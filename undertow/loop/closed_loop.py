@@ -28,10 +28,10 @@ from undertow.core.contracts import (
     starting_at,
 )
 from undertow.core.errors import BadInput
+from undertow.core.expected_measurement import Expected, at_start
 from undertow.core.measurement import completed
 from undertow.core.returned import check_command
 from undertow.core.signals import Signal, check_declared
-from undertow.loop.readings import Expected, at_start
 from undertow.loop.recorded_signals import RECORDED, RECORDED_WITH_FAULTS, Signals
 from undertow.numerics.random_keys import keys_for
 

@@ -13,10 +13,10 @@ from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from undertow.core.contracts import AbstractContinuousController, Outputs
 from undertow.core.errors import BadInput
+from undertow.core.expected_measurement import all_finite
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.outcome import Ending, Outcome, going, status_of
-from undertow.loop.readings import all_finite
 from undertow.loop.recording import freeze_on_failure, instant, record
 from undertow.numerics.integrators import rk4_compact
 

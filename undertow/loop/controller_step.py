@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from jaxtyping import PyTree
 
 from undertow.core.contracts import AbstractController, AbstractGatedController, Inputs, Measurement, Target, Time
-from undertow.loop.readings import Expected, at_start
+from undertow.core.expected_measurement import Expected, at_start
 
 
 class Memory(NamedTuple):

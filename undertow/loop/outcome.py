@@ -6,9 +6,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PyTree
 
 from undertow.core.contracts import Inputs
+from undertow.core.expected_measurement import all_finite
 from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.readings import all_finite
 from undertow.loop.recorded_signals import Signals
 
 

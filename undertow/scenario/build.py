@@ -14,8 +14,13 @@ from undertow.analysis.success import criterion_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array, in_present_precision
 from undertow.core.catalogue import KIND_OF
-from undertow.core.contracts import AbstractDisturbance, AbstractInformedNavigation, AbstractReference
-from undertow.core.errors import Advice, advice, within
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractDisturbance,
+    AbstractInformedNavigation,
+    AbstractReference,
+)
+from undertow.core.errors import Advice, BadInput, advice, within
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.disturbances.adding import Together
 from undertow.loop import continuous
@@ -161,6 +166,21 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         resolved["disturbance"] = [description for _, description in pairs]
         return Together(tuple(member for member, _ in pairs))
 
+    def supervised(part: Part, law: AbstractController) -> AbstractController:
+        """The law under supervision, with the fallback that takes its place."""
+        options, fallback, described = part.model_dump(), None, {}
+        if "fallback" in options:
+            given = options.pop("fallback")
+            given = {"kind": given} if isinstance(given, str) else given
+            if not (isinstance(given, Mapping) and isinstance(given.get("kind"), str)):
+                raise BadInput("supervisor.fallback", "be a controller by name, or a mapping with `kind`", given)
+            fallback, found = one("controller", "supervisor.fallback", Part(**given), (model,))
+            described = {"fallback": found}
+        context["update_period"] = float(getattr(navigation, "update_period", 0.0))
+        made, resolved["supervisor"] = one("supervisor", "supervisor", Part(**options), (law, plant, fallback))
+        resolved["supervisor"] |= described
+        return made
+
     plant = make("plant")
     known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
     with within("model"):
@@ -172,6 +192,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     check_noise(navigation, noise, plant, own_parts(scenario, text.folder))
     context["velocity_noise"] = np.asarray(noise, dtype=float).tolist()
     controller = make("controller", (model,))
+    if scenario.supervisor is not None:
+        controller = supervised(scenario.supervisor, controller)
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
     resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario
     with within("loop"):

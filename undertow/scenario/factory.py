@@ -50,6 +50,7 @@ _CONTRACTS = {
     "references": contracts.AbstractReference,
     "sensors": AbstractSensor,
     "navigation": contracts.AbstractNavigation,
+    "supervision": contracts.AbstractGatedController,
     "metrics": AbstractMetric,
 }
 

@@ -21,6 +21,8 @@ def _named(default: str | None = None) -> BeforeValidator:
     def complete(value: Any) -> Any:
         if isinstance(value, str):
             return {"kind": value}
+        if default and value is True:
+            return {"kind": default}
         return {"kind": default, **value} if default and isinstance(value, dict) else value
 
     return BeforeValidator(complete)
@@ -162,6 +164,11 @@ class Scenario(Strict):
     disturbance: OneOrMore = Field(Part(kind="none"), description="the disturbance; several as a list")
     navigation: NamedPart = Field(
         Part(kind="perfect"), description="the navigation filter, which computes the measurement of the controller"
+    )
+    supervisor: Annotated[Part, _named("supervisor")] | None = Field(
+        None,
+        description="supervision of the controller: true, or options of the supervisor; `fallback` is a controller "
+        "that takes over when the law fails",
     )
     loop: Loop = Field(default_factory=Loop, description="settings of the simulation")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults

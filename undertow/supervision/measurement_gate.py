@@ -1,0 +1,141 @@
+"""Gate for measurements: readings that cannot be true are replaced by the prediction of the nominal model.
+
+Those are readings that are not finite, implausibly large, too far from the prediction, or stuck. The prediction holds
+the applied input and the law's estimate of the uncertainty, so that the law does not adapt to it.
+"""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from undertow.core import checks
+from undertow.core.contracts import Measurement
+from undertow.core.param import Param, param
+from undertow.numerics.number import Number
+from undertow.numerics.rotations import attitude_error
+from undertow.supervision.motion import Motion, motion_of, path_velocity, predicted, split, with_motion
+from undertow.supervision.stuck_readings import StuckReadings, StuckState
+
+
+class GateState(NamedTuple):
+    """State of the gate."""
+
+    expected: Motion  # at this instant
+    path: tuple[Array, Array]  # believed velocity of position and attitude, m/s and rad/s
+    stuck: StuckState
+    since: Number  # time since the last step, s
+    actuator: Any  # last finite report of the actuators
+
+
+class Passed(NamedTuple):
+    """What the gate lets through, and what it found."""
+
+    measurement: Measurement
+    stuck: StuckState
+    not_finite: Number  # entries
+    implausible: Number  # largest size relative to its limit
+    jump: Number  # largest difference from the prediction relative to its limit
+    missing: Number  # motion missing from stuck readings relative to its limit
+
+
+class MeasurementGate(eqx.Module):
+    """Limits of plausible readings.
+
+    Raises:
+        BadInput: a limit is not positive.
+    """
+
+    stuck: StuckReadings
+    max_distance: Float[Param, ""] = param("m", "largest plausible coordinate")
+    max_speed: Float[Param, ""] = param("m/s", "largest plausible velocity")
+    max_rate: Float[Param, ""] = param("rad/s", "largest plausible angular velocity")
+    jump_position: Float[Param, ""] = param("m", "largest plausible difference of a position from its prediction")
+    jump_angle: Float[Param, ""] = param("rad", "the same of the attitude, as a rotation")
+    jump_velocity: Float[Param, ""] = param("m/s", "the same of velocity")
+    jump_rate: Float[Param, ""] = param("rad/s", "the same of angular velocity")
+
+    def __check_init__(self):
+        for name in ("max_distance", "max_speed", "max_rate", *(n for n in vars(self) if n.startswith("jump"))):
+            checks.positive(name, getattr(self, name), finite=False)
+
+    def init(self, y: Measurement) -> GateState:
+        """State before the first measurement; what is not finite in it is expected to be zero, the attitude level."""
+        read = motion_of(y)
+        zero = lambda array: jnp.where(jnp.isfinite(array), array, 0.0)
+        level = jnp.eye(4)[0] if read.attitude.shape[0] else read.attitude
+        attitude = jnp.where(jnp.isfinite(read.attitude).all(), read.attitude, level)
+        expected = Motion(zero(read.position), attitude, zero(read.velocity))
+        path = path_velocity(with_motion(y, expected))
+        return GateState(expected, path, self.stuck.init(read), jnp.zeros(()), jax.tree.map(zero, y.actuator))
+
+    def pass_through(self, state: GateState, y: Measurement, believe: Bool[Array, ""]) -> Passed:
+        """The measurement, with predictions in place of readings that cannot be true.
+
+        Args:
+            state: after the last step.
+            y: measurement.
+            believe: whether a jump is taken as the truth, since the prediction is not.
+        """
+        read, expected = motion_of(y), state.expected
+        finite = Motion(*map(jnp.isfinite, read))
+        of_size, of_jump = self._sizes(read), self._jumps(read, expected)
+        known = lambda ratios: Motion(*(jnp.where(f, ratio, 0.0) for f, ratio in zip(finite, ratios, strict=True)))
+        sizes, jumps = known(of_size), known(of_jump)
+        stuck_state = self.stuck.after(state.stuck, read, state.path, state.since)
+        stuck = self.stuck.found(stuck_state)
+        whole = Motion(stuck.position, stuck.attitude, _each(read.velocity, stuck.velocity, stuck.rates))
+        good = Motion(
+            *(
+                f & (size <= 1) & ((jump <= 1) | believe) & ~held
+                for f, size, jump, held in zip(finite, sizes, jumps, whole, strict=True)
+            )
+        )
+        # A quaternion is good as a whole, or not at all.
+        good = good._replace(attitude=jnp.broadcast_to(good.attitude.all(), good.attitude.shape))
+        reported = jax.tree.map(lambda now, kept: jnp.where(jnp.isfinite(now), now, kept), y.actuator, state.actuator)
+        y = y._replace(actuator=reported)
+
+        def mended() -> Measurement:
+            chosen = (jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True))
+            return with_motion(y, Motion(*chosen))
+
+        all_good = jnp.stack([one.all() for one in good]).all()
+        missing = jnp.stack([(~one).sum(dtype=float) for one in finite]).sum()
+        largest = lambda ratios: jnp.stack([one.max(initial=0.0) for one in ratios]).max()
+        measurement = jax.lax.cond(all_good, lambda: y, mended)
+        return Passed(measurement, stuck_state, missing, largest(sizes), largest(jumps), stuck.missing)
+
+    def after(self, passed: Passed, rate: Array, dt: Number) -> GateState:
+        """State one step later, for a rate of the velocity (m/s^2, rad/s^2) by the model, and the time passed (s)."""
+        y = passed.measurement
+        return GateState(predicted(y, rate, dt), path_velocity(y), passed.stuck, jnp.asarray(dt), y.actuator)
+
+    def _sizes(self, read: Motion) -> Motion:
+        """Sizes of readings relative to their limits."""
+        velocity = _each(read.velocity, self.max_speed, self.max_rate)
+        return Motion(
+            jnp.abs(read.position) / self.max_distance, jnp.zeros_like(read.attitude), jnp.abs(read.velocity) / velocity
+        )
+
+    def _jumps(self, read: Motion, expected: Motion) -> Motion:
+        """Differences between readings and predictions relative to their limits."""
+        turn = jnp.zeros(0)
+        if read.attitude.shape[0]:
+            off = attitude_error(read.attitude, expected.attitude)
+            turn = jnp.broadcast_to(jnp.sqrt((off**2).sum()) / self.jump_angle, (4,))
+        return Motion(
+            jnp.abs(read.position - expected.position) / self.jump_position,
+            turn,
+            jnp.abs(read.velocity - expected.velocity) / _each(read.velocity, self.jump_velocity, self.jump_rate),
+        )
+
+
+def _each(velocity: Array, linear: Any, angular: Any) -> Array:
+    """A value for the linear and one for the angular entries of a velocity."""
+    parts = split(velocity)
+    return jnp.concatenate(
+        [jnp.broadcast_to(one, part.shape) for one, part in zip((linear, angular), parts, strict=True)]
+    )

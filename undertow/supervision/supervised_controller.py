@@ -1,0 +1,424 @@
+"""A supervised controller: gates around a controller, states with reasons, restarts, and a safe output."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PyTree
+
+from undertow.core import checks
+from undertow.core.contracts import (
+    AbstractController,
+    AbstractGatedController,
+    AbstractRestartable,
+    Inputs,
+    Measurement,
+    Model,
+    Outputs,
+    Target,
+    known_acceleration,
+)
+from undertow.core.expected_measurement import all_finite
+from undertow.core.param import Param, param
+from undertow.core.signals import Signal
+from undertow.supervision.conditions import (
+    CONDITIONS,
+    NAMES,
+    NUMBER,
+    OPERATOR,
+    Conditions,
+    PerCondition,
+    Request,
+    State,
+    code_of,
+    held_for,
+    judged,
+    none_held,
+)
+from undertow.supervision.measurement_gate import GateState, MeasurementGate, Passed
+from undertow.supervision.motion import rate_of_velocity
+from undertow.supervision.tracking_allowance import AllowanceState, TrackingAllowance
+from undertow.supervision.transitions import TransitionLog, empty_log, logged
+
+_OVERRUN = 1.5  # sampling times between two steps
+_CLOCK_FAULT = 10.0  # likewise
+_ADVANCED = 3.0  # sampling times by which a law advances at most
+_PREDICTED = 0.5  # s for which the motion is predicted at most
+_NEAR_VERTICAL = np.deg2rad(75)
+_INFEASIBLE = 0.05  # share of the desired acceleration
+_WINDOW = 600.0  # s in which restarts count
+_AVERAGED = 0.5  # s over which the variation of the input is averaged
+_LONG_AGO = -1e9  # s
+_BIG = 1e30  # stands for what is not finite in the log
+
+SIGNALS = {
+    "supervisor_state": Signal((), "1", "0 INIT, 1 READY, 2 ACTIVE, 3 DEGRADED, 4 SAFE, 5 STOPPED"),
+    "supervisor_reason": Signal(
+        (), "1", "code of the reason of that state: its line in the table of conditions; 0 for none"
+    ),
+    "supervisor_value": Signal((), "1", "value of that condition, or of none 0"),
+    "supervisor_limit": Signal((), "1", "its limit"),
+    "supervisor_transitions": Signal((), "1", "transitions so far"),
+    "supervisor_restarts": Signal((), "1", "restarts of the law so far"),
+    "fallback_controls": Signal((), "1", "1 while the fallback controls in place of the law"),
+}
+
+
+Scalar = Float[Array, ""]
+
+
+class SupervisedState(NamedTuple):
+    """State z of a supervised controller."""
+
+    law: PyTree
+    fallback: PyTree  # () without one
+    gate: GateState
+    reference: Target  # last valid one
+    allowance: AllowanceState
+    conditions: Conditions
+    state: Int[Array, ""]
+    reason: Int[Array, ""]
+    cause: Float[Array, "2"]  # value and limit of the reason
+    time: Float[Array, ""]  # s since the start
+    safe_for: Float[Array, ""]  # s in SAFE
+    output: Inputs  # applied last
+    turning: Bool[Array, ""]  # whether the output turns into that of the law, no faster than `slew`
+    variation: Float[Array, ""]  # of the input, ranges per second, averaged
+    restarts: Float[Array, " kept"]  # times of the last restarts, s, the latest first
+    restarted: Int[Array, ""]  # how often
+    fallback_controls: Bool[Array, ""]
+    request: Int[Array, ""]
+    log: TransitionLog
+
+
+class _View(NamedTuple):
+    """What a step sees and decides."""
+
+    passed: Passed
+    r: Target
+    rejected: Scalar  # entries of the reference
+    controls: Bool[Array, ""]  # whether the law's command may leave
+    command: Inputs  # of the law
+    signals: dict[str, Array]  # of the law
+    output: Inputs
+    reached: Bool[Array, ""]  # whether the output is the law's command within limits
+
+
+class Supervised(AbstractGatedController):
+    """A controller between gates. Where nothing is wrong its input has the bits of the controller's own.
+
+    Raises:
+        BadInput: an option is out of its range.
+    """
+
+    law: AbstractController
+    fallback: AbstractController | None
+    gate: MeasurementGate
+    tracking: TrackingAllowance
+    model: Model
+    sampling_time: Float[Param, ""] = param("s", "between two steps")
+    low: Float[Param, " m"] = param("as input", "smallest input")
+    high: Float[Param, " m"] = param("as input", "largest input")
+    safe_output: Float[Param, " m"] = param("as input", "input in all states but ACTIVE and DEGRADED")
+    slew: Float[Param, ""] = param("1/s", "fastest change of the input at a transfer, ranges from limit to limit")
+    max_estimate: Float[Param, " n"] = param("as estimated", "largest plausible estimate of the uncertainty")
+    max_variation: Float[Param, ""] = param("1/s", "variation of the input that counts as chattering, ranges")
+    stop_after: Float[Param, ""] = param("s", "time in SAFE after which the state is STOPPED")
+    restarts: int = eqx.field(static=True, default=3)
+
+    def __check_init__(self):
+        for name in ("sampling_time", "slew", "max_estimate", "max_variation", "stop_after"):
+            checks.positive(name, getattr(self, name), finite=False)
+        checks.finite("safe_output", self.safe_output)
+
+    def init(self, y: Measurement, r: Target) -> SupervisedState:
+        gate = self.gate.init(y)
+        passed = self.gate.pass_through(gate, y, jnp.asarray(True))
+        target, _ = self._checked(Target(jnp.zeros_like(r.position), *map(jnp.zeros_like, r[1:])), r)
+        usable = (passed.not_finite == 0) & (passed.implausible <= 1)
+        state = jnp.where(usable, int(State.ACTIVE), int(State.INIT)).astype(int)
+        zero, none = jnp.zeros(()), jnp.zeros((), dtype=int)
+        log = empty_log()
+        for entered in (State.READY, State.ACTIVE):
+            log = logged(log, usable, (zero, jnp.asarray(int(entered)), none, zero, zero))
+        known = passed.measurement
+        return SupervisedState(
+            law=self.law.init(known, target),
+            fallback=() if self.fallback is None else self.fallback.init(known, target),
+            gate=gate,
+            reference=target,
+            allowance=self.tracking.start(self.model.coordinates, known, target),
+            conditions=none_held(),
+            state=state,
+            reason=none,
+            cause=jnp.zeros(2),
+            time=zero,
+            safe_for=zero,
+            output=self.safe_output,
+            turning=jnp.logical_not(usable),
+            variation=zero,
+            restarts=jnp.full(self.restarts + 1, _LONG_AGO),
+            restarted=none,
+            fallback_controls=jnp.asarray(False),
+            request=jnp.asarray(int(Request.RUN)),
+            log=log,
+        )
+
+    def command(self, z: SupervisedState, y: Measurement, r: Target):
+        view = self._view(z, y, r)
+        own = {
+            "supervisor_state": z.state,
+            "supervisor_reason": z.reason,
+            "supervisor_value": z.cause[0],
+            "supervisor_limit": z.cause[1],
+            "supervisor_transitions": z.log.number,
+            "supervisor_restarts": z.restarted,
+            "fallback_controls": z.fallback_controls.astype(int),
+        }
+        return view.output, view.signals | own
+
+    def advance(self, z: SupervisedState, y: Measurement, r: Target, u_applied: Inputs, dt) -> SupervisedState:
+        view, nominal = self._view(z, y, r), self.sampling_time
+        runs = jnp.isfinite(dt) & (dt > 0)
+        elapsed = jnp.where(runs, jnp.minimum(dt, _PREDICTED), nominal)
+        step = jnp.where(runs & (dt <= _CLOCK_FAULT * nominal), jnp.minimum(dt, _ADVANCED * nominal), nominal)
+        u = jnp.where(jnp.isfinite(u_applied), u_applied, self.safe_output)
+        laws = self._advanced(z, view, u, step)
+        broken = ~all_finite(laws)
+        allowance = self._allowance(z, view, elapsed)
+        variation = self._variation(z, view, u, step)
+
+        found = self._values(z, view, u, allowance, variation) | {
+            "estimator_diverged": jnp.where(broken, jnp.inf, self._estimate_ratio(view)),
+            "overrun": jnp.where(runs, dt / nominal, 0.0),
+            "clock_fault": jnp.where(runs & (dt <= _CLOCK_FAULT * nominal), 0.0, 1.0),
+        }
+        values, limits = (
+            jnp.stack([jnp.asarray(given[name], dtype=float) for name in NAMES]) for given in (found, self._limits())
+        )
+        holds = ~(values <= limits)  # NaN is beyond every limit
+        conditions = held_for(z.conditions, holds, elapsed, self._tolerated(z))
+
+        asked, reason = judged(conditions.level)
+        state, reason = self._next(z, view, asked, reason)
+        begins = _controls(state) & ~view.controls
+        wrong = NUMBER["estimator_diverged"]
+        diverged = view.controls & (
+            broken | (holds[wrong] & (conditions.held[wrong] >= CONDITIONS[wrong].degraded_after))
+        )
+        switches = self._switches(z, conditions)
+        again = begins | diverged | switches
+        counted = (begins & (z.state == int(State.SAFE))) | diverged
+        times = jnp.where(counted, jnp.concatenate([z.time[None], z.restarts[:-1]]), z.restarts)
+        # What has begun again gets its time before it is judged.
+        judged_anew = jnp.arange(len(NAMES)) == wrong
+        conditions = conditions._replace(held=jnp.where(judged_anew & again, 0.0, conditions.held))
+        time, changed = z.time + elapsed, (state != z.state) | (reason != z.reason)
+        cause = jnp.where(changed, _cause(values, limits, reason), z.cause)
+        law, fallback = self._continued(z, view, laws, again, broken)
+        return SupervisedState(
+            law=law,
+            fallback=fallback,
+            gate=self.gate.after(view.passed, self._rate(z, view, u), elapsed),
+            reference=view.r,
+            allowance=allowance,
+            conditions=conditions,
+            state=state,
+            reason=reason,
+            cause=cause,
+            time=time,
+            safe_for=jnp.where(state == int(State.SAFE), z.safe_for + elapsed, 0.0),
+            output=u,
+            turning=again | (z.turning & ~view.reached),
+            variation=variation,
+            restarts=jnp.where(switches, _LONG_AGO, times),
+            restarted=z.restarted + jnp.where(counted, 1, 0),
+            fallback_controls=z.fallback_controls | switches,
+            request=z.request,
+            log=logged(z.log, changed, (time, state, reason, cause[0], cause[1])),
+        )
+
+    def known_acceleration(self, z: SupervisedState, y: Measurement, u_applied: Inputs) -> Outputs:
+        return known_acceleration(self.law, z.law, y, u_applied)
+
+    def signals(self):
+        return self.law.signals() | SIGNALS
+
+    def _view(self, z: SupervisedState, y: Measurement, r: Target) -> _View:
+        controls = _controls(z.state)
+        passed = self.gate.pass_through(z.gate, y, ~controls)
+        r, rejected = self._checked(z.reference, r)
+        y, own = passed.measurement, lambda: self.law.command(z.law, passed.measurement, r)
+        if self.fallback is None:
+            command, signals = own()
+        else:
+            command, signals = jax.lax.cond(z.fallback_controls, lambda: self._by_fallback(z, y, r), own)
+        most = self.slew * (self.high - self.low) * self.sampling_time
+        wanted = jnp.clip(command, self.low, self.high)
+        output = jnp.where(z.turning, jnp.clip(wanted, z.output - most, z.output + most), wanted)
+        leaves = controls & jnp.isfinite(command).all()
+        output = jnp.where(leaves, output, self.safe_output)
+        return _View(passed, r, rejected, controls, command, signals, output, (output == wanted).all())
+
+    def _by_fallback(self, z: SupervisedState, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
+        """Command of the fallback; of the signals those that it declares, too, the others are zero."""
+        assert self.fallback is not None
+        command, given = self.fallback.command(z.fallback, y, r)
+        _, declared = jax.eval_shape(self.law.command, z.law, y, r)
+        alike = lambda name, form: name in given and given[name].shape == form.shape
+        signals = {
+            name: given[name] if alike(name, form) else jnp.zeros(form.shape, form.dtype)
+            for name, form in declared.items()
+        }
+        return command, signals
+
+    def _checked(self, before: Target, r: Target) -> tuple[Target, Scalar]:
+        """The reference, or the last valid one at rest; and the number of entries that cannot be used."""
+        lengths = ~jnp.asarray(np.array(self.model.coordinates.angles))
+        far = lengths & (jnp.abs(r.position) > self.gate.max_distance)
+        wrong = (~jnp.isfinite(jnp.stack(r))).sum(dtype=float) + far.sum(dtype=float)
+        held = (before.position, jnp.zeros_like(before.velocity), jnp.zeros_like(before.acceleration))
+        return Target(*(jnp.where(wrong > 0, kept, new) for kept, new in zip(held, r, strict=True))), wrong
+
+    def _advanced(self, z: SupervisedState, view: _View, u: Inputs, step: Scalar) -> tuple[PyTree, PyTree]:
+        """States of law and fallback one step later; only the one that controls advances."""
+        y, r = view.passed.measurement, view.r
+        by_law = lambda: (self.law.advance(z.law, y, r, u, step), z.fallback)
+        if (fallback := self.fallback) is None:
+            return by_law()
+        by_fallback = lambda: (z.law, fallback.advance(z.fallback, y, r, u, step))
+        return jax.lax.cond(z.fallback_controls, by_fallback, by_law)
+
+    def _continued(self, z: SupervisedState, view: _View, laws: tuple, again, broken) -> tuple[PyTree, PyTree]:
+        """States of law and fallback: begun again from the present measurement, advanced, or held."""
+        y, r = view.passed.measurement, view.r
+
+        def begun() -> tuple[PyTree, PyTree]:
+            fallback = () if self.fallback is None else _begun(self.fallback, z.fallback, y, r)
+            return _begun(self.law, z.law, y, r), fallback
+
+        goes_on = view.controls & ~broken
+        kept = lambda: jax.tree.map(lambda new, old: jnp.where(goes_on, new, old), laws, (z.law, z.fallback))
+        return jax.lax.cond(again, begun, kept)
+
+    def _allowance(self, z: SupervisedState, view: _View, elapsed: Scalar) -> AllowanceState:
+        """Allowed tracking error; where nobody controls, it is the present one."""
+        coordinates = self.model.coordinates
+        here = self.tracking.start(coordinates, view.passed.measurement, view.r)
+        later = self.tracking.after(z.allowance, coordinates, z.reference, view.r, elapsed)
+        return AllowanceState(*(jnp.where(view.controls, a, b) for a, b in zip(later, here, strict=True)))
+
+    def _variation(self, z: SupervisedState, view: _View, u: Inputs, step: Scalar) -> Scalar:
+        """Average variation of the input, ranges from limit to limit per second."""
+        width = jnp.where(jnp.isfinite(self.high - self.low), self.high - self.low, jnp.inf)
+        now = (jnp.abs(u - z.output) / width).mean() / step
+        share = jnp.minimum(step / _AVERAGED, 1.0)
+        return jnp.where(view.controls & ~z.turning, z.variation + share * (now - z.variation), 0.0)
+
+    def _estimate_ratio(self, view: _View) -> Scalar:
+        """Estimated uncertainty relative to the largest plausible one."""
+        if "estimate" not in view.signals:
+            return jnp.zeros(())
+        ratio = (jnp.abs(view.signals["estimate"]) / self.max_estimate).max()
+        return jnp.where(view.controls, ratio, 0.0)
+
+    def _values(
+        self, z: SupervisedState, view: _View, u: Inputs, allowance: AllowanceState, variation: Scalar
+    ) -> dict[str, Scalar]:
+        """Values of the conditions that do not depend on the clock."""
+        passed, signals = view.passed, view.signals
+        position, angle = self.tracking.ratios(allowance, self.model.coordinates, passed.measurement, view.r)
+        at_limit = ((u <= self.low) | (u >= self.high)).sum(dtype=float)
+        controlled = {
+            "output_not_finite": (~jnp.isfinite(view.command)).sum(dtype=float),
+            "saturated": at_limit,
+            "chattering": variation,
+            "reference_infeasible": 1 - signals.get("attained_share", jnp.ones(())),
+            "position_error": position,
+            "attitude_error": angle,
+        }
+        found = {name: jnp.where(view.controls, value, 0.0) for name, value in controlled.items()}
+        euler = passed.measurement.body is not None and not self.model.coordinates.axes
+        pitch = jnp.abs(passed.measurement.position[4]) if euler else jnp.zeros(())
+        lost = lambda name: jnp.asarray(signals.get(name, jnp.zeros(1)), dtype=float).sum()
+        return found | {
+            "measurement_not_finite": passed.not_finite,
+            "measurement_implausible": passed.implausible,
+            "measurement_jump": passed.jump,
+            "measurement_stuck": passed.missing,
+            "reference_rejected": view.rejected,
+            "restarts_exhausted": (z.time - z.restarts < _WINDOW).sum(dtype=float),
+            "thruster_lost": lost("lost_thrusters"),
+            "axes_lost": lost("lost_axes"),
+            "near_vertical": pitch,
+        }
+
+    def _limits(self) -> dict[str, Any]:
+        """Limits of the conditions."""
+        counted = ("measurement_not_finite", "reference_rejected", "output_not_finite", "saturated")
+        zero = dict.fromkeys((*counted, "thruster_lost", "axes_lost", "clock_fault"), 0.0)
+        return (
+            dict.fromkeys(NAMES, 1.0)
+            | zero
+            | {
+                "restarts_exhausted": float(self.restarts),
+                "chattering": self.max_variation,
+                "reference_infeasible": _INFEASIBLE,
+                "near_vertical": _NEAR_VERTICAL,
+                "overrun": _OVERRUN,
+            }
+        )
+
+    def _tolerated(self, z: SupervisedState) -> Bool[Array, " conditions"]:
+        """Conditions that do not lead to SAFE now: the law has failed, but there is a fallback."""
+        row = jnp.arange(len(NAMES)) == NUMBER["restarts_exhausted"]
+        return row & ~z.fallback_controls & (self.fallback is not None)
+
+    def _switches(self, z: SupervisedState, conditions: Conditions) -> Bool[Array, ""]:
+        """Whether the fallback takes over now."""
+        if self.fallback is None:
+            return jnp.asarray(False)
+        failed = jnp.stack([conditions.level[NUMBER[name]] for name in ("restarts_exhausted", "chattering")]).max()
+        return ~z.fallback_controls & (failed > 0) & _controls(z.state)
+
+    def _next(self, z: SupervisedState, view: _View, asked, reason) -> tuple[Int[Array, ""], Int[Array, ""]]:
+        """State and reason of the next step, from what the conditions and the operator ask for."""
+        code = lambda state: jnp.asarray(int(state))
+        usable = (view.passed.not_finite == 0) & (view.passed.implausible <= 1)
+        ready = jnp.where(asked == int(State.SAFE), code(State.READY), asked)
+        state = jnp.where(z.state == int(State.READY), ready, asked)
+        state = jnp.where(z.state == int(State.INIT), jnp.where(usable, code(State.READY), code(State.INIT)), state)
+        state = jnp.where(z.safe_for > self.stop_after, code(State.STOPPED), state)
+        hold = (z.request == int(Request.HOLD)) & (state != int(State.INIT)) & (state != int(State.STOPPED))
+        stop = z.request == int(Request.STOP)
+        state = jnp.where(hold, code(State.READY), jnp.where(stop, code(State.STOPPED), state))
+        reason = jnp.where(hold | stop, code_of(OPERATOR), reason)
+        stopped = z.state == int(State.STOPPED)
+        return jnp.where(stopped, z.state, state), jnp.where(stopped, z.reason, reason)
+
+    def _rate(self, z: SupervisedState, view: _View, u: Inputs) -> Array:
+        """Rate of the velocity by the model and the law's estimate of the uncertainty, m/s^2 and rad/s^2."""
+        y = view.passed.measurement
+        known = known_acceleration(self.law, z.law, y, u)
+        acceleration = known + view.signals["estimate"] if "estimate" in view.signals else known
+        return rate_of_velocity(y, self.model.coordinates, acceleration)
+
+
+def _controls(state: Int[Array, ""]) -> Bool[Array, ""]:
+    """Whether the command of a law leaves in this state."""
+    return (state == int(State.ACTIVE)) | (state == int(State.DEGRADED))
+
+
+def _begun(law: AbstractController, z: PyTree, y: Measurement, r: Target) -> PyTree:
+    """State of a law that begins again; a law that knows of failed thrusters does not forget them."""
+    return law.restarted(z, y, r) if isinstance(law, AbstractRestartable) else law.init(y, r)
+
+
+def _cause(values: PerCondition, limits: PerCondition, reason: Int[Array, ""]) -> Float[Array, "2"]:
+    """Value and limit of the condition that is the reason."""
+    row = jnp.arange(len(NAMES)) == reason - 1
+    return jnp.stack(
+        [jnp.where(row, numbers, 0.0).sum() for numbers in (jnp.where(jnp.isfinite(values), values, _BIG), limits)]
+    )

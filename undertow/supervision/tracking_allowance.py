@@ -1,0 +1,57 @@
+"""The tracking error that is allowed: a limit, and what jumps of the reference and the start add, which decays."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core.contracts import AbstractCoordinates, Measurement, Target
+from undertow.core.param import Param, param
+
+Scalar = Float[Array, ""]
+
+
+class AllowanceState(NamedTuple):
+    """What is allowed beyond the limits."""
+
+    position: Float[Array, ""]  # m
+    angle: Float[Array, ""]  # rad
+
+
+class TrackingAllowance(eqx.Module):
+    """Limits of the tracking error, and how fast what is allowed beyond them decays."""
+
+    max_position_error: Float[Param, ""] = param("m", "tracking error that is always allowed")
+    max_angle_error: Float[Param, ""] = param("rad", "the same of the attitude, or of angles")
+    seconds: Float[Param, ""] = param("s", "time in which an allowance of the size of the limit decays")
+
+    def start(self, coordinates: AbstractCoordinates, y: Measurement, r: Target) -> AllowanceState:
+        """What the error at the start adds."""
+        return AllowanceState(*_sizes(coordinates, coordinates.tracking_error(y, r).error))
+
+    def after(
+        self, state: AllowanceState, coordinates: AbstractCoordinates, before: Target, r: Target, dt: Scalar
+    ) -> AllowanceState:
+        """One step later, with the reference as it was and is."""
+        jump = coordinates.difference(r.position, before.position) - dt * before.velocity
+        decayed = (
+            jnp.maximum(0.0, kept - dt * limit / self.seconds)
+            for kept, limit in zip(state, (self.max_position_error, self.max_angle_error), strict=True)
+        )
+        return AllowanceState(*(kept + size for kept, size in zip(decayed, _sizes(coordinates, jump), strict=True)))
+
+    def ratios(
+        self, state: AllowanceState, coordinates: AbstractCoordinates, y: Measurement, r: Target
+    ) -> tuple[Scalar, Scalar]:
+        """Tracking errors of position and attitude relative to the allowed ones."""
+        position, angle = _sizes(coordinates, coordinates.tracking_error(y, r).error)
+        return (position / (self.max_position_error + state.position), angle / (self.max_angle_error + state.angle))
+
+
+def _sizes(coordinates: AbstractCoordinates, difference: Array) -> tuple[Scalar, Scalar]:
+    """Lengths of the parts of a difference that are lengths and angles."""
+    turns = np.array(coordinates.angles)
+    length = lambda which: jnp.sqrt((difference**2 * jnp.asarray(which, dtype=float)).sum())
+    return length(~turns), length(turns)
