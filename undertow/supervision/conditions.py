@@ -172,6 +172,7 @@ CONDITIONS = (
         0.0,
         "They are announced in the signal `lost_axes`",
     ),
+    Condition("near_vertical", "pitch, of a law in Euler angles", "75 degrees", 0.0, 0.5, 1.0, ""),
     Condition(
         "position_error",
         "tracking error in position relative to the allowed one",
@@ -184,7 +185,6 @@ CONDITIONS = (
     Condition(
         "attitude_error", "the same of the attitude", "1, of `max_angle_error` and what is added", 0.2, 2.0, 1.0, ""
     ),
-    Condition("near_vertical", "pitch, of a law in Euler angles", "75 degrees", 0.0, 0.5, 1.0, ""),
     Condition(
         "overrun",
         "time since the last step, sampling times",

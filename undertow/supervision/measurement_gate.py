@@ -14,10 +14,11 @@ from jaxtyping import Array, Bool, Float
 from undertow.core import checks
 from undertow.core.contracts import Measurement
 from undertow.core.param import Param, param
-from undertow.numerics.number import Number
 from undertow.numerics.rotations import attitude_error
 from undertow.supervision.motion import Motion, motion_of, path_velocity, predicted, split, with_motion
 from undertow.supervision.stuck_readings import StuckReadings, StuckState
+
+Scalar = Float[Array, ""]
 
 
 class GateState(NamedTuple):
@@ -26,7 +27,7 @@ class GateState(NamedTuple):
     expected: Motion  # at this instant
     path: tuple[Array, Array]  # believed velocity of position and attitude, m/s and rad/s
     stuck: StuckState
-    since: Number  # time since the last step, s
+    since: Scalar  # time since the last step, s
     actuator: Any  # last finite report of the actuators
 
 
@@ -35,10 +36,10 @@ class Passed(NamedTuple):
 
     measurement: Measurement
     stuck: StuckState
-    not_finite: Number  # entries
-    implausible: Number  # largest size relative to its limit
-    jump: Number  # largest difference from the prediction relative to its limit
-    missing: Number  # motion missing from stuck readings relative to its limit
+    not_finite: Scalar  # entries
+    implausible: Scalar  # largest size relative to its limit
+    jump: Scalar  # largest difference from the prediction relative to its limit
+    missing: Scalar  # motion missing from stuck readings relative to its limit
 
 
 class MeasurementGate(eqx.Module):
@@ -82,15 +83,17 @@ class MeasurementGate(eqx.Module):
         read, expected = motion_of(y), state.expected
         finite = Motion(*map(jnp.isfinite, read))
         of_size, of_jump = self._sizes(read), self._jumps(read, expected)
-        known = lambda ratios: Motion(*(jnp.where(f, ratio, 0.0) for f, ratio in zip(finite, ratios, strict=True)))
-        sizes, jumps = known(of_size), known(of_jump)
         stuck_state = self.stuck.after(state.stuck, read, state.path, state.since)
         stuck = self.stuck.found(stuck_state)
-        whole = Motion(stuck.position, stuck.attitude, _each(read.velocity, stuck.velocity, stuck.rates))
+        held = Motion(stuck.position, stuck.attitude, _each(read.velocity, stuck.velocity, stuck.rates))
+        known = lambda ratios, which: Motion(*(jnp.where(w, r, 0.0) for w, r in zip(which, ratios, strict=True)))
+        sizes = known(of_size, finite)
+        # What is stuck departs from its prediction, of course.
+        jumps = known(of_jump, Motion(*(f & ~h for f, h in zip(finite, held, strict=True))))
         good = Motion(
             *(
-                f & (size <= 1) & ((jump <= 1) | believe) & ~held
-                for f, size, jump, held in zip(finite, sizes, jumps, whole, strict=True)
+                f & (size <= 1) & ((jump <= 1) | believe) & ~stands
+                for f, size, jump, stands in zip(finite, sizes, jumps, held, strict=True)
             )
         )
         # A quaternion is good as a whole, or not at all.
@@ -108,7 +111,7 @@ class MeasurementGate(eqx.Module):
         measurement = jax.lax.cond(all_good, lambda: y, mended)
         return Passed(measurement, stuck_state, missing, largest(sizes), largest(jumps), stuck.missing)
 
-    def after(self, passed: Passed, rate: Array, dt: Number) -> GateState:
+    def after(self, passed: Passed, rate: Array, dt: Scalar) -> GateState:
         """State one step later, for a rate of the velocity (m/s^2, rad/s^2) by the model, and the time passed (s)."""
         y = passed.measurement
         return GateState(predicted(y, rate, dt), path_velocity(y), passed.stuck, jnp.asarray(dt), y.actuator)

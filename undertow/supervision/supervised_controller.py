@@ -50,6 +50,7 @@ _NEAR_VERTICAL = np.deg2rad(75)
 _INFEASIBLE = 0.05  # share of the desired acceleration
 _WINDOW = 600.0  # s in which restarts count
 _AVERAGED = 0.5  # s over which the variation of the input is averaged
+_BELIEVED = 0.1  # share of a jump that the estimate may add to a prediction in a step
 _LONG_AGO = -1e9  # s
 _BIG = 1e30  # stands for what is not finite in the log
 
@@ -402,7 +403,12 @@ class Supervised(AbstractGatedController):
         """Rate of the velocity by the model and the law's estimate of the uncertainty, m/s^2 and rad/s^2."""
         y = view.passed.measurement
         known = known_acceleration(self.law, z.law, y, u)
-        acceleration = known + view.signals["estimate"] if "estimate" in view.signals else known
+        acceleration = known
+        if "estimate" in view.signals:
+            # One that has diverged would make a jump of every reading.
+            most = _BELIEVED * jnp.minimum(self.gate.jump_velocity, self.gate.jump_rate) / self.sampling_time
+            most = jnp.minimum(most, self.max_estimate)
+            acceleration = known + jnp.clip(view.signals["estimate"], -most, most)
         return rate_of_velocity(y, self.model.coordinates, acceleration)
 
 

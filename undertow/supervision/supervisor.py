@@ -131,6 +131,6 @@ def _plausible_estimate(model: Model, start: Measurement, limits: tuple[Any, Any
     """Largest plausible estimate of the uncertainty along each axis of a model, m/s^2 and rad/s^2."""
     gain = jnp.abs(model.dynamics.gain(start))
     forces = jnp.stack([jnp.abs(force_of(model.actuators, limit)) for limit in limits]).max(0)
-    authority = jnp.where(gain > 0, gain * forces, 0.0).sum(1)
+    authority = jnp.where(gain > 0, gain * forces[None, :], 0.0).sum(1)
     known = jnp.isfinite(authority) & (authority > 0)
     return jnp.where(known, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)

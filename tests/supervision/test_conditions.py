@@ -1,0 +1,224 @@
+"""Every line of the supervisor's table: its condition leads to its state with its reason in its time, and is over again."""
+
+import dataclasses
+import functools
+import math
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import undertow as ut
+from undertow.core.contracts import AbstractController, AbstractInformedController, Model, Target, known_acceleration
+from undertow.core.measurement import with_outputs
+from undertow.core.signals import Signal
+from undertow.loop.sampled import moved
+from undertow.numerics.integrators import METHODS
+from undertow.supervision.conditions import CONDITIONS, NAMES, State, code_of, markdown, reason_of
+from undertow.supervision.supervisor import supervisor
+from undertow.supervision.transitions import transitions
+
+T = 0.02
+
+
+class Tampering(NamedTuple):
+    """What happens to a step from outside."""
+
+    add_position: np.ndarray = np.zeros(6)  # to the measured outputs
+    add_velocity: np.ndarray = np.zeros(6)
+    scale_position: float = 1.0
+    hold: float = 0.0  # 1: the measurement keeps the bits of the first one
+    command: float = 0.0  # added to the command of the law
+    spoil: float = 0.0  # 1: the command is NaN
+    estimate: float = 0.0  # added to its estimate
+    share: float = 0.0  # of the desired acceleration that it says it cannot give
+    thrusters: float = 0.0  # that it says to be lost
+    axes: float = 0.0
+    target: np.ndarray = np.zeros(6)  # added to the target
+    dt: float = T  # that the controller is told
+
+
+UNTOUCHED = Tampering()
+
+
+def _of_law(how: Tampering) -> Tampering:
+    """What the state of the law holds: only finite numbers."""
+    zero = jnp.zeros(6)
+    return how._replace(add_position=zero, add_velocity=zero, target=zero)
+
+
+class Tampered(AbstractInformedController):
+    """A law whose answers are changed by its state, which the test writes."""
+
+    law: AbstractController
+    model: Model
+
+    def init(self, y, r):
+        return self.law.init(y, r), _of_law(jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=float), UNTOUCHED))
+
+    def command(self, z, y, r):
+        law, how = z
+        u, signals = self.law.command(law, y, r)
+        more = {"estimate": signals["estimate"] + how.estimate, "attained_share": 1.0 - how.share}
+        return jnp.where(how.spoil > 0, jnp.nan, u + how.command), signals | more | {
+            "lost_thrusters": how.thrusters[None],
+            "lost_axes": how.axes[None],
+        }
+
+    def advance(self, z, y, r, u_applied, dt):
+        return self.law.advance(z[0], y, r, u_applied, dt), z[1]
+
+    def known_acceleration(self, z, y, u_applied):
+        return known_acceleration(self.law, z[0], y, u_applied)
+
+    def signals(self):
+        one = Signal((), "1", "of a test")
+        return self.law.signals() | {"lost_thrusters": one, "lost_axes": one}
+
+
+class Stepped:
+    """A supervised law that watches a vehicle which another law moves; what it is told can be tampered with."""
+
+    def __init__(self, euler: bool = False, **options):
+        self.plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200())
+        self.mover = ut.controllers.pid(self.plant.model(), sampling_time=T)
+        law = ut.controllers.pid(self.plant.model(), sampling_time=T)
+        made = supervisor(Tampered(law, law.model), self.plant, sampling_time=T, **options)
+        self.supervised = dataclasses.replace(made, model=self.plant.model()) if euler else made
+        self.start = self.plant.initial_state(None, np.array([0.3, 0, 0, 0, 0, 0]))
+        self.first = self.plant.output(jnp.zeros(()), self.start)
+        r = _target(jnp.zeros(()), UNTOUCHED)
+        self.begun = self.mover.init(self.first, r), self.supervised.init(self.first, r)
+        self.restart()
+
+    def restart(self):
+        self.k, self.x, (self.moving, self.z) = 0, self.start, self.begun
+        self.outputs, self.states = [], []
+
+    def step(self, how: Tampering = UNTOUCHED):
+        how = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=float), how)
+        now = (self.x, self.moving, self.z, self.first)
+        self.x, self.moving, self.z, output = _step(
+            (self.plant, self.mover, self.supervised), jnp.asarray(self.k * T), now, how
+        )
+        self.k += 1
+        self.outputs.append(np.asarray(output))
+        self.states.append((State(int(self.z.state)), reason_of(int(self.z.reason))))
+
+    def steps(self, seconds: float, how=UNTOUCHED):
+        for k in range(round(seconds / T)):
+            self.step(how(k) if callable(how) else how)
+
+
+def _target(t, how):
+    speed = jnp.zeros(6).at[0].set(0.3)
+    return Target(speed * t + how.target, speed, jnp.zeros(6))
+
+
+@eqx.filter_jit
+def _step(parts, t, now, how):
+    plant, mover, supervised = parts
+    x, moving, z, first = now
+    r, truth = _target(t, how), plant.output(t, x)
+    read = with_outputs(
+        truth, truth.position * how.scale_position + how.add_position, truth.velocity + how.add_velocity
+    )
+    y = jax.tree.map(lambda kept, new: jnp.where(how.hold > 0, kept, new), first, read)
+    z = z._replace(law=(z.law[0], _of_law(how)))
+    output, _ = supervised.command(z, y, r)
+    z = supervised.advance(z, y, r, plant.admissible(x, output), how.dt)
+    u, _ = mover.command(moving, truth, _target(t, Tampering()))
+    applied = plant.admissible(x, u)
+    motion = lambda t, x: plant.dynamics(t, x, applied, plant.no_load())
+    new = moved(motion, t, x, jnp.asarray(T), METHODS["rk4"], 1)
+    return new, mover.advance(moving, truth, _target(t, Tampering()), applied, jnp.asarray(T)), z, output
+
+
+def _only(axis: int, value: float) -> np.ndarray:
+    return np.where(np.arange(6) == axis, value, 0.0)
+
+
+# What brings about the condition of a line, as steps of it; `(k)` for what changes from step to step.
+CAUSES = {
+    "measurement_not_finite": Tampering(add_position=_only(1, np.nan)),
+    "measurement_implausible": Tampering(add_velocity=_only(2, 40.0)),
+    "measurement_jump": Tampering(add_position=_only(0, 5.0)),
+    "measurement_stuck": Tampering(hold=1.0),
+    "reference_rejected": Tampering(target=_only(3, np.inf)),
+    "output_not_finite": Tampering(spoil=1.0),
+    "estimator_diverged": Tampering(estimate=1e3),
+    "restarts_exhausted": Tampering(estimate=1e3),
+    "saturated": Tampering(command=1e3),
+    "chattering": lambda k: Tampering(command=8.0 * (-1) ** k),
+    "reference_infeasible": Tampering(share=0.5),
+    "thruster_lost": Tampering(thrusters=1.0),
+    "axes_lost": Tampering(axes=1.0),
+    "position_error": lambda k: Tampering(add_position=_only(1, 0.03 * k)),
+    "attitude_error": lambda k: Tampering(add_position=_only(5, 0.02 * k)),
+    "near_vertical": lambda k: Tampering(add_position=_only(4, min(0.05 * k, 1.4))),
+    "overrun": Tampering(dt=2 * T),
+    "clock_fault": Tampering(dt=-1.0),
+}
+# Time, s, that a condition takes to come about: a drift has to reach its limit, an average to rise.
+BUILT_UP = {"measurement_stuck": 10 * T, "chattering": 0.5, "position_error": 1.0, "attitude_error": 1.2}
+BUILT_UP |= {"near_vertical": 0.6, "restarts_exhausted": 1.0}
+
+
+@functools.cache
+def stepped(euler: bool = False) -> Stepped:
+    return Stepped(euler)
+
+
+def test_every_line_of_the_table_has_a_cause():
+    assert set(CAUSES) == set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_condition_leads_to_its_state_in_its_time(name):
+    line, run = CONDITIONS[NAMES.index(name)], stepped(name == "near_vertical")
+    run.restart()
+    run.steps(0.2)
+    assert set(run.states) == {(State.ACTIVE, "")}
+    until = line.safe_after if math.isfinite(line.safe_after) else line.degraded_after
+    run.steps(until + BUILT_UP.get(name, 0.0) + 3 * T, CAUSES[name])
+    found = run.states[10:]
+    with_reason = [k for k, (state, reason) in enumerate(found) if reason == name]
+    assert with_reason, set(found)
+    for state, after in ((State.DEGRADED, line.degraded_after), (State.SAFE, line.safe_after)):
+        if math.isfinite(after) and (state is State.SAFE or line.safe_after > after):
+            first = found.index((state, name)) * T
+            assert after - 1.01 * T <= first <= after + BUILT_UP.get(name, 0.0) + 1.01 * T
+    if not math.isfinite(line.safe_after):
+        assert State.SAFE not in {state for state, _ in found}
+    if run.z.state == int(State.SAFE):
+        assert (run.outputs[-1] == 0.0).all()
+    assert np.isfinite(run.outputs).all()
+    entry = next(one for one in transitions(run.z.log) if one.reason == name)
+    assert not entry.value <= entry.limit
+    run.steps(5.0)
+    if math.isfinite(line.recovers_after):
+        assert run.states[-1] == (State.ACTIVE, "")
+    else:
+        assert run.states[-1][1] == name
+
+
+def test_output_that_is_not_finite_never_leaves():
+    run = stepped()
+    run.restart()
+    run.steps(0.1)
+    run.steps(0.1, Tampering(spoil=1.0))
+    assert (np.array(run.outputs[5:]) == 0.0).all()
+
+
+def test_markdown_has_a_line_for_each_condition():
+    lines = markdown().splitlines()
+    assert [line.split("`")[1] for line in lines[2:]] == list(NAMES)
+    assert len({line.count("|") for line in lines}) == 1
+
+
+@pytest.mark.parametrize("reason", ["", *NAMES, "operator"])
+def test_codes_of_reasons(reason):
+    assert reason_of(code_of(reason)) == reason
