@@ -112,17 +112,15 @@ class Loop:
         final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
         return self._step.whole(final), self._record.whole(self._record_layout.unpacked(series, runs))
 
-    def kept(self) -> tuple[Callable[[], None], list[np.ndarray], list[np.ndarray]]:
+    def kept(self) -> "Kept":
         """What records one instant of one run again and again, in memory that is kept.
-
-        Returns:
-            The function; the numbers that it reads, and what it records, as arrays in that memory.
 
         Raises:
             Unsupported: XLA computes what comes before the first step, or a GPU the steps.
         """
         call, given, series = self._kept(1)
-        return call, self._numbers_layout.views(given), self._record_layout.views(series)
+        views = self._numbers_layout.views(given), self._record_layout.views(series)
+        return Kept(call, *views, given[0, 0], series[0, 0])
 
     def kept_runs(self, runs: int) -> tuple[Callable[[], None], list[np.ndarray], list[np.ndarray]]:
         """`kept` of many runs: arrays of shape (groups, runs of a group, ...), the last runs of which may be idle."""
@@ -135,6 +133,22 @@ class Loop:
         layouts = self._numbers_layout, self._carry_layout, self._record_layout
         given, carry, series = (layout.memory(groups) for layout in layouts)
         return self._code.repeated(given, carry, series), given, series
+
+
+class Kept(NamedTuple):
+    """A function without arguments, and the memory that it reads and writes.
+
+    Attributes:
+        call: the function.
+        numbers, recorded: what it reads and what it records, as arrays in that memory.
+        read, written: the same memory, bytes of one slot after the other, in the order of the numbers of these arrays.
+    """
+
+    call: Callable[[], None]
+    numbers: list[np.ndarray]
+    recorded: list[np.ndarray]
+    read: np.ndarray
+    written: np.ndarray
 
 
 class Program(NamedTuple):

@@ -40,15 +40,17 @@ class Step:
         results = jax.eval_shape(function, *given)
         if not same_types(state, results[0]):
             raise Unsupported("a state that changes its type")
-        self._call, arguments, found = loop.kept()
+        self._call, arguments, found, read, written = loop.kept()
         self.numbers, self.state, self.inputs = jax.tree.unflatten(jax.tree.structure(given), arguments)
         after, self.outputs = jax.tree.unflatten(jax.tree.structure(results), found)
-        self._state = jax.tree.leaves(self.state), jax.tree.leaves(after)
+        # The numbers of the state stand together, before and after: they are copied at once.
+        size = lambda tree: sum(leaf.size for leaf in jax.tree.leaves(tree))
+        first, count = size(self.numbers), size(after)
+        self._before, self._after = read[first : first + count], written[:count]
         for place, value in zip(arguments, jax.tree.leaves(given), strict=True):
             place[...] = value
 
     def __call__(self) -> None:
         """Take the step: the outputs and the new state follow from the inputs, the numbers and the old state."""
         self._call()
-        for place, value in zip(*self._state, strict=True):
-            place[...] = value
+        self._before[...] = self._after

@@ -124,7 +124,7 @@ CONDITIONS = (
     ),
     Condition(
         "estimator_diverged",
-        "estimated uncertainty relative to three times the acceleration of the actuators, or a law's state that is not "
+        "estimated uncertainty relative to ten times the acceleration of the actuators, or a law's state that is not "
         "finite",
         "1, or `max_estimate`",
         0.1,

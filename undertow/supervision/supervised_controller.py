@@ -331,10 +331,11 @@ class Supervised(AbstractGatedController):
         """Values of the conditions that do not depend on the clock."""
         passed, signals = view.passed, view.signals
         position, angle = self.tracking.ratios(allowance, self.model.coordinates, passed.measurement, view.r)
-        at_limit = ((u <= self.low) | (u >= self.high)).sum(dtype=float)
+        # An actuator of one direction rests at its limit of zero.
+        at_limit = ((u <= self.low) & (self.low < 0)) | ((u >= self.high) & (self.high > 0))
         controlled = {
             "output_not_finite": (~jnp.isfinite(view.command)).sum(dtype=float),
-            "saturated": at_limit,
+            "saturated": at_limit.sum(dtype=float),
             "chattering": variation,
             "reference_infeasible": 1 - signals.get("attained_share", jnp.ones(())),
             "position_error": position,
