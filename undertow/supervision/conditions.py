@@ -45,9 +45,11 @@ _MEANINGS = {
 class Request(enum.IntEnum):
     """What the operator wants."""
 
-    RUN = 0
-    HOLD = 1  # READY: the safe output, until RUN
+    RUN = 0  # whoever controls goes on
+    HOLD = 1  # READY: the safe output, until another request
     STOP = 2
+    LAW = 3  # the law controls
+    FALLBACK = 4  # the fallback controls
 
 
 class Condition(NamedTuple):

@@ -209,7 +209,8 @@ class Supervised(AbstractGatedController):
         diverged = view.controls & (
             broken | (holds[wrong] & (conditions.held[wrong] >= CONDITIONS[wrong].degraded_after))
         )
-        switches = self._switches(z, conditions)
+        by_fallback = self._by_whom(z, conditions)
+        switches = by_fallback != z.fallback_controls
         again = begins | diverged | switches
         counted = (begins & (z.state == int(State.SAFE))) | diverged
         times = jnp.where(counted, jnp.concatenate([z.time[None], z.restarts[:-1]]), z.restarts)
@@ -236,7 +237,7 @@ class Supervised(AbstractGatedController):
             variation=variation,
             restarts=jnp.where(switches, _LONG_AGO, times),
             restarted=z.restarted + jnp.where(counted, 1, 0),
-            fallback_controls=z.fallback_controls | switches,
+            fallback_controls=by_fallback,
             request=z.request,
             log=logged(z.log, changed, (time, state, reason, cause[0], cause[1])),
         )
@@ -258,9 +259,12 @@ class Supervised(AbstractGatedController):
             command, signals = jax.lax.cond(z.fallback_controls, lambda: self._by_fallback(z, y, r), own)
         most = self.slew * (self.high - self.low) * self.sampling_time
         wanted = jnp.clip(command, self.low, self.high)
-        output = jnp.where(z.turning, jnp.clip(wanted, z.output - most, z.output + most), wanted)
+        towards = lambda goal: jnp.clip(goal, z.output - most, z.output + most)
+        output = jnp.where(z.turning, towards(wanted), wanted)
+        # Who holds or stops a vehicle that nothing is wrong with gets no jump either.
+        safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
-        output = jnp.where(leaves, output, self.safe_output)
+        output = jnp.where(leaves, output, safe)
         return _View(passed, r, rejected, controls, command, signals, output, (output == wanted).all())
 
     def _by_fallback(self, z: SupervisedState, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
@@ -378,12 +382,14 @@ class Supervised(AbstractGatedController):
         row = jnp.arange(len(NAMES)) == NUMBER["restarts_exhausted"]
         return row & ~z.fallback_controls & (self.fallback is not None)
 
-    def _switches(self, z: SupervisedState, conditions: Conditions) -> Bool[Array, ""]:
-        """Whether the fallback takes over now."""
+    def _by_whom(self, z: SupervisedState, conditions: Conditions) -> Bool[Array, ""]:
+        """Whether the fallback controls from now on: where the law has failed, or as the operator wants."""
         if self.fallback is None:
-            return jnp.asarray(False)
-        failed = jnp.stack([conditions.level[NUMBER[name]] for name in ("restarts_exhausted", "chattering")]).max()
-        return ~z.fallback_controls & (failed > 0) & _controls(z.state)
+            return z.fallback_controls
+        failed = jnp.stack([conditions.level[NUMBER[name]] for name in ("restarts_exhausted", "chattering")]).max() > 0
+        fails = z.fallback_controls | (failed & _controls(z.state))
+        asked = lambda request: z.request == int(request)
+        return (fails | asked(Request.FALLBACK)) & ~asked(Request.LAW)
 
     def _next(self, z: SupervisedState, view: _View, asked, reason) -> tuple[Int[Array, ""], Int[Array, ""]]:
         """State and reason of the next step, from what the conditions and the operator ask for."""

@@ -19,7 +19,7 @@ _EQUAL = 10  # readings of the same bits, from which on they may be stuck
 _PERIODS = 3  # the same where readings are rarer than control steps
 _SHARE = 10.0  # of the largest acceleration of the actuators that an estimate may have
 _LEAST = 1.0  # m/s^2 or rad/s^2 that an estimate may have in any case
-_UNLIMITED = 50.0  # the same without limits of the actuators
+_UNLIMITED = 500.0  # the same without limits of the actuators
 _BEYOND = 1e9  # more than any actuator takes, in its unit
 _DECAY = 10.0  # s in which an allowed tracking error of the size of its limit decays
 
@@ -71,7 +71,7 @@ def supervisor(
         max_position_error: tracking error that is always allowed, m.
         max_angle_error: the same of the attitude, rad.
         max_estimate: largest plausible estimate of the uncertainty, m/s^2 and rad/s^2; None for ten times the
-            acceleration that the actuators can give, and 50 where they have no limit.
+            acceleration that the actuators can give, and 500 where they have no limit.
         max_variation: variation of the input that counts as chattering, ranges from limit to limit per second.
         restarts: of the law within ten minutes; one more, and the fallback takes over, or the state is SAFE.
         stop_after: time in SAFE after which control does not begin again by itself, s.

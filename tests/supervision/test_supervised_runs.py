@@ -1,0 +1,118 @@
+"""A supervised controller in closed loop: the bits of its law where nothing is wrong, and no jump at any transfer."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import undertow as ut
+from undertow.core import runtime
+from undertow.loop import simd_batch
+from undertow.loop.sampled import moved
+from undertow.numerics.integrators import METHODS
+from undertow.scenario.build import build
+from undertow.scenario.reading import from_data
+from undertow.supervision.conditions import Request, State
+from undertow.supervision.supervisor import supervisor
+from undertow.supervision.transitions import transitions
+
+HEAVY = {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}}
+GOAL = {"kind": "setpoint", "position": [1, 1, 1, 0, 0, 0.5]}
+SEA = [{"kind": "current", "velocity": [0.2, 0.1, 0]}, {"kind": "waves", "height": 0.3}]
+SCENARIOS = {
+    "robust": {
+        "plant": HEAVY,
+        "controller": {"kind": "rcaf", "preset": "robust"},
+        "reference": GOAL,
+        "disturbance": SEA,
+    },
+    "pid": {"plant": HEAVY, "controller": "pid", "reference": GOAL, "navigation": {"kind": "white_noise"}},
+    "paper": {"reference": {"kind": "lissajous"}, "disturbance": "u1", "loop": {"dt": 1e-3}},
+    "pendulum": {
+        "plant": {"kind": "inverted_pendulum"},
+        "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 0.5},
+        "loop": {"dt": 1e-3},
+    },
+}
+
+
+def _outcome(scenario, duration=3.0):
+    built = build(from_data(scenario | {"loop": {"dt": 0.01, "duration": duration} | scenario.get("loop", {})}))
+    with runtime.on_processor(), runtime.in_precision("float64"):
+        return simd_batch.simulate(built.closed_loop, duration=duration, dt=built.scenario.loop.dt, record_every=1)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_where_nothing_is_wrong_a_run_has_the_same_bits(name):
+    alone, watched = _outcome(SCENARIOS[name]), _outcome(SCENARIOS[name] | {"supervisor": True})
+    for signal in set(alone.signals) - {"commanded_input"}:
+        np.testing.assert_array_equal(watched.signals[signal], alone.signals[signal], err_msg=signal)
+    state = np.asarray(watched.signals["supervisor_state"])
+    assert (state == int(State.ACTIVE)).all()
+    assert [str(one) for one in transitions(watched.final[1].log)] == ["0 s: READY", "0 s: ACTIVE"]
+
+
+T = 0.02
+
+
+class Controlled:
+    """A supervised vehicle, stepped by the test, that an operator's requests reach."""
+
+    def __init__(self):
+        self.plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(supply=16.0))
+        law = ut.rcaf(self.plant.model(), preset="robust", sampling_time=T)
+        fallback = ut.controllers.pid(self.plant.model(), sampling_time=T)
+        self.supervised = supervisor(law, self.plant, fallback, sampling_time=T)
+        self.x = self.plant.initial_state()
+        target = ut.references.setpoint(np.array([2.0, 1, 1, 0, 0, 1]))
+        self.z = self.supervised.init(self.plant.output(jnp.zeros(()), self.x), target.at(jnp.zeros(())))
+        self.parts = (self.plant, self.supervised, target)
+
+    def step(self, request: Request):
+        self.z = self.z._replace(request=jnp.asarray(int(request)))
+        self.x, self.z, output = _step(self.parts, self.x, self.z)
+        return np.asarray(output)
+
+
+@eqx.filter_jit
+def _step(parts, x, z):
+    plant, supervised, target = parts
+    t = jnp.zeros(())
+    y, r = plant.output(t, x), target.at(t)
+    u, _ = supervised.command(z, y, r)
+    applied = plant.admissible(x, u)
+    new = moved(lambda t, x: plant.dynamics(t, x, applied, plant.no_load()), t, x, jnp.asarray(T), METHODS["rk4"], 1)
+    return new, supervised.advance(z, y, r, applied, jnp.asarray(T)), u
+
+
+def test_a_thousand_transfers_make_no_jump():
+    run, chance = Controlled(), np.random.default_rng(0)
+    most = float(run.supervised.slew) * 32.0 * T
+    before, request, seen, largest, transfers = run.step(Request.RUN), Request.RUN, set(), 0.0, 0
+    for _ in range(1000):
+        request = Request(int(chance.choice([r for r in (0, 1, 3, 4) if r != request])))
+        whom = None
+        for _ in range(chance.integers(2, 6)):
+            controls = run.z.state in (State.ACTIVE, State.DEGRADED)
+            transfers += whom is not None and whom != (controls, bool(run.z.fallback_controls))
+            whom = (controls, bool(run.z.fallback_controls))
+            in_transfer = bool(run.z.turning) or not controls
+            output = run.step(request)
+            largest = max(largest, np.abs(output - before).max() if in_transfer else 0.0)
+            before = output
+        seen.add((State(int(run.z.state)), bool(run.z.fallback_controls)))
+    assert largest <= most * (1 + 1e-12)
+    assert transfers > 500
+    assert {(State.READY, False), (State.READY, True), (State.ACTIVE, True), (State.ACTIVE, False)} <= seen
+
+
+def test_stopped_is_for_good():
+    run = Controlled()
+    for _ in range(5):
+        run.step(Request.RUN)
+    run.step(Request.STOP)
+    for _ in range(60):
+        output = run.step(Request.RUN)
+    assert run.z.state == int(State.STOPPED)
+    assert (output == 0).all()
+    assert transitions(run.z.log)[-1].reason == "operator"
