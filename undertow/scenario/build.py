@@ -24,6 +24,7 @@ from undertow.navigation.from_sensors import SensorNavigation
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import check_fit, check_noise, check_start, check_times, check_window, rounded_times
+from undertow.scenario.faulted import faulted
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
@@ -174,6 +175,10 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     controller = make("controller", (model,))
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
     resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario
+    with within("faults"):
+        loop, entries = faulted(loop, scenario.faults, text.folder, scenario.loop.dt)
+    if entries:
+        resolved["faults"] = entries
     with within("loop"):
         if scenario.loop.kind == "continuous":
             continuous.check(loop)
