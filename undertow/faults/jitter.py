@@ -18,7 +18,7 @@ class Jitter(AbstractComputationFault):
     default_duration: ClassVar = float("inf")
 
     def execution(self, instant, dt):
-        place = instant.count * _GOLDEN
+        place = _GOLDEN * jnp.asarray(instant.count, dtype=float)
         return Execution(jnp.asarray(True), dt * (1 + instant.severity * (2 * (place - jnp.floor(place)) - 1)))
 
     def state(self, instant, law, z, y, r):

@@ -56,6 +56,13 @@ def list_kinds(targets: Iterable[FaultTarget] | None = None) -> list[Kind]:
     return [kind_of(one, name, fault) for one in found for name, fault in modes.items() if supports(one, fault)]
 
 
+def severity_cells(kind: Kind) -> tuple[str, str, str, str]:
+    """Meaning, unit, default and range of a severity as text, for tables."""
+    if kind.default is None:
+        return kind.meaning, "", "", ""
+    return kind.meaning, kind.unit or "1", f"{kind.default:g}", f"{kind.lowest:g} to {kind.highest:g}"
+
+
 def check_pair(target: FaultTarget, mode: str, fault: AbstractFault) -> Kind:
     """The kind of a fault.
 

@@ -144,5 +144,10 @@ def computed(law: AbstractController, faults: tuple[ComputationFault, ...]) -> A
     return kinds[gated, informed](law.model, law, faults)
 
 
+def law_of_computed(controller: AbstractController) -> AbstractController:
+    """The controller on a computer without faults."""
+    return controller.law if isinstance(controller, _AbstractComputed) else controller
+
+
 def _where(condition, new, old):
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), new, old)

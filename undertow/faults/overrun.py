@@ -15,8 +15,8 @@ class Overrun(AbstractComputationFault):
     default_duration: ClassVar = float("inf")
 
     def execution(self, instant, dt):
-        length = 1 + jnp.round(instant.severity).astype(int)
-        return Execution(instant.count % length == 0, dt * length)
+        length = 1 + jnp.round(instant.severity)
+        return Execution(instant.count % length.astype(int) == 0, dt * length)
 
     def state(self, instant, law, z, y, r):
         return z

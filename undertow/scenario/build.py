@@ -24,7 +24,7 @@ from undertow.navigation.from_sensors import SensorNavigation
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import check_fit, check_noise, check_start, check_times, check_window, rounded_times
-from undertow.scenario.faulted import faulted
+from undertow.scenario.faulted import faulted, without_faults
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
@@ -86,6 +86,10 @@ class Built(NamedTuple):
         if isinstance(navigation, SensorNavigation):
             yield from (advice("navigation", sentence) for sentence in navigation.advice(end))
         yield from plausibility(self.closed_loop, end, self.scenario.initial.position)
+
+    def without_faults(self) -> "Built":
+        """The same scenario before any fault: predictions, tuning and exports are about that."""
+        return self._replace(closed_loop=without_faults(self.closed_loop))
 
     def known_metrics(self) -> dict[str, Metric]:
         """Metrics that its runs may have, by name, with their units."""

@@ -16,10 +16,11 @@ from undertow.faults.injected import Faults, InputFault, PlantFault, QuantityFau
 from undertow.faults.kinds import Kind, check_pair
 from undertow.faults.mode import AbstractFault
 from undertow.faults.occurrence import Occurrence
-from undertow.faults.of_computation import ComputationFault, computed
+from undertow.faults.of_computation import ComputationFault, computed, law_of_computed
 from undertow.faults.of_sensors import SensorFault, SensorFaults
 from undertow.faults.targets import FaultTarget, checked_number, named, targets_of
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.from_sensors import SensorNavigation
 from undertow.scenario import factory
 from undertow.scenario.schema import Fault
 
@@ -73,21 +74,31 @@ def faulted(
     return dataclasses.replace(loop, navigation=navigation, controller=controller, faults=faults), resolved
 
 
+def without_faults(loop: ClosedLoop) -> ClosedLoop:
+    """The loop as it is before any fault."""
+    if loop.faults is None:
+        return loop
+    navigation, controller = loop.navigation, loop.controller
+    if isinstance(navigation, SensorNavigation):
+        navigation = dataclasses.replace(navigation, faults=None)
+    return dataclasses.replace(loop, navigation=navigation, controller=law_of_computed(controller), faults=None)
+
+
 def _made(entry: Fault, folder: Path, sampling_time: float) -> tuple[AbstractFault, dict[str, Any]]:
     """The mode of an entry, and its options with their defaults."""
     options = dict(entry.model_extra or {})
     function = catalogue.find("faults", entry.mode, folder, "mode")
-    own = inspect.signature(function).parameters
+    longest = entry.severity if entry.severity is not None else _default_severity(function)
+    context = {"sampling_time": sampling_time, "longest": float(np.max(longest))}
+    own = [name for name in inspect.signature(function).parameters if name not in context]
     for key in options:
         if key not in own:
             hint = known_key(str(key), [*type(entry).model_fields, *own])
             raise BadInput(str(key), f"be a key of a fault, or an option of `{entry.mode}`", "unknown", hint=hint)
-    longest = entry.severity if entry.severity is not None else _default_severity(function)
-    context = {"sampling_time": sampling_time, "longest": float(np.max(longest))}
     with within(written=lambda key: "mode" if key == "kind" else key):
         fault, described = factory.make("faults", {"kind": entry.mode, **options}, folder, (), context)
     name = described.pop("kind")
-    return fault, {"mode": name, **described}
+    return fault, {"mode": name} | {key: value for key, value in described.items() if key not in context}
 
 
 def _default_severity(function: Any) -> float:
