@@ -20,6 +20,12 @@ SCENARIO = {
     "reference": {"kind": "sine", "amplitude": [0.3, 0.2, 0.2, 0.1, 0.1, 0.3], "frequency": 1.5},
     "loop": {"duration": DURATION, "dt": DT, "record": DT},
 }
+# A law that uses the report of the propellers: only with a motor model is there anything to learn from it.
+MOTORS = {
+    "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "shaft"}},
+    "controller": "pid",
+    "model": {"speed_sensor": True},
+}
 KALMAN = {"navigation": {"kind": "kalman", "sensors": SENSORS}}
 
 # Inputs of this run are small: severities that are shares of the largest input have to be near the end of their range.
@@ -32,10 +38,10 @@ def entry_of(kind, onset):
     return {"target": target, "mode": kind.mode, "onset": onset} | ({} if severity is None else {"severity": severity})
 
 
-def both(kind, change=None):
+def both(kind):
     """Recorded signals of a run with the fault and of one in which it never begins; one compiled program."""
     filtered = KALMAN if kind.target.startswith("sensor") else {}
-    data = SCENARIO | filtered | (change or {})
+    data = SCENARIO | filtered | (MOTORS if kind.target.endswith("propeller_speed") else {})
     loops = [build(data | {"faults": [entry_of(kind, onset)]}).closed_loop for onset in (ONSET, NEVER)]
     with runtime.in_precision("float64"):
         start = loops[0].outputs_at_start(None, None)
@@ -45,6 +51,7 @@ def both(kind, change=None):
         plan = simd_batch.Plan(round(DURATION / DT), DT, 1, tuple(loops[0].signals()))
         constant = [bool((leaf[0] == leaf[1]).all()) for leaf in jax.tree.leaves(together)]
         outcome = simd_batch.BatchRunner(runs[0], plan, constant).run(together)
+    assert outcome.status[1] == 0, "the run without the fault does not last"
     return {name: np.asarray(one) for name, one in outcome.signals.items()}, np.asarray(outcome.time[0])
 
 

@@ -56,7 +56,9 @@ def test_single_precision():
     assert single["position"].dtype == single["acting_input"].dtype == np.float32
     assert np.array_equal(single["active_faults"], double["active_faults"])
     np.testing.assert_allclose(single["position"][:31], double["position"][:31], atol=1e-4)
-    assert np.isfinite(single["position"]).all() and not np.array_equal(single["position"][31:], double["position"][31:])
+    assert np.isfinite(single["position"]).all() and not np.array_equal(
+        single["position"][31:], double["position"][31:]
+    )
 
 
 def test_faults_begin_and_end_on_their_steps():

@@ -85,6 +85,11 @@ class Built(NamedTuple):
             yield advice("steady.start", f"there are no steady metrics: {window}")
         if isinstance(navigation, SensorNavigation):
             yield from (advice("navigation", sentence) for sentence in navigation.advice(end))
+        if self.resolved["model"].get("speed_sensor") is False:
+            for place, entry in enumerate(self.resolved.get("faults", ())):
+                if entry["target"].endswith("propeller_speed"):
+                    says = f"`faults[{place}]` has no effect: the controller does not use measured propeller speeds"
+                    yield advice(f"faults[{place}]", says, hint="Write `model: {speed_sensor: true}`")
         yield from plausibility(self.closed_loop, end, self.scenario.initial.position)
 
     def without_faults(self) -> "Built":
