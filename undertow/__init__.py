@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from undertow import controllers as controllers
     from undertow import disturbances as disturbances
+    from undertow import faults as faults
     from undertow import navigation as navigation
     from undertow import plants as plants
     from undertow import power as power
@@ -53,6 +54,7 @@ _HOMES = {
 _PACKAGES = (
     "controllers",
     "disturbances",
+    "faults",
     "navigation",
     "plants",
     "power",

@@ -18,22 +18,25 @@ from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
+    AbstractFaults,
     AbstractNavigation,
     AbstractPlant,
     AbstractReference,
 )
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, within
 from undertow.core.status import Status
 from undertow.disturbances.adding import Together
 from undertow.disturbances.none import none
+from undertow.faults.mode import AbstractFault
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.navigation.perfect import perfect
 from undertow.scenario import execute
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
+from undertow.scenario.faulted import faulted
 from undertow.scenario.finished_run import Measuring, certificate_of, label, metrics_of
 from undertow.scenario.reading import from_data, read
-from undertow.scenario.schema import Initial, Loop, Window, complaint
+from undertow.scenario.schema import Fault, Initial, Loop, Window, complaint
 from undertow.scenario.step_size import step_failure
 
 if TYPE_CHECKING:
@@ -130,6 +133,7 @@ def simulate(
     *,
     disturbance: AbstractDisturbance | Sequence[AbstractDisturbance] | None = None,
     navigation: AbstractNavigation | None = None,
+    faults: Sequence[Mapping[str, Any]] | AbstractFaults | None = None,
     duration: float = 20.0,
     loop: Literal["sampled", "continuous"] = "sampled",
     dt: float = 1e-3,
@@ -147,6 +151,7 @@ def simulate(
         reference: what to follow.
         disturbance: what the surroundings do; several as a list, None for nothing.
         navigation: filter that estimates position and velocity from measurements; None for the true ones.
+        faults: entries as those of the key `faults` of a scenario, whose mode may be an object; None for none.
         duration: s. The steady metrics are taken over its second half.
         loop: `sampled` (input held over each dt) or `continuous` (one ODE, the paper's setting).
         dt: sampling time of the controller, or step of the ODE, s.
@@ -173,8 +178,30 @@ def simulate(
             raise BadInput(name, f"be an {contract.__name__}", f"a {type(part).__name__}")
     checks.choice("precision", precision, ("float64", "float32"))
     with runtime.in_precision(precision):
-        closed_loop = in_present_precision(ClosedLoop(*(part for part, _ in roles.values())))
+        closed_loop = ClosedLoop(*(part for part, _ in roles.values()))
+        closed_loop = in_present_precision(_with_faults(closed_loop, faults, dt))
         return _simulate(closed_loop, loop, (duration, dt, record), seed, position, velocity)
+
+
+def _with_faults(
+    loop: ClosedLoop, faults: Sequence[Mapping[str, Any]] | AbstractFaults | None, dt: float
+) -> ClosedLoop:
+    """The loop with faults that are entries of a scenario, or a part of the loop already."""
+    if faults is None or isinstance(faults, AbstractFaults):
+        return dataclasses.replace(loop, faults=faults)
+    if not isinstance(faults, list | tuple) or not all(isinstance(entry, Mapping) for entry in faults):
+        raise BadInput("faults", "be a list of mappings", faults)
+    made = {place: entry["mode"] for place, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)}
+    named = {place: {"mode": type(mode).__name__} for place, mode in made.items()}
+    entries = []
+    for place, entry in enumerate(faults):
+        with within(f"faults[{place}]"):
+            try:
+                entries.append(Fault.model_validate({**entry, **named.get(place, {})}))
+            except ValidationError as errors:
+                raise complaint(errors, from_data({}), Fault) from None
+    with within("faults"):
+        return faulted(loop, entries, sampling_time=dt, made=made)[0]
 
 
 def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], seed: int, position, velocity) -> Run:

@@ -7,6 +7,14 @@ from textbook import rotation_from_euler
 
 from undertow.core.contracts import Load, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
+from undertow.faults.mode import (
+    AbstractComputationFault,
+    AbstractPlantFault,
+    AbstractThrustMode,
+    Instant,
+    Moment,
+    Presence,
+)
 from undertow.power import ESC
 from undertow.sensors.motion import motion_of
 from undertow.thrusters.thruster import PropellerReport
@@ -93,7 +101,37 @@ def navigation(filter_, v):
     )
 
 
-KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation)
+class Restarted:
+    """What faults of the computation need of a law: a state with which it begins."""
+
+    def init(self, y, r):
+        return {"integral": y, "filter": 2 * y}
+
+
+def faults(fault, v):
+    severity, value = 1.5 + v[0], v[1:5]
+    if isinstance(fault, AbstractThrustMode):
+        return fault.factor(severity)
+    if isinstance(fault, AbstractPlantFault):
+        place = Pose(jnp.stack([v[16], v[17], 3 + v[18]]), rotation_from_euler(v[13:16]), v[19:22])
+        return fault.load(Presence(jnp.asarray(True), 1 + v[5], severity - 3), place, Load(v[6:12], v[22:28]))
+    if isinstance(fault, AbstractComputationFault):
+        now = Instant(jnp.asarray(True), jnp.asarray(0), severity)
+        state = {"integral": v[6:10], "filter": v[10:14]}
+        state = fault.state(now, Restarted(), state, v[14:18], v[18:22])
+        return fault.execution(now, 0.01 + 0.001 * v[5]), jax.tree.map(jnp.nan_to_num, state)
+    # A few control steps that are far apart: with one of them a period may change nothing.
+    size = 0.05 * severity if fault.delays else severity / 3
+    memory, found = fault.init(v[6:10]), []
+    for k in range(8):
+        since, step = 5.3 + 37.3 * k + v[5], jnp.asarray(k)
+        moment = Moment(jnp.asarray(True), since, 0.01, size, jax.random.PRNGKey(3), step, jnp.zeros(4), holds=False)
+        altered, memory = fault.apply(memory, moment, value + k)
+        found.append((jnp.nan_to_num(altered.value), altered.present))
+    return found, memory
+
+
+KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation, faults)
 USES = {use.__name__: use for use in KINDS}
 
 

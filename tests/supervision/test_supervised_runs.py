@@ -27,7 +27,12 @@ SCENARIOS = {
         "disturbance": SEA,
     },
     "pid": {"plant": HEAVY, "controller": "pid", "reference": GOAL, "navigation": {"kind": "white_noise"}},
-    "paper": {"reference": {"kind": "lissajous"}, "disturbance": "u1", "loop": {"dt": 1e-3}},
+    "paper": {
+        "controller": {"kind": "rcaf", "composite": 20, "weights_bound": 20},
+        "reference": {"kind": "setpoint", "position": [2, 3, 4, 1, 0.8, 1.2]},
+        "disturbance": "u1",
+        "loop": {"dt": 1e-3},
+    },
     "pendulum": {
         "plant": {"kind": "inverted_pendulum"},
         "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 0.5},

@@ -348,6 +348,6 @@ def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | No
     built = build(text)
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
-    loop = built.closed_loop
+    loop = built.without_faults().closed_loop
     open_loop = dataclasses.replace(loop, reference=built.reference)
     return open_loop, built.scenario.precision, built.scenario.loop.dt

@@ -24,6 +24,18 @@ from undertow.core.contracts import (
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.user_code import fault_of
+from undertow.faults.mode import (
+    AbstractComputationFault,
+    AbstractFault,
+    AbstractMode,
+    AbstractPlantFault,
+    AbstractThrustMode,
+    Altered,
+    Execution,
+    Instant,
+    Moment,
+    Presence,
+)
 from undertow.sensors.motion import motion_of
 from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster, PropellerReport
@@ -149,6 +161,61 @@ def _reference(reference: AbstractReference, around: Surroundings) -> Iterator[F
         yield from agree("at", target[2], rate[1], f"the rate of the velocity at {t:g} s")
 
 
+def _mode(mode: AbstractMode, around: Surroundings) -> Iterator[Finding]:
+    """Check of a mode on a signal of three entries: its memory and the signal keep their form."""
+    yield from _roles(mode, ("quantity", "sensor", "thruster", "bus"))
+    value = jnp.linspace(0.2, 0.4, 3)
+    severity = jnp.asarray(float(mode.severity[2]))
+    times = (jnp.asarray(True), jnp.asarray(0.3), jnp.asarray(0.01))
+    moment = Moment(*times, severity, jax.random.PRNGKey(0), jnp.asarray(3), jnp.zeros(3), holds=True)
+    memory = mode.init(value)
+    answer = mode.apply(memory, moment, value)
+    if unpaired := list(two_values("apply", answer, "the altered signal and the memory after it")):
+        yield from unpaired
+        return
+    altered, after = answer
+    yield from alike("apply", after, memory, "return the memory in the form that `init` gives it", types=True)
+    wrong = list(is_a("apply", altered, Altered))
+    yield from wrong or [*shaped("apply", altered.value, value.shape), *shaped("apply", altered.present, ())]
+
+
+def _thrust_mode(mode: AbstractThrustMode, around: Surroundings) -> Iterator[Finding]:
+    yield from _roles(mode, ("thruster",))
+    yield from shaped("factor", mode.factor(jnp.asarray(float(mode.severity[2]))), ())
+
+
+def _plant_fault(fault: AbstractPlantFault, around: Surroundings) -> Iterator[Finding]:
+    """Check that nothing is added to the load while the fault is not present."""
+    yield from _roles(fault, ("plant",))
+    n, severity = len(around.truth.position), jnp.asarray(float(fault.severity[2]))
+    before = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
+    loads = [
+        fault.load(Presence(jnp.asarray(active), jnp.asarray(0.3), severity), around.pose, before)
+        for active in (False, True)
+    ]
+    for load in loads:
+        if wrong := list(is_a("load", load, Load)):
+            yield from wrong
+            return
+        yield from (finding for value in load[:2] for finding in shaped("load", value, (n,)))
+    for name in ("acceleration", "wrench"):
+        yield from agree("load", getattr(loads[0], name), getattr(before, name), "what it was where nothing has failed")
+
+
+def _computation_fault(fault: AbstractComputationFault, around: Surroundings) -> Iterator[Finding]:
+    yield from _roles(fault, ("computation",))
+    now = Instant(jnp.asarray(True), jnp.asarray(0), jnp.asarray(float(fault.severity[2])))
+    yield from is_a("execution", fault.execution(now, jnp.asarray(0.01)), Execution)
+
+
+def _roles(fault: AbstractFault, allowed: tuple[str, ...]) -> Iterator[Finding]:
+    """Check that a fault names targets, of which only some can fail in the way of its contract."""
+    if not fault.targets or not set(fault.targets) <= set(allowed):
+        yield error("contract", "targets", f"be some of {', '.join(allowed)}", f"{fault.targets}")
+    if not fault.severity[3] <= fault.severity[2] <= fault.severity[4]:
+        yield error("contract", "severity", "have a default within its range", f"{tuple(fault.severity)}")
+
+
 _USES: dict[type, Callable[[Any, Surroundings], Iterator[Finding]]] = {
     AbstractPlant: lambda plant, around: check_plant(plant),
     AbstractController: lambda controller, around: check_controller(controller),
@@ -156,5 +223,9 @@ _USES: dict[type, Callable[[Any, Surroundings], Iterator[Finding]]] = {
     AbstractReference: _reference,
     AbstractNavigation: _navigation,
     AbstractSensor: _sensor,
+    AbstractMode: _mode,
+    AbstractThrustMode: _thrust_mode,
+    AbstractPlantFault: _plant_fault,
+    AbstractComputationFault: _computation_fault,
     AbstractThruster: lambda thruster, around: check_thruster(thruster),
 }

@@ -14,6 +14,7 @@ from undertow.cli.tables import titled, wide_console
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.signals import Signal
+from undertow.faults.kinds import list_kinds, severity_cells
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.describing import summary, text_of
@@ -91,15 +92,47 @@ def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: li
     console.print(table)
 
 
-def list_parts(kind: str | None) -> None:
-    """Print the parts of one kind, or of all kinds, with one line each."""
+def list_parts(kind: str | None, as_json: bool = False) -> None:
+    """Print the parts of one kind, or of all kinds, with one line each; of faults every pair of target and mode."""
     if kind is not None and kind not in catalogue.KINDS:
         raise BadInput("KIND", "be a kind of part", kind, hint=did_you_mean(kind, catalogue.KINDS))
+    if kind == "faults":
+        _list_faults(as_json)
+        return
+    shown_kinds = (kind,) if kind else catalogue.KINDS
+    if as_json:
+        rows = [
+            {"kind": shown, "name": name, "description": summary(part)}
+            for shown in shown_kinds
+            for name, part in sorted(catalogue.names(shown).items())
+        ]
+        print(json.dumps(rows, indent=1))
+        return
     table = Table("kind", "name", "description")
-    for shown in (kind,) if kind else catalogue.KINDS:
+    for shown in shown_kinds:
         for name, part in sorted(catalogue.names(shown).items()):
             table.add_row(shown, name, Text(summary(part)))
         table.add_section()
     console = wide_console()
     console.print(table)
     console.print("`undertow describe NAME` shows one of them with its options.", highlight=False, soft_wrap=True)
+
+
+def _list_faults(as_json: bool) -> None:
+    """Print every kind of fault: target, mode, and the severity with its unit, default and range."""
+    found = list_kinds()
+    if as_json:
+        print(json.dumps([one._asdict() for one in found], indent=1))
+        return
+    table = Table("target", "mode", "severity", "unit", "default", "range")
+    for i, one in enumerate(found):
+        table.add_row(one.target, one.mode, *map(Text, severity_cells(one)))
+        if found[i + 1 : i + 2] and found[i + 1].target != one.target:
+            table.add_section()
+    console = wide_console()
+    console.print(table)
+    console.print(
+        f"{len(found)} kinds. `undertow describe faults/NAME` shows the options of a mode.",
+        highlight=False,
+        soft_wrap=True,
+    )

@@ -310,14 +310,18 @@ for command in outside_commands.ALL:
 @app.command("list")
 def list_parts(
     kind: Annotated[str | None, typer.Argument(metavar="[KIND]", help="One kind only, e.g. thrusters.")] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON instead of a table: with faults every target and mode.")
+    ] = False,
 ) -> None:
     """List the available parts.
 
-    Kinds: vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation.
+    Kinds: vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation, faults.
+    `undertow list faults` shows every pair of target and mode, with the meaning of its severity.
     """
     from undertow.cli.describe import list_parts
 
-    list_parts(kind)
+    list_parts(kind, as_json)
 
 
 @app.command()

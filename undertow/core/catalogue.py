@@ -32,6 +32,7 @@ KINDS = (
     "sensors",
     "navigation",
     "supervision",
+    "faults",
 )
 
 # Key of a scenario -> kind of its part.
@@ -42,7 +43,7 @@ KIND_OF |= {"supervisor": "supervision"}
 # Kind of a part -> where it stands in a scenario.
 KEY_OF = {kind: key for key, kind in KIND_OF.items()}
 KEY_OF |= {"vehicles": "plant.vehicle", "thrusters": "plant.thruster", "power": "plant.battery` or `plant.esc"}
-KEY_OF |= {"sensors": "navigation.sensors` of `kind: kalman"}
+KEY_OF |= {"sensors": "navigation.sensors` of `kind: kalman", "faults": "mode` of an entry of `faults"}
 
 # What others call a part -> its name here.
 _OTHER_WORDS = {"gps": "position_fix", "gnss": "position_fix", "usbl": "position_fix", "lbl": "position_fix"}

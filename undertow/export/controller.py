@@ -83,7 +83,7 @@ def checked(precision: str, form: Format) -> str:
 
 def functions_of(built: Built, form: Format, output: str = "input", esc: ESC | None = None) -> Functions:
     """The functions of the controller in the present precision."""
-    loop = in_present_precision(built.closed_loop)
+    loop = in_present_precision(built.without_faults().closed_loop)
     return Functions(loop, form, output_of(output, loop.plant, loop.controller, esc))
 
 

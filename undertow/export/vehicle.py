@@ -90,7 +90,7 @@ def vehicle_program(built: Built, name: str, form: Format) -> Program:
         BadInput: the name is none for C, or the plant or the disturbance needs something that has no counterpart in C.
     """
     check_compiler()
-    loop = in_present_precision(built.closed_loop)
+    loop = in_present_precision(built.without_faults().closed_loop)
     if built.scenario.loop.method not in COMPACT_METHODS:
         must = f"be one of {', '.join(COMPACT_METHODS)} for a vehicle in C"
         raise BadInput("loop.method", must, built.scenario.loop.method)

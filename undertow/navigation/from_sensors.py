@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int, PyTree
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.errors import BadInput
@@ -64,6 +64,20 @@ class AbstractFilter(eqx.Module):
         """What the sensors do not measure, and how far its estimate drifts in `duration` (s)."""
 
 
+class AbstractSensorFaults(eqx.Module):
+    """Faults of sensors: what a filter receives instead of what they deliver."""
+
+    @abc.abstractmethod
+    def init(self, readings: Sequence[Reading]) -> PyTree:
+        """State before the first step, for readings of these shapes."""
+
+    @abc.abstractmethod
+    def received(
+        self, key: PRNGKeyArray, state: PyTree, t: Number, received: tuple[Received, ...]
+    ) -> tuple[tuple[Received, ...], PyTree]:
+        """What reaches the filter at time t (s), and the state afterwards; `key` is that of the run."""
+
+
 class SensorNavigationState(NamedTuple):
     """State of the sensors and of the filter."""
 
@@ -72,6 +86,7 @@ class SensorNavigationState(NamedTuple):
     sensors: tuple[SensorState, ...]  # state of each
     filter: Any
     ignored: Int[Array, ""]  # readings so far that were not finite
+    faults: Any = ()  # state of the faults of the sensors; () without any
 
 
 class SensorNavigation(AbstractInformedNavigation):
@@ -79,9 +94,11 @@ class SensorNavigation(AbstractInformedNavigation):
 
     filter: AbstractFilter
     smooth: bool = eqx.field(static=True, default=False)
+    faults: AbstractSensorFaults | None = None
 
     def realize(self, key):
-        return jax.random.split(key, len(self.filter.sensors))
+        """A key for each sensor, and one more for their faults where there are any."""
+        return jax.random.split(key, len(self.filter.sensors) + (self.faults is not None))
 
     def velocity_noise(self, dt):
         """Noise density of all sensors, spread over every control step; the memory of the filters is neglected."""
@@ -96,20 +113,24 @@ class SensorNavigation(AbstractInformedNavigation):
             raise BadInput("", "be used on a vehicle", f"a plant of {truth.position.shape[0]} outputs", hint=hint)
         motion = motion_of(truth, truth.velocity[:3], jnp.zeros(()))
         readings = [sensor.reading(motion) for sensor in self.filter.sensors]
-        chances = _chances(realization, jnp.full(len(readings), -1), readings)
+        chances = _chances(realization[: len(readings)], jnp.full(len(readings), -1), readings)
         states = tuple(
             sensor.sampling.init(reading, chance[:-1])
             for sensor, reading, chance in zip(self.filter.sensors, readings, chances, strict=True)
         )
         start = self.filter.start(truth)
-        return SensorNavigationState(jnp.zeros(()), motion.velocity, states, start, jnp.zeros((), dtype=int))
+        faults = () if self.faults is None else self.faults.init(readings)
+        return SensorNavigationState(jnp.zeros(()), motion.velocity, states, start, jnp.zeros((), dtype=int), faults)
 
     def measure(self, realization, state: SensorNavigationState, t, truth: Measurement):
         received, states, velocity = self.sample(realization, state, t, truth)
+        faults = state.faults
+        if self.faults is not None:
+            received, faults = self.faults.received(realization[-1], faults, t, received)
         lost = [one.fresh & ~jnp.isfinite(one.reading).all() for one in received]
         estimated = self.filter.update(state.filter, t - state.time, received)
         ignored = state.ignored + sum(jnp.where(one, 1, 0) for one in lost)
-        after = SensorNavigationState(t, velocity, states, estimated, ignored)
+        after = SensorNavigationState(t, velocity, states, estimated, ignored, faults)
         return self.filter.measurement(estimated), after
 
     def sample(self, realization, state: SensorNavigationState, t, truth: Measurement):
@@ -117,10 +138,11 @@ class SensorNavigation(AbstractInformedNavigation):
         motion = motion_of(truth, state.velocity, t - state.time)
         readings = [sensor.reading(motion) for sensor in self.filter.sensors]
         numbers = jnp.stack([sensor.sampling.number(t) for sensor in self.filter.sensors])
+        chances = _chances(realization[: len(readings)], numbers, readings)
         deliveries = [
             sensor.sampling.deliver(states, t, reading, chance)
             for sensor, states, reading, chance in zip(
-                self.filter.sensors, state.sensors, readings, _chances(realization, numbers, readings), strict=True
+                self.filter.sensors, state.sensors, readings, chances, strict=True
             )
         ]
         received = tuple(

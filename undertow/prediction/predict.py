@@ -76,7 +76,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     """Predict a scenario from its linearised closed loop."""
     progress("equilibrium", 0.0)
     known = operating_point(built)
-    loop, settings = built.closed_loop, built.scenario.loop
+    loop, settings = known.built.closed_loop, built.scenario.loop
     progress("poles at the operating points", 0.5)
     points = tuple(_point(known, *each) for each in zip(SHARES, known.around.operating_loads(SHARES), strict=True))
     worst = max(points, key=lambda point: point.radius).at

@@ -29,6 +29,7 @@ from undertow.navigation.from_sensors import SensorNavigation
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import check_fit, check_noise, check_start, check_times, check_window, rounded_times
+from undertow.scenario.faulted import faulted, without_faults
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
@@ -89,7 +90,16 @@ class Built(NamedTuple):
             yield advice("steady.start", f"there are no steady metrics: {window}")
         if isinstance(navigation, SensorNavigation):
             yield from (advice("navigation", sentence) for sentence in navigation.advice(end))
+        if self.resolved["model"].get("speed_sensor") is False:
+            for place, entry in enumerate(self.resolved.get("faults", ())):
+                if entry["target"].endswith("propeller_speed"):
+                    says = f"`faults[{place}]` has no effect: the controller does not use measured propeller speeds"
+                    yield advice(f"faults[{place}]", says, hint="Write `model: {speed_sensor: true}`")
         yield from plausibility(self.closed_loop, end, self.scenario.initial.position)
+
+    def without_faults(self) -> "Built":
+        """The same scenario before any fault: predictions, tuning and exports are about that."""
+        return self._replace(closed_loop=without_faults(self.closed_loop))
 
     def known_metrics(self) -> dict[str, Metric]:
         """Metrics that its runs may have, by name, with their units."""
@@ -196,6 +206,10 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         controller = supervised(scenario.supervisor, controller)
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
     resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario
+    with within("faults"):
+        loop, entries = faulted(loop, scenario.faults, text.folder, scenario.loop.dt)
+    if entries:
+        resolved["faults"] = entries
     with within("loop"):
         if scenario.loop.kind == "continuous":
             continuous.check(loop)

@@ -15,6 +15,7 @@ from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput, joined, known_key, within
 from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import fault_of, place_of
+from undertow.faults.mode import AbstractFault
 from undertow.logs.log import Log
 from undertow.power import ESC, Battery
 from undertow.scenario.csv_table import csv_of, read_csv, samples_of
@@ -51,6 +52,7 @@ _CONTRACTS = {
     "sensors": AbstractSensor,
     "navigation": contracts.AbstractNavigation,
     "supervision": contracts.AbstractGatedController,
+    "faults": AbstractFault,
     "metrics": AbstractMetric,
 }
 

@@ -100,6 +100,39 @@ class Window(Strict):
         return start, duration if self.stop is None else self.stop
 
 
+Range = Annotated[
+    Annotated[float | None, Tag(_ONE)] | Annotated[list[float], Tag(_SEVERAL)],
+    Discriminator(lambda given: _SEVERAL if isinstance(given, list) else _ONE),
+]
+NumberOrRandom = Annotated[
+    Annotated[int | None, Tag(_ONE)] | Annotated[Literal["random"], Tag(_SEVERAL)],
+    Discriminator(lambda given: _SEVERAL if isinstance(given, str) else _ONE),
+]
+
+
+class Fault(BaseModel):
+    """One fault. Further keys are options of its mode, checked against the mode's own signature when it is built."""
+
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+    target: str = Field(
+        description="what fails: a quantity that the controller receives (position, attitude, velocity, angular_rate, "
+        "depth, propeller_speed), a sensor of the navigation (sensor dvl), thruster 3, bus, plant or computation"
+    )
+    mode: str = Field(description="how, see `undertow list faults`, or ./file.py:function")
+    severity: Range = Field(
+        None, description="how much; [lowest, highest] is sampled for every seed; default: that of the mode"
+    )
+    onset: Annotated[Range, Field(description="when it begins, s; [earliest, latest] is sampled for every seed")] = 0.0
+    duration: float | None = Field(
+        None, gt=0, description="how long it lasts, s; default: that of the mode, or to the end"
+    )
+    announced: bool = Field(False, description="whether the controller is told that the thruster has failed")
+    number: NumberOrRandom = Field(
+        None, description="of the thruster or of the sensor of this name; random: any thruster"
+    )
+    axis: int | None = Field(None, description="the one entry of the signal that fails, from 1; default: all")
+
+
 class TrainingRuns(Strict):
     """Runs for the evaluation of gains: every parameter set with every seed."""
 
@@ -170,6 +203,7 @@ class Scenario(Strict):
         description="supervision of the controller: true, or options of the supervisor; `fallback` is a controller "
         "that takes over when the law fails",
     )
+    faults: list[Fault] = Field(default_factory=list, description="faults that are injected into the run")
     loop: Loop = Field(default_factory=Loop, description="settings of the simulation")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     steady: Window = Field(default_factory=Window, description="window of the steady metrics")
@@ -368,6 +402,7 @@ def _type_name(annotation: Any) -> str:
         list[str]: "list of names",
         list[Any]: "list of values",
         list[NamedPart]: "list of parts",
+        list[Fault]: "list of faults",
         typing.get_args(OneOrMore)[0]: "part or list of parts",
         str | dict[str, Any]: "name of a file, or mapping",
     }

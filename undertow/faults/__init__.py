@@ -1,0 +1,5 @@
+"""Faults of sensors, thrusters, power, plant and computation. One file per mode; `undertow list faults` shows all."""
+
+from undertow.core.catalogue import publish
+
+__getattr__ = publish(__name__)

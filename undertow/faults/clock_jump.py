@@ -1,0 +1,28 @@
+"""A clock that jumps."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from undertow.faults.mode import AbstractComputationFault, Execution, Severity
+
+
+class ClockJump(AbstractComputationFault):
+    """In the step of the onset the law is given another sampling time."""
+
+    targets: ClassVar = ("computation",)
+    severity: ClassVar = Severity(
+        "sampling time that the controller is given once; negative where the clock goes back", "s", -1.0, -1e9, 1e9
+    )
+    default_duration: ClassVar = float("inf")
+
+    def execution(self, instant, dt):
+        return Execution(jnp.asarray(True), jnp.where(instant.count == 0, instant.severity, dt))
+
+    def state(self, instant, law, z, y, r):
+        return z
+
+
+def clock_jump() -> ClockJump:
+    """A jump of the clock: the controller is given a wrong sampling time once."""
+    return ClockJump()
