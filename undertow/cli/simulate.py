@@ -18,10 +18,10 @@ from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.logs.run_log import log_of_run
 from undertow.report.plotting import plotting_process
-from undertow.report.run_tables import certificate_rows, metrics_rows
+from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
 from undertow.scenario.build import Built, build, own_parts
 from undertow.scenario.execute import Executed, execute, write
-from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of
+from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of, transitions_of
 from undertow.scenario.reading import read
 
 if TYPE_CHECKING:
@@ -114,6 +114,8 @@ def _print_results(executed: Executed, folder: Path, console: Console) -> None:
     console.print(terminal_table(metrics_rows(executed.steady, executed.whole, window, known)))
     if certificate is not None:
         console.print(terminal_table(certificate_rows(certificate, window)))
+    if (transitions := transitions_of(executed.dataset)) is not None:
+        console.print(terminal_table(transition_rows(transitions)))
     verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
     console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
     own = own_parts(executed.built.scenario, executed.built.text.folder).get("controller")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from undertow.analysis.metrics import for_people, infinite
 from undertow.core.metric import Metric
+from undertow.supervision.transitions import Transition
 
 if TYPE_CHECKING:  # it loads SciPy, which a run does not need
     from undertow.analysis.linearization.response import Comparison
@@ -65,6 +66,12 @@ def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float]
         rows.append((one["sentence"], _share(one["steady"]), _share(one["whole"]), first))
     head = ("hypothesis", _span(window), "whole run", "first fails at")
     return RunTable("Certificate: hypotheses of the stability proof", head, rows, _consequences(certificate))
+
+
+def transition_rows(transitions: Sequence[Transition]) -> RunTable:
+    """Transitions of the supervisor: when, to which state, and why."""
+    rows: list[tuple[str | float, ...]] = [(f"{one.time:.6g} s", one.state.name, one.why()) for one in transitions]
+    return RunTable("Supervision", ("time", "state", "reason: value, limit"), rows)
 
 
 def _span(window: tuple[float, float] | None) -> str:

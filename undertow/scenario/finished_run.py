@@ -21,6 +21,8 @@ from undertow.power.ledger import closure
 from undertow.scenario.foreign_code import changed
 from undertow.scenario.provenance import checksum, claims, content_hash, versions
 from undertow.scenario.reading import parse
+from undertow.supervision.conditions import State
+from undertow.supervision.transitions import Transition, log_in, transitions
 
 
 class Measuring(NamedTuple):
@@ -87,6 +89,8 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
     dataset.attrs["metric_meanings"] = to_json({n: one._asdict() for n, one in known.items() if n in shown})
     if success is not None:
         dataset.attrs["success"] = to_json(success._asdict())
+    if (log := log_in(outcome.final[1])) is not None:
+        dataset.attrs["transitions"] = to_json([one._asdict() for one in transitions(log)])
     dataset.attrs["content_hash"] = content_hash(dataset)
     dataset.attrs["checksum"] = checksum(dataset)
     return Labelled(status, steady, whole, success, dataset)
@@ -115,6 +119,13 @@ def metrics_of(dataset: xr.Dataset) -> dict[str, Metric]:
 def certificate_of(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Certificate of a run from its attributes; None for a controller without one, and in older files."""
     return json.loads(dataset.attrs["certificate"]) if "certificate" in dataset.attrs else None
+
+
+def transitions_of(dataset: xr.Dataset) -> list[Transition] | None:
+    """Transitions of the supervisor of a run from its attributes; None where nothing was supervised."""
+    if "transitions" not in dataset.attrs:
+        return None
+    return [Transition(**one | {"state": State(one["state"])}) for one in json.loads(dataset.attrs["transitions"])]
 
 
 def window_of(dataset: xr.Dataset) -> tuple[float, float] | None:

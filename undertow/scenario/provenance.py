@@ -16,7 +16,7 @@ import xarray as xr
 _PACKAGES = ("undertow", "jax", "jaxlib", "equinox", "diffrax", "numpy")
 
 # Attributes of a result that are results themselves; those in JSON are compared one by one.
-_CLAIMED = ("status", "ended", "certificate")
+_CLAIMED = ("status", "ended", "certificate", "transitions")
 _CLAIMED_EACH = "metrics"
 
 

@@ -55,6 +55,7 @@ class StuckReadings(eqx.Module):
     def init(self, read: Motion) -> StuckState:
         """State at the first reading."""
         moved, turned = jnp.zeros_like(read.position), jnp.zeros_like(split(read.velocity)[1])
+        read = _finite(read)
         anchor = Anchor(read.position, read.attitude, moved, turned, jnp.zeros(2))
         return StuckState(read, anchor, anchor)
 
@@ -70,6 +71,7 @@ class StuckReadings(eqx.Module):
         before, now = split(state.read.velocity), split(read.velocity)
         pose = (read.position == state.read.position).all(), (read.attitude == state.read.attitude).all()
         rates = (now[0] == before[0]).all(), (now[1] == before[1]).all()
+        read = _finite(read)
         go_on = lambda anchor, same: _go_on(anchor, same, read, path, dt)
         return StuckState(read, go_on(state.pose, pose), go_on(state.rates, rates))
 
@@ -100,3 +102,8 @@ def _go_on(anchor: Anchor, same: tuple, read: Motion, path: tuple[Array, Array],
         jnp.where(turning, anchor.turned + dt * turned, 0.0),
         jnp.where(jnp.stack([straight, turning]), anchor.same + 1, 0.0),
     )
+
+
+def _finite(read: Motion) -> Motion:
+    """A reading with zeros for what is not finite, as the state of a run must be; NaN is never equal to them."""
+    return Motion(*(jnp.where(jnp.isfinite(entry), entry, 0.0) for entry in read))

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from undertow.supervision.conditions import State, reason_of
+from undertow.supervision.conditions import NAMES, State, reason_of
 
 KEPT = 16  # the last ones
 
@@ -34,8 +34,11 @@ class Transition(NamedTuple):
     limit: float
 
     def __str__(self) -> str:
-        why = f" ({self.reason}: {self.value:.4g}, limit {self.limit:.4g})" if self.reason else ""
-        return f"{self.time:.6g} s: {self.state.name}{why}"
+        return f"{self.time:.6g} s: {self.state.name}{f' ({self.why()})' if self.reason else ''}"
+
+    def why(self) -> str:
+        """The reason, with the value and the limit of a condition."""
+        return self.reason + (f": {self.value:.4g}, limit {self.limit:.4g}" if self.reason in NAMES else "")
 
 
 def empty_log() -> TransitionLog:
@@ -61,3 +64,9 @@ def transitions(log: Any) -> Sequence[Transition]:
     slots = [k % KEPT for k in range(max(0, int(count) - KEPT), int(count))]
     rows = ([column[slot] for column in columns] for slot in slots)
     return [Transition(float(t), State(int(s)), reason_of(c), float(v), float(limit)) for t, s, c, v, limit in rows]
+
+
+def log_in(state: Any) -> TransitionLog | None:
+    """The log in the state of a controller; None for one that is not supervised."""
+    is_log = lambda node: isinstance(node, TransitionLog)
+    return next((leaf for leaf in jax.tree.leaves(state, is_leaf=is_log) if is_log(leaf)), None)
