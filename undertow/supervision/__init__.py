@@ -1,0 +1,1 @@
+"""Supervision: what notices in closed loop that a part has failed, and what goes on without it."""
