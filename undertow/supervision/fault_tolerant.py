@@ -139,7 +139,7 @@ def fault_tolerant(
     priority = default_priority(law.model) if priority is None else priority
     checks.positive("priority", priority)
     priority = np.broadcast_to(np.asarray(priority, dtype=float), (effect.shape[0],))
-    return FaultTolerantController(law, watch, priority)
+    return FaultTolerantController(law, watch, priority)  # pyright: ignore[reportArgumentType] - an abstract field is no argument
 
 
 def _gain_at_rest(model: Model):

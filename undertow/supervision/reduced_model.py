@@ -66,7 +66,8 @@ class ReducedActuators(AbstractActuatorModel):
         return self.whole.update_from_report(state, report)
 
     def range(self, state, rate):
-        return tuple(self._masked(limit) for limit in self.whole.range(state, rate))
+        low, high = self.whole.range(state, rate)
+        return self._masked(low), self._masked(high)
 
     def force(self, state, u):
         return self.whole.force(state, u)
@@ -101,7 +102,7 @@ def least_forces(gain: Gain, used: PerActuator, priority: PerAxis, acceleration:
 
 def attained_share(gain: Gain, used: PerActuator, priority: PerAxis) -> PerAxis:
     """Share of an acceleration demanded of one axis alone that `least_forces` gives it: the diagonal of G G#."""
-    scale, scaled, normal = _weighted(gain, used, priority)
+    scale, _, normal = _weighted(gain, used, priority)
     square = normal - _damping(gain) * jnp.eye(len(scale), dtype=gain.dtype)
     return (square * inverse_symmetric(normal)).sum(-1)
 

@@ -112,8 +112,8 @@ class ThrusterMonitor(eqx.Module):
             dt: sampling time, s.
         """
         share, slow = -jnp.expm1(-self.bandwidth * dt), -jnp.expm1(-dt / self.background_time)
-        actuators, dynamics = self.model.actuators, self.model.dynamics
-        reported, after, force, unreported, differs = self._forces(state, y, u_applied, dt)
+        dynamics = self.model.dynamics
+        after, force, unreported, differs = self._forces(state, y, u_applied, dt)
         away = self.model.coordinates.velocity(y) - state.velocity
         away = jnp.where(jnp.isfinite(away), away, 0.0)
         effect = dynamics.gain(y)
@@ -149,18 +149,18 @@ class ThrusterMonitor(eqx.Module):
         )
 
     def _forces(self, state: MonitorState, y: Measurement, u_applied: Inputs, dt):
-        """Actuators as reported and one step later, mean force, the same unreported, and 1 where both forces differ."""
+        """Actuators one step later, their mean force, the same actuators without report, and 1 where both differ."""
         model = self.model.actuators
         reported = model.update_from_report(state.actuators, y.actuator)
         after = model.advance(reported, u_applied, dt)
         before = model.force(reported, u_applied)
         force = jnp.broadcast_to((before + model.force(after, u_applied)) / 2, self.largest.shape)
-        if y.actuator is None or isinstance(state.unreported, tuple) and not state.unreported:
-            return reported, after, force, state.unreported, jnp.zeros_like(self.largest)
+        if y.actuator is None or (isinstance(state.unreported, tuple) and not state.unreported):
+            return after, force, state.unreported, jnp.zeros_like(self.largest)
         predicted = model.force(state.unreported, u_applied)
         allowed = _REPORTED * self.largest + _RELATIVE * jnp.abs(predicted)
         differs = jnp.where(jnp.abs(before - predicted) > allowed, 1.0, 0.0)
-        return reported, after, force, model.advance(state.unreported, u_applied, dt), differs
+        return after, force, model.advance(state.unreported, u_applied, dt), differs
 
     def _isolated(self, covariance, fast: PerAxis, effect, forces: PerActuator, used: PerActuator):
         """1 for an actuator that is suspected, (J of the best, D . P D), and the force a of each that explains D."""
