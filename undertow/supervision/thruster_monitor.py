@@ -23,6 +23,8 @@ _FIRST, _START = 20.0, 25.0
 _SLACK, _EXCESS, _MOST = 0.05, 2.5, 1.3
 # Difference between reported and predicted force that is a fault: share of the largest force, and of the predicted one.
 _REPORTED, _RELATIVE = 0.15, 0.3
+# Largest change of the log-likelihood ratio by one independent residual, so that no single one decides.
+_CHANGE = 20.0
 
 
 class MonitorState(NamedTuple):
@@ -34,7 +36,8 @@ class MonitorState(NamedTuple):
     residual: PerAxis  # rho, m/s^2, rad/s^2
     background: PerAxis  # its slow part: loads and errors of the model
     covariance: Float[Array, "n n"]  # of the fast part without faults, in squares of `unit`
-    forces: Float[Array, "2 m"]  # nominal forces behind one and two low-passes, N
+    forces: Float[Array, "3 m"]  # nominal forces behind one and two low-passes, and their slow part, N
+    likelihood: PerActuator  # log-likelihood ratio of "off" to "healthy", of the last seconds
     suspected: PerActuator  # for how long each actuator has been suspected, s
     lost: PerActuator  # 1 for an actuator that has failed
     quiet: Float[Array, ""]  # time until an alarm is possible, s
@@ -57,6 +60,12 @@ class ThrusterMonitor(eqx.Module):
     against the nominal force, and not above the largest. A suspicion that persists is an alarm. Where actuators report
     their speed, one whose reported force differs from that predicted of its command is suspected as well.
 
+    This finds a fault that begins while a thruster works. One that begins at little thrust, or a stuck propeller, shows
+    by what does not happen afterwards: the fast part of the nominal force, phi, has no effect, D = -E_i phi_i. Its
+    log-likelihood ratio to a healthy thruster, -2 phi_i E_i . P D - phi_i^2 E_i . P E_i per independent residual, is
+    summed with fading memory (Page's cumulative sum, 1954); the thruster is suspected where it exceeds `likely` and
+    that of every other by `clearly` and by the factor 1 / `likely_rival`.
+
     Raises:
         BadInput: a value that is not positive.
     """
@@ -72,14 +81,22 @@ class ThrusterMonitor(eqx.Module):
     rival: Float[Param, ""] = param("", "largest share that the second best explains of that", default=0.9)
     margin: Float[Param, ""] = param("", "least squared distance to the second best, in variances", default=12.0)
     least: Float[Param, ""] = param("", "smallest force of a fault, as a share of the largest force", default=0.08)
+    likely: Float[Param, ""] = param("", "log-likelihood ratio that is a fault", default=40.0)
+    clearly: Float[Param, ""] = param("", "by which it exceeds that of the second best", default=25.0)
+    likely_rival: Float[Param, ""] = param("", "largest ratio of the second best to the best", default=0.7)
+    correlation: Float[Param, ""] = param("s", "after which residuals are independent", default=0.3)
+    fading: Float[Param, ""] = param("s", "time constant with which the sum fades", default=4.0)
     persistence: Float[Param, ""] = param("s", "for which a suspicion persists before it is an alarm", default=0.05)
     settling: Float[Param, ""] = param("s", "after the start, without alarms", default=2.0)
     pause: Float[Param, ""] = param("s", "after an alarm, without another", default=0.3)
 
     def __check_init__(self):
-        for name in ("unit", "largest", "bandwidth", "background_time", "memory", "threshold", "explained", "rival"):
+        for name in (
+            *("unit", "largest", "bandwidth", "background_time", "memory", "threshold", "explained", "rival"),
+            *("likely", "likely_rival", "correlation", "fading"),
+        ):
             checks.positive(name, getattr(self, name))
-        for name in ("margin", "least", "persistence", "settling", "pause"):
+        for name in ("margin", "least", "clearly", "persistence", "settling", "pause"):
             checks.not_negative(name, getattr(self, name))
 
     def init(self, y: Measurement) -> MonitorState:
@@ -93,7 +110,8 @@ class ThrusterMonitor(eqx.Module):
             residual=jnp.zeros_like(velocity),
             background=jnp.zeros_like(velocity),
             covariance=_START * jnp.eye(velocity.shape[0]),
-            forces=jnp.zeros((2, *none.shape)),
+            forces=jnp.zeros((3, *none.shape)),
+            likelihood=none,
             suspected=none,
             lost=none,
             quiet=self.settling,
@@ -122,17 +140,17 @@ class ThrusterMonitor(eqx.Module):
         first = state.forces[0] + share * (force - state.forces[0])
 
         fast = (residual - state.background) / self.unit
-        found, evidence, explaining = self._isolated(state.covariance, fast, effect / self.unit[:, None], second, used)
-        suspicious = jnp.where(state.quiet > 0, 0.0, jnp.maximum(found, differs * used))
+        weighed = self._weighed(state.covariance, fast, effect / self.unit[:, None])
+        found, explained = self._isolated(weighed, second, used)
+        likelihood, likely = self._accumulated(state, weighed, second, used, dt)
+        suspicious = jnp.where(state.quiet > 0, 0.0, jnp.maximum(jnp.maximum(found, likely), differs) * used)
         suspected = jnp.where(suspicious > 0, state.suspected + dt, jnp.maximum(state.suspected - dt, 0.0))
         alarm = (suspected >= self.persistence) & (suspected >= suspected.max()) & (used > 0)
         raised = alarm.any()
         # What the alarm explains is no longer news: the rest may be the next fault.
-        known = matvec(effect, jnp.where(alarm, explaining, 0.0))
-        size = (fast * fast).sum()
+        known = matvec(effect, jnp.where(alarm, weighed.along / weighed.size, 0.0))
         steady = jnp.maximum(dt / self.memory, 1 / (state.steps + _FIRST))
-        weight = steady * jnp.minimum(1.0, _CLIP * fast.shape[0] / jnp.where(evidence[1] > 0, evidence[1], 1.0))
-        weight = jnp.where(jnp.isfinite(size), weight, 0.0)
+        weight = steady * jnp.minimum(1.0, _CLIP * fast.shape[0] / jnp.where(weighed.total > 0, weighed.total, 1.0))
         return MonitorState(
             actuators=after,
             unreported=unreported,
@@ -140,12 +158,13 @@ class ThrusterMonitor(eqx.Module):
             residual=residual,
             background=state.background + slow * (residual - state.background) + known,
             covariance=state.covariance * (1 - steady) + weight * fast[:, None] * fast[None, :],
-            forces=jnp.stack([first, second]),
+            forces=jnp.stack([first, second, state.forces[2] + slow * (second - state.forces[2])]),
+            likelihood=likelihood,
             suspected=jnp.where(raised, 0.0, suspected),
             lost=jnp.where(alarm, 1.0, state.lost),
             quiet=jnp.where(raised, self.pause, jnp.maximum(state.quiet - dt, 0.0)),
             steps=state.steps + 1,
-            evidence=jnp.sqrt(evidence[0]) / self.threshold,
+            evidence=jnp.maximum(jnp.sqrt(explained) / self.threshold, likelihood.max() / self.likely),
         )
 
     def _forces(self, state: MonitorState, y: Measurement, u_applied: Inputs, dt):
@@ -162,17 +181,19 @@ class ThrusterMonitor(eqx.Module):
         differs = jnp.where(jnp.abs(before - predicted) > allowed, 1.0, 0.0)
         return after, force, model.advance(state.unreported, u_applied, dt), differs
 
-    def _isolated(self, covariance, fast: PerAxis, effect, forces: PerActuator, used: PerActuator):
-        """1 for an actuator that is suspected, (J of the best, D . P D), and the force a of each that explains D."""
+    def _weighed(self, covariance, fast: PerAxis, effect: Float[Array, "n m"]) -> "_Weighed":
+        """Residual and accelerations per force, both in `unit`, weighed by the inverse covariance."""
         inverse = inverse_symmetric(covariance + jnp.eye(fast.shape[0]))
         weighed = matvec(inverse, fast)
-        total = (fast * weighed).sum()
-        along = (effect * weighed[:, None]).sum(0)
         size = (effect * (inverse[:, :, None] * effect[None, :, :]).sum(1)).sum(0)
-        size = jnp.where(size > 0, size, 1.0)
+        along = (effect * weighed[:, None]).sum(0)
+        return _Weighed(along, jnp.where(size > 0, size, 1.0), (fast * weighed).sum())
+
+    def _isolated(self, weighed: "_Weighed", forces: PerActuator, used: PerActuator):
+        """1 for the actuator whose force explains the residual as a fault can, else 0; and J of the best."""
+        along, size, total = weighed
         force, explained = along / size, along * along / size
-        nominal = jnp.abs(forces)
-        possible = (force * forces < 0) & (jnp.abs(force) < _EXCESS * nominal + _SLACK * self.largest)
+        possible = (force * forces < 0) & (jnp.abs(force) < _EXCESS * jnp.abs(forces) + _SLACK * self.largest)
         explained = jnp.where(possible | (used < 1), explained, 0.0)
         best = explained.max()
         is_best = explained >= best
@@ -184,5 +205,25 @@ class ThrusterMonitor(eqx.Module):
             & (second < best - self.margin)
         )
         believable = (jnp.abs(force) > self.least * self.largest) & (jnp.abs(forces + force) < _MOST * self.largest)
-        found = jnp.where(is_best & believable & clear & (used > 0), 1.0, 0.0)
-        return found, (best, total), force
+        return jnp.where(is_best & believable & clear, 1.0, 0.0), best
+
+    def _accumulated(self, state: MonitorState, weighed: "_Weighed", forces: PerActuator, used: PerActuator, dt):
+        """Log-likelihood ratios one step later, and 1 for an actuator whose ratio stands out, else 0."""
+        fast = forces - state.forces[2]
+        change = -2 * fast * weighed.along - fast * fast * weighed.size
+        change = jnp.clip(change, -_CHANGE, _CHANGE) * (dt / self.correlation)
+        summed = jnp.maximum(state.likelihood * (1 - dt / self.fading) + change, 0.0)
+        summed = jnp.where((used > 0) & (state.quiet <= 0), summed, 0.0)
+        best = summed.max()
+        is_best = summed >= best
+        second = jnp.where(is_best, 0.0, summed).max()
+        clear = (best > self.likely) & (second < best - self.clearly) & (second < self.likely_rival * best)
+        return summed, jnp.where(is_best & clear, 1.0, 0.0)
+
+
+class _Weighed(NamedTuple):
+    """Residual and thrusters weighed by the inverse covariance P, in squares of `unit`."""
+
+    along: PerActuator  # E_i . P D
+    size: PerActuator  # E_i . P E_i
+    total: Float[Array, ""]  # D . P D
