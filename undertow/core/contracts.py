@@ -322,8 +322,12 @@ class AbstractRestartable(AbstractInformedController):
     """A law with knowledge that a restart must not lose, such as which thrusters have failed."""
 
     @abc.abstractmethod
-    def restarted(self, z: PyTree, y: Measurement, r: Target) -> PyTree:
-        """State of a law that begins again from a measurement."""
+    def knowledge(self, z: PyTree) -> PyTree:
+        """What of a state a restart must not lose."""
+
+    @abc.abstractmethod
+    def restarted(self, knowledge: PyTree, y: Measurement, r: Target) -> PyTree:
+        """State of a law that begins again from a measurement, with what was known."""
 
 
 def known_acceleration(law: AbstractController, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:

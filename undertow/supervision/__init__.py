@@ -1,1 +1,1 @@
-"""Supervision of a controller: gates for what goes in and out, states with reasons, faults of thrusters."""
+"""Supervision of a controller: gates for what goes in and out, states with reasons, and failed thrusters."""

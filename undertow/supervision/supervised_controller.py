@@ -301,12 +301,23 @@ class Supervised(AbstractGatedController):
         y, r = view.passed.measurement, view.r
 
         def begun() -> tuple[PyTree, PyTree]:
-            fallback = () if self.fallback is None else _begun(self.fallback, z.fallback, y, r)
-            return _begun(self.law, z.law, y, r), fallback
+            if self.fallback is None:
+                return _begun(self.law, self._knowledge(z), y, r), ()
+            return _begun(self.law, self._knowledge(z), y, r), _begun(self.fallback, self._knowledge(z), y, r)
 
         goes_on = view.controls & ~broken
         kept = lambda: jax.tree.map(lambda new, old: jnp.where(goes_on, new, old), laws, (z.law, z.fallback))
         return jax.lax.cond(again, begun, kept)
+
+    def _knowledge(self, z: SupervisedState) -> PyTree:
+        """What law and fallback know and must not lose: of the one that controls; () where they know nothing."""
+        if not isinstance(self.law, AbstractRestartable):
+            return ()
+        known = self.law.knowledge(z.law)
+        if not isinstance(self.fallback, AbstractRestartable):
+            return known
+        own = self.fallback.knowledge(z.fallback)
+        return jax.tree.map(lambda a, b: jnp.where(z.fallback_controls, a, b), own, known)
 
     def _allowance(self, z: SupervisedState, view: _View, elapsed: Scalar) -> AllowanceState:
         """Allowed tracking error; where nobody controls, it is the present one."""
@@ -424,9 +435,9 @@ def _controls(state: Int[Array, ""]) -> Bool[Array, ""]:
     return (state == int(State.ACTIVE)) | (state == int(State.DEGRADED))
 
 
-def _begun(law: AbstractController, z: PyTree, y: Measurement, r: Target) -> PyTree:
+def _begun(law: AbstractController, knowledge: PyTree, y: Measurement, r: Target) -> PyTree:
     """State of a law that begins again; a law that knows of failed thrusters does not forget them."""
-    return law.restarted(z, y, r) if isinstance(law, AbstractRestartable) else law.init(y, r)
+    return law.restarted(knowledge, y, r) if isinstance(law, AbstractRestartable) else law.init(y, r)
 
 
 def _cause(values: PerCondition, limits: PerCondition, reason: Int[Array, ""]) -> Float[Array, "2"]:

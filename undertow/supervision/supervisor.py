@@ -10,6 +10,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import force_of
 from undertow.core.contracts import AbstractController, AbstractPlant, Inputs, Measurement, Model, Outputs
 from undertow.core.errors import BadInput
+from undertow.supervision.fault_tolerant import fault_tolerant
 from undertow.supervision.measurement_gate import MeasurementGate
 from undertow.supervision.stuck_readings import StuckReadings
 from undertow.supervision.supervised_controller import Supervised
@@ -46,6 +47,7 @@ def supervisor(
     max_angle_error: float = 0.8,
     max_estimate: float | None = None,
     max_variation: float = 10.0,
+    thruster_faults: bool = True,
     restarts: int = 3,
     stop_after: float = 60.0,
 ) -> Supervised:
@@ -73,6 +75,7 @@ def supervisor(
         max_estimate: largest plausible estimate of the uncertainty, m/s^2 and rad/s^2; None for ten times the
             acceleration that the actuators can give, and 500 where they have no limit.
         max_variation: variation of the input that counts as chattering, ranges from limit to limit per second.
+        thruster_faults: whether failed thrusters of a vehicle are looked for, and replaced by the others.
         restarts: of the law within ten minutes; one more, and the fallback takes over, or the state is SAFE.
         stop_after: time in SAFE after which control does not begin again by itself, s.
 
@@ -101,6 +104,9 @@ def supervisor(
         jump_velocity=of_vehicle(jump_velocity),
         jump_rate=of_vehicle(jump_rate),
     )
+    if thruster_faults and vehicle:
+        law = fault_tolerant(law, sampling_time, (low, high))
+        fallback = None if fallback is None else fault_tolerant(fallback, sampling_time, (low, high))
     return Supervised(
         law=law,
         fallback=fallback,

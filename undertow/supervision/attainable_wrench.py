@@ -1,0 +1,171 @@
+"""Forces and moments that thrusters can hold, before and after a loss, and whether a reference needs more.
+
+Host side: linear programmes by SciPy, nothing of the loop.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.optimize import linprog
+
+from undertow.core.contracts import AbstractReference, Model
+from undertow.core.errors import BadInput
+from undertow.supervision.reduced_model import VEHICLE_PRIORITY, attained_share
+
+# Share of an acceleration demanded of one axis that makes it one that the actuators control.
+_CONTROLLED = 0.85
+_NOTHING = 1e-9  # m/s^2, rad/s^2
+_ENOUGH = 1e3  # times the demand; a larger reserve is not searched for
+
+
+class AttainableWrench(NamedTuple):
+    """Least and largest force or moment along each axis, (n, 2), N and N m (or acceleration, of a gain)."""
+
+    alone: np.ndarray  # with the other controlled axes at zero; NaN for an axis that is not controlled
+    free: np.ndarray  # whatever happens along the others
+
+
+class Reserve(NamedTuple):
+    """How much of what a reference demands the actuators can give."""
+
+    share: float  # largest factor on the demand that stays within limits, at the worst time; feasible from 1 on
+    time: float  # of the worst, s
+    missing: tuple[int, ...]  # axes that are no longer controlled, although all actuators together do
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the reference can be followed, as far as the model knows."""
+        return self.share >= 1 and not self.missing
+
+
+def attainable_wrench(
+    matrix: Any, low: Any, high: Any, lost: Sequence[int] = (), axes: Sequence[int] | None = None
+) -> AttainableWrench:
+    """Largest steady forces and moments of a set of thrusters.
+
+    Args:
+        matrix: force and moment per thrust, (n, N), such as `plant.thruster_matrix`.
+        low, high: limits of the thrusts, N; one number or one per thruster.
+        lost: numbers, from 0, of thrusters that give nothing.
+        axes: those that count as controlled; None: those that the thrusters that are left control.
+
+    Raises:
+        BadInput: a thruster that does not exist, or limits without 0 between them.
+    """
+    matrix, low, high = _checked(matrix, low, high, lost)
+    kept = np.delete(np.arange(matrix.shape[1]), list(lost))
+    controlled = list(controlled_axes(matrix, lost) if axes is None else axes)
+    matrix, low, high = matrix[:, kept], low[kept], high[kept]
+    ends = np.stack([matrix * low, matrix * high])
+    free = np.stack([ends.min(0).sum(-1), ends.max(0).sum(-1)], axis=-1)
+    alone = np.full((len(matrix), 2), np.nan)
+    for axis in controlled:
+        others = [other for other in controlled if other != axis]
+        for side, sign in enumerate((-1.0, 1.0)):
+            alone[axis, side] = sign * _most(sign * matrix[axis], matrix[others], low, high)
+    return AttainableWrench(alone, free)
+
+
+def controlled_axes(matrix: Any, lost: Sequence[int] = ()) -> tuple[int, ...]:
+    """Axes, numbered from 0, on which actuators meet a demand at least to 85 %; of little priority give way first.
+
+    Args:
+        matrix: force, moment or acceleration per actuator, (n, N); with six axes, those of a vehicle.
+        lost: numbers, from 0, of actuators that give nothing.
+    """
+    matrix = np.asarray(matrix, dtype=float)
+    used = np.ones(matrix.shape[1])
+    used[list(lost)] = 0.0
+    priority = VEHICLE_PRIORITY if len(matrix) == len(VEHICLE_PRIORITY) else (1.0,) * len(matrix)
+    share = attained_share(jnp.asarray(matrix), jnp.asarray(used), jnp.asarray(priority))
+    return tuple(int(axis) for axis in np.flatnonzero(np.asarray(share) > _CONTROLLED))
+
+
+def reference_reserve(
+    model: Model,
+    reference: AbstractReference,
+    duration: float,
+    water: Any = (0.0, 0.0, 0.0),
+    lost: Sequence[int] = (),
+    samples: int = 200,
+) -> Reserve:
+    """Whether the actuators that are left can follow a reference, by the nominal model.
+
+    The demand is the acceleration of the target less the drift F at its velocity through the water: weight, buoyancy,
+    drag and Coriolis forces, on the axes that are still controlled. Feedback, loads and errors of the model need a
+    reserve beyond 1.
+
+    Args:
+        model: from `plant.model()`.
+        reference: given from its start.
+        duration: s.
+        water: its velocity, m/s: north, east, down; for a vehicle only.
+        lost: numbers, from 0, of actuators that give nothing.
+        samples: number of times at which the demand is computed.
+
+    Raises:
+        BadInput: an actuator that does not exist.
+    """
+    own = model.in_body_axes()
+    times = np.linspace(0.0, duration, samples)
+    demands, gains = (np.asarray(value) for value in _demands(own, reference, jnp.asarray(times), jnp.asarray(water)))
+    held = own.actuators.quasi_static()
+    least, largest = held.range(held.init(), jnp.ones(()))
+    _, low, high = _checked(gains[0], least, largest, lost)
+    left = controlled_axes(gains[0], lost)
+    share = lambda wanted, effect: _share(effect, wanted, low, high, lost, left)
+    worst, time = min((share(*both), float(t)) for *both, t in zip(demands, gains, times, strict=True))
+    return Reserve(worst, time, tuple(sorted(set(controlled_axes(gains[0])) - set(left))))
+
+
+@eqx.filter_jit
+def _demands(model: Model, reference: AbstractReference, times, water):
+    """Acceleration that the actuators have to give, and the gain, at each time."""
+    dynamics, coordinates, _ = model
+
+    def demand(t):
+        target = reference.at(t)
+        ground = coordinates.measurement(target.position, target.velocity)
+        flow = jnp.zeros_like(target.velocity)
+        flow = flow.at[:3].set(water) if flow.shape[0] == 6 else flow
+        through = coordinates.measurement(target.position, target.velocity - flow)
+        wanted = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(through)
+        return wanted, dynamics.gain(ground)
+
+    return jax.vmap(demand)(times)
+
+
+def _share(effect, wanted, low, high, lost, axes) -> float:
+    """Largest s with E f = s times the demand along the axes, and f within its limits."""
+    kept = np.delete(np.arange(effect.shape[1]), list(lost))
+    rows = effect[np.ix_(list(axes), kept)]
+    if np.linalg.norm(wanted[list(axes)]) < _NOTHING:
+        return _ENOUGH
+    extended = np.concatenate([rows, -wanted[list(axes), None]], axis=1)
+    low, high = np.append(low[kept], 0.0), np.append(high[kept], _ENOUGH)
+    return _most(np.append(np.zeros(len(kept)), 1.0), extended, low, high)
+
+
+def _most(gain: np.ndarray, zero: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
+    """Largest gain . f with `zero` f = 0 and f between its limits."""
+    bounds = list(zip(low, high, strict=True))
+    rows = {"A_eq": zero, "b_eq": np.zeros(len(zero))} if len(zero) else {}
+    found = linprog(-gain, bounds=bounds, **rows)
+    return float("inf") if found.status == 3 else -float(found.fun)
+
+
+def _checked(matrix, low, high, lost) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Arrays of a matrix and of limits per actuator."""
+    matrix = np.asarray(matrix, dtype=float)
+    count = matrix.shape[1]
+    low, high = (np.broadcast_to(np.asarray(end, dtype=float), (count,)) for end in (low, high))
+    for one in lost:
+        if not 0 <= one < count:
+            raise BadInput("lost", f"have numbers from 0 to {count - 1}, one per actuator", one)
+    if not ((low <= 0) & (high >= 0)).all():
+        raise BadInput("low, high", "have 0 between them", f"{low.tolist()}, {high.tolist()}")
+    return matrix, low, high
