@@ -86,7 +86,7 @@ class Stepped:
         self.plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200())
         self.mover = ut.controllers.pid(self.plant.model(), sampling_time=T)
         law = ut.controllers.pid(self.plant.model(), sampling_time=T)
-        made = supervisor(Tampered(law, law.model), self.plant, sampling_time=T, **options)
+        made = supervisor(Tampered(law, law.model), self.plant, sampling_time=T, thruster_faults=False, **options)
         self.supervised = dataclasses.replace(made, model=self.plant.model()) if euler else made
         self.start = self.plant.initial_state(None, np.array([0.3, 0, 0, 0, 0, 0]))
         self.first = self.plant.output(jnp.zeros(()), self.start)
