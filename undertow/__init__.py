@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from undertow import power as power
     from undertow import references as references
     from undertow import sensors as sensors
+    from undertow import supervision as supervision
     from undertow import thrusters as thrusters
     from undertow import vehicles as vehicles
     from undertow.autopilot.autopilot import Autopilot as Autopilot
@@ -60,6 +61,7 @@ _PACKAGES = (
     "power",
     "references",
     "sensors",
+    "supervision",
     "thrusters",
     "vehicles",
 )

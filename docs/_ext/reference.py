@@ -19,6 +19,7 @@ from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.describing import Description, text_of
 from undertow.scenario.schema import Scenario, keys
+from undertow.supervision.conditions import CONDITIONS, HEAD, State
 
 _PARAMETERS = ("parameter", "value", "unit", "symbol", "meaning", "source")
 
@@ -123,6 +124,20 @@ class Commands(FromCode):
         return [_command(f"undertow {name}", command) for name, command in main.commands.items()]
 
 
+class SupervisorStates(FromCode):
+    """States of the supervisor."""
+
+    def contents(self) -> list[nodes.Node]:
+        return [table(("state", "meaning"), [(one.name, one.meaning) for one in State], ("state",))]
+
+
+class SupervisorConditions(FromCode):
+    """The table of the supervisor: conditions, limits, times and reactions."""
+
+    def contents(self) -> list[nodes.Node]:
+        return [table(HEAD, [one.cells() for one in CONDITIONS], ("reason",))]
+
+
 def _command(name: str, command: Any) -> nodes.section:
     usage = " ".join([name, *command.collect_usage_pieces(command.make_context(name, [], resilient_parsing=True))])
     found = section(f"`{name}`", name, nodes.literal_block(usage, usage), *paragraphs(command.help))
@@ -148,6 +163,7 @@ def _caption(text: str) -> nodes.paragraph:
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     found = {"parts": Parts, "keys": Keys, "metrics": Metrics, "signals": Signals}
+    found |= {"supervisor-states": SupervisorStates, "supervisor-conditions": SupervisorConditions}
     for name, directive in (found | {"statuses": Statuses, "exit-codes": ExitCodes, "commands": Commands}).items():
         app.add_directive(name, directive)
     return {"parallel_read_safe": True}

@@ -17,9 +17,9 @@ from undertow.core.measurement import with_outputs
 from undertow.core.signals import Signal
 from undertow.loop.sampled import moved
 from undertow.numerics.integrators import METHODS
-from undertow.supervision.conditions import CONDITIONS, NAMES, State, code_of, markdown, reason_of
+from undertow.supervision.conditions import CONDITIONS, HEAD, NAMES, State, code_of, reason_of
 from undertow.supervision.supervisor import supervisor
-from undertow.supervision.transitions import transitions
+from undertow.supervision.transition_log import transitions
 
 T = 0.02
 
@@ -213,10 +213,11 @@ def test_output_that_is_not_finite_never_leaves():
     assert (np.array(run.outputs[5:]) == 0.0).all()
 
 
-def test_markdown_has_a_line_for_each_condition():
-    lines = markdown().splitlines()
-    assert [line.split("`")[1] for line in lines[2:]] == list(NAMES)
-    assert len({line.count("|") for line in lines}) == 1
+def test_the_table_of_the_documentation_has_a_line_for_each_condition():
+    lines = [condition.cells() for condition in CONDITIONS]
+    assert [line[0] for line in lines] == list(NAMES)
+    assert {len(line) for line in lines} == {len(HEAD)}
+    assert lines[NAMES.index("saturated")][3:6] == ("1 s", "never", "1 s")
 
 
 @pytest.mark.parametrize("reason", ["", *NAMES, "operator"])

@@ -14,7 +14,7 @@ from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 from undertow.supervision.conditions import Request, State
 from undertow.supervision.supervisor import supervisor
-from undertow.supervision.transitions import transitions
+from undertow.supervision.transition_log import transitions
 
 HEAVY = {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}}
 GOAL = {"kind": "setpoint", "position": [1, 1, 1, 0, 0, 0.5]}

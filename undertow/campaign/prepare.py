@@ -17,7 +17,7 @@ from undertow.core.metric import Metric
 from undertow.loop.simd_batch import unavailable
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
-from undertow.scenario.finished_run import rules
+from undertow.scenario.finished_run import law_of, rules
 from undertow.scenario.reading import Text
 from undertow.scenario.schema import check_kind
 
@@ -124,6 +124,6 @@ def _check_shapes(campaign: Campaign, several: Iterable[Built]) -> None:
     loops = [built.closed_loop for built in several]
     if len({(loop.plant.outputs, loop.plant.inputs()) for loop in loops}) > 1:
         raise BadInput("series", "be of plants with the same outputs and inputs", "of several", hint=hint)
-    if "weights" in campaign.series.signals and len({rules(loop) for loop in loops}) > 1:
+    if "weights" in campaign.series.signals and len({rules(law_of(loop)) for loop in loops}) > 1:
         must = "not contain weights where controllers have different numbers of rules"
         raise BadInput("series.signals", must, "with weights", hint=hint)

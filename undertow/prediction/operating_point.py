@@ -40,7 +40,7 @@ def operating_point(built: Built) -> OperatingPoint:
     Raises:
         BadInput: the Jacobians are not finite there.
     """
-    built = built.without_faults()
+    built = built.of_the_law()
     loop, settings = built.closed_loop, built.scenario.loop
     start, stop = built.window()
     position = np.asarray(_desired(loop.reference, as_array((start + min(stop, settings.duration)) / 2)))

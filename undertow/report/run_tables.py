@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from undertow.analysis.metrics import for_people, infinite
 from undertow.core.metric import Metric
-from undertow.supervision.transitions import Transition
+from undertow.supervision.transition_log import Transition
 
 if TYPE_CHECKING:  # it loads SciPy, which a run does not need
     from undertow.analysis.linearization.response import Comparison

@@ -1,5 +1,6 @@
 """Build the closed loop of a scenario."""
 
+import dataclasses
 import functools
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -35,6 +36,7 @@ from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
 from undertow.scenario.step_size import step_advice
+from undertow.supervision.supervised_controller import unsupervised
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -96,6 +98,12 @@ class Built(NamedTuple):
                     says = f"`faults[{place}]` has no effect: the controller does not use measured propeller speeds"
                     yield advice(f"faults[{place}]", says, hint="Write `model: {speed_sensor: true}`")
         yield from plausibility(self.closed_loop, end, self.scenario.initial.position)
+
+    def of_the_law(self) -> "Built":
+        """The same without faults and supervision, for what concerns the law by itself: prediction, tuning."""
+        found, loop = self.without_faults(), self.without_faults().closed_loop
+        law = unsupervised(loop.controller)
+        return found._replace(closed_loop=dataclasses.replace(loop, controller=law))
 
     def without_faults(self) -> "Built":
         """The same scenario before any fault: predictions, tuning and exports are about that."""

@@ -38,6 +38,10 @@ class Description(NamedTuple):
     signals: dict[str, Signal]  # that it records
 
 
+# Arguments that come from the rest of a scenario, not from the user, by kind.
+_GIVEN = {"controllers": ("model",), "supervision": ("law", "plant")}
+
+
 def describe(name: str) -> tuple[Description, ...]:
     """All parts of a name; several kinds can have a part of the same name.
 
@@ -136,7 +140,7 @@ def options_of(kind: str, part: Any) -> tuple[Option, ...]:
         default = "required" if parameter.default is inspect.Parameter.empty else parameter.default
         if name in factory.INNER:
             default = factory.inner_default(name, parameter)
-        if not (kind == "controllers" and name == "model"):  # comes from the plant, not from the user
+        if name not in _GIVEN.get(kind, ()):
             options.append(Option(name, default, meanings.get(name, "")))
     return tuple(options)
 

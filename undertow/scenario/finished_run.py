@@ -12,8 +12,10 @@ import xarray as xr
 from undertow.analysis.certify import certify
 from undertow.analysis.metrics import Gathered, meanings, measure, results
 from undertow.analysis.success import Success, judged
+from undertow.core.contracts import AbstractController
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.status import Status
+from undertow.faults.of_computation import law_of_computed
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.dataset import to_dataset
 from undertow.loop.outcome import Outcome
@@ -22,7 +24,8 @@ from undertow.scenario.foreign_code import changed
 from undertow.scenario.provenance import checksum, claims, content_hash, versions
 from undertow.scenario.reading import parse
 from undertow.supervision.conditions import State
-from undertow.supervision.transitions import Transition, log_in, transitions
+from undertow.supervision.supervised_controller import unsupervised
+from undertow.supervision.transition_log import Transition, log_in, transitions
 
 
 class Measuring(NamedTuple):
@@ -63,7 +66,8 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
         attributes: further attributes of the dataset.
     """
     status, ended = Status(int(outcome.status)), float(outcome.ended)
-    counted = {} if rules(loop) is None else {"rules": rules(loop)}
+    law = law_of(loop)
+    counted = {} if rules(law) is None else {"rules": rules(law)}
     covered = status is Status.OK and how.window[0] < ended
     dataset = to_dataset(outcome, loop)
 
@@ -78,7 +82,7 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
         steady |= results(how.gathered, outcome.accumulated)
     lasted_but_unseen = status is Status.OK and not covered
     success = None if lasted_but_unseen else judged(how.criterion, steady)
-    certified = certify(dataset, loop.controller, how.window, how.dt)
+    certified = certify(dataset, law, how.window, how.dt)
     if certified is not None:
         dataset = dataset.assign(certified.signals)
         dataset.attrs["certificate"] = to_json(certified.summary)
@@ -96,9 +100,14 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
     return Labelled(status, steady, whole, success, dataset)
 
 
-def rules(loop: ClosedLoop) -> int | None:
+def law_of(loop: ClosedLoop) -> AbstractController:
+    """The control law of a loop, without supervision and faults of its computer."""
+    return unsupervised(law_of_computed(loop.controller))
+
+
+def rules(law: AbstractController) -> int | None:
     """Number of fuzzy rules per axis; None for a controller without a fuzzy system."""
-    fuzzy = getattr(loop.controller, "fuzzy", None)
+    fuzzy = getattr(law, "fuzzy", None)
     return None if fuzzy is None else fuzzy.rules
 
 

@@ -72,6 +72,13 @@ class Condition(NamedTuple):
     recovers_after: float
     reaction: str
 
+    def cells(self) -> tuple[str, ...]:
+        """Its line in the table of the documentation, under `HEAD`."""
+        seconds = lambda time: "never" if time == math.inf else f"{time:g} s" if time else "at once"
+        return (self.name, self.value, self.limit, *map(seconds, self[3:6]), self.reaction)
+
+
+HEAD = ("reason", "holds while", "exceeds", "DEGRADED after", "SAFE after", "over after", "reaction")
 
 _NEVER = math.inf
 _PREDICTED = "The model's prediction takes the place of the reading; the law does not adapt to it"
@@ -274,13 +281,3 @@ def judged(level: PerCondition) -> tuple[Int[Array, ""], Int[Array, ""]]:
     first = jnp.where(level >= top, jnp.arange(len(CONDITIONS)), len(CONDITIONS)).min()
     state = jnp.where(top >= 2, int(State.SAFE), jnp.where(top >= 1, int(State.DEGRADED), int(State.ACTIVE)))
     return state.astype(int), jnp.where(top > 0, first + 1, 0).astype(int)
-
-
-def markdown() -> str:
-    """The table for the documentation."""
-    seconds = lambda time: "never" if time == _NEVER else f"{time:g} s" if time else "at once"
-    head = ["reason", "holds while", "exceeds", "DEGRADED after", "SAFE after", "over after", "reaction"]
-    rows = [
-        [f"`{one.name}`", one.value, one.limit, *map(seconds, one[3:6]), one.reaction.rstrip(".")] for one in CONDITIONS
-    ]
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))

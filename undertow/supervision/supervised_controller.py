@@ -37,10 +37,11 @@ from undertow.supervision.conditions import (
     judged,
     none_held,
 )
+from undertow.supervision.fault_tolerant import FaultTolerantController
 from undertow.supervision.measurement_gate import GateState, MeasurementGate, Passed
 from undertow.supervision.motion import rate_of_velocity
 from undertow.supervision.tracking_allowance import AllowanceState, TrackingAllowance
-from undertow.supervision.transitions import TransitionLog, empty_log, logged
+from undertow.supervision.transition_log import TransitionLog, empty_log, logged
 
 _OVERRUN = 1.5  # sampling times between two steps
 _CLOCK_FAULT = 10.0  # likewise
@@ -446,3 +447,10 @@ def _cause(values: PerCondition, limits: PerCondition, reason: Int[Array, ""]) -
     return jnp.stack(
         [jnp.where(row, numbers, 0.0).sum() for numbers in (jnp.where(jnp.isfinite(values), values, _BIG), limits)]
     )
+
+
+def unsupervised(controller: AbstractController) -> AbstractController:
+    """The law under supervision by itself; any other controller as it is."""
+    if isinstance(controller, Supervised):
+        controller = controller.law
+    return controller.law if isinstance(controller, FaultTolerantController) else controller

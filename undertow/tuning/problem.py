@@ -59,7 +59,7 @@ def problem(text: Text) -> Problem:
         BadInput: the scenario, or its section `tune`, cannot be used.
     """
     with within(location=text.location):
-        return _problem(text, build(text).without_faults())
+        return _problem(text, build(text).of_the_law())
 
 
 def _problem(text: Text, built: Built) -> Problem:
