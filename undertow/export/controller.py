@@ -77,6 +77,7 @@ def checked(precision: str, form: Format) -> str:
         BadInput: there is no such precision or format.
     """
     checks.choice("precision", precision, ("float64", "float32"))
+    checks.choice("attitude", form.attitude, tuple(_ATTITUDES))
     form.check()
     return precision
 
@@ -105,7 +106,7 @@ def controller_program(built: Built, name: str, of: Functions) -> Program:
 
 def _system(built: Built, name: str, of: Functions) -> System:
     period, unit = built.scenario.loop.dt, built.closed_loop.plant.input_unit
-    inputs = ControllerInput(*of.given, of.applied, np.asarray(period, dtype=of.time.dtype))
+    inputs = ControllerInput(*of.given[:3], of.applied, np.asarray(period, dtype=of.time.dtype))
 
     def answered(memory, answer):
         return memory, ControllerOutput(answer.command, of.output.of(answer.command))
