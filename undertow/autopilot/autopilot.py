@@ -106,15 +106,23 @@ class Autopilot:
         self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
         self._blended, self._started = np.zeros((), dtype=bool), np.zeros((), dtype=bool)
         self._received = ReceivedStep(*self._begin.inputs, np.zeros_like(self._command), 0.0)
-        self._log, self._log_later = None if log is None else self._log_to(log), log_later
+        self._log_later, self._log = log_later, None
+        if log is not None:
+            self.log_to(log)
 
-    def _log_to(self, path: str | Path) -> StepLog:
+    def log_to(self, path: str | Path) -> None:
+        """Write the steps from now on to a .mcap file, as with `log`.
+
+        Raises:
+            BadInput: it cannot be written.
+        """
         plant, law = self._loop.plant, self._loop.controller
         received = received_signals(plant, self._form, self._received.numbers())
         written = law_signals(plant, law, law.signals(), self._go_on.outputs.signals) | received
         form = self._form or Format("", "")
         facts = {"attitude": form.attitude, "velocity": form.velocity, "precision": self.precision}
-        return StepLog(path, written, self.sampling_time, self, facts)
+        self.close_log()
+        self._log = StepLog(path, written, self.sampling_time, self, facts)
 
     def close_log(self) -> None:
         """Finish the log, if there is one; later steps are not written."""

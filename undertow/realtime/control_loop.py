@@ -60,7 +60,7 @@ class RealTimeLoop:
         autopilot: whose format is that of the link, and whose output is the input of the plant.
         link: it is finished by `run`.
         clock: the only clock that is used.
-        settings: see there.
+        settings: None for the usual ones.
         stop: asked once per step; the loop ends when it says so.
 
     Attributes:
@@ -75,9 +75,10 @@ class RealTimeLoop:
         autopilot: Autopilot,
         link: AbstractLink,
         clock: AbstractLoopClock,
-        settings: LoopSettings = LoopSettings(),
+        settings: LoopSettings | None = None,
         stop: Callable[[], bool] = lambda: False,
     ):
+        settings = LoopSettings() if settings is None else settings
         self._autopilot, self._link, self._clock, self._stop = autopilot, link, clock, stop
         self._period = autopilot.sampling_time
         self._deadline = self._period if settings.deadline is None else settings.deadline

@@ -1,6 +1,5 @@
 """The vehicle of a scenario in the same process, with its navigation, disturbances and faults, as a link."""
 
-import contextlib
 from typing import Any, NamedTuple
 
 import jax
@@ -107,7 +106,7 @@ class VehicleLink(AbstractLink):
         """s since the start, as a simulation counts it."""
         return self._since + self._steps * self._period
 
-    def receive(self, elapsed: float) -> LinkMeasurement | None:
+    def receive(self, elapsed: float) -> LinkMeasurement:
         if self._began and elapsed > 0:
             self._move(elapsed)
         applied = self._seen.applied if self._began else None
