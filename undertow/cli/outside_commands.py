@@ -148,8 +148,8 @@ def run(
         str,
         typer.Option(
             metavar="LINK",
-            help="vehicle (that of the scenario, in this process), udp:HOST:PORT (a vehicle there), or log:FILE (replay "
-            "the run.mcap of an earlier run and compare the commands).",
+            help="vehicle (that of the scenario, in this process), udp:HOST:PORT (a vehicle there), or log:FILE "
+            "(replay the run.mcap of an earlier run and compare the commands).",
         ),
     ] = "vehicle",
     serve: Annotated[

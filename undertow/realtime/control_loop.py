@@ -99,8 +99,8 @@ class RealTimeLoop:
         form, outputs = self._link.form, len(self._autopilot.plant.outputs)
         if form is None:
             return LinkMeasurement(np.full(outputs, np.nan), np.full(outputs, np.nan))
-        names = form.columns()
-        return LinkMeasurement(*(np.full(len(names[i]), np.nan) for i in (0, 2, 1)))
+        names, unknown = form.columns(), lambda columns: np.full(len(columns), np.nan)
+        return LinkMeasurement(unknown(names.position), unknown(names.velocity), unknown(names.attitude))
 
     def run(self, steps: float = math.inf) -> Reason:
         """Take steps until their number is reached, the link ends or is silent for too long, or `stop` says so.

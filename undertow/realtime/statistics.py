@@ -8,6 +8,8 @@ import numpy as np
 _SHORTEST, _RATIO, _LONGEST = 1e-7, 1.01, 1e3
 _INTERVALS = int(np.ceil(np.log(_LONGEST / _SHORTEST) / np.log(_RATIO)))
 
+_ROUNDING = 1e-9  # of the rank of a quantile
+
 _SHARES = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999}
 
 
@@ -33,9 +35,11 @@ class Durations:
         """The duration, s, below which a share of them is, to 1 %; NaN without one."""
         if not self.number:
             return np.nan
-        reached = int(np.searchsorted(np.cumsum(self._counts), np.ceil(share * self.number)))
-        middle = _SHORTEST * _RATIO ** (reached + 0.5)
-        return float(np.clip(middle if reached else 0.0, self._least, self._largest))
+        rank = np.ceil(share * self.number - _ROUNDING)
+        reached = int(np.searchsorted(np.cumsum(self._counts), rank))
+        if reached in (0, _INTERVALS):  # below the first interval or above the last
+            return self._largest if reached else max(self._least, 0.0)
+        return float(np.clip(_SHORTEST * _RATIO ** (reached + 0.5), self._least, self._largest))
 
     def summary(self) -> dict[str, float]:
         """Number, mean, rms, p50, p99, p99.9 and maximum; times in s; {} without one."""

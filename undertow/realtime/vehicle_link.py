@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -86,9 +87,11 @@ class VehicleLink(AbstractLink):
         begin = step_of(lambda part, _, start: ((), _first(part, start)), part, (), start)
         begin()
         first, self._first = begin.outputs
+        types = eqx.filter_eval_shape(lambda part, start: _first(part, start)[0], part, start)
+        typed = lambda value, like: jnp.asarray(value, dtype=like.dtype)
         zero = np.zeros((), dtype=jax.dtypes.canonicalize_dtype(float))
         given = _Given(zero, zero, zero, np.zeros(loop.plant.inputs(), dtype=zero.dtype))
-        self._go_on = step_of(self._next, part, jax.tree.map(jnp.asarray, first), given)
+        self._go_on = step_of(self._next, part, jax.tree.map(typed, first, types), given)
         put(self._go_on.state, first)
         self.backend = self._go_on.backend
 
