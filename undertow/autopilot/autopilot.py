@@ -228,7 +228,7 @@ class Autopilot:
         """
         self._check_started("step")
         motion = self._motion(position, velocity, attitude)
-        given = self._command if applied is None else self._input(applied)
+        given = self._command.copy() if applied is None else self._input(applied)
         report = self._report(propellers, np.nan)
         goal = None if target is None else self._target(target)  # before anything changes
         healthy = self._health(health)
