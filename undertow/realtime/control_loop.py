@@ -2,8 +2,8 @@
 
 Step n is planned for n periods after the start. In each step the loop receives the newest measurement, computes, and
 sends one command. Then it waits for the next whole period that has not begun: a period whose beginning was missed has
-no step of its own, so that no period ever has two commands. The controller is told the time since its last step; where
-that is a whole number of periods to a tenth of one, it is told that number, and jitter of the machine is not passed on.
+no step of its own, so that no period ever has two commands. The controller gets the time since its last step; where
+that is a whole number of periods to a tenth of one, it gets that number, and jitter of the machine is not passed on.
 """
 
 import contextlib
@@ -140,7 +140,7 @@ class RealTimeLoop:
             if self._stop():
                 return Reason.STOPPED
             started = clock.now()
-            elapsed = self._told(started - last)
+            elapsed = self._passed(started - last)
             received = self._link.receive(elapsed)
             if self._link.ended:
                 return Reason.LINK_ENDED
@@ -156,8 +156,8 @@ class RealTimeLoop:
         seen.missed += missed
         seen.stale += not fresh
 
-    def _told(self, elapsed: float) -> float:
-        """The time since the last step that the controller is told, s."""
+    def _passed(self, elapsed: float) -> float:
+        """The time since the last step as the controller gets it, s."""
         periods = elapsed / self._period
         whole = round(periods)
         return whole * self._period if abs(periods - whole) <= _WHOLE else elapsed
