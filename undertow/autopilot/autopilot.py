@@ -105,7 +105,8 @@ class Autopilot:
         self._clock = Clock(self.sampling_time)
         self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
         self._blended, self._started = np.zeros((), dtype=bool), np.zeros((), dtype=bool)
-        self._received = ReceivedStep(*self._begin.inputs, np.zeros_like(self._command), 0.0)
+        motion, report, target, status = self._begin.inputs
+        self._received = ReceivedStep(motion, report, target, status, np.zeros_like(self._command), 0.0)
         self._log_later, self._log = log_later, None
         if log is not None:
             self.log_to(log)

@@ -8,6 +8,7 @@ import os
 import platform
 import signal
 import time
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
@@ -18,7 +19,7 @@ import typer
 
 from undertow.autopilot.autopilot import Autopilot
 from undertow.autopilot.measured_motion import Format
-from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
+from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.tables import numbers, titled, wide_console
@@ -35,6 +36,7 @@ from undertow.realtime.vehicle_link import VehicleLink
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import dump, read
 
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _WRITTEN = ("run.mcap", "statistics.json", "scenario.yaml")
 
 
@@ -58,7 +60,7 @@ class Options(NamedTuple):
 
 
 class _Stop:
-    """Whether a signal asked for the end, and which."""
+    """Whether a signal asked for the end, and which: Ctrl-C, SIGTERM, or the end of the terminal."""
 
     def __init__(self) -> None:
         self.number = 0
@@ -68,14 +70,14 @@ class _Stop:
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
-        """Inside, Ctrl-C and SIGTERM do not raise: the loop asks, and ends with its safe output."""
+        """Inside, signals do not raise: the loop asks, and ends with its safe output."""
 
         def note(number: int, frame: FrameType | None) -> None:
             if not self.number:
                 os.write(2, b"\nInterrupted: stopping.\n")
             self.number = number
 
-        before = {one: signal.signal(one, note) for one in (signal.SIGINT, signal.SIGTERM)}
+        before = {one: signal.signal(one, note) for one in _SIGNALS}
         try:
             yield
         finally:
@@ -122,8 +124,11 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
         pass
     with output_folder(options.out, Path("runs") / path.stem) as folder:
         check_folder(folder, _WRITTEN, "run.mcap", options.overwrite)
+        for one in built.advice():
+            typer.echo(f"Advice: {one.sentence}", err=True)
         link = VehicleLink(built) if own else UdpVehicleLink(options.link.removeprefix("udp:"), built)
-        with _logging(built if own else _starting_anywhere(built), link, folder) as autopilot:
+        given, troubles = built if own else _starting_anywhere(built), list[str]()
+        with _logging(given, link, folder, troubles) as autopilot:
             loop = RealTimeLoop(autopilot, link, clock, settings, stop.asked)
             say = (lambda line: None) if options.json else typer.echo
             say(f"Link {options.link}, {1 / period:g} Hz, log {folder / 'run.mcap'}. To end: Ctrl-C")
@@ -138,7 +143,9 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
             remove(folder / "run.mcap")
             with contextlib.suppress(OSError):  # it held something before
                 folder.rmdir()
-    return _ending(reason, link, options, stop)
+    for trouble in troubles:
+        complain(trouble)
+    return max(_ending(reason, link, options, stop), FILES_FAILED if troubles else DONE)
 
 
 def _safe(text: str, actuators: int) -> Any:
@@ -159,18 +166,24 @@ def _starting_anywhere(built: Built) -> Built:
 
 
 @contextlib.contextmanager
-def _logging(built: Built, link: AbstractLink, folder: Path) -> Iterator[Autopilot]:
-    """The autopilot, compiled, which logs to a folder; an earlier result there is removed."""
+def _logging(built: Built, link: AbstractLink, folder: Path, troubles: list[str]) -> Iterator[Autopilot]:
+    """The autopilot, compiled, which logs to a folder; an earlier result there is removed.
+
+    What goes wrong with the log is added to `troubles`: it does not stop the controller.
+    """
     form = link.form or Format()
     compiled = interruptible(lambda: _autopilot(built, form))
     folder.mkdir(parents=True, exist_ok=True)
     for name in _WRITTEN:
         remove(folder / name)
-    try:
-        compiled.log_to(folder / "run.mcap")
-        yield compiled
-    finally:
-        compiled.close_log()
+    with warnings.catch_warnings(record=True) as noted:
+        warnings.simplefilter("always")
+        try:
+            compiled.log_to(folder / "run.mcap")
+            yield compiled
+        finally:
+            compiled.close_log()
+            troubles.extend(str(one.message) for one in noted)
 
 
 def _autopilot(built: Built, form: Format) -> Autopilot:
