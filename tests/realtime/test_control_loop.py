@@ -161,7 +161,14 @@ def test_a_late_command_is_told_as_two_periods():
 def test_lateness_beyond_a_tenth_of_a_period_is_told_as_it_is():
     loop, autopilot, _ = made(late=[0.05 * PERIOD, 0.6 * PERIOD, 0.0])
     loop.run(4)
-    np.testing.assert_allclose(np.array(autopilot.told) / PERIOD, [0, 1, 1.55, 0.4])
+    np.testing.assert_allclose(np.array(autopilot.told) / PERIOD, [0, 1, 1.6, 0.4])
+
+
+def test_a_step_soon_after_a_late_one_is_a_step():
+    """Late by 0.95 periods and then on time: the controller gets 1.95 and 0.05 periods, not zero."""
+    loop, autopilot, _ = made(late=[0.95 * PERIOD, 0.0])
+    loop.run(4)
+    np.testing.assert_allclose(np.array(autopilot.told) / PERIOD, [0, 1.95, 0.05, 1], atol=1e-9)
 
 
 def test_jitter_against_known_numbers():

@@ -55,6 +55,20 @@ def test_a_replay_has_the_bits_of_the_log(autopilot, log):
     assert np.ptp(link._found) > 1.0
 
 
+def test_a_step_that_is_logged_later_is_logged_once(autopilot, tmp_path, heavy_data):
+    """A repeated step changes nothing, and is not in the log."""
+    later = ut.Autopilot(heavy_data, log=tmp_path / "later.mcap", log_later=True)
+    later.start(np.zeros(3), np.zeros(6), np.zeros(3))
+    for dt in (0.01, 0.0, 0.012, -1.0, 0.01):
+        later.log_step()
+        later.step(np.ones(3), np.zeros(6), np.zeros(3), dt=dt)
+        later.log_step()
+        later.log_step()
+    later.close_log()
+    np.testing.assert_array_equal(read_log(tmp_path / "later.mcap")["elapsed"].values, [0, 0.01, 0.012, 0.01])
+    assert replayed(autopilot, tmp_path / "later.mcap").differences() == []
+
+
 def test_one_bit_of_one_command_is_found(autopilot, log):
     link = replayed(autopilot, log)
     link._found[30, 2] = np.nextafter(link._found[30, 2], 1e9)

@@ -107,7 +107,7 @@ class Autopilot:
         self._blended, self._started = np.zeros((), dtype=bool), np.zeros((), dtype=bool)
         motion, report, target, status = self._begin.inputs
         self._received = ReceivedStep(motion, report, target, status, np.zeros_like(self._command), 0.0)
-        self._log_later, self._log = log_later, None
+        self._log_later, self._logged, self._log = log_later, True, None
         if log is not None:
             self.log_to(log)
 
@@ -365,14 +365,16 @@ class Autopilot:
             self._command[...] = share * self._before + (1 - share) * command if share else command
         self._convert.inputs[...] = self._command
         self._convert()
+        self._logged = False
         if not self._log_later:
             self.log_step()
         return self._convert.outputs.copy()
 
     def log_step(self) -> None:
-        """Write the last step to the log, if there is one."""
-        if self._log is None:
+        """Write the last step to the log, if there is one and it has not been written; a repeated step is none."""
+        if self._log is None or self._logged:
             return
+        self._logged = True
         memory = self._go_on.state
         own = {
             "measured_position": memory.y.position,

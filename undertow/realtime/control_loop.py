@@ -2,8 +2,8 @@
 
 Step n is planned for n periods after the start. In each step the loop receives the newest measurement, computes, and
 sends one command. Then it waits for the next whole period that has not begun: a period whose beginning was missed has
-no step of its own, so that no period ever has two commands. The controller gets the time since its last step; where
-that is a whole number of periods to a tenth of one, it gets that number, and jitter of the machine is not passed on.
+no step of its own, so that no period ever has two commands. The controller gets the time since its last step. A step
+that begins up to a tenth of a period late counts as on time there, so that jitter of the machine is not passed on.
 """
 
 import contextlib
@@ -23,7 +23,8 @@ from undertow.realtime.link import AbstractLink, LinkMeasurement
 from undertow.realtime.loop_clock import AbstractLoopClock
 from undertow.realtime.statistics import LoopStatistics
 
-_WHOLE = 0.1  # periods, within which a time is a whole number of them
+_LITTLE = 0.1  # periods, by which a step may begin late and counts as on time for the controller
+_ROUNDING = 1e-6  # periods
 
 
 class Reason(enum.Enum):
@@ -119,7 +120,7 @@ class RealTimeLoop:
             return self._why_no_start()
         clock, period, seen = self._clock, self._period, self.statistics
         begin = started = last = clock.now()
-        planned, elapsed, waited = 0, 0.0, 0.0
+        planned, at, elapsed, waited = 0, 0.0, 0.0, 0.0
         while True:
             begun = clock.now()
             self._link.send(self._step(received, elapsed, seen.steps == 0))
@@ -140,7 +141,8 @@ class RealTimeLoop:
             if self._stop():
                 return Reason.STOPPED
             started = clock.now()
-            elapsed = self._passed(started - last)
+            before, at = at, self._instant(started - begin)
+            elapsed = (at - before) * period
             received = self._link.receive(elapsed)
             if self._link.ended:
                 return Reason.LINK_ENDED
@@ -156,11 +158,11 @@ class RealTimeLoop:
         seen.missed += missed
         seen.stale += not fresh
 
-    def _passed(self, elapsed: float) -> float:
-        """The time since the last step as the controller gets it, s."""
-        periods = elapsed / self._period
-        whole = round(periods)
-        return whole * self._period if abs(periods - whole) <= _WHOLE else elapsed
+    def _instant(self, since: float) -> float:
+        """Time of a step that begins `since` (s) after the start, as the controller gets it, in periods."""
+        periods = since / self._period
+        whole = math.floor(periods + _ROUNDING)
+        return whole if periods - whole <= _LITTLE else periods
 
     def _step(self, received: LinkMeasurement | None, elapsed: float, first: bool) -> np.ndarray:
         """The command for a measurement, or without one."""
