@@ -57,6 +57,7 @@ def test_a_changed_test_vector_is_noticed(tmp_path):
 @pytest.mark.parametrize(
     "arguments, said",
     [
+        (["--attitude", "both", "--velocity", "both"], "`attitude` must be one of"),
         (["--name", "My Controller"], "`name` must be lower-case letters, digits and underscores"),
         (["--precision", "half"], "`precision` must be one of float64, float32"),
         (["--output", "pwm"], "`output` must be one of input, newtons, pulses, wrench"),

@@ -87,11 +87,18 @@ def test_formats_describe_one_motion(heavy):
         ("quaternion", "body"): (quaternion, nu),
         ("quaternion", "world"): (2.0 * quaternion, world),  # of any length
         ("euler", "rates"): (angles, np.concatenate([world[:3], rates @ nu[3:]])),
+        ("both", "both"): (np.concatenate([angles, quaternion]), np.concatenate([world[:3], rates @ nu[3:], nu])),
     }
     expected = heavy.start(position, nu, angles)
     for (attitude, velocity), (turned, moving) in forms.items():
         found = ut.Autopilot(HEAVY, attitude=attitude, velocity=velocity).start(position, moving, turned)
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_both_forms_of_a_motion_belong_together():
+    for form in (Format("both", "body"), Format("euler", "both")):
+        with pytest.raises(BadInput, match="both"):
+            form.check()
 
 
 def test_a_quaternion_that_was_integrated_is_taken_as_it_is():

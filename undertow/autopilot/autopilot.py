@@ -1,7 +1,7 @@
 """One compiled controller, stepped by somebody else's clock."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +16,20 @@ from undertow.autopilot.measured_motion import Format, Motion
 from undertow.autopilot.numbers import numbers, step_of
 from undertow.autopilot.output import output_of
 from undertow.autopilot.saved_state import packed, unpacked
-from undertow.autopilot.step_log import StepLog, law_signals
+from undertow.autopilot.step_log import ReceivedStep, StepLog, law_signals, received_signals
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
-from undertow.core.contracts import Target, starting_at
+from undertow.core.contracts import AbstractGatedController, Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.stepped import put
 from undertow.power.esc import ESC
-from undertow.scenario.build import build
+from undertow.scenario.build import Built, build
 from undertow.scenario.reading import from_data, read
+from undertow.supervision.conditions import Request, State, reason_of
+from undertow.supervision.supervised_controller import SupervisedState, state_in
+from undertow.supervision.transition_log import Transition, transitions
 
 _NO_ROTATION = 1e-6  # length of a quaternion that is none
 
@@ -50,15 +53,18 @@ class Autopilot:
     Entries of a measurement that are not finite are replaced by those that the law's model expects.
 
     Args:
-        scenario: a .yaml file or an earlier run.nc, the same as a mapping, or a closed loop made of parts.
+        scenario: a .yaml file or an earlier run.nc, the same as a mapping, a closed loop made of parts, or what `build`
+            made of a scenario, whose reference begins where the scenario's plant does.
         sampling_time: s; None for that of the scenario. A closed loop needs one.
-        attitude: format of measured attitudes, `euler` (roll, pitch, yaw) or `quaternion` (w, x, y, z, body -> world).
-        velocity: format of measured velocities: `body`, `world` or `rates`, see `measured_motion.Format`.
+        attitude: format of measured attitudes, `euler` (roll, pitch, yaw), `quaternion` (w, x, y, z, body -> world) or
+            `both`.
+        velocity: format of measured velocities: `body`, `world`, `rates` or `both`, see `measured_motion.Format`.
         output: what the vehicle takes: `input`, `newtons`, `pulses` or `wrench`, see `output.Output`.
         esc: speed controllers for `pulses`; None for usual ones.
         blend: time constant, s, with which the output turns from that before the start into that of the law.
         log: .mcap file for measurement, target, command and signals of every step; None for none. What was written
             survives the end of the process, however it ends; `close_log` finishes it.
+        log_later: whether a step is written by `log_step` only: its command can be sent before.
         allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
 
     Attributes:
@@ -74,7 +80,7 @@ class Autopilot:
 
     def __init__(
         self,
-        scenario: str | Path | Mapping[str, Any] | ClosedLoop,
+        scenario: str | Path | Mapping[str, Any] | ClosedLoop | Built,
         *,
         sampling_time: float | None = None,
         attitude: str = "euler",
@@ -83,6 +89,7 @@ class Autopilot:
         esc: ESC | None = None,
         blend: float = 1.0,
         log: str | Path | None = None,
+        log_later: bool = False,
         allow_code: bool = False,
     ):
         loop, precision, usual = _given(scenario, allow_code)
@@ -101,12 +108,25 @@ class Autopilot:
         self._clock = Clock(self.sampling_time)
         self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
         self._blended, self._started = np.zeros((), dtype=bool), np.zeros((), dtype=bool)
-        self._log = None if log is None else self._log_to(log)
+        motion, report, target, status = self._begin.inputs
+        self._received = ReceivedStep(motion, report, target, status, np.zeros_like(self._command), 0.0)
+        self._log_later, self._logged, self._log = log_later, True, None
+        if log is not None:
+            self.log_to(log)
 
-    def _log_to(self, path: str | Path) -> StepLog:
+    def log_to(self, path: str | Path) -> None:
+        """Write the steps from now on to a .mcap file, as with `log`.
+
+        Raises:
+            BadInput: it cannot be written.
+        """
         plant, law = self._loop.plant, self._loop.controller
-        written = law_signals(plant, law, law.signals(), self._go_on.outputs.signals)
-        return StepLog(path, written, self.sampling_time, self)
+        received = received_signals(plant, self._form, self._received.numbers())
+        written = law_signals(plant, law, law.signals(), self._go_on.outputs.signals) | received
+        form = self._form or Format("", "")
+        facts = {"attitude": form.attitude, "velocity": form.velocity, "precision": self.precision}
+        self.close_log()
+        self._log = StepLog(path, written, self.sampling_time, self, facts)
 
     def close_log(self) -> None:
         """Finish the log, if there is one; later steps are not written."""
@@ -133,6 +153,7 @@ class Autopilot:
         target: Any = None,
         applied: Any = None,
         propellers: Any = None,
+        health: Any = None,
     ) -> np.ndarray:
         """The first step, which sets all states of the controller.
 
@@ -145,6 +166,8 @@ class Autopilot:
             applied: input that has been applied so far, in the unit of the plant's input: the output begins there, and
                 turns into the law's. None for the law's at once.
             propellers: speeds, rad/s, or (speeds, accelerations), of thrusters that report them; None at rest.
+            health: per actuator, 1, or 0 where it announced that it has failed, in a scenario with such faults; None
+                where none has.
 
         Returns:
             The output, one entry per actuator, or six of a wrench.
@@ -159,7 +182,9 @@ class Autopilot:
         report = self._report(propellers, 0.0)
         for value in jax.tree.leaves(report):
             checks.finite("propellers", value)
-        put(self._begin.inputs, (motion, report, self._target(target)))
+        held = np.full_like(before, np.nan) if applied is None else before
+        self._received = ReceivedStep(motion, report, self._target(target), self._health(health), held, 0.0)
+        put(self._begin.inputs, self._received[:4])
         self._begin()
         self._clock.begin()
         if target is None:  # the reference begins here
@@ -184,6 +209,7 @@ class Autopilot:
         target: Any = None,
         applied: Any = None,
         propellers: Any = None,
+        health: Any = None,
         dt: float | None = None,
     ) -> np.ndarray:
         """One control step.
@@ -195,6 +221,7 @@ class Autopilot:
             target: as for `start`.
             applied: input applied since the last step, in the unit of the plant's input; None for the commanded one.
             propellers: as for `start`; None where they were not measured.
+            health: as for `start`.
             dt: time since the last step, s; None for the sampling time.
 
         Returns:
@@ -205,13 +232,18 @@ class Autopilot:
         """
         self._check_started("step")
         motion = self._motion(position, velocity, attitude)
-        given = self._command if applied is None else self._input(applied)
+        given = self._command.copy() if applied is None else self._input(applied)
         report = self._report(propellers, np.nan)
         goal = None if target is None else self._target(target)  # before anything changes
+        healthy = self._health(health)
         passed = self._clock.passed(dt)
-        if not passed:
+        elapsed = self.sampling_time if dt is None else float(dt)
+        if isinstance(self._loop.controller, AbstractGatedController):
+            passed = elapsed  # whatever it is: a supervisor knows what to do with it
+        elif not passed:
             return self._convert.outputs.copy()
-        put(self._go_on.inputs, (motion, report, goal or self._target(None), given, passed))
+        self._received = ReceivedStep(motion, report, goal or self._target(None), healthy, given, elapsed)
+        put(self._go_on.inputs, (*self._received[:5], passed))
         self._go_on()
         return self._answered()
 
@@ -254,6 +286,47 @@ class Autopilot:
         """Steps after the first one, and those of them that were late, missed or repeated."""
         return self._clock.counts
 
+    def request(self, what: str) -> None:
+        """Ask the supervisor for something, from the next step on.
+
+        Args:
+            what: `run`, `hold` (the safe output until another request), `stop` (until `start`), `law` or `fallback` (who
+                controls).
+
+        Raises:
+            BadInput: there is no such request, the scenario has no supervisor, or `start` was not called.
+        """
+        self._check_started("request")
+        checks.choice("request", what, tuple(one.name.lower() for one in Request))
+        self._supervised("request").request[...] = int(Request[what.upper()])
+
+    @property
+    def state(self) -> tuple[str, str]:
+        """State of the supervisor after the last step, and its reason: ("DEGRADED", "thruster_lost").
+
+        Raises:
+            BadInput: the scenario has no supervisor, or `start` was not called.
+        """
+        self._check_started("state")
+        z = self._supervised("state")
+        return State(int(z.state)).name, reason_of(int(z.reason))
+
+    def transitions(self) -> Sequence[Transition]:
+        """The last transitions of the supervisor, oldest first.
+
+        Raises:
+            BadInput: as of `state`.
+        """
+        self._check_started("transitions")
+        return transitions(self._supervised("transitions").log)
+
+    def _supervised(self, method: str) -> SupervisedState:
+        """State of the supervisor, of which the arrays can be written into."""
+        found = state_in(self._go_on.state)
+        if found is None:
+            raise BadInput(method, "be used with a supervisor", "none", hint="Add `supervisor: true` to the scenario")
+        return found
+
     def signals(self) -> dict[str, np.ndarray]:
         """Values of the signals of the last step: those that the law declares, and `command`, its input.
 
@@ -291,6 +364,19 @@ class Autopilot:
         found = [numbers("propellers", part, place.shape) for part, place in zip(parts, places, strict=True)]
         return jax.tree.unflatten(form, found)
 
+    def _health(self, health: Any) -> Any:
+        """Health of the actuators, of the form that the loop has; all work unless it is given."""
+        place = self._begin.inputs.health
+        if place is None and health is not None:
+            raise BadInput("health", "be left out: no actuator of this scenario announces a failure", "given")
+        return (
+            None
+            if place is None
+            else np.ones(place.shape)
+            if health is None
+            else numbers("health", health, place.shape)
+        )
+
     def _target(self, target: Any) -> Target:
         """The target as given, or of the scenario's reference now."""
         if target is None:
@@ -325,11 +411,16 @@ class Autopilot:
             self._command[...] = share * self._before + (1 - share) * command if share else command
         self._convert.inputs[...] = self._command
         self._convert()
-        if self._log is not None:
-            self._write(self._log)
+        self._logged = False
+        if not self._log_later:
+            self.log_step()
         return self._convert.outputs.copy()
 
-    def _write(self, log: StepLog) -> None:
+    def log_step(self) -> None:
+        """Write the last step to the log, if there is one and it has not been written; a repeated step is none."""
+        if self._log is None or self._logged:
+            return
+        self._logged = True
         memory = self._go_on.state
         own = {
             "measured_position": memory.y.position,
@@ -337,17 +428,20 @@ class Autopilot:
             "reference": memory.r.position,
             "commanded_input": self._command,
         }
-        log.append(self._clock.time, own | self._go_on.outputs.signals)
+        signals = self._go_on.outputs.signals
+        self._log.append(self._clock.time, own | signals | self._received.numbers())
 
 
 def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | None]:
     """Closed loop, precision and sampling time of what an autopilot is made from."""
     if isinstance(scenario, ClosedLoop):
         return scenario, "float64", None
-    text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
-    built = build(text)
+    built, placed = scenario, isinstance(scenario, Built)
+    if not isinstance(built, Built):
+        text = from_data(built) if isinstance(built, Mapping) else read(Path(built), allow_code=allow_code)
+        built = build(text)
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
-    loop = built.without_faults().closed_loop
-    open_loop = dataclasses.replace(loop, reference=built.reference)
-    return open_loop, built.scenario.precision, built.scenario.loop.dt
+    loop = built.closed_loop if placed else built.without_faults().closed_loop
+    given = loop if placed else dataclasses.replace(loop, reference=built.reference)
+    return given, built.scenario.precision, built.scenario.loop.dt

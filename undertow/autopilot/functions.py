@@ -8,17 +8,26 @@ import numpy as np
 
 from undertow.autopilot.measured_motion import Format, Motion
 from undertow.autopilot.output import Output
-from undertow.core.contracts import AbstractController, Target
+from undertow.core.contracts import AbstractController, AbstractGatedController, Measurement, Target
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.controller_step import Answer, Memory, first_step, next_step
+from undertow.numerics.random_keys import key_of_seed
 
 
 class Given(NamedTuple):
-    """What a step is given: the measured motion, what the actuators report (None or a tree), and the target."""
+    """What a step is given.
+
+    Attributes:
+        motion: as measured.
+        actuator: what the actuators report; None or a tree.
+        target: to follow.
+        health: of the actuators, see `Measurement`; None for a loop in which none announces anything.
+    """
 
     motion: Motion
     actuator: Any
     target: Target
+    health: Any = None
 
 
 class Functions:
@@ -43,10 +52,11 @@ class Functions:
         zero: Any = number(len(loop.plant.outputs))
         motion = Motion(zero, number(0), zero)
         if self.form is not None:
-            upright = np.eye(4, dtype=kind)[0] if form.attitude == "quaternion" else number(3)
-            motion = Motion(number(3), upright, number(6))
+            names = form.columns()
+            upright = np.array([float(name == "w") for name in names.attitude], dtype=kind)
+            motion = Motion(number(3), upright, number(len(names.velocity)))
         actuator = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), truth.actuator)
-        self.given = Given(motion, actuator, Target(zero, zero, zero))
+        self.given = Given(motion, actuator, Target(zero, zero, zero), _healthy(loop, truth))
         self.applied, self.time = number(loop.plant.inputs()), number(())
 
     def first(self, law: AbstractController, given: Given) -> tuple[Memory, Answer]:
@@ -58,4 +68,21 @@ class Functions:
         return next_step(law, memory, self._measured(law, given), given.target, applied, dt)
 
     def _measured(self, law: AbstractController, given: Given):
-        return given.motion.measurement(law.model.coordinates, self.form, given.actuator)
+        measured = given.motion.measurement(law.model.coordinates, self.form, given.actuator)
+        return measured._replace(health=given.health)
+
+
+def _healthy(loop: ClosedLoop, truth: Measurement) -> Any:
+    """Health of actuators that all work; None where nobody announces anything, or would listen."""
+    if isinstance(loop.controller, AbstractGatedController):
+        return np.ones(loop.plant.inputs(), dtype=jax.dtypes.canonicalize_dtype(float))
+    if loop.faults is None:
+        return None
+    faults, key = loop.faults, key_of_seed(0)
+
+    def health(truth: Measurement):
+        realization = faults.realize(key)
+        state = faults.init(realization, truth, jnp.zeros(loop.plant.inputs()))
+        return faults.measurement(realization, state, jnp.zeros(()), truth)[0].health
+
+    return jax.tree.map(lambda one: np.ones(one.shape, one.dtype), jax.eval_shape(health, truth))

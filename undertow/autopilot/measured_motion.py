@@ -7,14 +7,22 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractCoordinates, BodyMotion, Measurement
-from undertow.core.measurement import measurement_of_outputs, measurement_of_pose
+from undertow.core.errors import BadInput
+from undertow.core.measurement import BODY_OUTPUTS, measurement_of_outputs, measurement_of_pose
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_from_euler, rotation_from_quaternion
 
 Vector3 = Float[Array, "3"]
 
-ATTITUDES = ("euler", "quaternion")
-VELOCITIES = ("body", "world", "rates")
+_QUATERNION = ("w", "x", "y", "z")
+_BODY = ("u", "v", "w", "p", "q", "r")
+_WORLD = ("v_north", "v_east", "v_down", "omega_north", "omega_east", "omega_down")
+_RATES = tuple(f"{name}_rate" for name in BODY_OUTPUTS)
+
+# Names of the numbers of each format.
+_ATTITUDES = {"euler": BODY_OUTPUTS[3:], "quaternion": _QUATERNION, "both": (*BODY_OUTPUTS[3:], *_QUATERNION)}
+_VELOCITIES = {"body": _BODY, "world": _WORLD, "rates": _RATES, "both": (*_RATES, *_BODY)}
+ATTITUDES, VELOCITIES = tuple(_ATTITUDES), tuple(_VELOCITIES)
 
 _UNIT = 1e-9  # a quaternion whose square departs from 1 by less, as in a simulation, is taken as it is
 
@@ -23,9 +31,12 @@ class Format(NamedTuple):
     """Format of the measured motion of a vehicle.
 
     Attributes:
-        attitude: `euler` (roll, pitch, yaw, rad) or `quaternion` (w, x, y, z, body -> world).
-        velocity: `body` (surge, sway, heave, p, q, r), `world` (velocity and angular velocity in world axes) or `rates`
-            (of north, east, down and of the Euler angles); m/s and rad/s.
+        attitude: `euler` (roll, pitch, yaw, rad), `quaternion` (w, x, y, z, body -> world), or `both` in this order.
+        velocity: `body` (surge, sway, heave, p, q, r), `world` (velocity and angular velocity in world axes), `rates`
+            (of north, east, down and of the Euler angles), or `both` rates and body; m/s and rad/s.
+
+    `both` and `both` belong together: they are all that a navigation filter knows, and nothing is computed of them, so
+    that a controller has the bits of a simulation with any navigation.
     """
 
     attitude: str = "euler"
@@ -39,10 +50,20 @@ class Format(NamedTuple):
         """
         checks.choice("attitude", self.attitude, ATTITUDES)
         checks.choice("velocity", self.velocity, VELOCITIES)
+        if (self.attitude == "both") != (self.velocity == "both"):
+            raise BadInput("attitude", "be `both` where velocity is, and only there", self.attitude)
+
+    def columns(self) -> "Motion":
+        """Names of the numbers of a motion."""
+        return Motion(BODY_OUTPUTS[:3], _ATTITUDES[self.attitude], _VELOCITIES[self.velocity])
 
     def measurement(self, motion: "Motion", actuator: Any) -> Measurement:
         """The measurement of a body from its motion in this format."""
         position, attitude, velocity = motion
+        if self.attitude == "both":
+            rotation = rotation_from_quaternion(attitude[3:])
+            body = BodyMotion(attitude[3:], rotation, velocity[6:])
+            return Measurement(jnp.concatenate([position, attitude[:3]]), velocity[:6], actuator, body)
         if self.attitude == "euler" and self.velocity == "rates":
             return measurement_of_outputs(jnp.concatenate([position, attitude]), velocity, actuator)
         if self.attitude == "quaternion":

@@ -5,11 +5,13 @@ import warnings
 import weakref
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
-from undertow.core.contracts import AbstractController, AbstractPlant
+from undertow.autopilot.measured_motion import Format, Motion
+from undertow.core.contracts import AbstractController, AbstractPlant, Target
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.logs.known_signals import SIGNALS, thruster_columns
@@ -22,6 +24,50 @@ _STEPS = {
     "reference": Signal(("axis",), "[axis]", "desired position x_d"),
     "commanded_input": Signal(("actuator",), "[input]", "input commanded"),
 }
+
+_RECEIVED = {
+    "received_position": Signal(("axis",), "[axis]", "position as it was given"),
+    "received_attitude": Signal(("axis",), "1", "attitude as it was given"),
+    "received_velocity": Signal(("axis",), "[axis]/s", "velocity as it was given"),
+    "received_report": Signal((), "1", "reports of the actuators as they were given"),
+    "received_health": Signal(("actuator",), "1", "1, or 0 of an actuator that announced that it has failed"),
+    "reference_velocity": Signal(("axis",), "[axis]/s", "desired velocity"),
+    "reference_acceleration": Signal(("axis",), "[axis]/s^2", "desired acceleration"),
+    "applied_input": Signal(("actuator",), "[input]", "input applied since the last step"),
+    "elapsed": Signal((), "s", "time since the last step; 0 at a start"),
+}
+
+
+class ReceivedStep(NamedTuple):
+    """What a step was given, as it was given: from a log that holds it, the step can be repeated bit for bit.
+
+    Attributes:
+        motion: as measured, in the format of the autopilot.
+        actuator: what the actuators reported; a tree of arrays, or None.
+        target: to follow.
+        health: of the actuators, or None.
+        applied: input applied since the last step; NaN at a start without one.
+        elapsed: time since the last step, s; 0 at a start.
+    """
+
+    motion: Motion
+    actuator: Any
+    target: Target
+    health: Any
+    applied: Any
+    elapsed: float
+
+    def numbers(self) -> dict[str, Any]:
+        """The numbers by name of the signal; reports of several kinds one behind the other."""
+        found = {f"received_{name}": value for name, value in zip(Motion._fields, self.motion, strict=True)}
+        reports = jax.tree.leaves(self.actuator)
+        if reports:
+            found["received_report"] = np.concatenate([np.ravel(one) for one in reports])
+        if self.health is not None:
+            found["received_health"] = self.health
+        reference = {"reference_velocity": self.target.velocity, "reference_acceleration": self.target.acceleration}
+        found |= reference | {"applied_input": self.applied, "elapsed": self.elapsed}
+        return {name: value for name, value in found.items() if np.size(value)}
 
 
 class StepLog:
@@ -36,6 +82,7 @@ class StepLog:
         signals: by name, with values of the right shape.
         period: sampling time, s.
         owner: with whose end the file is finished.
+        facts: text by name that the file keeps.
 
     Attributes:
         path: of the file that is written.
@@ -44,14 +91,21 @@ class StepLog:
         BadInput: the file cannot be written.
     """
 
-    def __init__(self, path: str | Path, signals: Mapping[str, Series], period: float, owner: Any):
+    def __init__(
+        self,
+        path: str | Path,
+        signals: Mapping[str, Series],
+        period: float,
+        owner: Any,
+        facts: Mapping[str, str] | None = None,
+    ):
         path = _free(Path(path))
         self.path = path
         self._period, self._offset, self._last = period, 0.0, -np.inf
         if path.suffix != ".mcap":
             raise BadInput("log", "be a file whose name ends in .mcap", str(path))
         try:
-            self._file = LiveLog(path, signals, {"sampling_time": f"{period!r} s"})
+            self._file = LiveLog(path, signals, {"sampling_time": f"{period!r} s"} | dict(facts or {}))
         except OSError as error:
             raise BadInput("log", "be a file that can be written", f"{path}: {error.strerror}") from None
         self.close = weakref.finalize(owner, _close, self._file, path)
@@ -106,6 +160,29 @@ def law_signals(
         unit = signal.unit_for(plant.output_units, plant.input_unit)
         found[name] = Series(np.zeros(1), np.zeros((1, *shape)), columns, unit, signal.meaning)
     return found
+
+
+def received_signals(plant: AbstractPlant, form: Format | None, numbers: Mapping[str, Any]) -> dict[str, Series]:
+    """What an autopilot writes of what it was given: enough to repeat the step.
+
+    Args:
+        plant: that is controlled.
+        form: of the measured motion; None for a plant that is no vehicle.
+        numbers: examples, of `ReceivedStep.numbers`.
+    """
+    outputs, inputs = plant.outputs, thruster_columns(plant.inputs())
+    names = Motion(outputs, (), outputs) if form is None else form.columns()
+    columns = {f"received_{name}": found for name, found in zip(Motion._fields, names, strict=True)}
+    columns |= dict.fromkeys(("reference_velocity", "reference_acceleration"), outputs)
+    columns |= dict.fromkeys(("received_health", "applied_input"), inputs)
+    made = lambda name, value: Series(
+        np.zeros(1),
+        np.zeros((1, *np.shape(value))),
+        columns.get(name, ()),
+        _RECEIVED[name].unit_for(plant.output_units, plant.input_unit),
+        _RECEIVED[name].meaning,
+    )
+    return {name: made(name, value) for name, value in numbers.items()}
 
 
 def filter_signals(declared: Mapping[str, Signal], values: Mapping[str, Any]) -> dict[str, Series]:

@@ -142,6 +142,79 @@ def mavlink(
     )
 
 
+def run(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    link: Annotated[
+        str,
+        typer.Option(
+            metavar="LINK",
+            help="vehicle (that of the scenario, in this process), udp:HOST:PORT (a vehicle there), or log:FILE "
+            "(replay the run.mcap of an earlier run and compare the commands).",
+        ),
+    ] = "vehicle",
+    serve: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Be the simulated vehicle of a link by UDP, and listen there."),
+    ] = None,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="Do not wait: a simulated clock, and the bits of `simulate`.")
+    ] = False,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Default: that of the scenario; with udp, until Ctrl-C. inf: no end."),
+    ] = None,
+    safe: Annotated[
+        str,
+        typer.Option(
+            metavar="NUMBERS",
+            help="Output sent last, in the unit of the input: one number, or one per actuator (1,0,...).",
+        ),
+    ] = "0",
+    deadline: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Time from the start of a period to its command. Default: the sampling time."),
+    ] = None,
+    max_age: Annotated[
+        float, typer.Option(metavar="S", help="Without a measurement for so long, the run ends with the safe output.")
+    ] = 0.5,
+    patience: Annotated[float, typer.Option(metavar="S", help="Longest wait for the first measurement.")] = 10.0,
+    priority: Annotated[
+        int | None, typer.Option(metavar="1-99", help="Real-time priority of the loop (SCHED_FIFO); needs permission.")
+    ] = None,
+    cpu: Annotated[int | None, typer.Option(metavar="N", help="Processor on which the loop stays.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for run.mcap and statistics.json. Default: runs/NAME.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the statistics as JSON.")] = False,
+    allow_code: AllowCode = False,
+) -> int:
+    """Run the controller of a scenario in real time, with a link to its vehicle.
+
+    One command per sampling time, a log of every step, and statistics of jitter, computing time and overruns. However
+    the run ends, the last thing sent is the safe output. Before you use it on a vehicle, read docs/how-to/real-time.md.
+    """
+    from undertow.cli import run as command
+
+    options = command.Options(
+        link,
+        serve,
+        fast,
+        duration,
+        safe,
+        deadline,
+        max_age,
+        patience,
+        priority,
+        cpu,
+        out,
+        overwrite,
+        as_json,
+        allow_code,
+    )
+    return command.run(scenario, options)
+
+
 def ros2(
     scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
     role: Annotated[
@@ -255,4 +328,4 @@ def logs(
     return logs(words, mapping, out, overwrite, allow_code)
 
 
-ALL = (export, ros2, ardupilot, mavlink, logs)
+ALL = (run, export, ros2, ardupilot, mavlink, logs)

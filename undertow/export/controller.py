@@ -12,7 +12,7 @@ from undertow.autopilot.measured_motion import Format
 from undertow.autopilot.output import output_of
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
-from undertow.core.contracts import starting_at
+from undertow.core.contracts import AbstractGatedController, starting_at
 from undertow.core.errors import BadInput
 from undertow.export.c_program import Exported, Function, Program, System, made_from
 from undertow.loop.simd_batch import Unsupported
@@ -24,11 +24,12 @@ _SPREAD = 0.2  # of the random numbers of a test, m, rad, V
 
 
 class ControllerInput(NamedTuple):
-    """Input of a step: measured motion, report of the actuators, target, input applied and time since the last step."""
+    """Input of a step: measured motion, what the actuators report, target, input applied, time since the last step."""
 
     motion: Any
     actuator: Any
     target: Any
+    health: Any  # None where the controller does not ask for it
     applied: Any
     dt: Any
 
@@ -77,6 +78,7 @@ def checked(precision: str, form: Format) -> str:
         BadInput: there is no such precision or format.
     """
     checks.choice("precision", precision, ("float64", "float32"))
+    checks.choice("attitude", form.attitude, tuple(_ATTITUDES))
     form.check()
     return precision
 
@@ -111,14 +113,19 @@ def _system(built: Built, name: str, of: Functions) -> System:
         return memory, ControllerOutput(answer.command, of.output.of(answer.command))
 
     def start(inputs: ControllerInput):
-        return answered(*of.first(of.controller, Given(*inputs[:3])))
+        return answered(*of.first(of.controller, Given(*inputs[:4])))
 
     def step(memory, inputs: ControllerInput):
-        """As `Autopilot` does: no further than a missed step; a time that is none leaves the state as it was."""
+        """As `Autopilot` does: no further than a missed step; a time that is none leaves the state as it was.
+
+        A supervisor gets the time as it is.
+        """
+        if isinstance(of.controller, AbstractGatedController):
+            return answered(*of.following(of.controller, memory, Given(*inputs[:4]), inputs.applied, inputs.dt))
         usual = jnp.asarray(period, dtype=inputs.dt.dtype)
         passed = (inputs.dt > 0) & (inputs.dt < jnp.inf)
         elapsed = jnp.where(passed, jnp.minimum(inputs.dt, MISSED * usual), usual)
-        after, answer = answered(*of.following(of.controller, memory, Given(*inputs[:3]), inputs.applied, elapsed))
+        after, answer = answered(*of.following(of.controller, memory, Given(*inputs[:4]), inputs.applied, elapsed))
         return jax.tree.map(lambda new, old: jnp.where(passed, new, old), after, memory), answer
 
     def sample(chance: np.random.Generator, _: int) -> ControllerInput:
@@ -148,6 +155,7 @@ def _meanings(of: Functions, unit: str) -> dict[str, str]:
         "input.target_position": f"to reach: {outputs}",
         "input.target_velocity": "rates of the target",
         "input.target_acceleration": "second derivatives of the target",
+        "input.health": "of each thruster: 1, or 0 where it announced that it has failed",
         "input.applied": f"to be set at each step: what was applied since the last, {unit}; output->command, or less",
         "input.dt": "time since the last step, s",
         "output.command": f"of the law, in the order of the thrusters, {unit}; see that it is finite",

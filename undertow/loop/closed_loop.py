@@ -179,6 +179,10 @@ class Realization(NamedTuple):
         gated = isinstance(loop.controller, AbstractGatedController)
         return (y if gated else repaired), MeasurementState(state, expected, faults)
 
+    def failed(self, faults: PyTree, t: Time, x: PyTree, applied: Inputs) -> tuple[Inputs, PyTree]:
+        """Input that acts on the plant, and the state of the faults, of a loop with faults."""
+        return _failed(self, faults, t, x, applied)
+
     def signals(self, t: Time, x: PyTree, z: PyTree, decision: Decision) -> Signals:
         """All recorded signals of time t. Errors are those of the true state, not of the measurement."""
         plant, controller = self.loop.plant, self.loop.controller

@@ -24,8 +24,8 @@ from undertow.scenario.foreign_code import changed
 from undertow.scenario.provenance import checksum, claims, content_hash, versions
 from undertow.scenario.reading import parse
 from undertow.supervision.conditions import State
-from undertow.supervision.supervised_controller import unsupervised
-from undertow.supervision.transition_log import Transition, log_in, transitions
+from undertow.supervision.supervised_controller import state_in, unsupervised
+from undertow.supervision.transition_log import Transition, transitions
 
 
 class Measuring(NamedTuple):
@@ -93,8 +93,8 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
     dataset.attrs["metric_meanings"] = to_json({n: one._asdict() for n, one in known.items() if n in shown})
     if success is not None:
         dataset.attrs["success"] = to_json(success._asdict())
-    if (log := log_in(outcome.final[1])) is not None:
-        dataset.attrs["transitions"] = to_json([one._asdict() for one in transitions(log)])
+    if (supervised := state_in(outcome.final[1])) is not None:
+        dataset.attrs["transitions"] = to_json([one._asdict() for one in transitions(supervised.log)])
     dataset.attrs["content_hash"] = content_hash(dataset)
     dataset.attrs["checksum"] = checksum(dataset)
     return Labelled(status, steady, whole, success, dataset)

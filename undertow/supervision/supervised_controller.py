@@ -454,3 +454,9 @@ def unsupervised(controller: AbstractController) -> AbstractController:
     if isinstance(controller, Supervised):
         controller = controller.law
     return controller.law if isinstance(controller, FaultTolerantController) else controller
+
+
+def state_in(tree: PyTree) -> SupervisedState | None:
+    """The state of a supervised controller somewhere in a tree; None where there is none."""
+    is_state = lambda node: isinstance(node, SupervisedState)
+    return next((leaf for leaf in jax.tree.leaves(tree, is_leaf=is_state) if is_state(leaf)), None)

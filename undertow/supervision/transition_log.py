@@ -64,9 +64,3 @@ def transitions(log: Any) -> Sequence[Transition]:
     slots = [k % KEPT for k in range(max(0, int(count) - KEPT), int(count))]
     rows = ([column[slot] for column in columns] for slot in slots)
     return [Transition(float(t), State(int(s)), reason_of(c), float(v), float(limit)) for t, s, c, v, limit in rows]
-
-
-def log_in(state: Any) -> TransitionLog | None:
-    """The log in the state of a controller; None for one that is not supervised."""
-    is_log = lambda node: isinstance(node, TransitionLog)
-    return next((leaf for leaf in jax.tree.leaves(state, is_leaf=is_log) if is_log(leaf)), None)

@@ -1,0 +1,291 @@
+"""`undertow run`: the controller of a scenario in real time, with a link to its vehicle."""
+
+import contextlib
+import dataclasses
+import json
+import math
+import os
+import platform
+import signal
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Any, NamedTuple
+
+import numpy as np
+import typer
+
+from undertow.autopilot.autopilot import Autopilot
+from undertow.autopilot.measured_motion import Format
+from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
+from undertow.cli.interruptible import interruptible
+from undertow.cli.results_folder import check_folder, output_folder, remove
+from undertow.cli.tables import numbers, titled, wide_console
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
+from undertow.realtime.link import AbstractLink
+from undertow.realtime.log_link import LogLink
+from undertow.realtime.loop_clock import MonotonicClock, SimulatedClock
+from undertow.realtime.process_priority import scheduled
+from undertow.realtime.statistics import LoopStatistics
+from undertow.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
+from undertow.realtime.vehicle_link import VehicleLink
+from undertow.scenario.build import Built, build
+from undertow.scenario.reading import dump, read
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_WRITTEN = ("run.mcap", "statistics.json", "scenario.yaml")
+
+
+class Options(NamedTuple):
+    """Options of the command, as given; None where one was not."""
+
+    link: str
+    serve: str | None
+    fast: bool
+    duration: float | None
+    safe: str
+    deadline: float | None
+    max_age: float
+    patience: float
+    priority: int | None
+    cpu: int | None
+    out: Path | None
+    overwrite: bool
+    json: bool
+    allow_code: bool
+
+
+class _Stop:
+    """Whether a signal asked for the end, and which: Ctrl-C, SIGTERM, or the end of the terminal."""
+
+    def __init__(self) -> None:
+        self.number = 0
+
+    def asked(self) -> bool:
+        return self.number != 0
+
+    @contextlib.contextmanager
+    def listening(self) -> Iterator[None]:
+        """Inside, signals do not raise: the loop asks, and ends with its safe output."""
+
+        def note(number: int, frame: FrameType | None) -> None:
+            if not self.number:
+                os.write(2, b"\nInterrupted: stopping.\n")
+            self.number = number
+
+        before = {one: signal.signal(one, note) for one in _SIGNALS}
+        try:
+            yield
+        finally:
+            for one, handler in before.items():
+                signal.signal(one, handler)
+
+
+def run(scenario: Path, options: Options) -> int:
+    """Run until the end of the scenario, of the link, or Ctrl-C; return the exit code."""
+    _check(options)
+    built = interruptible(lambda: build(read(scenario, allow_code=options.allow_code)))
+    if built.scenario.loop.kind != "sampled":
+        raise BadInput("loop.kind", "be sampled for `undertow run`", built.scenario.loop.kind)
+    if options.serve is not None:
+        return _serve(built, options)
+    if options.link.startswith("log:"):
+        return _replay(built, options)
+    return _controlled(scenario, built, options)
+
+
+def _check(options: Options) -> None:
+    kind, colon, rest = options.link.partition(":")
+    if not (options.link == "vehicle" or (kind in ("udp", "log") and colon and rest)):
+        raise BadInput("--link", "be vehicle, udp:HOST:PORT or log:FILE", repr(options.link))
+    if options.fast and kind == "udp":
+        raise BadInput("--fast", "be left out with a link to a real vehicle", options.link)
+    for name in ("duration", "deadline", "max_age", "patience"):
+        value = getattr(options, name)
+        if value is not None:
+            checks.positive(f"--{name.replace('_', '-')}", value, "s", finite=name != "duration")
+
+
+def _controlled(path: Path, built: Built, options: Options) -> int:
+    """The loop with the vehicle of the scenario, or one behind UDP, with a log."""
+    own, period, stop = options.link == "vehicle", float(built.scenario.loop.dt), _Stop()
+    duration = options.duration or (built.scenario.loop.duration if own else math.inf)
+    steps = duration if math.isinf(duration) else round(duration / period)
+    if steps < 1:
+        raise BadInput("--duration", f"be at least one sampling time ({period:g} s)", f"{duration:g} s")
+    safe = _safe(options.safe, built.closed_loop.plant.inputs())
+    settings = LoopSettings(safe, options.deadline, options.max_age, options.patience)
+    clock = SimulatedClock() if options.fast else MonotonicClock()
+    with scheduled(options.priority, options.cpu):  # whether it is permitted, before anything is written
+        pass
+    with output_folder(options.out, Path("runs") / path.stem) as folder:
+        check_folder(folder, _WRITTEN, "run.mcap", options.overwrite)
+        for one in built.advice():
+            typer.echo(f"Advice: {one.sentence}", err=True)
+        link = VehicleLink(built) if own else UdpVehicleLink(options.link.removeprefix("udp:"), built)
+        given, troubles = built if own else _starting_anywhere(built), list[str]()
+        with _logging(given, link, folder, troubles) as autopilot:
+            loop = RealTimeLoop(autopilot, link, clock, settings, stop.asked)
+            say = (lambda line: None) if options.json else typer.echo
+            say(f"Link {options.link}, {1 / period:g} Hz, log {folder / 'run.mcap'}. To end: Ctrl-C")
+            with stop.listening(), scheduled(options.priority, options.cpu):
+                reason = loop.run(steps)
+        if loop.statistics.steps:
+            found = _data(loop.statistics, link, autopilot, reason, options)
+            (folder / "statistics.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+            (folder / "scenario.yaml").write_text(dump(built.resolved), encoding="utf-8")
+            _print(found, folder, options.json)
+        else:
+            remove(folder / "run.mcap")
+            with contextlib.suppress(OSError):  # it held something before
+                folder.rmdir()
+    for trouble in troubles:
+        complain(trouble)
+    return max(_ending(reason, link, options, stop), FILES_FAILED if troubles else DONE)
+
+
+def _safe(text: str, actuators: int) -> Any:
+    """The safe output: one number, or one per actuator separated by commas."""
+    try:
+        found = [float(one) for one in text.split(",")]
+    except ValueError:
+        raise BadInput("--safe", "be a number, or one per actuator separated by commas", repr(text)) from None
+    checks.finite("--safe", np.array(found))
+    if len(found) not in (1, actuators):
+        raise BadInput("--safe", f"be one number, or {actuators} separated by commas", len(found))
+    return found if len(found) > 1 else found[0]
+
+
+def _starting_anywhere(built: Built) -> Built:
+    """With the reference as the scenario gives it: it begins where the vehicle is found."""
+    return built._replace(closed_loop=dataclasses.replace(built.closed_loop, reference=built.reference))
+
+
+@contextlib.contextmanager
+def _logging(built: Built, link: AbstractLink, folder: Path, troubles: list[str]) -> Iterator[Autopilot]:
+    """The autopilot, compiled, which logs to a folder; an earlier result there is removed.
+
+    What goes wrong with the log is added to `troubles`: it does not stop the controller.
+    """
+    form = link.form or Format()
+    compiled = interruptible(lambda: _autopilot(built, form))
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in _WRITTEN:
+        remove(folder / name)
+    with warnings.catch_warnings(record=True) as noted:
+        warnings.simplefilter("always")
+        try:
+            compiled.log_to(folder / "run.mcap")
+            yield compiled
+        finally:
+            compiled.close_log()
+            troubles.extend(str(one.message) for one in noted)
+
+
+def _autopilot(built: Built, form: Format) -> Autopilot:
+    return Autopilot(built, attitude=form.attitude, velocity=form.velocity, log_later=True)
+
+
+def _data(
+    seen: LoopStatistics, link: AbstractLink, autopilot: Autopilot, reason: Reason, options: Options
+) -> dict[str, Any]:
+    """Everything about a run as JSON; times in s."""
+    machine = {"python": platform.python_version(), "system": platform.platform(), "processors": os.cpu_count()}
+    return {
+        "link": options.link,
+        "clock": "simulated" if options.fast else "monotonic",
+        "ended": link.ended or reason.value,
+        "sampling_time": autopilot.sampling_time,
+        "deadline": options.deadline or autopilot.sampling_time,
+        "backend": autopilot.backend,
+        **seen.as_data(),
+        "link_counts": dict(link.counts()),
+        "autopilot_counts": autopilot.counts,
+        "machine": machine | {"priority": options.priority, "processor": options.cpu},
+    }
+
+
+def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(found, indent=2))
+        return
+    console, longest = wide_console(), 1e3 * found["longest_stale"]
+    if found["clock"] == "monotonic":
+        table = titled("Times, ms", "", *(numbers(name) for name in ("mean", "p50", "p99", "p99.9", "max")))
+        for name in ("computing", "lateness", "jitter"):
+            if found[name]:
+                cells = (f"{1e3 * found[name][share]:.3f}" for share in ("mean", "p50", "p99", "p99.9", "max"))
+                table.add_row({"lateness": "late start", "jitter": "jitter of the period"}.get(name, name), *cells)
+        console.print(table)
+    table = titled("Counts", "", numbers("number"))
+    for name in ("steps", "overruns", "missed", "stale"):
+        said = {"missed": "missed periods", "stale": f"without a new measurement (longest {longest:.0f} ms)"}
+        table.add_row(said.get(name, name), str(found[name]))
+    for name, number in found["link_counts"].items():
+        if number:
+            table.add_row(f"link: {name}", str(number))
+    console.print(table)
+    console.print(f"Ended: {found['ended']}. The last output is the safe one. Results: {folder}", highlight=False)
+
+
+def _ending(reason: Reason, link: AbstractLink, options: Options, stop: _Stop) -> int:
+    """The exit code, with a line about a failure."""
+    if reason is Reason.STOPPED:
+        return 128 + stop.number
+    if link.failed:
+        complain(link.ended)
+    elif reason is Reason.LINK_LOST:
+        complain(f"no measurement for {options.max_age:g} s: the safe output was sent, and the run ended")
+    elif reason is Reason.NO_START:
+        complain(f"no first measurement within {options.patience:g} s over {options.link}; nothing was written")
+    return RUN_FAILED if link.failed or reason in (Reason.LINK_LOST, Reason.NO_START) else DONE
+
+
+def _replay(built: Built, options: Options) -> int:
+    """Feed a log to the controller, and compare the commands."""
+    link = LogLink(Path(options.link.removeprefix("log:")), built.closed_loop.plant)
+    form = link.form or Format()
+    if link.precision != built.scenario.precision:
+        raise BadInput("precision", f"be {link.precision}, as in the log", built.scenario.precision)
+    period = link.sampling_time
+    made = lambda: Autopilot(built, sampling_time=period, attitude=form.attitude, velocity=form.velocity)
+    autopilot = interruptible(made)
+    for note in link.notes:
+        typer.echo(f"Note: {note}", err=True)
+    reason = RealTimeLoop(autopilot, link, SimulatedClock()).run()
+    replayed, apart = link.counts()["replayed"], link.differences()
+    data = {"replayed": replayed, "ended": reason.value, "differences": [one._asdict() for one in apart]}
+    if options.json:
+        typer.echo(json.dumps(data, indent=2))
+    elif apart:
+        unit = autopilot.unit
+        table = titled("Commands that differ", "actuator", *map(numbers, ("steps", "first, s", f"largest, {unit}")))
+        for one in apart:
+            table.add_row(one.actuator, str(one.steps), f"{one.first:.6g}", f"{one.largest:.3g}")
+        wide_console().print(table)
+    else:
+        typer.echo(f"{replayed} steps replayed: every bit of the commands is that of the log.")
+    if apart:
+        complain(f"the commands of {max(one.steps for one in apart)} or more of {replayed} steps differ from the log")
+    return RUN_FAILED if apart else DONE
+
+
+def _serve(built: Built, options: Options) -> int:
+    """Be the simulated vehicle at the other end of a link by UDP."""
+    stop, server = _Stop(), interruptible(lambda: UdpVehicleServer(built, str(options.serve)))
+    typer.echo(f"The vehicle listens on {options.serve}. To end: Ctrl-C")
+    end = math.inf if options.duration is None else time.monotonic() + options.duration
+    try:
+        with stop.listening():
+            server.serve(lambda: stop.asked() or time.monotonic() >= end)
+    finally:
+        server.close()
+    said = ", ".join(f"{number} {name}" for name, number in server.counts().items() if number)
+    typer.echo(f"Ended. Commands: {said or 'none'}. The last one: {np.array2string(server.last_command, precision=4)}")
+    if server.ended:
+        complain(server.ended)
+    return RUN_FAILED if server.ended else 128 + stop.number if stop.number else DONE

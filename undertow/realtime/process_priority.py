@@ -1,0 +1,65 @@
+"""Priority and processor of the thread that runs a loop."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+
+from undertow.core.errors import BadInput
+
+
+@contextlib.contextmanager
+def scheduled(priority: int | None, processor: int | None) -> Iterator[None]:
+    """Run the calling thread before others, or on one processor, and give both back at the end.
+
+    Args:
+        priority: of SCHED_FIFO, 1 to 99; None to leave it.
+        processor: number; None for any.
+
+    Raises:
+        BadInput: the system has no such thing, or does not permit it.
+    """
+    scheduler, processors = _scheduler(priority), _processors(processor)
+    try:
+        _prioritize(priority)
+        if processor is not None:
+            os.sched_setaffinity(0, {processor})
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            if scheduler is not None:
+                os.sched_setscheduler(0, *scheduler)
+            if processors is not None:
+                os.sched_setaffinity(0, processors)
+
+
+def _scheduler(priority: int | None) -> tuple[int, os.sched_param] | None:
+    """The scheduler as it is, to be restored; None where it is not changed."""
+    if priority is None:
+        return None
+    if not hasattr(os, "sched_setscheduler"):
+        raise BadInput("--priority", "be left out on a system without SCHED_FIFO", priority)
+    if not 1 <= priority <= 99:
+        raise BadInput("--priority", "be from 1 to 99", priority)
+    return os.sched_getscheduler(0), os.sched_getparam(0)
+
+
+def _processors(processor: int | None) -> set[int] | None:
+    """Processors that are used now, to be restored; None where they are not changed."""
+    if processor is None:
+        return None
+    if not hasattr(os, "sched_setaffinity"):
+        raise BadInput("--cpu", "be left out on a system that cannot bind threads to processors", processor)
+    found = os.sched_getaffinity(0)
+    if processor not in found:
+        raise BadInput("--cpu", f"be one of {', '.join(map(str, sorted(found)))}", processor)
+    return found
+
+
+def _prioritize(priority: int | None) -> None:
+    if priority is None:
+        return
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except PermissionError:
+        hint = "Permit it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or the capability CAP_SYS_NICE"
+        raise BadInput("--priority", "be permitted by the system", f"{priority}, which is not", hint=hint) from None
