@@ -290,8 +290,8 @@ class Autopilot:
         """Ask the supervisor for something, from the next step on.
 
         Args:
-            what: `run`, `hold` (the safe output until another request), `stop` (until `start`), `law` or `fallback` (who
-                controls).
+            what: `run`, `hold` (the safe output until another request), `stop` (the same until `start`), `law` or
+                `fallback` (which of them controls).
 
         Raises:
             BadInput: there is no such request, the scenario has no supervisor, or `start` was not called.

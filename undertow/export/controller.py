@@ -146,7 +146,7 @@ def _meanings(of: Functions, unit: str) -> dict[str, str]:
         "start": "The first step: sets the state; all of its input has to be finite.",
         "step": "A step input->dt after the last one, with input->applied applied since then. What was not measured is "
         f"NAN. After more than {MISSED:g} sampling times the law advances by {MISSED:g} of them; a dt that is zero, "
-        "negative or not finite leaves the state as it was.",
+        "negative or not finite leaves the state as it was. A supervisor gets the time as it is.",
         "input.motion_position": "north, east, down, m" if of.form else outputs,
         "input.motion_attitude": "" if of.form is None else _ATTITUDES[of.form.attitude],
         "input.motion_velocity": f"`{of.form.velocity}`, m/s and rad/s" if of.form else "rates of the outputs",
