@@ -43,7 +43,7 @@ class Delayed(AbstractMode):
 
 
 def delayed(longest: float = 0.1, sampling_time: float = 1e-3) -> Delayed:
-    """The signal as it was some time ago. Nobody is told: a navigation filter takes a late reading for a new one.
+    """The signal as it was some time ago. A navigation filter takes a late reading for a new one.
 
     Args:
         longest: largest severity, s; a scenario sets it.
