@@ -32,7 +32,7 @@ class SensorFaultsState(NamedTuple):
 
 
 class SensorFaults(AbstractSensorFaults):
-    """Faults of sensors, in the order in which they act. The filter does not learn of them: age and noise stay as they were.
+    """Faults of sensors, in the order in which they act. The filter does not learn of them.
 
     A sensor goes on to deliver: a fault changes what, and whether. A delay moves readings with the news that they are
     new.
