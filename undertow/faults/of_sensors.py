@@ -18,9 +18,9 @@ class SensorFault(eqx.Module):
 
     mode: AbstractMode
     occurrence: Occurrence
+    sensor: int = eqx.field(static=True)  # its place among the sensors of the filter
     chosen: Float[Param, "..."] = param("", "1 for entries of the reading that are affected, else 0")
     turn: Float[Param, "..."] = param("", "after how much an entry repeats; 0 where it does not")
-    sensor: int = eqx.field(static=True)  # its place among the sensors of the filter
 
 
 class SensorFaultsState(NamedTuple):
@@ -60,7 +60,7 @@ class SensorFaults(AbstractSensorFaults):
             reading = jnp.where(active & (fault.chosen > 0), altered.value[:width], before.reading)
             found[fault.sensor] = Received(reading, fresh, before.age)
             after.append(memory)
-        return tuple(found), SensorFaultsState(state.step + 1, t, tuple(after))
+        return tuple(found), SensorFaultsState(state.step + 1, jnp.asarray(t), tuple(after))
 
 
 def _signal(mode: AbstractMode, reading, fresh):
