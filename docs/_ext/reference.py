@@ -15,6 +15,7 @@ from undertow.cli.exit_codes import MEANINGS as EXIT_CODES
 from undertow.cli.main import app as command_line
 from undertow.core import catalogue
 from undertow.core.status import Status
+from undertow.faults.kinds import list_kinds, severity_cells
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.describing import Description, text_of
@@ -79,6 +80,14 @@ class Keys(FromCode):
 def _keys(model: Any) -> nodes.table:
     rows = [(key.path, key.type, text_of(key.default), key.meaning) for key in keys(model)]
     return table(("key", "type", "default", "meaning"), rows, ("key", "default"))
+
+
+class FaultKinds(FromCode):
+    """Every pair of target and mode of a fault, with the meaning of its severity."""
+
+    def contents(self) -> list[nodes.Node]:
+        rows = [(one.target, one.mode, *severity_cells(one)) for one in list_kinds()]
+        return [table(("target", "mode", "severity", "unit", "default", "range"), rows, ("target", "mode"))]
 
 
 class Metrics(FromCode):
@@ -162,7 +171,7 @@ def _caption(text: str) -> nodes.paragraph:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
-    found = {"parts": Parts, "keys": Keys, "metrics": Metrics, "signals": Signals}
+    found = {"parts": Parts, "keys": Keys, "metrics": Metrics, "signals": Signals, "fault-kinds": FaultKinds}
     found |= {"supervisor-states": SupervisorStates, "supervisor-conditions": SupervisorConditions}
     for name, directive in (found | {"statuses": Statuses, "exit-codes": ExitCodes, "commands": Commands}).items():
         app.add_directive(name, directive)

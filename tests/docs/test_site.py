@@ -80,7 +80,7 @@ def test_formulas_are_mathml(monkeypatch):
 def test_layers_are_those_of_the_import_contract(monkeypatch):
     layers = extension("layers", monkeypatch)
     assert (layers.layers()[0], layers.layers()[-1]) == (["cli"], ["numerics"])
-    assert ["plants", "controllers"] in layers.layers()
+    assert ["plants", "controllers", "faults"] in layers.layers()
     assert layers.purpose("report") == "Figures and self-contained HTML pages."
     assert layers.purpose("run").startswith("One closed loop from Python")
 

@@ -71,6 +71,11 @@ RETIRED = {
 ALLOWED = {
     "docs/explanation/simd.md": {r"lanes?"},  # vector lanes of a processor
     "undertow/report/figures": {r"ticks?"},  # matplotlib's axes
+    # The health of thrusters, which fault-tolerant control calls so.
+    "undertow/core/contracts.py": {r"health"},
+    "undertow/core/measurement.py": {r"health"},
+    "undertow/faults/injected.py": {r"health"},
+    "docs/how-to/faults.md": {r"health"},
 }
 
 # Phrases in which a retired word is the field's word, or somebody else's name.

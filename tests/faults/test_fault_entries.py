@@ -183,7 +183,6 @@ def test_own_mode_of_a_user(tmp_path, capsys):
 
 
 OWN = '''
-from typing import ClassVar
 
 import jax.numpy as jnp
 
@@ -193,9 +192,9 @@ from undertow.faults.mode import AbstractMode, Altered, Severity
 class Half(AbstractMode):
     """A share of the signal."""
 
-    targets: ClassVar = ("quantity", "sensor")
-    severity: ClassVar = Severity("share", "", 0.5, 0.0, 1.0)
-    delays: ClassVar = False
+    targets = ("quantity", "sensor")
+    severity = Severity("share", "", 0.5, 0.0, 1.0)
+    delays = False
 
     def init(self, value):
         return ()
@@ -207,9 +206,9 @@ class Half(AbstractMode):
 class Careless(Half.__base__):
     """Loses an entry of the signal."""
 
-    targets: ClassVar = ("quantity",)
-    severity: ClassVar = Severity("share", "", 0.5, 0.0, 1.0)
-    delays: ClassVar = False
+    targets = ("quantity",)
+    severity = Severity("share", "", 0.5, 0.0, 1.0)
+    delays = False
 
     def init(self, value):
         return ()

@@ -286,6 +286,11 @@ class Autopilot:
         """Steps after the first one, and those of them that were late, missed or repeated."""
         return self._clock.counts
 
+    @property
+    def supervised(self) -> bool:
+        """Whether a supervisor stands around the controller, which then has a state, transitions and requests."""
+        return state_in(self._go_on.state) is not None
+
     def request(self, what: str) -> None:
         """Ask the supervisor for something, from the next step on.
 

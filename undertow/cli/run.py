@@ -22,7 +22,7 @@ from undertow.autopilot.measured_motion import Format
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
-from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
@@ -33,8 +33,11 @@ from undertow.realtime.process_priority import scheduled
 from undertow.realtime.statistics import LoopStatistics
 from undertow.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.realtime.vehicle_link import VehicleLink
+from undertow.report.run_tables import transition_rows
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import dump, read
+from undertow.supervision.conditions import State
+from undertow.supervision.transition_log import Transition
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _WRITTEN = ("run.mcap", "statistics.json", "scenario.yaml")
@@ -203,10 +206,18 @@ def _data(
         "deadline": options.deadline or autopilot.sampling_time,
         "backend": autopilot.backend,
         **seen.as_data(),
+        **_supervision(autopilot),
         "link_counts": dict(link.counts()),
         "autopilot_counts": autopilot.counts,
         "machine": machine | {"priority": options.priority, "processor": options.cpu},
     }
+
+
+def _supervision(autopilot: Autopilot) -> dict[str, Any]:
+    """Transitions of the supervisor; nothing without one, or where no step was taken."""
+    if not autopilot.supervised:
+        return {}
+    return {"transitions": [one._asdict() | {"state": one.state.name} for one in autopilot.transitions()]}
 
 
 def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
@@ -229,6 +240,9 @@ def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
         if number:
             table.add_row(f"link: {name}", str(number))
     console.print(table)
+    if "transitions" in found:
+        several = [Transition(**one | {"state": State[one["state"]]}) for one in found["transitions"]]
+        console.print(terminal_table(transition_rows(several)))
     console.print(f"Ended: {found['ended']}. The last output is the safe one. Results: {folder}", highlight=False)
 
 

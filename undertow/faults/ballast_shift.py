@@ -1,7 +1,5 @@
 """A centre of gravity that has moved."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -20,9 +18,9 @@ class BallastShift(AbstractPlantFault):
     ballast: Float[Param, ""] = param("kg", "mass that moves")
     point: Float[Param, "3"] = param("m", "where it was, body axes")
     direction: Float[Param, "3"] = param("", "in which it moves, body axes")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("distance", "m", 0.1, -10.0, 10.0)
-    default_duration: ClassVar = float("inf")
+    targets = ("plant",)
+    severity = Severity("distance", "m", 0.1, -10.0, 10.0)
+    default_duration = float("inf")
 
     def __check_init__(self):
         checks.not_negative("ballast", self.ballast, "kg")

@@ -1,7 +1,5 @@
 """A constant that is added to a signal."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import LARGE, READINGS, TARGET, AbstractMode, Altered, Severity
@@ -10,9 +8,9 @@ from undertow.faults.mode import LARGE, READINGS, TARGET, AbstractMode, Altered,
 class Bias(AbstractMode):
     """An offset of every entry."""
 
-    targets: ClassVar = (*READINGS, "thruster")
-    severity: ClassVar = Severity("offset", TARGET, 1.0, -LARGE, LARGE)
-    delays: ClassVar = False
+    targets = (*READINGS, "thruster")
+    severity = Severity("offset", TARGET, 1.0, -LARGE, LARGE)
+    delays = False
 
     def init(self, value):
         return ()

@@ -1,7 +1,5 @@
 """A bit of the state of a controller that flips."""
 
-from typing import ClassVar
-
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -14,15 +12,15 @@ class BitFlip(AbstractComputationFault):
 
     entry: int | None = eqx.field(static=True)  # from 1; None for the numbers of the largest magnitude
 
-    targets: ClassVar = ("computation",)
-    severity: ClassVar = Severity("bit, from 0 for the sign; 1 is the largest of the exponent", "", 8.0, 0.0, 31.0)
-    default_duration: ClassVar = float("inf")
+    targets = ("computation",)
+    severity = Severity("bit, from 0 for the sign; 1 is the largest of the exponent", "", 8.0, 0.0, 31.0)
+    default_duration = float("inf")
 
     def execution(self, instant, dt):
         return Execution(jnp.asarray(True), dt)
 
     def state(self, instant, law, z, y, r):
-        first = instant.active & (instant.count == 0)
+        first = instant.active & (instant.number == 0)
         return with_entry(z, self.entry, first, lambda number: flipped(number, instant.severity))
 
 

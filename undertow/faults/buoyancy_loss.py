@@ -1,7 +1,5 @@
 """Buoyancy that is lost at once."""
 
-from typing import ClassVar
-
 from jaxtyping import Float
 
 from undertow.core import checks
@@ -15,9 +13,9 @@ class BuoyancyLoss(AbstractPlantFault):
     """A weight without mass."""
 
     point: Float[Param, "3"] = param("m", "where the buoyancy is lost, body axes")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("lost buoyancy; negative for lost ballast", "N", 10.0, -1e6, 1e6)
-    default_duration: ClassVar = float("inf")
+    targets = ("plant",)
+    severity = Severity("lost buoyancy; negative for lost ballast", "N", 10.0, -1e6, 1e6)
+    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("point", self.point, 3, "forward, starboard, down")

@@ -1,7 +1,5 @@
 """A clock that jumps."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import AbstractComputationFault, Execution, Severity
@@ -10,14 +8,14 @@ from undertow.faults.mode import AbstractComputationFault, Execution, Severity
 class ClockJump(AbstractComputationFault):
     """In the step of the onset the law is given another sampling time."""
 
-    targets: ClassVar = ("computation",)
-    severity: ClassVar = Severity(
+    targets = ("computation",)
+    severity = Severity(
         "sampling time that the controller is given once; negative where the clock goes back", "s", -1.0, -1e9, 1e9
     )
-    default_duration: ClassVar = float("inf")
+    default_duration = float("inf")
 
     def execution(self, instant, dt):
-        return Execution(jnp.asarray(True), jnp.where(instant.count == 0, instant.severity, dt))
+        return Execution(jnp.asarray(True), jnp.where(instant.number == 0, instant.severity, dt))
 
     def state(self, instant, law, z, y, r):
         return z

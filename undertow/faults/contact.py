@@ -1,7 +1,5 @@
 """A wall, or the bottom."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -17,9 +15,9 @@ class Contact(AbstractPlantFault):
     direction: Float[Param, "3"] = param("", "from free water into the obstacle, world axes")
     stiffness: Float[Param, ""] = param("N/m", "force per depth of penetration")
     damping: Float[Param, ""] = param("N s/m", "force per speed of penetration")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("position of the obstacle along its direction", "m", -0.05, -1e6, 1e6)
-    default_duration: ClassVar = float("inf")
+    targets = ("plant",)
+    severity = Severity("position of the obstacle along its direction", "m", -0.05, -1e6, 1e6)
+    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("direction", self.direction, 3, "north, east, down")

@@ -1,7 +1,5 @@
 """A current that sets in."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -15,9 +13,9 @@ class CurrentStep(AbstractPlantFault):
     """Uniform water of constant velocity from the onset on; the water does not accelerate gradually."""
 
     direction: Float[Param, "3"] = param("", "of the current, world axes")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("speed of the water", "m/s", 0.5, -10.0, 10.0)
-    default_duration: ClassVar = float("inf")
+    targets = ("plant",)
+    severity = Severity("speed of the water", "m/s", 0.5, -10.0, 10.0)
+    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("direction", self.direction, 3, "north, east, down")

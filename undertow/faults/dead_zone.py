@@ -1,7 +1,5 @@
 """A thruster that does not start at small inputs."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import AbstractMode, Altered, Severity
@@ -10,9 +8,9 @@ from undertow.faults.mode import AbstractMode, Altered, Severity
 class DeadZone(AbstractMode):
     """Inputs below a threshold have no effect."""
 
-    targets: ClassVar = ("thruster",)
-    severity: ClassVar = Severity("threshold as a share of the largest input", "", 0.3, 0.0, 1.0)
-    delays: ClassVar = False
+    targets = ("thruster",)
+    severity = Severity("threshold as a share of the largest input", "", 0.3, 0.0, 1.0)
+    delays = False
 
     def init(self, value):
         return ()

@@ -1,7 +1,6 @@
 """A signal that arrives late."""
 
 import math
-from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -23,11 +22,11 @@ class Delayed(AbstractMode):
         BadInput: sampling time not positive, or a delay of more than 512 control steps.
     """
 
-    sampling_time: Float[Param, ""] = param("s", "sampling time of the loop")
     slots: int = eqx.field(static=True)  # control steps that are remembered
-    targets: ClassVar = (*READINGS, "thruster")
-    severity: ClassVar = Severity("delay", "s", 0.1, 0.0, 10.0)
-    delays: ClassVar = True
+    sampling_time: Float[Param, ""] = param("s", "sampling time of the loop")
+    targets = (*READINGS, "thruster")
+    severity = Severity("delay", "s", 0.1, 0.0, 10.0)
+    delays = True
 
     def __check_init__(self):
         checks.positive("sampling_time", self.sampling_time, "s")
@@ -43,7 +42,7 @@ class Delayed(AbstractMode):
 
 
 def delayed(longest: float = 0.1, sampling_time: float = 1e-3) -> Delayed:
-    """The signal as it was some time ago. Nobody is told: a navigation filter takes a late reading for a new one.
+    """The signal as it was some time ago. A navigation filter takes a late reading for a new one.
 
     Args:
         longest: largest severity, s; a scenario sets it.
@@ -58,4 +57,4 @@ def delayed(longest: float = 0.1, sampling_time: float = 1e-3) -> Delayed:
     if steps >= _MOST:
         limit = f"{(_MOST - 1) * sampling_time:g} s"
         raise BadInput("severity", f"be at most {_MOST - 1} control steps ({limit}) for a delay", f"{longest:g} s")
-    return Delayed(sampling_time, steps + 1)
+    return Delayed(steps + 1, sampling_time)

@@ -1,7 +1,5 @@
 """Drag that the model does not know."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.core.contracts import ModelScaling
@@ -12,9 +10,9 @@ from undertow.faults.mode import AbstractPlantFault, Severity
 class Drag(AbstractPlantFault):
     """A factor on linear and quadratic damping."""
 
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("additional share of the damping", "", 1.0, -1.0, 100.0)
-    default_duration: ClassVar = float("inf")
+    targets = ("plant",)
+    severity = Severity("additional share of the damping", "", 1.0, -1.0, 100.0)
+    default_duration = float("inf")
 
     def load(self, presence, pose, load):
         one = jnp.ones(())

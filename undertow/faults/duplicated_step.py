@@ -1,7 +1,5 @@
 """A controller that is computed twice."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import AbstractComputationFault, Execution, Severity
@@ -10,12 +8,12 @@ from undertow.faults.mode import AbstractComputationFault, Execution, Severity
 class DuplicatedStep(AbstractComputationFault):
     """In every n-th control step the state advances twice."""
 
-    targets: ClassVar = ("computation",)
-    severity: ClassVar = Severity("control steps from one that is duplicated to the next", "", 5.0, 1.0, 1e6)
-    default_duration: ClassVar = float("inf")
+    targets = ("computation",)
+    severity = Severity("control steps from one that is duplicated to the next", "", 5.0, 1.0, 1e6)
+    default_duration = float("inf")
 
     def execution(self, instant, dt):
-        again = instant.count % jnp.round(instant.severity).astype(int) == 0
+        again = instant.number % jnp.round(instant.severity).astype(int) == 0
         return Execution(jnp.asarray(True), dt, again)
 
     def state(self, instant, law, z, y, r):

@@ -1,15 +1,13 @@
 """A thruster that gives less thrust than it should."""
 
-from typing import ClassVar
-
 from undertow.faults.mode import AbstractThrustMode, Severity
 
 
 class Fraction(AbstractThrustMode):
     """A share of the thrust is left; voltage, current and speed of the motor are those of a thruster without fault."""
 
-    targets: ClassVar = ("thruster",)
-    severity: ClassVar = Severity("share of the thrust that is left", "", 0.5, -1.0, 1.0)
+    targets = ("thruster",)
+    severity = Severity("share of the thrust that is left", "", 0.5, -1.0, 1.0)
 
     def factor(self, severity):
         return severity

@@ -1,7 +1,5 @@
 """Random numbers in place of a signal."""
 
-from typing import ClassVar
-
 import jax
 import jax.numpy as jnp
 
@@ -12,9 +10,9 @@ from undertow.numerics.random_keys import numbered
 class Garbage(AbstractMode):
     """Normally distributed random numbers, new at every control step, whatever the signal is."""
 
-    targets: ClassVar = (*READINGS, "thruster")
-    severity: ClassVar = Severity("standard deviation", TARGET, 2.0, 0.0, LARGE)
-    delays: ClassVar = False
+    targets = (*READINGS, "thruster")
+    severity = Severity("standard deviation", TARGET, 2.0, 0.0, LARGE)
+    delays = False
 
     def init(self, value):
         return ()

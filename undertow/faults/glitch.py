@@ -1,7 +1,5 @@
 """Single wrong values of a signal."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -14,9 +12,9 @@ class Glitch(AbstractMode):
     """An offset for one control step, at the onset and at regular intervals after it."""
 
     period: Float[Param, ""] = param("s", "between two glitches")
-    targets: ClassVar = (*READINGS, *INPUTS)
-    severity: ClassVar = Severity("offset", TARGET, 5.0, -LARGE, LARGE)
-    delays: ClassVar = False
+    targets = (*READINGS, *INPUTS)
+    severity = Severity("offset", TARGET, 5.0, -LARGE, LARGE)
+    delays = False
 
     def __check_init__(self):
         checks.positive("period", self.period, "s")

@@ -1,7 +1,5 @@
 """A controller that is not computed."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import NO_SEVERITY, AbstractComputationFault, Execution
@@ -10,9 +8,9 @@ from undertow.faults.mode import NO_SEVERITY, AbstractComputationFault, Executio
 class Hang(AbstractComputationFault):
     """No control step is computed: the last input is held, the state does not advance."""
 
-    targets: ClassVar = ("computation",)
-    severity: ClassVar = NO_SEVERITY
-    default_duration: ClassVar = 1.0
+    targets = ("computation",)
+    severity = NO_SEVERITY
+    default_duration = 1.0
 
     def execution(self, instant, dt):
         return Execution(jnp.asarray(False), dt)

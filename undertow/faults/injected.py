@@ -23,8 +23,8 @@ class QuantityFault(eqx.Module):
 
     mode: AbstractMode
     occurrence: Occurrence
-    chosen: Float[Param, " width"] = param("", "1 for entries that are affected, else 0")
     quantity: str = eqx.field(static=True)
+    chosen: Float[Param, " width"] = param("", "1 for entries that are affected, else 0")
 
 
 class InputFault(eqx.Module):
@@ -32,8 +32,8 @@ class InputFault(eqx.Module):
 
     mode: AbstractMode | AbstractThrustMode
     occurrence: Occurrence
-    chosen: Float[Param, " m"] = param("", "1 for thrusters that are affected, else 0")
     announced: bool = eqx.field(static=True)
+    chosen: Float[Param, " m"] = param("", "1 for thrusters that are affected, else 0")
     sampled: int | None = eqx.field(static=True, default=None)  # place among faults of a thruster that is sampled
 
 

@@ -1,7 +1,5 @@
 """A signal that comes and goes."""
 
-from typing import ClassVar
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
@@ -16,9 +14,9 @@ class Intermittent(AbstractMode):
     """Lost for random periods of equal length: a reading keeps its last value, an input is zero."""
 
     period: Float[Param, ""] = param("s", "length of each period, which is lost as a whole or not")
-    targets: ClassVar = (*READINGS, *INPUTS)
-    severity: ClassVar = Severity("probability that a period is lost", "", 0.5, 0.0, 1.0)
-    delays: ClassVar = False
+    targets = (*READINGS, *INPUTS)
+    severity = Severity("probability that a period is lost", "", 0.5, 0.0, 1.0)
+    delays = False
 
     def __check_init__(self):
         checks.positive("period", self.period, "s")

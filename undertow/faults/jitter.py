@@ -1,7 +1,5 @@
 """A sampling time that is measured with errors."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import AbstractComputationFault, Execution, Severity
@@ -13,12 +11,12 @@ _GOLDEN = 0.6180339887498949
 class Jitter(AbstractComputationFault):
     """The sampling time that the law is given differs from the true one in each step, uniformly distributed."""
 
-    targets: ClassVar = ("computation",)
-    severity: ClassVar = Severity("largest error as a share of the sampling time", "", 0.8, 0.0, 100.0)
-    default_duration: ClassVar = float("inf")
+    targets = ("computation",)
+    severity = Severity("largest error as a share of the sampling time", "", 0.8, 0.0, 100.0)
+    default_duration = float("inf")
 
     def execution(self, instant, dt):
-        place = _GOLDEN * jnp.asarray(instant.count, dtype=float)
+        place = _GOLDEN * jnp.asarray(instant.number, dtype=float)
         return Execution(jnp.asarray(True), dt * (1 + instant.severity * (2 * (place - jnp.floor(place)) - 1)))
 
     def state(self, instant, law, z, y, r):

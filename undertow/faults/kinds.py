@@ -18,7 +18,7 @@ class Kind(NamedTuple):
         unit: of the severity.
         default: severity unless given; None where it has none.
         lowest, highest: range of the severity; None where it has none.
-        can_be_announced: whether the controller may be told.
+        can_be_announced: whether the controller may be informed.
     """
 
     target: str

@@ -1,7 +1,5 @@
 """Water that enters the hull."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -19,9 +17,9 @@ class Leak(AbstractPlantFault):
 
     point: Float[Param, "3"] = param("m", "where the water collects, body axes")
     rise: Float[Param, ""] = param("s", "time in which it enters")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("mass of the water in the end", "kg", 1.0, 0.0, 1e6)
-    default_duration: ClassVar = float("inf")
+    targets = ("plant",)
+    severity = Severity("mass of the water in the end", "kg", 1.0, 0.0, 1e6)
+    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("point", self.point, 3, "forward, starboard, down")

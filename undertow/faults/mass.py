@@ -1,7 +1,5 @@
 """Inertia that the model does not know."""
 
-from typing import ClassVar
-
 from jaxtyping import Float
 
 from undertow.core import checks
@@ -15,9 +13,9 @@ class Mass(AbstractPlantFault):
     """A point mass that weighs nothing in water, such as water that is carried along."""
 
     point: Float[Param, "3"] = param("m", "where it is, body axes")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("mass", "kg", 5.0, 0.0, 1e6)
-    default_duration: ClassVar = float("inf")
+    targets = ("plant",)
+    severity = Severity("mass", "kg", 5.0, 0.0, 1e6)
+    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("point", self.point, 3, "forward, starboard, down")

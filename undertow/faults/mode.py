@@ -1,7 +1,7 @@
 """Contracts of modes: how a signal, the thrust, the plant or the computation of a controller fails."""
 
 import abc
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -69,14 +69,14 @@ class Altered(NamedTuple):
 class AbstractFault(eqx.Module):
     """One way to fail: its parameters. Where and when is said beside it."""
 
-    targets: eqx.AbstractClassVar[tuple[str, ...]]  # of ROLES
-    severity: eqx.AbstractClassVar[Severity]
+    targets: ClassVar[tuple[str, ...]]  # of ROLES
+    severity: ClassVar[Severity]
 
 
 class AbstractMode(AbstractFault):
     """A fault of a signal: any vector, with memory. Inputs are in units of their largest value."""
 
-    delays: eqx.AbstractClassVar[bool]  # whether it moves a reading in time, and with it the news that it is new
+    delays: ClassVar[bool]  # whether it moves a reading in time, and with it the news that it is new
 
     @abc.abstractmethod
     def init(self, value: Signal) -> PyTree:
@@ -111,7 +111,7 @@ class Presence(NamedTuple):
 class AbstractPlantFault(AbstractFault):
     """A fault of a body in water, or of its surroundings."""
 
-    default_duration: eqx.AbstractClassVar[float]  # s, unless given; infinite for most
+    default_duration: ClassVar[float]  # s, unless given; infinite for most
 
     @abc.abstractmethod
     def load(self, presence: Presence, pose: Pose | None, load: Load) -> Load:
@@ -122,7 +122,7 @@ class Instant(NamedTuple):
     """A control step, for a fault of the computation."""
 
     active: Bool[Array, ""]  # whether the fault is present
-    count: Int[Array, ""]  # number of this step among those with the fault, from 0
+    number: Int[Array, ""]  # of this step among those with the fault, from 0
     severity: Number
 
 
@@ -137,7 +137,7 @@ class Execution(NamedTuple):
 class AbstractComputationFault(AbstractFault):
     """A fault of the computer that runs the controller."""
 
-    default_duration: eqx.AbstractClassVar[float]  # s, unless given; infinite for most
+    default_duration: ClassVar[float]  # s, unless given; infinite for most
 
     @abc.abstractmethod
     def execution(self, instant: Instant, dt: Number) -> Execution:

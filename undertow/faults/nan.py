@@ -1,7 +1,5 @@
 """A signal that is not a number."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import NO_SEVERITY, READINGS, AbstractMode, Altered
@@ -10,9 +8,9 @@ from undertow.faults.mode import NO_SEVERITY, READINGS, AbstractMode, Altered
 class Nan(AbstractMode):
     """Not a number (NaN) in every entry."""
 
-    targets: ClassVar = READINGS
-    severity: ClassVar = NO_SEVERITY
-    delays: ClassVar = False
+    targets = READINGS
+    severity = NO_SEVERITY
+    delays = False
 
     def init(self, value):
         return ()

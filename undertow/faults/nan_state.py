@@ -1,7 +1,5 @@
 """A number of the state of a controller that is lost."""
 
-from typing import ClassVar
-
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -14,15 +12,15 @@ class NanState(AbstractComputationFault):
 
     entry: int | None = eqx.field(static=True)  # from 1; None for the numbers of the largest magnitude
 
-    targets: ClassVar = ("computation",)
-    severity: ClassVar = NO_SEVERITY
-    default_duration: ClassVar = float("inf")
+    targets = ("computation",)
+    severity = NO_SEVERITY
+    default_duration = float("inf")
 
     def execution(self, instant, dt):
         return Execution(jnp.asarray(True), dt)
 
     def state(self, instant, law, z, y, r):
-        first = instant.active & (instant.count == 0)
+        first = instant.active & (instant.number == 0)
         return with_entry(z, self.entry, first, lambda number: jnp.full_like(number, jnp.nan))
 
 

@@ -1,7 +1,5 @@
 """Noise that is added to a signal."""
 
-from typing import ClassVar
-
 import jax
 import jax.numpy as jnp
 
@@ -12,9 +10,9 @@ from undertow.numerics.random_keys import numbered
 class Noise(AbstractMode):
     """Normally distributed noise, independent from one control step to the next."""
 
-    targets: ClassVar = (*READINGS, *INPUTS)
-    severity: ClassVar = Severity("standard deviation", TARGET, 0.3, 0.0, LARGE)
-    delays: ClassVar = False
+    targets = (*READINGS, *INPUTS)
+    severity = Severity("standard deviation", TARGET, 0.3, 0.0, LARGE)
+    delays = False
 
     def init(self, value):
         return ()

@@ -23,7 +23,7 @@ class Timing(NamedTuple):
 
         Times of control steps are rounded products, so that a fault counts as begun some roundings early.
         """
-        later = t * (1 + 4 * jnp.finfo(jnp.result_type(float)).eps)
+        later = jnp.asarray(t) * (1 + 4 * jnp.finfo(jnp.result_type(float)).eps)
         return (later >= self.onset) & (later < self.stop)
 
 

@@ -18,9 +18,9 @@ class SensorFault(eqx.Module):
 
     mode: AbstractMode
     occurrence: Occurrence
+    sensor: int = eqx.field(static=True)  # its place among the sensors of the filter
     chosen: Float[Param, "..."] = param("", "1 for entries of the reading that are affected, else 0")
     turn: Float[Param, "..."] = param("", "after how much an entry repeats; 0 where it does not")
-    sensor: int = eqx.field(static=True)  # its place among the sensors of the filter
 
 
 class SensorFaultsState(NamedTuple):
@@ -32,7 +32,7 @@ class SensorFaultsState(NamedTuple):
 
 
 class SensorFaults(AbstractSensorFaults):
-    """Faults of sensors, in the order in which they act. The filter is told nothing: age and noise stay as they were.
+    """Faults of sensors, in the order in which they act. The filter does not learn of them.
 
     A sensor goes on to deliver: a fault changes what, and whether. A delay moves readings with the news that they are
     new.
@@ -60,7 +60,7 @@ class SensorFaults(AbstractSensorFaults):
             reading = jnp.where(active & (fault.chosen > 0), altered.value[:width], before.reading)
             found[fault.sensor] = Received(reading, fresh, before.age)
             after.append(memory)
-        return tuple(found), SensorFaultsState(state.step + 1, t, tuple(after))
+        return tuple(found), SensorFaultsState(state.step + 1, jnp.asarray(t), tuple(after))
 
 
 def _signal(mode: AbstractMode, reading, fresh):

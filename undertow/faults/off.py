@@ -1,7 +1,5 @@
 """A signal that is zero, or a sensor that delivers nothing."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import INPUTS, NO_SEVERITY, READINGS, AbstractMode, Altered
@@ -10,9 +8,9 @@ from undertow.faults.mode import INPUTS, NO_SEVERITY, READINGS, AbstractMode, Al
 class Off(AbstractMode):
     """Zero; the readings of a sensor do not arrive."""
 
-    targets: ClassVar = (*READINGS, *INPUTS)
-    severity: ClassVar = NO_SEVERITY
-    delays: ClassVar = False
+    targets = (*READINGS, *INPUTS)
+    severity = NO_SEVERITY
+    delays = False
 
     def init(self, value):
         return ()

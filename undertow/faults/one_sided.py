@@ -1,7 +1,5 @@
 """An actuator without the positive half of its range."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import AbstractMode, Altered, Severity
@@ -10,9 +8,9 @@ from undertow.faults.mode import AbstractMode, Altered, Severity
 class OneSided(AbstractMode):
     """Positive inputs are limited to less than negative ones."""
 
-    targets: ClassVar = ("thruster", "bus")
-    severity: ClassVar = Severity("largest positive input that is left, as a share of the largest", "", 0.0, 0.0, 1.0)
-    delays: ClassVar = False
+    targets = ("thruster", "bus")
+    severity = Severity("largest positive input that is left, as a share of the largest", "", 0.0, 0.0, 1.0)
+    delays = False
 
     def init(self, value):
         return ()

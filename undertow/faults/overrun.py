@@ -1,7 +1,5 @@
 """A controller that takes longer than a sampling time."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import AbstractComputationFault, Execution, Severity
@@ -10,13 +8,13 @@ from undertow.faults.mode import AbstractComputationFault, Execution, Severity
 class Overrun(AbstractComputationFault):
     """A computation takes several sampling times, during which the last input is held."""
 
-    targets: ClassVar = ("computation",)
-    severity: ClassVar = Severity("sampling times that a computation takes beyond one", "", 2.0, 1.0, 1e6)
-    default_duration: ClassVar = float("inf")
+    targets = ("computation",)
+    severity = Severity("sampling times that a computation takes beyond one", "", 2.0, 1.0, 1e6)
+    default_duration = float("inf")
 
     def execution(self, instant, dt):
         length = 1 + jnp.round(instant.severity)
-        return Execution(instant.count % length.astype(int) == 0, dt * length)
+        return Execution(instant.number % length.astype(int) == 0, dt * length)
 
     def state(self, instant, law, z, y, r):
         return z

@@ -1,7 +1,5 @@
 """A signal in coarse steps."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import LARGE, READINGS, TARGET, AbstractMode, Altered, Severity
@@ -10,9 +8,9 @@ from undertow.faults.mode import LARGE, READINGS, TARGET, AbstractMode, Altered,
 class Quantised(AbstractMode):
     """Rounded to multiples of a step."""
 
-    targets: ClassVar = (*READINGS, "thruster")
-    severity: ClassVar = Severity("step", TARGET, 0.5, 1e-9, LARGE)
-    delays: ClassVar = False
+    targets = (*READINGS, "thruster")
+    severity = Severity("step", TARGET, 0.5, 1e-9, LARGE)
+    delays = False
 
     def init(self, value):
         return ()

@@ -1,6 +1,6 @@
 """Quantities as the controller receives them, after the navigation filter: read from a measurement, and replaced in it.
 
-Of a body in water these are what its instruments would give: position in world axes, attitude as Euler angles, velocity
+Of a body in water these are what its sensors would give: position in world axes, attitude as Euler angles, velocity
 over ground and angular rate in body axes. A false attitude leaves the velocity in body axes as it is, as a Doppler log
 measures it, and turns it falsely into world axes.
 """

@@ -1,7 +1,5 @@
 """A controller that is restarted."""
 
-from typing import ClassVar
-
 import jax
 import jax.numpy as jnp
 
@@ -11,15 +9,15 @@ from undertow.faults.mode import NO_SEVERITY, AbstractComputationFault, Executio
 class Reload(AbstractComputationFault):
     """The state of the law begins anew from the measurement of the onset."""
 
-    targets: ClassVar = ("computation",)
-    severity: ClassVar = NO_SEVERITY
-    default_duration: ClassVar = float("inf")
+    targets = ("computation",)
+    severity = NO_SEVERITY
+    default_duration = float("inf")
 
     def execution(self, instant, dt):
         return Execution(jnp.asarray(True), dt)
 
     def state(self, instant, law, z, y, r):
-        first, fresh = instant.active & (instant.count == 0), law.init(y, r)
+        first, fresh = instant.active & (instant.number == 0), law.init(y, r)
         return jax.tree.map(lambda new, old: jnp.where(first, new, old), fresh, z)
 
 

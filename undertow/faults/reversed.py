@@ -1,7 +1,5 @@
 """A thruster that turns the wrong way."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import NO_SEVERITY, AbstractMode, Altered
@@ -10,9 +8,9 @@ from undertow.faults.mode import NO_SEVERITY, AbstractMode, Altered
 class Reversed(AbstractMode):
     """The sign of the input is wrong."""
 
-    targets: ClassVar = ("thruster",)
-    severity: ClassVar = NO_SEVERITY
-    delays: ClassVar = False
+    targets = ("thruster",)
+    severity = NO_SEVERITY
+    delays = False
 
     def init(self, value):
         return ()

@@ -1,7 +1,5 @@
 """A thruster at an input that nobody asks for."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import AbstractMode, Altered, Severity
@@ -10,9 +8,9 @@ from undertow.faults.mode import AbstractMode, Altered, Severity
 class Runaway(AbstractMode):
     """A constant input, whatever is commanded."""
 
-    targets: ClassVar = ("thruster",)
-    severity: ClassVar = Severity("input as a share of the largest, negative for reverse", "", 1.0, -1.0, 1.0)
-    delays: ClassVar = False
+    targets = ("thruster",)
+    severity = Severity("input as a share of the largest, negative for reverse", "", 1.0, -1.0, 1.0)
+    delays = False
 
     def init(self, value):
         return ()

@@ -1,7 +1,5 @@
 """A supply that has lost voltage."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import AbstractMode, Altered, Severity
@@ -10,9 +8,9 @@ from undertow.faults.mode import AbstractMode, Altered, Severity
 class Sag(AbstractMode):
     """All inputs are limited to a smaller range."""
 
-    targets: ClassVar = ("bus",)
-    severity: ClassVar = Severity("lost share of the largest input", "", 0.4, 0.0, 1.0)
-    delays: ClassVar = False
+    targets = ("bus",)
+    severity = Severity("lost share of the largest input", "", 0.4, 0.0, 1.0)
+    delays = False
 
     def init(self, value):
         return ()

@@ -1,7 +1,5 @@
 """A factor on a signal."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import READINGS, AbstractMode, Altered, Severity
@@ -10,9 +8,9 @@ from undertow.faults.mode import READINGS, AbstractMode, Altered, Severity
 class Scale(AbstractMode):
     """A factor on every entry."""
 
-    targets: ClassVar = (*READINGS, "thruster")
-    severity: ClassVar = Severity("factor", "", 1.5, -100.0, 100.0)
-    delays: ClassVar = False
+    targets = (*READINGS, "thruster")
+    severity = Severity("factor", "", 1.5, -100.0, 100.0)
+    delays = False
 
     def init(self, value):
         return ()

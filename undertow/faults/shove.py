@@ -1,7 +1,5 @@
 """A push."""
 
-from typing import ClassVar
-
 from jaxtyping import Float
 
 from undertow.core import checks
@@ -15,9 +13,9 @@ class Shove(AbstractPlantFault):
 
     direction: Float[Param, "3"] = param("", "of the force, world axes")
     point: Float[Param, "3"] = param("m", "where it acts, body axes")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("force", "N", 50.0, -1e6, 1e6)
-    default_duration: ClassVar = 1.0
+    targets = ("plant",)
+    severity = Severity("force", "N", 50.0, -1e6, 1e6)
+    default_duration = 1.0
 
     def __check_init__(self):
         checks.length("direction", self.direction, 3, "north, east, down")

@@ -1,7 +1,5 @@
 """A signal with a lag."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import INPUTS, READINGS, AbstractMode, Altered, Severity
@@ -10,9 +8,9 @@ from undertow.faults.mode import INPUTS, READINGS, AbstractMode, Altered, Severi
 class Slow(AbstractMode):
     """First-order lag, dv/dt = (signal - v) / tau, by the implicit Euler method; angles go the shorter way round."""
 
-    targets: ClassVar = (*READINGS, *INPUTS)
-    severity: ClassVar = Severity("time constant", "s", 0.5, 0.0, 100.0)
-    delays: ClassVar = False
+    targets = (*READINGS, *INPUTS)
+    severity = Severity("time constant", "s", 0.5, 0.0, 100.0)
+    delays = False
 
     def init(self, value):
         return value

@@ -1,7 +1,5 @@
 """A signal that keeps the value of its onset."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 
 from undertow.faults.mode import NO_SEVERITY, READINGS, AbstractMode, Altered
@@ -10,9 +8,9 @@ from undertow.faults.mode import NO_SEVERITY, READINGS, AbstractMode, Altered
 class Stuck(AbstractMode):
     """The value of the onset, bit for bit; a sensor goes on to deliver it."""
 
-    targets: ClassVar = (*READINGS, "thruster")
-    severity: ClassVar = NO_SEVERITY
-    delays: ClassVar = False
+    targets = (*READINGS, "thruster")
+    severity = NO_SEVERITY
+    delays = False
 
     def init(self, value):
         return value

@@ -42,6 +42,7 @@ class FaultTarget(NamedTuple):
         size: usual size of an error, for the default severity.
         width: entries of the signal; 0 where it has none, or where the plant is not known.
         places: of a sensor, among those of the filter.
+        angles: entries of a reading that are angles.
     """
 
     name: str
@@ -50,6 +51,7 @@ class FaultTarget(NamedTuple):
     size: float
     width: int = 0
     places: tuple[int, ...] = ()
+    angles: tuple[int, ...] = ()
 
 
 _INPUT_UNIT = "share of the largest input"
@@ -76,8 +78,9 @@ def targets_of(plant: AbstractPlant, navigation: AbstractNavigation) -> dict[str
         names = [_name_of(sensor) for sensor in navigation.filter.sensors]
         for name in dict.fromkeys(names):
             places = tuple(place for place, other in enumerate(names) if other == name)
-            reading = jax.eval_shape(lambda y, s=navigation.filter.sensors[places[0]]: s.reading(_motion(y)), y)
-            found.append(_sensor(name, len(reading), places))
+            sensor = navigation.filter.sensors[places[0]]
+            reading = jax.eval_shape(lambda y, sensor=sensor: sensor.reading(_motion(y)), y)
+            found.append(_sensor(name, len(reading), places)._replace(angles=tuple(sensor.angles)))
     found += _of_inputs("thruster" if y.body is not None else "input", plant.inputs())
     if y.body is not None:
         found.append(FaultTarget("plant", "plant", "", 1.0))

@@ -1,7 +1,5 @@
 """A tether that is caught."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -20,9 +18,9 @@ class TetherSnag(AbstractPlantFault):
     anchor: Float[Param, "3"] = param("m", "where it is caught, world axes")
     point: Float[Param, "3"] = param("m", "attachment on the vehicle, body axes")
     length: Float[Param, ""] = param("m", "length that is free")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("tension per extension", "N/m", 100.0, 0.0, 1e6)
-    default_duration: ClassVar = float("inf")
+    targets = ("plant",)
+    severity = Severity("tension per extension", "N/m", 100.0, 0.0, 1e6)
+    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("anchor", self.anchor, 3, "north, east, down")

@@ -1,7 +1,5 @@
 """A moment."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -15,9 +13,9 @@ class Twist(AbstractPlantFault):
     """A constant moment in body axes."""
 
     direction: Float[Param, "3"] = param("", "of the moment, body axes")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("moment", "N m", 10.0, -1e6, 1e6)
-    default_duration: ClassVar = 1.0
+    targets = ("plant",)
+    severity = Severity("moment", "N m", 10.0, -1e6, 1e6)
+    default_duration = 1.0
 
     def __check_init__(self):
         checks.length("direction", self.direction, 3, "roll, pitch, yaw")

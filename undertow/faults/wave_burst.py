@@ -1,7 +1,5 @@
 """A group of waves."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -16,9 +14,9 @@ class WaveBurst(AbstractPlantFault):
 
     direction: Float[Param, "3"] = param("", "of the motion, world axes")
     period: Float[Param, ""] = param("s", "of the waves")
-    targets: ClassVar = ("plant",)
-    severity: ClassVar = Severity("amplitude of the velocity of the water", "m/s", 0.5, 0.0, 10.0)
-    default_duration: ClassVar = 10.0
+    targets = ("plant",)
+    severity = Severity("amplitude of the velocity of the water", "m/s", 0.5, 0.0, 10.0)
+    default_duration = 10.0
 
     def __check_init__(self):
         checks.length("direction", self.direction, 3, "north, east, down")

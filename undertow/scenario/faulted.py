@@ -68,8 +68,8 @@ def faulted(
     if of_sensors:
         navigation = dataclasses.replace(navigation, faults=SensorFaults(of_sensors))
     elsewhere = tuple(one.occurrence for one in (*of_sensors, *of_computer))
-    inside = (tuple(groups[name]) for name in ("quantity", "input", "plant"))
-    faults = Faults(*inside, elsewhere, loop.plant.inputs())
+    first, second, third = (tuple(groups[name]) for name in ("quantity", "input", "plant"))
+    faults = Faults(first, second, third, elsewhere, loop.plant.inputs())
     controller = computed(loop.controller, of_computer)
     return dataclasses.replace(loop, navigation=navigation, controller=controller, faults=faults), resolved
 
@@ -108,7 +108,7 @@ def _default_severity(function: Any) -> float:
 
 def _occurrence(entry: Fault, kind: Kind, target: FaultTarget, fault: AbstractFault) -> Occurrence:
     """When and how severe, checked against the range of the severity."""
-    onset = _range("onset", entry.onset, 0.0, math.inf, "s")
+    onset = _range("onset", 0.0 if entry.onset is None else entry.onset, 0.0, math.inf, "s")
     duration = entry.duration
     if duration is None:
         duration = getattr(fault, "default_duration", math.inf)
@@ -155,15 +155,16 @@ def _placed(
     if target.role in ("thruster", "bus"):
         if target.role == "thruster":
             chosen = np.zeros(target.width) if number == "random" else np.eye(target.width)[int(number or 1) - 1]
-        return [InputFault(fault, occurrence, chosen, entry.announced, sampled)]
+        return [InputFault(fault, occurrence, entry.announced, chosen, sampled)]
     if entry.axis is not None:
         if not 1 <= entry.axis <= target.width:
             raise BadInput("axis", f"be from 1 to {target.width} for `{target.name}`", entry.axis)
         chosen = np.eye(target.width)[entry.axis - 1]
     if target.role == "quantity":
-        return [QuantityFault(fault, occurrence, chosen, target.name)]
+        return [QuantityFault(fault, occurrence, target.name, chosen)]
     places = target.places if number is None else (target.places[int(number) - 1],)
-    return [SensorFault(fault, occurrence, chosen, np.zeros(target.width), place) for place in places]
+    turn = np.where(np.isin(np.arange(target.width), target.angles), 2 * np.pi, 0.0)
+    return [SensorFault(fault, occurrence, place, chosen, turn) for place in places]
 
 
 def _resolved(

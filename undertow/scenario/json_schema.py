@@ -24,6 +24,8 @@ def scenario_schema() -> dict[str, Any]:
         shapes = {"disturbance": {"anyOf": [part, several]}, "metrics": several}
         found = schema["properties"][key]
         schema["properties"][key] = {**shapes.get(key, part), "description": found["description"]}
+    mode = {name: schema["$defs"]["Fault"]["properties"]["mode"][name] for name in ("title", "description")}
+    schema["$defs"]["Fault"]["properties"]["mode"] = {**mode, "anyOf": _names("faults")}
     definitions = {name: one for name, one in schema["$defs"].items() if name != "Part"}
     definitions |= {kind: _kind(kind) for kind in (*catalogue.KINDS, "metrics")}
     return {**schema, "$schema": "http://json-schema.org/draft-07/schema#", "$defs": definitions}
@@ -36,12 +38,11 @@ def _reference(kind: str) -> dict[str, Any]:
 def _kind(kind: str) -> dict[str, Any]:
     """A part by name, or a mapping whose further keys depend on the name."""
     parts = catalogue.names(kind)
-    known = [{"const": name, "description": describing.summary(part)} for name, part in sorted(parts.items())]
-    own = [{"type": "string", "pattern": pattern} for key, pattern in _FILES.items() if key in (kind, "")]
-    mapping = {"type": "object", "properties": {"kind": {"anyOf": [*known, *own]}}}
+    names = _names(kind)
+    mapping = {"type": "object", "properties": {"kind": {"anyOf": names}}}
     if kind not in _DEFAULTS and kind != "power":  # `battery` and `esc` have a default each
         mapping["required"] = ["kind"]
-    found = {"anyOf": [*known, *own, mapping]}
+    found = {"anyOf": [*names, mapping]}
     options = [
         {
             "if": {
@@ -53,6 +54,13 @@ def _kind(kind: str) -> dict[str, Any]:
         for name, part in sorted(parts.items())
     ]
     return {**found, "allOf": options} if options else found
+
+
+def _names(kind: str) -> list[dict[str, Any]]:
+    """What may stand where a part is named: the names of the catalogue, and files."""
+    parts = catalogue.names(kind)
+    known = [{"const": name, "description": describing.summary(part)} for name, part in sorted(parts.items())]
+    return known + [{"type": "string", "pattern": pattern} for key, pattern in _FILES.items() if key in (kind, "")]
 
 
 def _options(kind: str, part: Any) -> dict[str, Any]:

@@ -126,7 +126,7 @@ class Fault(BaseModel):
     duration: float | None = Field(
         None, gt=0, description="how long it lasts, s; default: that of the mode, or to the end"
     )
-    announced: bool = Field(False, description="whether the controller is told that the thruster has failed")
+    announced: bool = Field(False, description="whether the controller is informed that the thruster has failed")
     number: NumberOrRandom = Field(
         None, description="of the thruster or of the sensor of this name; random: any thruster"
     )
