@@ -25,8 +25,10 @@ MOTORS = {
     "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "shaft"}},
     "model": {"speed_sensor": True},
 }
+# So often that every fault of this short run falls on some reading.
+OFTEN = ["imu", {"kind": "dvl", "period": DT}, "depth", "compass", {"kind": "position_fix", "period": DT, "delay": 0.0}]
 # The observer is quicker to compile; the Kalman filter also takes the speeds of the propellers.
-OBSERVER = {"controller": "pid", "navigation": {"kind": "observer", "sensors": SENSORS[:5]}}
+OBSERVER = {"controller": "pid", "navigation": {"kind": "observer", "sensors": OFTEN}}
 KALMAN = MOTORS | {"navigation": {"kind": "kalman", "sensors": SENSORS}}
 
 
