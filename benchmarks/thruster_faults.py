@@ -144,10 +144,10 @@ def recovery(built: Built, faults: list[tuple[str, tuple[int, ...]]], seeds: int
         if name == "tolerant":
             lost, axes = rows["lost_thrusters"] > 0, rows["lost_axes"].any(-1)
             when = lambda flags, time_of=time_of: np.where(flags.any(-1), time_of[flags.argmax(-1)], np.inf)
-            wanted = np.array([np.isin(np.arange(count), case) for _, case in faults])[:, None]
+            demand = np.array([np.isin(np.arange(count), case) for _, case in faults])[:, None]
             found[name] |= {
-                "detected": np.max(np.where(wanted, when(np.moveaxis(lost[1:], -2, -1)), -np.inf), axis=-1),
-                "wrong": (lost[1:, :, -1] & ~wanted).any(-1),
+                "detected": np.max(np.where(demand, when(np.moveaxis(lost[1:], -2, -1)), -np.inf), axis=-1),
+                "wrong": (lost[1:, :, -1] & ~demand).any(-1),
                 "announced": when(axes[1:]),
             }
     return found
@@ -185,9 +185,9 @@ def pairs(seeds: int) -> None:
     found = recovery(built, [("off", pair) for pair in both], seeds)
     one, two = found["alone"], found["tolerant"]
     recovered, announced = two["ratio"] < 2, np.isfinite(two["announced"])
-    for pair, back, told, seen, wrong in zip(both, recovered, announced, two["detected"], two["wrong"], strict=True):
+    for pair, back, said, seen, wrong in zip(both, recovered, announced, two["detected"], two["wrong"], strict=True):
         words = (
-            f"recovered {back.mean():4.0%}, announced {told.mean():4.0%}, both found {np.isfinite(seen).mean():4.0%}"
+            f"recovered {back.mean():4.0%}, announced {said.mean():4.0%}, both found {np.isfinite(seen).mean():4.0%}"
         )
         print(f"  {pair[0] + 1} and {pair[1] + 1}: {words}, wrong {wrong.mean():4.0%}")
     print(f"  all: alone {np.mean(one['ratio'] < 2):.0%}; tolerant {np.mean(recovered | announced):.0%}", flush=True)

@@ -117,7 +117,7 @@ def reference_reserve(
     least, largest = held.range(held.init(), jnp.ones(()))
     _, low, high = _checked(gains[0], least, largest, lost)
     left = controlled_axes(gains[0], lost)
-    share = lambda wanted, effect: _share(effect, wanted, low, high, lost, left)
+    share = lambda required, effect: _share(effect, required, low, high, lost, left)
     worst, time = min((share(*both), float(t)) for *both, t in zip(demands, gains, times, strict=True))
     return Reserve(worst, time, tuple(sorted(set(controlled_axes(gains[0])) - set(left))))
 
@@ -133,19 +133,19 @@ def _demands(model: Model, reference: AbstractReference, times, water):
         flow = jnp.zeros_like(target.velocity)
         flow = flow.at[:3].set(water) if flow.shape[0] == 6 else flow
         through = coordinates.measurement(target.position, target.velocity - flow)
-        wanted = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(through)
-        return wanted, dynamics.gain(ground)
+        required = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(through)
+        return required, dynamics.gain(ground)
 
     return jax.vmap(demand)(times)
 
 
-def _share(effect, wanted, low, high, lost, axes) -> float:
+def _share(effect, required, low, high, lost, axes) -> float:
     """Largest s with E f = s times the demand along the axes, and f within its limits."""
     kept = np.delete(np.arange(effect.shape[1]), list(lost))
     rows = effect[np.ix_(list(axes), kept)]
-    if np.linalg.norm(wanted[list(axes)]) < _NOTHING:
+    if np.linalg.norm(required[list(axes)]) < _NOTHING:
         return _ENOUGH
-    extended = np.concatenate([rows, -wanted[list(axes), None]], axis=1)
+    extended = np.concatenate([rows, -required[list(axes), None]], axis=1)
     low, high = np.append(low[kept], 0.0), np.append(high[kept], _ENOUGH)
     return _most(np.append(np.zeros(len(kept)), 1.0), extended, low, high)
 

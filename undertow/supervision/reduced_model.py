@@ -40,7 +40,7 @@ class ReducedDynamics(AbstractDynamics):
         return self.whole.drift(y)
 
     def gain(self, y: Measurement) -> Gain:
-        return self.whole.gain(y) * self.used
+        return self.whole.gain(y) * self.used[None, :]
 
     def invert(self, y: Measurement, acceleration: Outputs) -> PerActuator:
         reduced = lambda: least_forces(self.whole.gain(y), self.used, self.priority, acceleration)
