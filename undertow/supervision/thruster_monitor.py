@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -27,6 +28,8 @@ _SLACK, _EXCESS, _MOST = 0.05, 2.5, 1.3
 _OFF_LEAST, _OFF_MOST, _REVERSED = 0.45, 0.95, 1.9
 # Difference between reported and predicted force that is a fault: share of the largest force, and of the predicted one.
 _REPORTED, _RELATIVE = 0.15, 0.3
+# Time after which the inverse covariance is renewed, s.
+_RENEWED = 0.1
 # Largest change of the log-likelihood ratio by one independent residual, so that no single one decides.
 _CHANGE = 20.0
 
@@ -40,6 +43,9 @@ class MonitorState(NamedTuple):
     residual: PerAxis  # rho, m/s^2, rad/s^2
     background: PerAxis  # its slow part: loads and errors of the model
     covariance: Float[Array, "n n"]  # of the fast part without faults, in squares of `unit`
+    inverse: Float[Array, "n n"]  # P, of the covariance and 1 in every direction, renewed from time to time
+    size: PerActuator  # E_i . P E_i, likewise
+    stale: Float[Array, ""]  # time until they are renewed, s
     forces: Float[Array, "3 m"]  # nominal forces behind one and two low-passes, and their slow part, N
     likelihood: PerActuator  # log-likelihood ratio of "off" to "healthy", of the last seconds
     suspected: PerActuator  # for how long each actuator has been suspected, s
@@ -60,10 +66,10 @@ class ThrusterMonitor(eqx.Module):
     explains, and a_i = E_i . P D / (E_i . P E_i) its force.
 
     Thruster i is suspected while J_i is above `threshold`^2 (`other_threshold`^2 unless a_i is that of a thruster that
-    is off) and explains the share `explained` of D; the second best
-    thruster explains `margin` less, and less than the share `rival` of it; and a_i is a force that a fault can have:
-    against the nominal force, and not above the largest. A suspicion that persists is an alarm. Where actuators report
-    their speed, one whose reported force differs from that predicted of its command is suspected as well.
+    is off) and explains the share `explained` of D; the second best thruster explains `margin` less, and less than the
+    share `rival` of it; and a_i is a force that a fault can have: against the nominal force, and not above the largest.
+    A suspicion that persists is an alarm. Where actuators report their speed, one whose reported force differs from
+    that predicted of its command is suspected as well.
 
     This finds a fault that begins while a thruster works. One that begins at little thrust, or a stuck propeller, shows
     by what does not happen afterwards: the fast part of the nominal force, phi, has no effect, D = -E_i phi_i. Its
@@ -116,6 +122,9 @@ class ThrusterMonitor(eqx.Module):
             residual=jnp.zeros_like(velocity),
             background=jnp.zeros_like(velocity),
             covariance=_START * jnp.eye(velocity.shape[0]),
+            inverse=jnp.eye(velocity.shape[0]) / (_START + 1),
+            size=jnp.ones_like(none),
+            stale=zero,
             forces=jnp.zeros((3, *none.shape)),
             likelihood=none,
             suspected=none,
@@ -146,7 +155,9 @@ class ThrusterMonitor(eqx.Module):
         first = state.forces[0] + share * (force - state.forces[0])
 
         fast = (residual - state.background) / self.unit
-        weighed = self._weighed(state.covariance, fast, effect / self.unit[:, None])
+        inverse, size = self._renewed(state, effect)
+        pulled = matvec(inverse, fast)
+        weighed = _Weighed(matvec(effect.T, pulled / self.unit), size, (fast * pulled).sum())
         found, explained = self._isolated(weighed, second, used)
         likelihood, likely = self._accumulated(state, weighed, second, used, dt)
         suspicious = jnp.where(state.quiet > 0, 0.0, jnp.maximum(jnp.maximum(found, likely), differs) * used)
@@ -164,6 +175,9 @@ class ThrusterMonitor(eqx.Module):
             residual=residual,
             background=state.background + slow * (residual - state.background) + known,
             covariance=state.covariance * (1 - steady) + weight * fast[:, None] * fast[None, :],
+            inverse=inverse,
+            size=size,
+            stale=jnp.where(state.stale > 0, state.stale - dt, _RENEWED),
             forces=jnp.stack([first, second, state.forces[2] + slow * (second - state.forces[2])]),
             likelihood=likelihood,
             suspected=jnp.where(raised, 0.0, suspected),
@@ -187,13 +201,16 @@ class ThrusterMonitor(eqx.Module):
         differs = jnp.where(jnp.abs(before - predicted) > allowed, 1.0, 0.0)
         return after, force, model.advance(state.unreported, u_applied, dt), differs
 
-    def _weighed(self, covariance, fast: PerAxis, effect: Float[Array, "n m"]) -> "_Weighed":
-        """Residual and accelerations per force, both in `unit`, weighed by the inverse covariance."""
-        inverse = inverse_symmetric(covariance + jnp.eye(fast.shape[0]))
-        weighed = matvec(inverse, fast)
-        size = (effect * (inverse[:, :, None] * effect[None, :, :]).sum(1)).sum(0)
-        along = (effect * weighed[:, None]).sum(0)
-        return _Weighed(along, jnp.where(size > 0, size, 1.0), (fast * weighed).sum())
+    def _renewed(self, state: MonitorState, effect: Float[Array, "n m"]):
+        """P and E_i . P E_i, which change slowly and are renewed every tenth of a second."""
+
+        def renewed():
+            scaled = effect / self.unit[:, None]
+            inverse = inverse_symmetric(state.covariance + jnp.eye(effect.shape[0]))
+            size = (scaled * (inverse[:, :, None] * scaled[None, :, :]).sum(1)).sum(0)
+            return inverse, jnp.where(size > 0, size, 1.0)
+
+        return jax.lax.cond(state.stale > 0, lambda: (state.inverse, state.size), renewed)
 
     def _isolated(self, weighed: "_Weighed", forces: PerActuator, used: PerActuator):
         """1 for the actuator whose force explains the residual as a fault can, else 0; and J of the best."""
