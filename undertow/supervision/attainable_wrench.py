@@ -14,6 +14,7 @@ from scipy.optimize import linprog
 
 from undertow.core.contracts import AbstractReference, Model
 from undertow.core.errors import BadInput
+from undertow.core.runtime import double_outside_runs
 from undertow.supervision.reduced_model import VEHICLE_PRIORITY, attained_share
 
 # Share of an acceleration demanded of one axis that makes it one that the actuators control.
@@ -70,6 +71,7 @@ def attainable_wrench(
     return AttainableWrench(alone, free)
 
 
+@double_outside_runs
 def controlled_axes(matrix: Any, lost: Sequence[int] = ()) -> tuple[int, ...]:
     """Axes, numbered from 0, on which actuators meet a demand at least to 85 %; of little priority give way first.
 
@@ -85,6 +87,7 @@ def controlled_axes(matrix: Any, lost: Sequence[int] = ()) -> tuple[int, ...]:
     return tuple(int(axis) for axis in np.flatnonzero(np.asarray(share) > _CONTROLLED))
 
 
+@double_outside_runs
 def reference_reserve(
     model: Model,
     reference: AbstractReference,

@@ -87,7 +87,7 @@ class ThrusterMonitor(eqx.Module):
     bandwidth: Float[Param, ""] = param("rad/s", "of each low-pass", symbol="w", default=15.0)
     background_time: Float[Param, ""] = param("s", "time constant of the slow part of the residual", default=0.7)
     memory: Float[Param, ""] = param("s", "time constant of the covariance", default=15.0)
-    threshold: Float[Param, ""] = param("", "size of the residual that is a fault, in standard deviations", default=5.0)
+    threshold: Float[Param, ""] = param("", "size of the residual that is a fault, in standard deviations", default=6.0)
     other_threshold: Float[Param, ""] = param("", "the same where the thruster is not simply off", default=8.0)
     explained: Float[Param, ""] = param("", "least share of the residual that one thruster explains", default=0.8)
     rival: Float[Param, ""] = param("", "largest share that the second best explains of that", default=0.9)
