@@ -1,6 +1,6 @@
 """Thruster faults in closed loop: recovery, pairs, detection and false alarms, with and without the wrapper.
 
-    python benchmarks/thruster_faults.py [single] [pairs] [detection] [false_alarms] [--seeds N]
+    python benchmarks/thruster_faults.py [single] [pairs] [detection] [false_alarms] [cost] [--seeds N]
 
 Vehicles keep station or move in waves (0.5 m, 5 s) and current (0.3, 0.2 m/s), on an observer of their own sensors
 at 100 Hz, as in examples/bluerov2_heavy.yaml. ODIN has the thruster of the paper with a supply of 24 V.
@@ -10,6 +10,7 @@ single: off, half, stuck at the voltage of the onset, reversed; every thruster. 
 pairs: every pair of thrusters of ODIN off at once.
 detection: thruster off while its nominal thrust exceeds 20 % of the largest one; references and onsets at random.
 false_alarms: alarms without a fault, per simulated hour.
+cost: a control step of preset robust with and without the wrapper.
 """
 
 import argparse
@@ -24,11 +25,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core import runtime
-from undertow.core.contracts import AbstractFaults, AbstractInformedController
+from undertow.core.contracts import AbstractFaults, AbstractInformedController, Target
+from undertow.core.measurement import measurement_of_outputs
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.simd_batch import BatchRunner, Plan, Run
+from undertow.loop.simd_batch import BatchRunner, Plan, Run, kept_step
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build
 from undertow.supervision.fault_tolerant import FaultTolerantController, fault_tolerant
@@ -144,10 +146,10 @@ def recovery(built: Built, faults: list[tuple[str, tuple[int, ...]]], seeds: int
         if name == "tolerant":
             lost, axes = rows["lost_thrusters"] > 0, rows["lost_axes"].any(-1)
             when = lambda flags, time_of=time_of: np.where(flags.any(-1), time_of[flags.argmax(-1)], np.inf)
-            wanted = np.array([np.isin(np.arange(count), case) for _, case in faults])[:, None]
+            demand = np.array([np.isin(np.arange(count), case) for _, case in faults])[:, None]
             found[name] |= {
-                "detected": np.max(np.where(wanted, when(np.moveaxis(lost[1:], -2, -1)), -np.inf), axis=-1),
-                "wrong": (lost[1:, :, -1] & ~wanted).any(-1),
+                "detected": np.max(np.where(demand, when(np.moveaxis(lost[1:], -2, -1)), -np.inf), axis=-1),
+                "wrong": (lost[1:, :, -1] & ~demand).any(-1),
                 "announced": when(axes[1:]),
             }
     return found
@@ -185,9 +187,9 @@ def pairs(seeds: int) -> None:
     found = recovery(built, [("off", pair) for pair in both], seeds)
     one, two = found["alone"], found["tolerant"]
     recovered, announced = two["ratio"] < 2, np.isfinite(two["announced"])
-    for pair, back, told, seen, wrong in zip(both, recovered, announced, two["detected"], two["wrong"], strict=True):
+    for pair, back, said, seen, wrong in zip(both, recovered, announced, two["detected"], two["wrong"], strict=True):
         words = (
-            f"recovered {back.mean():4.0%}, announced {told.mean():4.0%}, both found {np.isfinite(seen).mean():4.0%}"
+            f"recovered {back.mean():4.0%}, announced {said.mean():4.0%}, both found {np.isfinite(seen).mean():4.0%}"
         )
         print(f"  {pair[0] + 1} and {pair[1] + 1}: {words}, wrong {wrong.mean():4.0%}")
     print(f"  all: alone {np.mean(one['ratio'] < 2):.0%}; tolerant {np.mean(recovered | announced):.0%}", flush=True)
@@ -302,7 +304,41 @@ def false_alarms(seeds: int) -> None:
         print(f"  {what:<28}{moves:<9}{alarms:4d} in {hours:.1f} h: {100 * alarms / hours:6.1f} per 100 h", flush=True)
 
 
-SECTIONS = {"single": single, "pairs": pairs, "detection": detection, "false_alarms": false_alarms}
+def cost(seeds: int) -> None:
+    print("A control step (command, all signals, advance) as the autopilot takes it, without its checks of numbers.")
+    built = scenario("bluerov2_heavy")
+    start, target = np.zeros(6), Target(np.array([2.0, 1, 1, 0, 0, 0.5]), np.zeros(6), np.zeros(6))
+    steps = {}
+    for name, law in laws_of(built).items():
+        numbers, rest = eqx.partition(law, eqx.is_array)
+
+        def step(numbers, z, given, rest=rest):
+            law, y = eqx.combine(numbers, rest), measurement_of_outputs(*given)
+            u, signals = law.command(z, y, target)
+            return law.advance(z, y, target, jnp.clip(u, -16.0, 16.0), jnp.asarray(DT)), (u, signals)
+
+        z = law.init(measurement_of_outputs(start, start), target)
+        steps[name] = kept_step(step, numbers, jax.tree.map(np.asarray, z), (start, start))
+    chance, times = np.random.default_rng(0), {name: [] for name in [*steps, "one lost"]}
+    for block in range(200):
+        for name, one in steps.items():
+            lost = name == "tolerant" and block >= 100
+            if lost:
+                one.state.monitor.lost[2] = 1.0
+            taken = np.empty(200)
+            for k in range(200):
+                for place, value in zip(one.inputs, 0.1 * chance.normal(size=(2, 6)), strict=True):
+                    place[...] = value
+                before = time.perf_counter_ns()
+                one()
+                taken[k] = time.perf_counter_ns() - before
+            times["one lost" if lost else name].append(np.median(taken) / 1e3)
+    alone = np.median(times["alone"])
+    for name, one in times.items():
+        print(f"  {name:<10}{np.median(one):7.2f} us  {np.median(one) / alone - 1:+.1%}")
+
+
+SECTIONS = {"single": single, "pairs": pairs, "detection": detection, "false_alarms": false_alarms, "cost": cost}
 
 
 def main() -> None:

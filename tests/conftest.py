@@ -29,6 +29,7 @@ CHECKED = (
     "estimation",
     "plants",
     "controllers",
+    "supervision",
     "loop",
     "analysis",
 )

@@ -14,6 +14,7 @@ from scipy.optimize import linprog
 
 from undertow.core.contracts import AbstractReference, Model
 from undertow.core.errors import BadInput
+from undertow.core.runtime import double_outside_runs
 from undertow.supervision.reduced_model import VEHICLE_PRIORITY, attained_share
 
 # Share of an acceleration demanded of one axis that makes it one that the actuators control.
@@ -70,6 +71,7 @@ def attainable_wrench(
     return AttainableWrench(alone, free)
 
 
+@double_outside_runs
 def controlled_axes(matrix: Any, lost: Sequence[int] = ()) -> tuple[int, ...]:
     """Axes, numbered from 0, on which actuators meet a demand at least to 85 %; of little priority give way first.
 
@@ -85,6 +87,7 @@ def controlled_axes(matrix: Any, lost: Sequence[int] = ()) -> tuple[int, ...]:
     return tuple(int(axis) for axis in np.flatnonzero(np.asarray(share) > _CONTROLLED))
 
 
+@double_outside_runs
 def reference_reserve(
     model: Model,
     reference: AbstractReference,
@@ -117,7 +120,7 @@ def reference_reserve(
     least, largest = held.range(held.init(), jnp.ones(()))
     _, low, high = _checked(gains[0], least, largest, lost)
     left = controlled_axes(gains[0], lost)
-    share = lambda wanted, effect: _share(effect, wanted, low, high, lost, left)
+    share = lambda required, effect: _share(effect, required, low, high, lost, left)
     worst, time = min((share(*both), float(t)) for *both, t in zip(demands, gains, times, strict=True))
     return Reserve(worst, time, tuple(sorted(set(controlled_axes(gains[0])) - set(left))))
 
@@ -133,19 +136,19 @@ def _demands(model: Model, reference: AbstractReference, times, water):
         flow = jnp.zeros_like(target.velocity)
         flow = flow.at[:3].set(water) if flow.shape[0] == 6 else flow
         through = coordinates.measurement(target.position, target.velocity - flow)
-        wanted = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(through)
-        return wanted, dynamics.gain(ground)
+        required = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(through)
+        return required, dynamics.gain(ground)
 
     return jax.vmap(demand)(times)
 
 
-def _share(effect, wanted, low, high, lost, axes) -> float:
+def _share(effect, required, low, high, lost, axes) -> float:
     """Largest s with E f = s times the demand along the axes, and f within its limits."""
     kept = np.delete(np.arange(effect.shape[1]), list(lost))
     rows = effect[np.ix_(list(axes), kept)]
-    if np.linalg.norm(wanted[list(axes)]) < _NOTHING:
+    if np.linalg.norm(required[list(axes)]) < _NOTHING:
         return _ENOUGH
-    extended = np.concatenate([rows, -wanted[list(axes), None]], axis=1)
+    extended = np.concatenate([rows, -required[list(axes), None]], axis=1)
     low, high = np.append(low[kept], 0.0), np.append(high[kept], _ENOUGH)
     return _most(np.append(np.zeros(len(kept)), 1.0), extended, low, high)
 

@@ -20,6 +20,7 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
+from undertow.core.runtime import double_outside_runs
 from undertow.core.signals import Signal
 from undertow.supervision.reduced_model import attained_share, default_priority, reduced
 from undertow.supervision.thruster_monitor import MonitorState, ThrusterMonitor
@@ -106,6 +107,7 @@ class FaultTolerantController(AbstractRestartable):
         return jax.lax.cond((used < 1).any(), lost, lambda: jnp.zeros_like(self.priority))
 
 
+@double_outside_runs
 def fault_tolerant(
     law: AbstractController,
     sampling_time: float,

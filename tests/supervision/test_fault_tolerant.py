@@ -1,0 +1,104 @@
+"""The fault-tolerant law in closed loop: detection with the right index, and nothing else changes."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import undertow as ut
+from undertow.core.contracts import Target
+from undertow.core.measurement import measurement_of_outputs
+from undertow.disturbances.adding import Together
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.simd_batch import BatchRunner, Plan, Run
+from undertow.numerics.random_keys import key_of_seed
+from undertow.supervision.fault_tolerant import fault_tolerant
+
+DT, ONSET, DURATION = 0.02, 5.0, 9.0
+PLANT = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(fidelity="static"))
+LAW = ut.controllers.pid(PLANT.model(), sampling_time=DT)
+
+
+def losses():
+    """Nothing lost, then each thruster off, then each reversed."""
+    rows = [(1.0, ())] + [(share, (i,)) for share in (0.0, -1.0) for i in range(1, 9)]
+    return [ut.disturbances.thruster_loss(remaining=share, start=ONSET, failing=failing) for share, failing in rows]
+
+
+def loops(law, disturbances):
+    reference = ut.references.lissajous((1.0, 1.0, 0.5, 0.5), (0.3, 0.35, 0.25, 0.3))
+    noise, current = ut.navigation.white_noise(0.005, 0.005), ut.disturbances.current([0.5, 0.2, 0.2])
+    return [ClosedLoop(PLANT, law, reference, Together((current, one)), noise) for one in disturbances]
+
+
+def batch(several, signals, every=1):
+    runs = [Run(loop, (), loop.outputs_at_start(None, None), key_of_seed(3)) for loop in several]
+    numbers = [eqx.filter(run, eqx.is_array) for run in runs]
+    columns = zip(*(jax.tree.leaves(one) for one in numbers), strict=True)
+    same = [all(np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
+    plan = Plan(round(DURATION / DT), DT, every, signals)
+    stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *numbers)
+    return BatchRunner(runs[0], plan, same, runs=len(runs)).run(stacked)
+
+
+@pytest.fixture(scope="module")
+def found():
+    signals = ("lost_thrusters", "lost_axes", "input", "position")
+    return batch(loops(fault_tolerant(LAW, DT), losses()), signals).signals
+
+
+def test_the_batch_compiler_takes_it_and_without_a_fault_the_run_has_the_bits_of_the_law_alone(found):
+    alone = batch(loops(LAW, losses()[:2]), ("input", "position")).signals
+    np.testing.assert_array_equal(found["input"][0], alone["input"][0])
+    np.testing.assert_array_equal(found["position"][0], alone["position"][0])
+    assert not found["lost_thrusters"][0].any() and not found["lost_axes"][0].any()
+
+
+def test_a_thruster_that_works_and_fails_is_found_within_half_a_second_and_no_other_ever(found):
+    lost, start = found["lost_thrusters"][1:] > 0, round(ONSET / DT)
+    failing = np.tile(np.eye(8, dtype=bool), (2, 1))
+    assert not lost[:, :start].any() and not (lost[:, -1] & ~failing).any()
+    working = np.abs(found["input"][0, start]) > 4.5  # V; 16 are the limit
+    assert working.sum() == 6  # the other two stand still, in the dead zone
+    times = (lost.any(-1).argmax(-1) - start) * DT
+    assert lost[:, -1].any(-1)[np.tile(working, 2)].all() and (times[np.tile(working, 2)] <= 0.5).all()
+
+
+def test_a_lost_thruster_gets_no_command_and_seven_of_eight_control_every_axis(found):
+    lost = found["lost_thrusters"] > 0
+    assert lost.any() and (found["input"][lost] == 0.0).all() and not found["lost_axes"].any()
+
+
+def stepped(y_of=lambda y: y):
+    law, target = fault_tolerant(LAW, DT), Target(jnp.asarray([0.3, 0.0, 0.2, 0.0, 0.0, 0.1]), *jnp.zeros((2, 6)))
+    y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
+    return law, law.init(y, target), y, target
+
+
+def test_an_announced_failure_acts_at_once_and_ends_with_the_announcement():
+    law, z, y, target = stepped()
+    failed = y._replace(health=jnp.ones(8).at[jnp.asarray([1, 4])].set(0.0))
+    command = jax.jit(lambda z, y: law.command(z, y, target))
+    u, signals = command(z, failed)
+    np.testing.assert_array_equal(signals["lost_thrusters"], [0, 1, 0, 0, 1, 0, 0, 0])
+    assert u[1] == u[4] == 0.0 and (jnp.delete(u, jnp.asarray([1, 4])) != 0).all()
+    np.testing.assert_allclose(command(z, y)[0], LAW.command(z.law, y, target)[0], rtol=1e-12)
+    assert not command(z, y)[1]["lost_thrusters"].any()
+
+
+def test_a_restarted_law_knows_what_is_lost():
+    law, z, y, target = stepped()
+    z = z._replace(monitor=z.monitor._replace(lost=z.monitor.lost.at[2].set(1.0)))
+    again = law.restarted(z, y, target)
+    u, signals = law.command(again, y, target)
+    assert u[2] == 0.0 and signals["lost_thrusters"][2] == 1.0
+    first = law.init(y, target).law
+    assert all((a == b).all() for a, b in zip(jax.tree.leaves(again.law), jax.tree.leaves(first), strict=True))
+
+
+def test_axes_that_are_lost_are_announced():
+    law, z, y, target = stepped()
+    alone = z._replace(monitor=z.monitor._replace(lost=jnp.ones(8).at[jnp.asarray([0, 2])].set(0.0)))
+    _, signals = jax.jit(lambda z: law.command(z, y, target))(alone)
+    assert signals["lost_axes"].sum() >= 4
