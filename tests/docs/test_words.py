@@ -75,6 +75,14 @@ ALLOWED = {
     "undertow/core/contracts.py": {r"health"},
     "undertow/core/measurement.py": {r"health"},
     "undertow/faults/injected.py": {r"health"},
+    "undertow/supervision/": {r"health"},
+    "undertow/autopilot/": {r"health"},
+    "undertow/realtime/": {r"health"},
+    "undertow/export/controller.py": {r"health"},
+    "docs/how-to/supervisor.md": {r"health"},
+    "docs/how-to/thruster-faults.md": {r"health"},
+    "docs/how-to/real-time.md": {r"health"},
+    "docs/how-to/autopilot.md": {r"health"},
     "docs/how-to/faults.md": {r"health"},
 }
 

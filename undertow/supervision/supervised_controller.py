@@ -259,14 +259,14 @@ class Supervised(AbstractGatedController):
         else:
             command, signals = jax.lax.cond(z.fallback_controls, lambda: self._by_fallback(z, y, r), own)
         most = self.slew * (self.high - self.low) * self.sampling_time
-        wanted = jnp.clip(command, self.low, self.high)
+        within = jnp.clip(command, self.low, self.high)
         towards = lambda goal: jnp.clip(goal, z.output - most, z.output + most)
-        output = jnp.where(z.turning, towards(wanted), wanted)
+        output = jnp.where(z.turning, towards(within), within)
         # Who holds or stops a vehicle that nothing is wrong with gets no jump either.
         safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
         output = jnp.where(leaves, output, safe)
-        return _View(passed, r, rejected, controls, command, signals, output, (output == wanted).all())
+        return _View(passed, r, rejected, controls, command, signals, output, (output == within).all())
 
     def _by_fallback(self, z: SupervisedState, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
         """Command of the fallback; of the signals those that it declares, too, the others are zero."""
