@@ -19,7 +19,7 @@ from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.part_cache import PartCache, structure
 from undertow.soak.watching import Counts, Watch
 
-# Beyond any limit, in the unit of an input.
+# Beyond any limit, in the unit of an input; a plant that takes it has none.
 _LARGE = 1e6
 _AT_ONCE = 512  # runs of one call: the memory of their results
 
@@ -118,7 +118,8 @@ def _prepared_in_its_precision(built: Built, windows: int) -> tuple[Run, Plan, s
     start = built.closed_loop.outputs_at_start(built.scenario.initial.position, built.scenario.initial.velocity)
     most = jnp.full(plant.inputs(), _LARGE)
     x = plant.initial_state(*map(jnp.asarray, start))
-    limits = np.asarray(plant.admissible(x, -most)), np.asarray(plant.admissible(x, most))
+    limits = [np.asarray(plant.admissible(x, sign * most)) for sign in (-1, 1)]
+    limits = [np.where(np.abs(limit) >= _LARGE, np.copysign(np.inf, limit), limit) for limit in limits]
     length = np.asarray(loop.duration / windows, dtype=limits[0].dtype)
     run = Run(built.closed_loop, (Watch(*limits, length, windows),), start, key_of_seed(built.scenario.seed))
     plan = Plan(round(loop.duration / loop.dt), loop.dt, 0, (), loop.method, loop.substeps)
