@@ -82,7 +82,12 @@ def _odin(lag: float, **changes: Any) -> Scenario:
 def _rov(vehicle: str) -> Scenario:
     goal = {"kind": "setpoint", "position": [1.0, 1.0, 1.0, 0.0, 0.5, 0.5]}
     controller = {"kind": "rcaf", "preset": "paper"}
-    return {"plant": {"vehicle": vehicle, "thruster": "t200"}, "controller": controller, "reference": goal, "loop": _LOOP}
+    return {
+        "plant": {"vehicle": vehicle, "thruster": "t200"},
+        "controller": controller,
+        "reference": goal,
+        "loop": _LOOP,
+    }
 
 
 def _with_sensor(fidelity: str) -> Scenario:

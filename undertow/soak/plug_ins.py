@@ -2,8 +2,8 @@
 
 import random
 
-from undertow.soak.specimens import PLUG_IN
 from undertow.soak.mutation import spoilt_text
+from undertow.soak.specimens import PLUG_IN
 
 # What a file does at the top; `exit` and exceptions that derive from BaseException are the users' as well.
 _AT_IMPORT = (

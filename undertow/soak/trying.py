@@ -75,9 +75,10 @@ def work(run: Run, seed: int, material: Mapping[str, bytes], folder: str, pipe: 
         try_in_process(run, attack(kind, -1, 0, material), here)
     for text in SCENARIOS.values():
         try_in_process(run, Attack("", scenario_files(text), (BUILD, "s.yaml")), here)
-    while (asked := pipe.recv()) is not None:
-        given = attack(asked[0], seed, asked[1], material)
-        pipe.send((given, try_in_process(run, given, here)))
+    with contextlib.suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # the process that asks has ended
+        while (asked := pipe.recv()) is not None:
+            given = attack(asked[0], seed, asked[1], material)
+            pipe.send((given, try_in_process(run, given, here)))
 
 
 def _write(files: Mapping[str, bytes | None], folder: Path) -> None:
