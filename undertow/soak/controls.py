@@ -156,7 +156,7 @@ CONTROLS = (
     ),
     Control(
         "D10",
-        "With a speed sensor on a shaft that has inertia the law is an algebraic loop, which undertow refuses to build.",
+        "With a speed sensor on a shaft with inertia the law is an algebraic loop, which undertow refuses to build.",
         _with_sensor("shaft"),
         _with_sensor("ideal"),
     ),

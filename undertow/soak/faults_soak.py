@@ -3,6 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -116,8 +117,7 @@ def run_faulted(
     failures: list[Failure] = []
     number = repeated = 0
     while time.monotonic() < until and (block := _next(several, _BLOCK)):
-        shown = lambda done, before=number: watch(before + done, len(failures))
-        found = judged_runs(block, watch=shown)
+        found = judged_runs(block, watch=partial(_shown, watch, number, len(failures)))
         identities = [f"faults/{seed}/{number + i}" for i in range(len(block))]
         for identity, one, scenario in zip(identities, found, block, strict=True):
             failures += [Failure(event, identity, says) for event, says in one.events()]
@@ -127,6 +127,10 @@ def run_faulted(
         number, repeated = number + len(block), repeated + len(block[::_REPEATED])
         watch(number, len(failures))
     return Faulted(number, dict(endings), dict(modes), repeated, failures, time.monotonic() - began)
+
+
+def _shown(watch: Callable[[int, int], None], before: int, failed: int, done: int) -> None:
+    watch(before + done, failed)
 
 
 def _other_bytes(block: Sequence[Scenario], found: Sequence[Judged], identities: Sequence[str]) -> list[Failure]:

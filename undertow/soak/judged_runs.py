@@ -1,7 +1,10 @@
 """Runs of many scenarios, those of one program together, each judged for never-events."""
 
 import hashlib
+import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -89,31 +92,33 @@ def judged_runs(
     Raises:
         BadInput: a scenario is invalid.
     """
-    groups = _grouped([_prepared(build(one, cache), windows) for cache in [PartCache()] for one in scenarios])
+    cache = PartCache()
+    groups = _grouped([_prepared(build(one, cache), windows) for one in scenarios])
     found: list[Judged | None] = [None] * len(scenarios)
+    outer = max(1, min(workers, len(groups)))
     done = 0
-    for group in groups:
-        with runtime.in_precision(group.precision), runtime.on_processor():
-            program, shared = _program(group)
-            parts = [range(i, min(i + _AT_ONCE, len(group.members))) for i in range(0, len(group.members), _AT_ONCE)]
-            if len(parts) < workers:
-                cuts = np.array_split(np.arange(len(group.members)), min(workers, len(group.members)))
-                parts = [range(int(cut[0]), int(cut[-1]) + 1) for cut in cuts]
-            with runtime.workers(workers) as threads:
-                for part, several in threads.map(lambda part: (part, _run(group, program, shared, part)), parts):
-                    for place, one in zip(part, several, strict=True):
-                        found[group.members[place]] = one
-                    done += len(part)
-                    watch(done)
+    with ThreadPoolExecutor(outer) as threads:
+        for group, several in threads.map(partial(_all_of, workers=workers // outer), groups):
+            for place, one in zip(group.members, several, strict=True):
+                found[place] = one
+            done += len(several)
+            watch(done)
     return [one for one in found if one is not None]
 
 
-def _prepared(built: Built, windows: int) -> tuple[Run, Plan, str]:
-    return _prepared_in_its_precision(built, windows)
+def _all_of(group: "_Group", workers: int) -> tuple["_Group", list[Judged]]:
+    """All runs of a group, by so many threads."""
+    count = len(group.members)
+    with runtime.in_precision(group.precision), runtime.on_processor():
+        program, shared = _program(group)
+        cuts = np.array_split(np.arange(count), min(count, max(workers, math.ceil(count / _AT_ONCE))))
+        with runtime.workers(workers) as threads:
+            parts = threads.map(partial(_run, group, program, shared), cuts)
+            return group, [one for several in parts for one in several]
 
 
 @in_its_precision
-def _prepared_in_its_precision(built: Built, windows: int) -> tuple[Run, Plan, str]:
+def _prepared(built: Built, windows: int) -> tuple[Run, Plan, str]:
     loop, plant = built.scenario.loop, built.closed_loop.plant
     start = built.closed_loop.outputs_at_start(built.scenario.initial.position, built.scenario.initial.velocity)
     most = jnp.full(plant.inputs(), _LARGE)
@@ -121,7 +126,9 @@ def _prepared_in_its_precision(built: Built, windows: int) -> tuple[Run, Plan, s
     limits = [np.asarray(plant.admissible(x, sign * most)) for sign in (-1, 1)]
     limits = [np.where(np.abs(limit) >= _LARGE, np.copysign(np.inf, limit), limit) for limit in limits]
     length = np.asarray(loop.duration / windows, dtype=limits[0].dtype)
-    run = Run(built.closed_loop, (Watch(*limits, length, windows),), start, key_of_seed(built.scenario.seed))
+    run = Run(
+        built.closed_loop, (Watch(limits[0], limits[1], length, windows),), start, key_of_seed(built.scenario.seed)
+    )
     plan = Plan(round(loop.duration / loop.dt), loop.dt, 0, (), loop.method, loop.substeps)
     return run, plan, built.scenario.precision
 
@@ -145,7 +152,7 @@ def _program(group: _Group) -> tuple[Any, list[bool]]:
         return vmap_batch.BatchRunner(group.first, group.plan), shared
 
 
-def _run(group: _Group, program: Any, shared: Sequence[bool], part: range) -> list[Judged]:
+def _run(group: _Group, program: Any, shared: Sequence[bool], part: np.ndarray) -> list[Judged]:
     tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
     columns = zip(*(group.numbers[place] for place in part), strict=True)
     outcome = program.run(jax.tree.unflatten(tree, [np.stack(column) for column in columns]))

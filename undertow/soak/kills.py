@@ -1,4 +1,4 @@
-"""Campaigns that are killed at random moments, damaged and resumed: their tables must be those of an undisturbed one."""
+"""Campaigns that are killed at random moments, damaged and resumed: each must end with the undisturbed table."""
 
 import random
 import resource

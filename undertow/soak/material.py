@@ -1,4 +1,4 @@
-"""Valid binary files that hostile ones are made of: results of short runs, logs of other programs, a campaign's store."""
+"""Valid binary files that hostile ones are made of: results of runs, logs of other programs, a campaign's store."""
 
 import os
 import struct

@@ -37,9 +37,9 @@ def _failures(failures: Sequence[Mapping[str, Any]]) -> list[Html]:
 
 def _inputs(found: Mapping[str, Any]) -> Html:
     words = (
-        f"{found['number']} hostile inputs were tried in {_time(found['seconds'])}. Each must be accepted, or refused by "
-        "one line that names the place, within 1 s of processor time and without files left behind. The slowest refusal "
-        f"took {found['slowest']:.2f} s. There were {found['messages']} different messages."
+        f"{found['number']} hostile inputs were tried in {_time(found['seconds'])}. Each must be accepted, or refused "
+        "by one line that names the place, within 1 s of processor time and without files left behind. The slowest "
+        f"refusal took {found['slowest']:.2f} s. There were {found['messages']} different messages."
     )
     endings = ("accepted", "refused", "failed")
     rows = [(kind, *(str(counts.get(one, 0)) for one in endings)) for kind, counts in found["counts"].items()]
@@ -48,9 +48,9 @@ def _inputs(found: Mapping[str, Any]) -> Html:
 
 def _kills(found: Mapping[str, Any]) -> Html:
     words = (
-        f"{found['campaigns']} campaigns of {found['trials']} trials were ended {found['kills']} times by kill -9, Ctrl-C "
-        f"or SIGTERM at random moments and resumed, in {_time(found['seconds'])}. Their tables are compared byte by byte "
-        "with that of a campaign that was left alone."
+        f"{found['campaigns']} campaigns of {found['trials']} trials were ended {found['kills']} times by kill -9, "
+        f"Ctrl-C or SIGTERM at random moments and resumed, in {_time(found['seconds'])}. Their tables are compared "
+        "byte by byte with that of a campaign that was left alone."
     )
     also = (
         f"files of the unfinished table that were cut off or changed before resuming: {found['damaged']}",
@@ -64,8 +64,8 @@ def _hours(found: Mapping[str, Any]) -> Html:
     before, after = found["memory"]
     words = (
         f"{found['hours']:g} vehicle-hours in waves, current and noise were simulated in {_time(found['seconds'])}. At "
-        "every control step the input and the states were checked. The first and the last hour of each run are compared. "
-        f"The process had {before:.0f} MB before and at most {after:.0f} MB, compilers included."
+        "every control step the input and the states were checked. The first and the last hour of each run are "
+        f"compared. The process had {before:.0f} MB before and at most {after:.0f} MB, compilers included."
     )
     head = ("loop", "runs", "h each", "completed", "rms first, m", "rms last, m", "change, %", "weights first", "last")
     rows = [
@@ -98,8 +98,8 @@ def _faults(found: Mapping[str, Any]) -> Html:
 
 def _controls(found: Mapping[str, Any]) -> Html:
     words = (
-        "The law of the paper without protection must fail in these ways, and succeed without what causes each failure. "
-        "A soak in which they do not fail would not notice failures."
+        "The law of the paper without protection must fail in these ways, and succeed without what causes each "
+        "failure. A soak in which they do not fail would not notice failures."
     )
     rows = [
         (one["identity"], "fails" if one["fails"] else "DOES NOT FAIL", one["says"], one["found"], one["beside"])
