@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core import runtime
+from undertow.core.arrays import as_array
 from undertow.core.status import Status
 from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.outcome import Outcome
@@ -125,10 +126,9 @@ def _prepared(built: Built, windows: int) -> tuple[Run, Plan, str]:
     x = plant.initial_state(*map(jnp.asarray, start))
     limits = [np.asarray(plant.admissible(x, sign * most)) for sign in (-1, 1)]
     limits = [np.where(np.abs(limit) >= _LARGE, np.copysign(np.inf, limit), limit) for limit in limits]
-    length = np.asarray(loop.duration / windows, dtype=limits[0].dtype)
-    run = Run(
-        built.closed_loop, (Watch(limits[0], limits[1], length, windows),), start, key_of_seed(built.scenario.seed)
-    )
+    least, largest, length = map(as_array, (*limits, loop.duration / windows))
+    watching = (Watch(least, largest, length, windows),)
+    run = Run(built.closed_loop, watching, start, key_of_seed(built.scenario.seed))
     plan = Plan(round(loop.duration / loop.dt), loop.dt, 0, (), loop.method, loop.substeps)
     return run, plan, built.scenario.precision
 
