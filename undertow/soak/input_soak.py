@@ -13,7 +13,7 @@ from undertow.soak.inputs import Attack, attack, planned
 from undertow.soak.judgement import REFUSED, Done, Failure, judged
 from undertow.soak.trying import Run, work
 
-_LATEST = 60.0  # s without an answer, after which a process is ended
+_LATEST = 300.0  # s without an answer, after which a process is ended
 _FRESH = 1500  # inputs after which a process is replaced: compiled code of every shape stays in memory
 
 

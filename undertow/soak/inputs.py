@@ -114,7 +114,7 @@ def _result(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[
 
 
 # Valid command lines that end soon; with a word spoilt they mostly say so.
-_LINES = (
+LINES = (
     ("check", "s.yaml", "--option", "mass=3"),
     ("check", "odin", "--option", "mass=130", "--option", "r_g=[0,0,0.1]"),
     ("check", "t200", "--option", "supply=16"),
@@ -139,7 +139,7 @@ _LINES = (
 
 
 def _command(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[str, bytes | None], list[str]]:
-    words = spoilt_words(list(chance.choice(_LINES)), chance)
+    words = spoilt_words(list(chance.choice(LINES)), chance)
     files: dict[str, bytes | None] = {**specimens.scenario_files(specimens.SCENARIOS["axis"]), "folder": None}
     return files | {"log.csv": _encoded(specimens.LOG), "m.yaml": _encoded(specimens.MAPPING)}, words
 

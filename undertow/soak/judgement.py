@@ -19,7 +19,7 @@ EVENTS = {
 REFUSED = (2, 4)  # exit codes of a command that could not use its input
 _ACCEPTED = (0, 1)
 _LONGEST = 2000  # characters of a line
-_SLOW, _HANGING = 1.0, 20.0  # s of this process's own time, for a refusal; of all time
+_SLOW, _HANGING = 1.0, 20.0  # s of processor time: for a refusal, and for anything
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
 _COMMAND_LINE = re.compile(r"See `undertow[^`]*--help`")
 _PLACE = re.compile(r"`[^`]+`|, line \d+")
@@ -76,8 +76,8 @@ def judged(identity: str, arguments: Sequence[str], files: Mapping[str, bytes | 
 def _event(arguments: Sequence[str], files: Mapping[str, bytes | None], done: Done) -> tuple[str, str] | None:
     if done.code is None:
         return "N2", f"the process died: {_last(done.err) or 'no message'}"
-    if done.seconds[1] > _HANGING:
-        return "N3", f"took {done.seconds[1]:.1f} s"
+    if done.seconds[0] > _HANGING:
+        return "N3", f"took {done.seconds[0]:.1f} s of processor time"
     if "Traceback (most recent call last)" in done.out + done.err or done.code not in (*REFUSED, *_ACCEPTED):
         return "N2", f"exit code {done.code}: {_last(done.err)}"
     errors = [line for line in done.err.splitlines() if line.startswith("Error: ")]

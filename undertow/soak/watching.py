@@ -53,7 +53,7 @@ class Watch(AbstractAccumulator):
         outputs = jnp.isfinite(signals["position"]).all() & jnp.isfinite(signals["velocity"]).all()
         finite = jnp.isfinite(acting).all()
         now = jnp.minimum(jnp.floor(t / self.length + 1e-9), self.windows - 1.0)
-        here = jnp.where(jnp.arange(self.windows) == now, 1.0, 0.0)
+        here = jnp.where(jnp.arange(self.windows, dtype=t.dtype) == now, 1.0, 0.0)
         largest = jnp.abs(signals["weights_peak"]).max() if "weights_peak" in signals else jnp.zeros(())
         return Counts(
             state.steps + 1.0,
@@ -61,6 +61,6 @@ class Watch(AbstractAccumulator):
             state.exceeded_limits + jnp.where(finite & ~within.all(), 1.0, 0.0),
             state.undefined_outputs + jnp.where(outputs, 0.0, 1.0),
             state.samples + here,
-            state.squares + here[:, None] * signals["error"] ** 2,
+            state.squares + here[:, None] * signals["error"][None, :] ** 2,
             jnp.maximum(state.weights, here * largest),
         )
