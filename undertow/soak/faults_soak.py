@@ -17,7 +17,7 @@ from undertow.soak.judgement import Failure
 _REPEATED = 20  # of so many runs one is repeated, in other company
 _BLOCK = 2000  # scenarios that are built at once: the memory of their parts
 _PAIRS = 0.2  # share of runs with two faults
-_KINDS_OF_PAIRS = 20  # different pairs: each has a program of its own
+_KINDS_OF_PAIRS = 10  # different pairs of each loop: each has a program of its own
 _DURATION = 20.0  # s
 
 # Loops that are given faults; under supervision, at 50 Hz.
@@ -81,19 +81,19 @@ def faulted_scenarios(number: int, seed: int) -> Iterator[dict[str, Any]]:
     chance = np.random.default_rng([seed, 20])
     loops = [(name, LOOPS[name] | _COMMON) for name in LOOPS]
     built = [build({**one, "supervisor": None}).closed_loop for _, one in loops]
-    pairs: dict[tuple[Any, ...], None] = {}
+    pools: list[dict[str, dict[str, Any]]] = [{} for _ in loops]  # the latest fault of each kind
+    pairs: list[list[tuple[str, str]]] = [[] for _ in loops]
     for i in range(number):
         place = i % len(loops)
-        plant, navigation = built[place].plant, built[place].navigation
-        several = 2 if chance.uniform() < _PAIRS else 1
-        while True:
-            faults = random_faults(chance, plant, navigation, _DURATION, several)
-            pair = (place, *(_kind(one) for one in faults))
-            if several == 1 or pair in pairs:
-                break
-            if len(pairs) < _KINDS_OF_PAIRS:
-                pairs[pair] = None
-                break
+        faults = random_faults(chance, built[place].plant, built[place].navigation, _DURATION)
+        pool = pools[place]
+        pool[_kind(faults[0])] = faults[0]
+        if chance.uniform() < _PAIRS and len(pool) > _KINDS_OF_PAIRS:
+            if len(pairs[place]) < _KINDS_OF_PAIRS:
+                first, second = chance.choice(sorted(pool), 2, replace=False)
+                pairs[place].append((str(first), str(second)))
+            pair = pairs[place][int(chance.integers(len(pairs[place])))]
+            faults = [pool[kind] for kind in pair]
         yield loops[place][1] | {"faults": faults, "seed": i}
 
 
