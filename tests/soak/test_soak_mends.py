@@ -46,7 +46,7 @@ FOUND = {
         "which returns a `X` (mine.py)",
     ),
     "a key of thousands of characters": (
-        {"s.yaml": f"plant: {{kind: double_integrator, {'k' * 5000}: 1, {'l' * 5000}: 2}}\n".encode()},
+        {"s.yaml": f"plant: {{kind: double_integrator, {'k' * 1000}: 1, {'l' * 1000}: 2, {'m' * 1000}: 3}}\n".encode()},
         (BUILD, "s.yaml"),
         "kkk...",
     ),

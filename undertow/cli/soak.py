@@ -130,7 +130,7 @@ def _replayed(what: str) -> int:
     file = Path(what).suffix == ".json"
     failed = False
     for identity in soaking.identities(Path(what)) if file else [what]:
-        failure, words = interruptible(lambda one=identity: soaking.replayed(attacked, one))
+        failure, words = soaking.replayed(attacked, identity)
         verdict = f"{failure.event}, {failure.says}" if failure else "no never-event"
         print(exit_codes.printable(f"{identity}: {verdict}. {words}"))
         failed |= failure is not None

@@ -37,7 +37,8 @@ class PlainFuzzySystem(eqx.Module):
         """Fuzzy basis functions xi of each axis."""
         products = jnp.ones((inputs.shape[0], 1))
         for j in range(self.inputs):
-            degrees = jnp.exp(-(((inputs[:, j, None] - self.centres[j]) / self.widths[j]) ** 2))
+            distance = (inputs[:, j, None] - self.centres[j][None, :]) / self.widths[j][None, :]
+            degrees = jnp.exp(-(distance**2))
             products = (products[:, :, None] * degrees[:, None, :]).reshape(inputs.shape[0], -1)
         return products / products.sum(-1, keepdims=True)
 
