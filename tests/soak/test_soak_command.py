@@ -9,7 +9,7 @@ from undertow.cli import soak as command
 from undertow.cli.main import run
 from undertow.soak import soak as soaking
 from undertow.soak.inputs import Attack
-from undertow.soak.judgement import EVENTS, Failure
+from undertow.soak.verdict import EVENTS, Failure
 
 
 @pytest.fixture

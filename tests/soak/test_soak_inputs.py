@@ -11,8 +11,8 @@ from undertow.scenario.reading import parse
 from undertow.soak import mutation, specimens
 from undertow.soak.input_soak import try_inputs
 from undertow.soak.inputs import BUILD, KINDS, Attack, attack, planned
-from undertow.soak.judgement import Done, judged
 from undertow.soak.trying import try_in_process
+from undertow.soak.verdict import Done, judged
 
 VALID = {
     "run.nc": b"\x89HDF\r\n\x1a\n" + bytes(200),

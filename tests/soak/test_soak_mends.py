@@ -6,8 +6,8 @@ from undertow.cli.soak import attacked
 from undertow.core.errors import BadInput, printable
 from undertow.soak import specimens
 from undertow.soak.inputs import BUILD, Attack
-from undertow.soak.judgement import judged
 from undertow.soak.trying import try_in_process
+from undertow.soak.verdict import judged
 
 LAW = "return pid(model, frequency=frequency)"
 
@@ -19,6 +19,9 @@ def plugged(code):
 def table(data):
     return {**specimens.scenario_files(specimens.SCENARIOS["recorded"]), "d.csv": data}
 
+
+LONG = "k" * 1000
+REST = "reference: {kind: setpoint, position: [0]}\n"
 
 FOUND = {
     "control characters of a table": (table(b"t,d1\n0,1\n1,\x1b[31m\x07\n"), (BUILD, "s.yaml"), r"\x1b[31m\x07"),
@@ -46,7 +49,7 @@ FOUND = {
         "which returns a `X` (mine.py)",
     ),
     "a key of thousands of characters": (
-        {"s.yaml": f"plant: {{kind: double_integrator, {'k' * 1000}: 1, {'l' * 1000}: 2, {'m' * 1000}: 3}}\n".encode()},
+        {"s.yaml": f"plant: {{kind: double_integrator, {LONG}: 1, l{LONG}: 2, m{LONG}: 3}}\n{REST}".encode()},
         (BUILD, "s.yaml"),
         "kkk...",
     ),

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.soak.judged_runs import Judged, judged_runs
-from undertow.soak.judgement import Failure
+from undertow.soak.verdict import Failure
 
 _UNPROTECTED = str(Path(__file__).with_name("unprotected.py"))
 

@@ -12,7 +12,7 @@ import numpy as np
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
 from undertow.soak.judged_runs import Judged, judged_runs
-from undertow.soak.judgement import Failure
+from undertow.soak.verdict import Failure
 
 _REPEATED = 20  # of so many runs one is repeated, in other company
 _BLOCK = 2000  # scenarios that are built at once: the memory of their parts

@@ -9,7 +9,7 @@ import numpy as np
 
 from undertow.core.status import Status
 from undertow.soak.judged_runs import Judged, judged_runs
-from undertow.soak.judgement import Failure
+from undertow.soak.verdict import Failure
 
 # The longest run, h; more hours make more runs.
 LONGEST = 24.0

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.soak.inputs import Attack, attack, planned
-from undertow.soak.judgement import REFUSED, Done, Failure, judged
 from undertow.soak.trying import Run, work
+from undertow.soak.verdict import REFUSED, Done, Failure, judged
 
 _LATEST = 300.0  # s without an answer, after which a process is ended
 _FRESH = 1500  # inputs after which a process is replaced: compiled code of every shape stays in memory
@@ -23,7 +23,7 @@ class Tried(NamedTuple):
     Attributes:
         counts: inputs by kind and ending: accepted, refused, failed.
         failures: never-events, each with its input.
-        slowest: processor time of the slowest refusal, s.
+        slowest: processor time of the slowest rejection, s.
         messages: how many different errors there were, without numbers and quoted values.
         seconds: elapsed time.
     """

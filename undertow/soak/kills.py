@@ -15,7 +15,7 @@ from undertow.campaign.run_campaign import STORE
 from undertow.scenario.reading import dump
 from undertow.scenario.yaml_text import load
 from undertow.soak import specimens
-from undertow.soak.judgement import Failure
+from undertow.soak.verdict import Failure
 
 _COMMAND = (sys.executable, "-W", "ignore", "-m", "undertow.cli.main", "campaign")
 _LATEST = 120.0  # s, for one process

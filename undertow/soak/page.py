@@ -39,7 +39,7 @@ def _inputs(found: Mapping[str, Any]) -> Html:
     words = (
         f"{found['number']} hostile inputs were tried in {_time(found['seconds'])}. Each must be accepted, or refused "
         "by one line that names the place, within 1 s of processor time and without files left behind. The slowest "
-        f"refusal took {found['slowest']:.2f} s. There were {found['messages']} different messages."
+        f"rejection took {found['slowest']:.2f} s. There were {found['messages']} different messages."
     )
     endings = ("accepted", "refused", "failed")
     rows = [(kind, *(str(counts.get(one, 0)) for one in endings)) for kind, counts in found["counts"].items()]

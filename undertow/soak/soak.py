@@ -17,9 +17,9 @@ from undertow.core.errors import BadInput, did_you_mean
 from undertow.soak import controls, faults_soak, hours_soak, kills
 from undertow.soak.input_soak import try_inputs
 from undertow.soak.inputs import KINDS, Attack, attack
-from undertow.soak.judgement import EVENTS, Failure, judged
 from undertow.soak.material import material
 from undertow.soak.trying import Run, try_in_process
+from undertow.soak.verdict import EVENTS, Failure, judged
 
 PARTS = ("inputs", "kills", "hours", "faults", "controls")
 

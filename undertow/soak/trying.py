@@ -14,14 +14,14 @@ from pathlib import Path
 from types import FrameType
 
 from undertow.soak.inputs import BUILD, KINDS, LINES, Attack, attack
-from undertow.soak.judgement import REFUSED, Done
 from undertow.soak.specimens import SCENARIOS, scenario_files
+from undertow.soak.verdict import REFUSED, Done
 
 Run = Callable[[Sequence[str]], int]
 
 _MEMORY = 12 * 2**30  # bytes of address space of a process
 _LIMIT = 21.0  # s of processor time, for one input
-_ONCE = 0.5  # s of processor time, from which on a refusal is tried once more
+_ONCE = 0.5  # s of processor time, from which on a rejection is tried once more
 _KEPT = 20_000  # characters of output
 
 

@@ -1,4 +1,4 @@
-"""Never-events of undertow, and the judgement of one hostile input by what it did."""
+"""Never-events of undertow, and the verdict of one hostile input by what it did."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ EVENTS = {
 REFUSED = (2, 4)  # exit codes of a command that could not use its input
 _ACCEPTED = (0, 1)
 _LONGEST = 2000  # characters of a line
-_SLOW, _HANGING = 1.0, 20.0  # s of processor time: for a refusal, and for anything
+_SLOW, _HANGING = 1.0, 20.0  # s of processor time: for a rejection, and for anything
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
 _COMMAND_LINE = re.compile(r"See `undertow[^`]*--help`")
 _PLACE = re.compile(r"`[^`]+`|, line \d+")
@@ -85,10 +85,10 @@ def _event(arguments: Sequence[str], files: Mapping[str, bytes | None], done: Do
         return None  # findings of `check`, which stand in its report
     if done.code not in REFUSED:
         return ("message", f"exit code {done.code} with an error: {errors[0]}") if errors and done.code == 0 else None
-    return _refusal(arguments, files, done, errors)
+    return _rejection(arguments, files, done, errors)
 
 
-def _refusal(
+def _rejection(
     arguments: Sequence[str], files: Mapping[str, bytes | None], done: Done, errors: Sequence[str]
 ) -> tuple[str, str] | None:
     if len(errors) != 1 or done.err.count("\n") != 1 + sum(_is_advice(line) for line in done.err.splitlines()):
@@ -103,7 +103,7 @@ def _refusal(
     if done.left:
         return "partial", f"exit code {done.code}, and left {', '.join(list(done.left)[:4])}"
     if done.seconds[0] > _SLOW:
-        return "N3", f"a refusal after {done.seconds[0]:.2f} s of processor time"
+        return "N3", f"a rejection after {done.seconds[0]:.2f} s of processor time"
     return None
 
 
