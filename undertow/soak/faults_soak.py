@@ -14,8 +14,9 @@ from undertow.scenario.build import build
 from undertow.soak.judged_runs import Judged, judged_runs
 from undertow.soak.verdict import Failure
 
-_REPEATED = 20  # of so many runs one is repeated, in other company
-_BLOCK = 2000  # scenarios that are built at once: the memory of their parts
+# Of so many runs one is repeated, in other company, and no more of a block: each may need a program of its own.
+_REPEATED, _MOST_REPEATED = 20, 25
+_BLOCK = 10_000  # scenarios that share programs; their numbers are in memory at once
 _PAIRS = 0.2  # share of runs with two faults
 _KINDS_OF_PAIRS = 10  # different pairs of each loop: each has a program of its own
 _DURATION = 20.0  # s
@@ -124,7 +125,7 @@ def run_faulted(
             endings[one.status.word] += 1
             modes.update(_kind(fault) for fault in scenario.get("faults", ()))
         failures += _other_bytes(block, found, identities)
-        number, repeated = number + len(block), repeated + len(block[::_REPEATED])
+        number, repeated = number + len(block), repeated + len(_repeated(block))
         watch(number, len(failures))
     return Faulted(number, dict(endings), dict(modes), repeated, failures, time.monotonic() - began)
 
@@ -135,13 +136,18 @@ def _shown(watch: Callable[[int, int], None], before: int, failed: int, done: in
 
 def _other_bytes(block: Sequence[Scenario], found: Sequence[Judged], identities: Sequence[str]) -> list[Failure]:
     """N6: runs whose bytes differ when they are run again, in the opposite order and with fewer others."""
-    places = range(0, len(block), _REPEATED)[::-1]
+    places = _repeated(block)[::-1]
     again = judged_runs([block[place] for place in places])
     pairs = [(place, one) for place, one in zip(places, again, strict=True) if one.digest != found[place].digest]
     return [
         Failure("N6", identities[place], f"digest {found[place].digest}, and {one.digest} when it was repeated")
         for place, one in pairs
     ]
+
+
+def _repeated(block: Sequence[Scenario]) -> range:
+    """Places of the runs that are repeated."""
+    return range(0, len(block), _REPEATED)[:_MOST_REPEATED]
 
 
 def replay(identity: str) -> tuple[dict[str, Any], Judged]:
