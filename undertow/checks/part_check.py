@@ -23,7 +23,7 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.core.user_code import fault_of
+from undertow.core.user_code import RAISED, fault_of
 from undertow.faults.mode import (
     AbstractComputationFault,
     AbstractFault,
@@ -73,12 +73,12 @@ def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ..
         if isinstance(part, kind):
             try:
                 return tuple(use(part, around))
-            except Exception as complaint:
+            except RAISED as complaint:
                 return (_failed(part, complaint),)
     return ()
 
 
-def _failed(part: Any, complaint: Exception) -> Finding:
+def _failed(part: Any, complaint: BaseException) -> Finding:
     """Finding for an exception in a part or in its use."""
     if isinstance(complaint, BadInput):  # worded already, with its place
         return Finding("error", "contract", "", str(complaint))

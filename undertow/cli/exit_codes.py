@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from undertow.cli.interruptible import interrupted_by, raise_if_interrupted
+from undertow.core.errors import BadInput, printable
 
 DONE = 0
 RUN_FAILED = 1
@@ -18,6 +19,9 @@ INTERNAL_ERROR = 3
 FILES_FAILED = 4
 INTERRUPTED = 130  # by Ctrl-C; 143 by SIGTERM
 _BY_SIGNAL = 128  # and the number of the signal
+
+# What Python code of a user may end with, beside exceptions.
+_OF_PLUG_INS = (SystemExit, GeneratorExit)
 
 # Exit code -> when a command ends with it, for the documentation.
 MEANINGS = {
@@ -40,7 +44,7 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
         return _BY_SIGNAL + interrupted_by() if code == INTERRUPTED else code  # as typer makes of KeyboardInterrupt
     except KeyboardInterrupt:
         return _BY_SIGNAL + interrupted_by()
-    except Exception as error:
+    except (Exception, *_OF_PLUG_INS) as error:
         if os.environ.get("UNDERTOW_TRACEBACK") and not isinstance(error, typer.TyperException):
             traceback.print_exc()
         code, sentence = _explain(error)
@@ -50,25 +54,27 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
 
 def complain(sentence: str) -> None:
     """Print an error on one line of stderr."""
-    print("Error: " + " ".join(sentence.split()), file=sys.stderr)
+    print("Error: " + printable(sentence), file=sys.stderr)
 
 
 def warn_of(sentences: Iterable[str]) -> None:
     """Print warnings, one line each; the command continues."""
     for sentence in sentences:
-        print("Warning: " + " ".join(sentence.split()), file=sys.stderr)
+        print("Warning: " + printable(sentence), file=sys.stderr)
 
 
-def _explain(error: Exception) -> tuple[int, str]:
+def _explain(error: BaseException) -> tuple[int, str]:
     if isinstance(error, typer.TyperException):
         sentence = getattr(error, "format_message", error.__str__)().rstrip(".")
         context = getattr(error, "ctx", None)
         path = context.command_path if context is not None else "undertow"
         return BAD_INPUT, f"{sentence}{'' if sentence.endswith('?') else '.'} See `{path} --help`"
-    from undertow.core.errors import BadInput
-
     if isinstance(error, BadInput):
         return BAD_INPUT, str(error)
+    if isinstance(error, _OF_PLUG_INS):
+        from undertow.core.user_code import python_says
+
+        return BAD_INPUT, f"the command was ended by Python code that it runs: {python_says(error)}"
     if isinstance(error, OSError):
         at = f" ({error.filename})" if error.filename else ""
         return FILES_FAILED, f"files could not be read or written: {error.strerror or error}{at}"

@@ -16,6 +16,7 @@ from undertow.cli import outside_commands
 from undertow.cli.exit_codes import run_guarded
 from undertow.cli.interruptible import remember_interrupts
 from undertow.cli.options import AllowCode, Pdf, Replay
+from undertow.cli.soak import soak
 from undertow.process_setup import prepare
 
 app = typer.Typer(name="undertow", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -303,7 +304,7 @@ def compare(
     return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf, replay)
 
 
-for command in outside_commands.ALL:
+for command in (*outside_commands.ALL, soak):
     app.command()(command)
 
 

@@ -132,6 +132,8 @@ def check_folder(
 
 
 def _check_place(folder: Path) -> None:
+    if not folder.resolve().name:
+        raise BadInput("--out", "be a folder inside another one", str(folder), hint="Choose another name")
     for part in (folder, *folder.parents):
         if part.exists() and not part.is_dir():
             got = f"{folder}, a file" if part == folder else f"{folder}, and {part} is a file"

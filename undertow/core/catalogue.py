@@ -145,7 +145,9 @@ def _from_file(name: str, folder: Path, what: str) -> Part:
         raise BadInput(what, "name an existing file", path_text)
     try:
         module = _module(path, path.read_bytes())
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            raise
         fault = fault_of(error)
         says = f"{'' if fault.says.startswith('cannot') else 'Python cannot run it: '}{fault.says}"
         raise BadInput(what, "", says, hint=fault.hint) from error

@@ -106,7 +106,7 @@ class BadInput(ValueError):
 
 def _sentence(says: str, where: str, hint: str) -> str:
     place = f" ({where})" if where else ""
-    return f"{says}{place}{f'. {hint}' if hint else ''}"
+    return printable(f"{says}{place}{f'. {hint}' if hint else ''}")
 
 
 def known_key(key: str, known: Iterable[str]) -> str:
@@ -131,6 +131,13 @@ def nearest(word: str, known: Iterable[str]) -> str:
     by_small = {one.lower(): one for one in known}
     near = difflib.get_close_matches(str(word).lower(), list(by_small), n=1, cutoff=0.6)
     return f"Did you mean `{by_small[near[0]]}`?" if near else ""
+
+
+def printable(text: str) -> str:
+    """Text in one line of words that can be shown: characters that act on a terminal are written as escapes."""
+    words = (word if len(word) <= _LONGEST else f"{word[: _LONGEST - 3]}..." for word in text.split())
+    shown = (one if one.isprintable() else one.encode("unicode_escape").decode() for one in " ".join(words))
+    return "".join(shown)
 
 
 def _one_line(value: object) -> str:

@@ -14,6 +14,9 @@ from undertow.core.errors import nearest
 
 MODULE_PREFIX = "undertow_part_"  # of the modules that users' files become
 
+# What the code of a user may raise and end with: `sys.exit` as well, but not Ctrl-C.
+RAISED = (Exception, SystemExit, GeneratorExit)
+
 _ABSTRACT = re.compile(r"Can't instantiate abstract class (\w+).* abstract (method|attribute)s? (.+)")
 _ASSIGNED = re.compile(r"cannot assign to field '(\w+)'")
 # Arithmetic with a Measurement or a Target, whole or in slices.
@@ -50,7 +53,7 @@ def fault_of(error: BaseException) -> Fault:
         return Fault(
             f"{type(error).__name__}: {error.msg} ({Path(error.filename or '').name}, line {error.lineno})", ""
         )
-    text = " ".join(str(error).split())
+    text = said_by(error)
     frames = [(f, line) for f, line in traceback.walk_tb(error.__traceback__) if _is_own(f.f_globals.get("__name__"))]
     if abstract := _ABSTRACT.match(text):
         return _abstract(abstract, frames)
@@ -68,8 +71,18 @@ def python_says(error: BaseException) -> str:
     return f"{says}. {hint}" if hint else says
 
 
+def said_by(error: BaseException) -> str:
+    """The message of an exception in one line; that it has none where the class of a user's own fails to give it."""
+    try:
+        return " ".join(str(error).split())
+    except RAISED:
+        return "its message cannot be read"
+
+
 def place_of(part: Any, method: str = "") -> str:
     """`mine.py, line 7`, where a class or function of the user's own begins, or a method; "" for other people's.
+
+    Without the line for a class that no statement of the file defines.
 
     Args:
         part: an object, or the class, or a function.
@@ -79,7 +92,10 @@ def place_of(part: Any, method: str = "") -> str:
     thing: Any = inspect.unwrap(getattr(kind, method, None) or str) if method else kind
     if not _is_own(getattr(thing, "__module__", None)):
         return ""
-    return f"{Path(inspect.getsourcefile(thing) or '').name}, line {inspect.getsourcelines(thing)[1]}"
+    try:
+        return f"{Path(inspect.getsourcefile(thing) or '').name}, line {inspect.getsourcelines(thing)[1]}"
+    except (OSError, TypeError, IndexError):  # made by `type`, or the file is another by now
+        return f"{thing.__module__.removeprefix(MODULE_PREFIX)}.py"
 
 
 def _is_own(module: str | None) -> bool:

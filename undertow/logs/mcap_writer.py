@@ -13,6 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from undertow.core.errors import BadInput
 from undertow.logs import foxglove
 from undertow.logs.log import Log, Series
 from undertow.logs.messages import MessageForm, grouped
@@ -22,6 +23,8 @@ METADATA = "undertow"  # name of the record with the facts of a log
 
 # Bytes of a chunk. A program that is killed loses the one that is not full.
 _CHUNK, _LIVE_CHUNK = 2**20, 2**14
+
+_LATEST = 2.0**63 * 1e-9  # s, times of a file
 
 
 class _Writer:
@@ -62,8 +65,10 @@ def write_mcap(log: Log, path: Path, size: Any = None) -> None:
         size: length, width and height of the vehicle, m, for the view in three dimensions; None for usual ones.
 
     Raises:
+        BadInput: a time that the format cannot hold.
         OSError: the file cannot be written.
     """
+    _check_times(log)
     with path.open("wb") as stream:
         facts = {"source": log.source, "format": log.format, "notes": "\n".join(log.notes)} | dict(log.facts)
         writer = _Writer(stream, _CHUNK, facts)
@@ -76,6 +81,16 @@ def write_mcap(log: Log, path: Path, size: Any = None) -> None:
         for channel, (time, message) in heapq.merge(*streams, *_view(writer, log, size), key=lambda one: one[1][0]):
             writer.write(channel, time, message)
         writer.finish()
+
+
+def _check_times(log: Log) -> None:
+    """Check that all times can be written: as nanoseconds from 0 in 64 bits."""
+    for name, series in log.signals.items():
+        held = (series.time > -0.5e-9) & (series.time < _LATEST)
+        if not held.all():
+            got = f"{log.source}, whose {name} has {float(series.time[~held][0]):g} s"
+            must = f"have times from 0 to {_LATEST:.4g} s to be written as MCAP"
+            raise BadInput("log", must, got, hint="Write a .csv file instead")
 
 
 def _view(writer: _Writer, log: Log, size: Any) -> list[Iterable[tuple[int, tuple[float, bytes]]]]:

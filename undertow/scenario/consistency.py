@@ -16,7 +16,7 @@ from undertow.core.contracts import AbstractNavigation, AbstractPlant, Load, Tar
 from undertow.core.errors import Advice, BadInput, advice, joined, within
 from undertow.core.returned import check_state, form
 from undertow.core.signals import check_declared
-from undertow.core.user_code import fault_of
+from undertow.core.user_code import RAISED, fault_of
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.schema import Initial, Loop, Window
 
@@ -183,7 +183,7 @@ def _part(key: str, own: Mapping[str, str]) -> Iterator[Callable[..., Any]]:
             return jax.eval_shape(function, *arguments)
         except BadInput:
             raise
-        except Exception as error:
+        except RAISED as error:
             fault = fault_of(error)
             says = fault.says if fault.says.startswith("cannot") else f"it does not fit the other parts: {fault.says}"
             raise BadInput("", "", says, hint=joined(fault.hint, remedy)) from error

@@ -14,7 +14,7 @@ from undertow.core import catalogue, checks, contracts
 from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput, joined, known_key, within
 from undertow.core.metric import AbstractMetric
-from undertow.core.user_code import fault_of, place_of
+from undertow.core.user_code import RAISED, fault_of, place_of
 from undertow.faults.mode import AbstractFault
 from undertow.logs.log import Log
 from undertow.power import ESC, Battery
@@ -268,7 +268,7 @@ def _made(make: Callable[[], Any]) -> Any:
         return make()
     except BadInput:
         raise
-    except Exception as error:
+    except RAISED as error:
         fault = fault_of(error)
         raise BadInput("", "", fault.says, hint=fault.hint) from error
 

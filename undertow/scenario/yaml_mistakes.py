@@ -30,7 +30,7 @@ def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
     if "character" in problem and "cannot start any token" in problem:
         return Mistake(problem.replace(" that cannot start any token", ""), line, "Put text that starts so in quotes")
     if "mapping values are not allowed" in problem:
-        if line and len(re.findall(r":(?=\s|$)", _uncommented(lines[line - 1]))) > 1:
+        if line and len(re.findall(r":(?=\s|$)", _uncommented(_at(lines, line)))) > 1:
             return Mistake("there are two colons in one line", line, "Put text with a colon in quotes")
         above = _last(lines[: line - 1]) if line else 0
         if above and re.fullmatch(r"[\w-]+:[^\s:]+", _uncommented(lines[above - 1]).strip()):
@@ -40,7 +40,7 @@ def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
         return Mistake("the indentation does not fit the lines above", line, _ALIGN)
     if "could not find expected ':'" in problem:
         return Mistake("a key has no colon", begun or line, "Write `key: value`, with a space after the colon")
-    if "expected ',' or '}'" in problem and line and (key := _BRACKETED.search(_uncommented(lines[line - 1]))):
+    if "expected ',' or '}'" in problem and line and (key := _BRACKETED.search(_uncommented(_at(lines, line)))):
         hint = f'Inside braces, quote a key that has brackets: {{"{key[1]}":{key[2]}}}'
         return Mistake(f"the key {key[1]} has brackets, but no quotes", line, hint)
     if opened := re.match(r"expected ',' or '([\]}])'", problem):
@@ -61,6 +61,11 @@ def _line(mark) -> int | None:
 def _last(lines: list[str]) -> int:
     """Number of the last line with more than a comment; 0 where there is none."""
     return max((number for number, each in enumerate(lines, start=1) if _uncommented(each).strip()), default=0)
+
+
+def _at(lines: list[str], line: int) -> str:
+    """A line by its number; empty behind the end of the text, where the parser misses something."""
+    return lines[line - 1] if line <= len(lines) else ""
 
 
 def _uncommented(line: str) -> str:

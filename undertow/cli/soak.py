@@ -1,0 +1,144 @@
+"""`undertow soak`: attack undertow itself, count, and report."""
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from undertow.cli import exit_codes
+from undertow.cli.interruptible import interruptible
+
+_WRITTEN = ("soak.json", "soak.html", "failures")
+_SHOWN = 20  # failures that are printed
+
+
+def soak(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PART]...", help="inputs, kills, hours, faults, controls. Default: all."),
+    ] = None,
+    inputs: Annotated[int | None, typer.Option(metavar="N", help="Hostile inputs. Default: 2000.")] = None,
+    kills: Annotated[int | None, typer.Option(metavar="N", help="Ended processes. Default: 5.")] = None,
+    hours: Annotated[float | None, typer.Option(metavar="H", help="Simulated vehicle-hours. Default: 4.")] = None,
+    faults: Annotated[int | None, typer.Option(metavar="N", help="Runs with random faults. Default: 500.")] = None,
+    minutes: Annotated[
+        float | None, typer.Option(metavar="M", help="Begin nothing further after this time. Default: no limit.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Default: from the clock; it is printed.")] = None,
+    short: Annotated[bool, typer.Option("--short", help="A little of inputs, hours and controls: a minute.")] = False,
+    replay: Annotated[
+        str | None,
+        typer.Option(metavar="WHAT", help="Repeat failures alone: a file soak.json, or an identity from one."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the results. Default: runs/soak, or the next free one."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier soak in DIR.")] = False,
+) -> int:
+    """Attack undertow itself, and count what must never happen.
+
+    The command tries thousands of hostile files and command lines, kills campaigns and resumes them, simulates hours in
+    waves and noise, injects random faults, and checks that an unprotected law fails where it must. It writes soak.json,
+    soak.html, and the files of each failed input. The exit code is 1 if there was a never-event.
+    """
+    from undertow.soak import soak as soaking
+
+    if replay is not None:
+        return _replayed(replay)
+    amounts = soaking.SHORT if short else soaking.Amounts()
+    given = {"inputs": inputs, "kills": kills, "hours": hours, "faults": faults}
+    amounts = amounts._replace(**{name: _count(name, value) for name, value in given.items() if value is not None})
+    asked = [part for part in soaking.check_parts(parts or []) if getattr(amounts, part, 1)]
+    seed = int(time.time()) if seed is None else seed
+    limit = float("inf") if minutes is None else _count("minutes", minutes)
+    return _soak(asked, amounts, seed, limit, out, overwrite)
+
+
+def attacked(arguments: Sequence[str]) -> int:
+    """Run `undertow` with arguments in this process, or build a scenario, with the guard of the command line."""
+    from undertow.cli.main import run
+    from undertow.soak.inputs import BUILD
+
+    return exit_codes.run_guarded(_Build(), arguments) if arguments[:1] == (BUILD,) else run(arguments)
+
+
+class _Build:
+    """A command that reads, validates and builds a scenario."""
+
+    def main(self, args: Sequence[str], **settings: Any) -> int:
+        """Build the scenario that is the second word."""
+        from undertow.scenario.build import build
+        from undertow.scenario.reading import read
+
+        build(read(Path(args[1])))
+        return exit_codes.DONE
+
+
+def _soak(parts: Sequence[str], amounts: Any, seed: int, minutes: float, out: Path | None, overwrite: bool) -> int:
+    from undertow.cli.results_folder import output_folder, results_folder
+    from undertow.soak import soak as soaking
+    from undertow.soak.page import soak_page
+
+    print(f"Seed {seed}; parts: {', '.join(parts)}", file=sys.stderr)
+    progress = lambda part, words: print(f"{part}: {words}", file=sys.stderr, flush=True)
+    with (
+        output_folder(out, Path("runs") / "soak") as folder,
+        results_folder(folder, _WRITTEN, "soak.json", overwrite) as draft,
+    ):
+        found = interruptible(lambda: soaking.soak(attacked, parts, amounts, seed, minutes, progress))
+        (draft.path / "soak.json").write_text(json.dumps(found.summary, indent=1) + "\n", encoding="utf-8")
+        (draft.path / "soak.html").write_text(soak_page(found.summary), encoding="utf-8")
+        for failure, given in found.attacks:
+            _keep(draft.path / "failures" / given.identity.replace("/", "-"), failure.says, given)
+    _print(found.summary, folder)
+    return exit_codes.DONE if found.passed else exit_codes.RUN_FAILED
+
+
+def _keep(folder: Path, says: str, given: Any) -> None:
+    """The files of a hostile input, and command.txt with its command line and what happened."""
+    for name, data in given.files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if data is None:
+            path.mkdir(exist_ok=True)
+        else:
+            path.write_bytes(data)
+    folder.mkdir(parents=True, exist_ok=True)
+    words = json.dumps(list(given.arguments))
+    (folder / "command.txt").write_text(f"{given.identity}\n{words}\n{says}\n", encoding="utf-8", errors="replace")
+
+
+def _print(summary: dict[str, Any], folder: Path) -> None:
+    for event, count in summary["events"].items():
+        print(f"{event:<8}{count:>6}  {summary['meanings'][event]}")
+    for one in summary["failures"][:_SHOWN]:
+        print(exit_codes.printable(f"{one['event']} {one['identity']}: {one['says']}"))
+    if len(summary["failures"]) > _SHOWN:
+        print(f"{len(summary['failures']) - _SHOWN} more are in soak.json")
+    print(f"Seed {summary['seed']}, {summary['seconds']:g} s. Page: {folder / 'soak.html'}")
+
+
+def _replayed(what: str) -> int:
+    """Repeat the failures of a soak.json, or one of an identity; the exit code is 1 if one occurs again."""
+    from undertow.soak import soak as soaking
+
+    file = Path(what).suffix == ".json"
+    failed = False
+    for identity in soaking.identities(Path(what)) if file else [what]:
+        failure, words = soaking.replayed(attacked, identity)
+        verdict = f"{failure.event}, {failure.says}" if failure else "no never-event"
+        print(exit_codes.printable(f"{identity}: {verdict}. {words}"))
+        failed |= failure is not None
+    return exit_codes.RUN_FAILED if failed else exit_codes.DONE
+
+
+def _count(name: str, value: float) -> float:
+    from undertow.core.checks import not_negative
+
+    not_negative(f"--{name}", value)
+    return value

@@ -1,0 +1,232 @@
+"""A whole soak: its parts one after the other, with what each counted, as one set of plain data."""
+
+import contextlib
+import importlib.metadata
+import io
+import json
+import os
+import platform
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.soak import controls, faults_soak, hours_soak, kills
+from undertow.soak.input_soak import try_inputs
+from undertow.soak.inputs import KINDS, Attack, attack
+from undertow.soak.material import material
+from undertow.soak.trying import Run, try_in_process
+from undertow.soak.verdict import EVENTS, Failure, judged
+
+PARTS = ("inputs", "kills", "hours", "faults", "controls")
+
+Watch = Callable[[str, str], None]  # called with the name of a part and its progress in words
+
+
+class Amounts(NamedTuple):
+    """How much of each part: numbers of inputs, kills and runs with faults; vehicle-hours; fewer controls or all."""
+
+    inputs: int = 2000
+    kills: int = 5
+    hours: float = 4.0
+    faults: int = 500
+    short_controls: bool = False
+
+
+# Under a minute on two cores.
+SHORT = Amounts(inputs=300, kills=0, hours=0.2, faults=0, short_controls=True)
+
+
+class Soaked(NamedTuple):
+    """Result of a soak: plain data for soak.json, and the hostile inputs that failed."""
+
+    summary: dict[str, Any]
+    attacks: list[tuple[Failure, Attack]]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no never-event occurred."""
+        return not self.summary["failures"]
+
+
+def soak(
+    run: Run,
+    parts: Sequence[str],
+    amounts: Amounts,
+    seed: int,
+    minutes: float = float("inf"),
+    watch: Watch | None = None,
+) -> Soaked:
+    """Run parts of a soak.
+
+    Args:
+        run: `undertow` with arguments, in the process that calls it.
+        parts: some of `PARTS`, in their order.
+        amounts: how much of each.
+        seed: of everything random.
+        minutes: after which no further input, campaign, loop or block of runs begins; the parts that are left share
+            what is left of it.
+        watch: called with the progress.
+    """
+    began = time.monotonic()
+    said = watch or (lambda part, words: None)
+    found: dict[str, Any] = {}
+    failures: list[Failure] = []
+    attacks: list[tuple[Failure, Attack]] = []
+    with tempfile.TemporaryDirectory(prefix="undertow-soak-", ignore_cleanup_errors=True) as name:
+        for number, part in enumerate(parts):
+            left = began + 60.0 * minutes - time.monotonic()
+            until = time.monotonic() + left / (len(parts) - number)
+            folder = Path(name) / part
+            folder.mkdir()
+            described, own, hostile = _PARTS[part](run, amounts, seed, folder, until, said)
+            found[part] = described
+            failures += own
+            attacks += hostile
+    counted = Counter(one.event for one in failures)
+    summary = {
+        "title": "Soak of undertow",
+        "version": importlib.metadata.version("undertow"),
+        "python": platform.python_version(),
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+        "seed": seed,
+        "seconds": round(time.monotonic() - began, 1),
+        "events": {event: counted.get(event, 0) for event in EVENTS},
+        "meanings": EVENTS,
+        "parts": found,
+        "failures": [one._asdict() for one in failures],
+    }
+    return Soaked(summary, attacks)
+
+
+def replayed(run: Run, identity: str) -> tuple[Failure | None, str]:
+    """Repeat one input or run by its identity; the never-event if it occurs again, and what happened in words.
+
+    Args:
+        run: as of `soak`.
+        identity: such as inputs/scenario/7/123, faults/7/12, hours/0/24/7 or controls/D3.
+
+    Raises:
+        BadInput: no such identity, or one of a kill, whose moment cannot be repeated.
+    """
+    part, *rest = identity.split("/")
+    try:
+        if part == "inputs":
+            return _replayed_input(run, *rest)
+        if part in ("hours", "faults"):
+            one = hours_soak.replay(identity) if part == "hours" else faults_soak.replay(identity)[1]
+            found = [Failure(event, identity, says) for event, says in one.events()]
+            return (found[0] if found else None), f"{one.status.word} at {one.ended:g} s, digest {one.digest}"
+        if part == "controls":
+            row = controls.judged_control({one.identity: one for one in controls.CONTROLS}[rest[0]])
+            return None, f"{row['found']}; beside it: {row['beside']}"
+    except (KeyError, ValueError, IndexError, TypeError):
+        pass
+    hint = "Identities are in soak.json, such as inputs/scenario/7/123, faults/7/12, hours/0/24/7 or controls/D3"
+    raise BadInput("--replay", "be a file soak.json or the identity of a failure", identity, hint=hint)
+
+
+def _replayed_input(run: Run, kind: str, seed: str, number: str) -> tuple[Failure | None, str]:
+    given = attack(kind, int(seed), int(number), valid_files(run))
+    with tempfile.TemporaryDirectory(prefix="undertow-soak-") as name:
+        done = try_in_process(run, given, Path(name))
+    failure = judged(given.identity, given.arguments, given.files, done)
+    return failure, f"undertow {' '.join(given.arguments)}: exit code {done.code}. {done.err.strip()}"
+
+
+def valid_files(run: Run) -> dict[str, bytes]:
+    """The files that hostile ones are made of; what their commands print is left out."""
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        return material(run)
+
+
+def identities(path: Path) -> list[str]:
+    """Identities of the failures in a soak.json.
+
+    Raises:
+        BadInput: it cannot be read, or is another file.
+    """
+    try:
+        read = json.loads(path.read_text(encoding="utf-8"))
+        return [str(one["identity"]) for one in read["failures"]]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        raise BadInput("--replay", "be a file soak.json or the identity of a failure", str(path)) from None
+
+
+def check_parts(parts: Sequence[str]) -> list[str]:
+    """Parts in their order, without repetitions; all of them where none is named.
+
+    Raises:
+        BadInput: an unknown part, or `faults` in a version that has none.
+    """
+    for part in parts:
+        if part not in PARTS:
+            raise BadInput("PART", "be a part of a soak", part, hint=did_you_mean(part, PARTS))
+    if "faults" in parts:
+        faults_soak.check_available()
+    available = [part for part in PARTS if part != "faults" or faults_soak.available()]
+    return [part for part in available if part in parts or not parts]
+
+
+Described = tuple[dict[str, Any], list[Failure], list[tuple[Failure, Attack]]]
+
+
+def _inputs(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
+    said("inputs", "preparing valid files")
+    shown = _seldom(lambda done, failed: said("inputs", f"{done} of {amounts.inputs}, {failed} failed"))
+    tried = try_inputs(run, amounts.inputs, seed, valid_files(run), folder, until=until, watch=shown)
+    described = tried._asdict() | {"number": tried.number, "asked": amounts.inputs, "kinds": list(KINDS)}
+    del described["failures"]
+    return described, [failure for failure, _ in tried.failures], tried.failures
+
+
+def _kills(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
+    shown = lambda done: said("kills", f"{done} of {amounts.kills}")
+    found = kills.kill_campaigns(amounts.kills, seed, folder, until=until, watch=shown)
+    return _plain(found._asdict()) | {"asked": amounts.kills}, found.failures, []
+
+
+def _hours(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
+    shown = lambda done: said("hours", f"{done:g} of {amounts.hours:g}")
+    found = hours_soak.simulate_hours(amounts.hours, seed, until, shown)
+    return _plain(found._asdict()) | {"asked": amounts.hours}, found.failures, []
+
+
+def _faults(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
+    shown = _seldom(lambda done, failed: said("faults", f"{done} of {amounts.faults}, {failed} failed"))
+    found = faults_soak.run_faulted(faults_soak.faulted_scenarios(amounts.faults, seed), seed, until, shown)
+    return _plain(found._asdict()) | {"asked": amounts.faults}, found.failures, []
+
+
+def _controls(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
+    shown = lambda done: said("controls", f"{done} done")
+    found = controls.run_controls(amounts.short_controls, until, shown)
+    return _plain(found._asdict()), found.failures, []
+
+
+_PARTS: Mapping[str, Callable[..., Described]] = {
+    "inputs": _inputs,
+    "kills": _kills,
+    "hours": _hours,
+    "faults": _faults,
+    "controls": _controls,
+}
+
+
+def _plain(described: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in described.items() if key != "failures"}
+
+
+def _seldom(watch: Callable[[int, int], None]) -> Callable[[int, int], None]:
+    """Call a function once a second at most."""
+    last = [0.0]
+
+    def called(done: int, failed: int) -> None:
+        if time.monotonic() - last[0] > 1.0:
+            last[0] = time.monotonic()
+            watch(done, failed)
+
+    return called
