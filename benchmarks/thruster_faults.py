@@ -33,7 +33,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.simd_batch import BatchRunner, Plan, Run, kept_step
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build
-from undertow.supervision.fault_tolerant import FaultTolerantController, fault_tolerant
+from undertow.supervision.fault_tolerant_law import FaultTolerantController, fault_tolerant
 
 DT, ONSET, DURATION = 0.01, 20.0, 40.0  # s
 KINDS = {"off": (0.0, 0.0), "half": (0.5, 0.0), "stuck": (0.0, 1.0), "reversed": (-1.0, 0.0)}  # scale, held share

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from undertow.controllers.pid import pid
 from undertow.core import catalogue
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.scenario.factory import presets_of
@@ -24,6 +25,8 @@ def required(argument):
         "vehicle": odin,
         "thruster": lambda: thruster,
         "model": lambda: hybrid_vehicle(odin(), thruster).model(),
+        "law": lambda: pid(hybrid_vehicle(odin(), thruster).model()),
+        "plant": lambda: hybrid_vehicle(odin(), thruster),
         "position": lambda: np.linspace(-0.5, 0.5, 6),
         "samples": lambda: rows,
         "commands": lambda: np.column_stack([rows, rows[:, 1:3]]),  # for eight thrusters

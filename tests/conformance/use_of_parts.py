@@ -132,7 +132,7 @@ def faults(fault, v):
 
 
 KINDS = (vehicles, thrusters, power, plants, controllers, disturbances, references, sensors, navigation, faults)
-USES = {use.__name__: use for use in KINDS}
+USES = {use.__name__: use for use in KINDS} | {"supervision": controllers}  # a supervisor is a controller around one
 
 
 def numbers(kind, part, v):

@@ -13,7 +13,7 @@ from undertow.disturbances.adding import Together
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.simd_batch import BatchRunner, Plan, Run
 from undertow.numerics.random_keys import key_of_seed
-from undertow.supervision.fault_tolerant import fault_tolerant
+from undertow.supervision.fault_tolerant_law import fault_tolerant
 
 DT, ONSET, DURATION = 0.02, 5.0, 9.0
 PLANT = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(fidelity="static"))

@@ -9,7 +9,7 @@ import undertow as ut
 from undertow.controllers.pid import pid
 from undertow.core.contracts import BodyMotion, Measurement
 from undertow.core.errors import BadInput
-from undertow.supervision.fault_tolerant import fault_tolerant
+from undertow.supervision.fault_tolerant_law import fault_tolerant
 from undertow.thrusters.thruster import PropellerReport
 
 DT = 0.01

@@ -37,7 +37,7 @@ from undertow.supervision.conditions import (
     judged,
     none_held,
 )
-from undertow.supervision.fault_tolerant import FaultTolerantController
+from undertow.supervision.fault_tolerant_law import FaultTolerantController
 from undertow.supervision.measurement_gate import GateState, MeasurementGate, Passed
 from undertow.supervision.motion import rate_of_velocity
 from undertow.supervision.tracking_allowance import AllowanceState, TrackingAllowance

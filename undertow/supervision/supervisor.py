@@ -10,7 +10,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import force_of
 from undertow.core.contracts import AbstractController, AbstractPlant, Inputs, Measurement, Model, Outputs
 from undertow.core.errors import BadInput
-from undertow.supervision.fault_tolerant import fault_tolerant
+from undertow.supervision.fault_tolerant_law import fault_tolerant
 from undertow.supervision.measurement_gate import MeasurementGate
 from undertow.supervision.stuck_readings import StuckReadings
 from undertow.supervision.supervised_controller import Supervised

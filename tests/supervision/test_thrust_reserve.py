@@ -5,7 +5,7 @@ import pytest
 
 import undertow as ut
 from undertow.core.errors import BadInput
-from undertow.supervision.attainable_wrench import attainable_wrench, controlled_axes, reference_reserve
+from undertow.supervision.thrust_reserve import attainable_wrench, controlled_axes, reference_reserve
 
 LOW, HIGH = -40.0, 50.0  # N
 ODIN = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.t200())
